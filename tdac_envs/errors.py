@@ -1,0 +1,13 @@
+"""Errors that a user of the environments can cause, one type per cause."""
+
+
+class TdacError(Exception):
+    """Something the user gave cannot be used; the message says what and what to do."""
+
+
+class MapError(TdacError):
+    """A map image, map file or occupancy grid cannot be used."""
+
+
+class TaskError(TdacError):
+    """A start, goal or robot does not make a feasible task on its map."""

@@ -1,0 +1,140 @@
+"""Occupancy grid: which pixels are obstacles, and how far away they are."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.errors import MapError
+
+BoolGrid = NDArray[np.bool_]
+FloatGrid = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyGrid:
+    """A map of square pixels, each free or occupied.
+
+    Pixel (i, j) is the square [i - 1/2, i + 1/2) x [j - 1/2, j + 1/2), x to the
+    right and y down. Everything outside the map is occupied.
+
+    Attributes:
+        cells: Shape (height, width), bool, indexed `[y, x]`; True = occupied.
+            Stored read-only.
+        resolution: Metres per pixel, or None where the map has no scale.
+        origin: Pose (x, y, yaw) in metres of the lower-left pixel, as in ROS
+            `map.yaml`.
+    """
+
+    cells: BoolGrid
+    resolution: float | None = None
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        cells = np.array(self.cells, dtype=np.bool_, order="C")
+        if cells.ndim != 2 or 0 in cells.shape:
+            raise MapError(f"expected a 2-D grid of cells, got shape {cells.shape}")
+        if self.resolution is not None and not self.resolution > 0:
+            raise MapError(f"expected a resolution above 0, got {self.resolution}")
+        cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+
+    @property
+    def width(self) -> int:
+        """Number of columns, px."""
+        return int(self.cells.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Number of rows, px."""
+        return int(self.cells.shape[0])
+
+    def is_occupied(self, x: float, y: float) -> bool:
+        """Whether the point (x, y), in pixels, lies in an obstacle or outside."""
+        i, j = int(np.floor(x + 0.5)), int(np.floor(y + 0.5))
+        if not (0 <= i < self.width and 0 <= j < self.height):
+            return True
+        return bool(self.cells[j, i])
+
+    def sha256(self) -> str:
+        """Hash of the shape and the cells."""
+        head = f"{self.width}x{self.height}:".encode()
+        return hashlib.sha256(head + np.packbits(self.cells).tobytes()).hexdigest()
+
+
+def clearance(cells: BoolGrid) -> FloatGrid:
+    """Exact distance from each pixel centre to the nearest occupied square, in px.
+
+    The border of the map counts as occupied. The point of a unit square that is
+    nearest to a pixel centre always lies on the half-pixel lattice, so a distance
+    transform on that lattice is exact.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+
+    Returns:
+        Shape (height, width), float32; 0 inside obstacles.
+    """
+    height, width = cells.shape
+    lattice = np.ones((2 * height + 3, 2 * width + 3), np.uint8)
+    free = lattice[1:-1, 1:-1]
+    occupied = cells.astype(np.uint8)
+    for dy in range(3):
+        for dx in range(3):
+            window = free[dy : dy + 2 * height : 2, dx : dx + 2 * width : 2]
+            window &= 1 - occupied
+    for edge in (lattice[:2], lattice[-2:], lattice[:, :2], lattice[:, -2:]):
+        edge[...] = 0
+    distance = cv2.distanceTransform(lattice, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    centres = distance[2 : 2 + 2 * height : 2, 2 : 2 + 2 * width : 2]
+    return np.ascontiguousarray(centres * np.float32(0.5))
+
+
+def clearance_at(cells: BoolGrid, x: float, y: float, limit: float) -> float:
+    """Exact distance from any point to the nearest occupied square, up to `limit`.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        x: Column, px.
+        y: Row, px.
+        limit: Largest distance of interest, px.
+    """
+    height, width = cells.shape
+    reach = int(np.ceil(limit)) + 1
+    i, j = int(np.floor(x + 0.5)), int(np.floor(y + 0.5))
+    edge = min(x + 0.5, y + 0.5, width - 0.5 - x, height - 0.5 - y)
+    x0, x1 = max(i - reach, 0), min(i + reach + 1, width)
+    y0, y1 = max(j - reach, 0), min(j + reach + 1, height)
+    rows, columns = np.nonzero(cells[y0:y1, x0:x1])
+    best = max(min(edge, limit), 0.0)
+    if rows.size:
+        dx = np.maximum(np.abs(columns + x0 - x) - 0.5, 0.0)
+        dy = np.maximum(np.abs(rows + y0 - y) - 0.5, 0.0)
+        best = min(best, float(np.hypot(dx, dy).min()))
+    return best
+
+
+def inflate(cells: BoolGrid, radius: float) -> BoolGrid:
+    """Cells within `radius` px (centre to centre, inclusive) of an occupied cell."""
+    if radius <= 0 or not cells.any():
+        return cells.copy()
+    free = (~cells).astype(np.uint8)
+    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(distance <= radius)
+
+
+def body_free(clear: FloatGrid, radius: float) -> BoolGrid:
+    """Pixels where a disc of `radius` px may stand and step to a free neighbour.
+
+    A disc that is `sqrt(radius**2 + 1/2)` clear at both ends of a step to one of
+    the eight neighbours stays at least `radius` clear all along it.
+
+    Args:
+        clear: Shape (height, width), float32, from `clearance`.
+        radius: Body radius, px.
+    """
+    return np.asarray(clear >= np.float32(np.sqrt(radius * radius + 0.5)))

@@ -1,0 +1,92 @@
+"""`params.json`: what a map's preprocessing chose, and the task on it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tdac_envs.errors import MapError
+
+PIXELS_PER_METRE = 3779.52
+"""Pixels per metre of the paper's 2-D setting (96 dpi)."""
+
+
+class RobotParams(BaseModel):
+    """The differential-drive robot: a disc with a fan of ultrasonic rays."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    radius: float = Field(15.0, gt=0, description="Body radius, px.")
+    axle_length: float = Field(30.0, gt=0, description="Distance of the wheels, px.")
+    max_wheel_speed: float = Field(75.59, gt=0, description="Wheel limit, px/s.")
+    n_rays: int = Field(18, ge=1, le=4096, description="Number of range rays.")
+    field_of_view_deg: float = Field(
+        110.0, gt=0, le=360, description="Whole angle of the fan, degrees."
+    )
+    range_max: float = Field(220.0, gt=0, description="Range without a hit, px.")
+
+    @classmethod
+    def disc(cls, radius: float) -> RobotParams:
+        """The default robot with another body radius and its axle 2 x radius."""
+        return cls(radius=radius, axle_length=2 * radius)
+
+
+class ScoreTerms(BaseModel):
+    """The terms of the score of Algorithm 1."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    min_clearance: float = Field(description="Smallest clearance on the path, px.")
+    path_length: float = Field(description="Length of the path, px.")
+    sharpness: float = Field(description="Boundary sharpness of the grid.")
+
+
+class MapParams(BaseModel):
+    """Contents of `params.json`; points are (x, y) in pixels, headings in rad."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    schema_version: Literal[1] = 1
+    source: str = Field(description="File name of the map image.")
+    source_sha256: str = Field(description="SHA-256 of the map image's bytes.")
+    width: int = Field(gt=0, description="px")
+    height: int = Field(gt=0, description="px")
+    start: tuple[float, float] | None = None
+    heading: float = 0.0
+    goal: tuple[float, float] | None = None
+    robot: RobotParams = RobotParams()
+    polarity: Literal["dark", "light", "mixed", "given"] = Field(
+        description="Which pixels are obstacles; `given` where the file says so."
+    )
+    method: str = Field(description="How the image was made black and white.")
+    threshold: float | None = Field(None, description="Luminance, 0..255.")
+    cleanup: int = Field(0, ge=0, description="Strength of the noise removal, px.")
+    opening: int = Field(0, ge=0, description="Obstacle lines thinner are dropped, px.")
+    inflation: float = Field(0, ge=0, description="Planner's margin, px.")
+    score: float | None = None
+    score_terms: ScoreTerms | None = None
+    resolution: float | None = Field(None, description="Metres per pixel.")
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def save(self, path: Path) -> None:
+        """Writes the file."""
+        path.write_text(json.dumps(self.model_dump(mode="json"), indent=2) + "\n")
+
+    @classmethod
+    def load(cls, path: Path) -> MapParams:
+        """Reads the file.
+
+        Raises:
+            MapError: It is missing, not JSON, or has a wrong or unknown field.
+        """
+        try:
+            return cls.model_validate_json(path.read_text())
+        except OSError as error:
+            raise MapError(f"cannot read {path}: {error.strerror}") from error
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"])) or "the file"
+            raise MapError(f"{path}: {where}: {first['msg']}") from error
