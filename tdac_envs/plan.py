@@ -36,7 +36,8 @@ def _spread(free: BoolGrid, goal_x: int, goal_y: int, stop: int) -> Field:
     height, width = free.shape
     distance = np.full(height * width, np.inf)
     settled = np.zeros(height * width, np.bool_)
-    one, two, three = (np.empty(256, np.int64) for _ in range(3))
+    one = np.empty(256, np.int64)
+    two, three = np.empty(256, np.int64), np.empty(256, np.int64)
     n_one, n_two, n_three = 1, 0, 0
     one[0] = goal_y * width + goal_x
     distance[one[0]] = 0.0
