@@ -1,0 +1,48 @@
+"""Gymnasium environments on map images: `gym.make("TDAC-Map2D-v0")`."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
+
+from tdac_envs.errors import MapError, TaskError, TdacError
+
+if TYPE_CHECKING:
+    from tdac_envs.grid import OccupancyGrid
+    from tdac_envs.maps import bundled_map, bundled_maps
+    from tdac_envs.params import MapParams, RobotParams
+    from tdac_envs.preprocess import preprocess
+
+__all__ = [
+    "MapError",
+    "MapParams",
+    "OccupancyGrid",
+    "RobotParams",
+    "TaskError",
+    "TdacError",
+    "bundled_map",
+    "bundled_maps",
+    "preprocess",
+]
+
+_HOME = {
+    "MapParams": "tdac_envs.params",
+    "OccupancyGrid": "tdac_envs.grid",
+    "RobotParams": "tdac_envs.params",
+    "bundled_map": "tdac_envs.maps",
+    "bundled_maps": "tdac_envs.maps",
+    "preprocess": "tdac_envs.preprocess",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Imports the heavier parts on first use."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'tdac_envs' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+# The horizon depends on the task, so the env truncates itself: no TimeLimit here.
+gym.register("TDAC-Map2D-v0", entry_point="tdac_envs.map2d:Map2DEnv")

@@ -1,0 +1,41 @@
+"""Reward of TDAC-Map2D-v0, as pure functions of one step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class RewardWeights(NamedTuple):
+    """Weights of the four terms.
+
+    Attributes:
+        progress: For each full-speed step's worth of progress along the shortest
+            path.
+        goal: Once, on reaching the goal.
+        collision: Subtracted at each contact.
+        time: Subtracted at each step.
+    """
+
+    progress: float = 0.1
+    goal: float = 10.0
+    collision: float = 10.0
+    time: float = 0.01
+
+
+def step_reward(
+    weights: RewardWeights, progress: float, reached: bool, collided: bool
+) -> float:
+    """Reward of one step.
+
+    Args:
+        weights: Weights of the terms.
+        progress: Path distance gained, in full-speed steps.
+        reached: Whether the goal was reached in this step.
+        collided: Whether the body touched an obstacle in this step.
+    """
+    reward = weights.progress * progress - weights.time
+    if reached:
+        reward += weights.goal
+    if collided:
+        reward -= weights.collision
+    return reward
