@@ -1,0 +1,117 @@
+"""`report.json`: what was verified, how, and what came out."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Group = Literal["static", "unit", "end to end", "judge"]
+Cause = Literal[
+    "collision",
+    "no motion",
+    "stuck",
+    "spinning",
+    "oscillating",
+    "too slow",
+    "missed goal",
+    "error",
+    "time-out",
+    "contract",
+    "held out",
+]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Diagnosis(_Record):
+    """What happened in an episode, computed from its trajectory.
+
+    Attributes are figures where they apply: `step`, `x`, `y` of the event, `side`
+    of the body that was hit, path distances `d0` and `d_min` in px.
+    """
+
+    cause: Cause
+    text: str = Field(description="One paragraph, deterministic, no paths.")
+    step: int | None = None
+    x: float | None = None
+    y: float | None = None
+    side: str | None = None
+    d0: float | None = None
+    d_min: float | None = None
+
+
+class Failure(_Record):
+    """One expected test that did not pass."""
+
+    test: str = Field(description="Test id, as pytest prints it.")
+    group: Group
+    message: str = Field(description="What was expected and what came.")
+    diagnosis: Diagnosis | None = None
+
+
+class Episode(_Record):
+    """Figures of one judged episode; distances in px."""
+
+    name: str
+    held_out: bool
+    outcome: str
+    steps: int
+    collisions: int
+    d0: float
+    d_min: float
+    d0_euclidean: float
+    d_min_euclidean: float
+    progress_passed: bool = Field(description="The progress test, geodesic.")
+    progress_passed_euclidean: bool
+    call_ms_mean: float
+    call_ms_p99: float
+    error: str | None = None
+
+
+class Provenance(_Record):
+    """What the verdict is about."""
+
+    task: str
+    task_sha256: str
+    map_sha256: str
+    params_sha256: str
+    sensors_sha256: str
+    controller_sha256: str
+    suite: str
+    suite_sha256: str
+    profile: Literal["policy", "paper"]
+    paper: bool = Field(description="Nominal start only.")
+    seed: int
+    sandbox: str = Field(description="Tier that held the controller.")
+    warnings: tuple[str, ...] = ()
+    versions: dict[str, str]
+
+
+class Verdict(_Record):
+    """Passed means: exactly the expected tests ran and each one passed."""
+
+    passed: bool
+    expected: int
+    passed_tests: int
+    failed_tests: int
+
+
+class Report(_Record):
+    """One verification."""
+
+    schema_version: Literal[1] = 1
+    verdict: Verdict
+    provenance: Provenance
+    failures: tuple[Failure, ...]
+    tests: dict[str, str] = Field(description="Outcome of each expected test.")
+    episodes: tuple[Episode, ...]
+    child_cpu_seconds: float
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the controller is verified."""
+        return self.verdict.passed

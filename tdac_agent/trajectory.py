@@ -1,0 +1,115 @@
+"""What one judged episode did: the judge's own record, never the controller's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Outcome = Literal["reached", "collision", "out of time", "stopped", "error"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Poses and actions of an episode of T steps.
+
+    Attributes:
+        poses: Shape (T + 1, 3), float64: x, y (px), heading (rad), start included.
+        actions: Shape (T, 2), float32: left and right wheel, fractions as applied.
+        path_distances: Shape (T + 1,), float64: shortest free path left, px.
+        ranges: Shape (T + 1, n_rays), float32, px, as the controller saw them.
+        collisions: Number of steps with a contact.
+        dt: Duration of a step, s.
+    """
+
+    poses: NDArray[np.float64]
+    actions: NDArray[np.float32]
+    path_distances: NDArray[np.float64]
+    ranges: NDArray[np.float32]
+    collisions: int
+    dt: float
+
+    @property
+    def steps(self) -> int:
+        """Number of steps, T."""
+        return len(self.actions)
+
+    def save(self, path: Path) -> None:
+        """Writes an `.npz` with one array per attribute."""
+        np.savez_compressed(
+            path,
+            schema_version=1,
+            poses=self.poses,
+            actions=self.actions,
+            path_distances=self.path_distances,
+            ranges=self.ranges,
+            collisions=self.collisions,
+            dt=self.dt,
+        )
+
+    @classmethod
+    def load(cls, path: Path) -> Trajectory:
+        """Reads what `save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            return cls(
+                data["poses"],
+                data["actions"],
+                data["path_distances"],
+                data["ranges"],
+                int(data["collisions"]),
+                float(data["dt"]),
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rollout:
+    """A judged episode.
+
+    Attributes:
+        name: `nominal`, `jitter 1` ….
+        held_out: Whether feedback may tell only pass or fail of it.
+        outcome: How it ended; `error` where the controller failed, `stopped` where
+            it ran for fewer steps than the horizon on purpose.
+        trajectory: The judge's record.
+        goal: (x, y), px.
+        radius: Body radius, px.
+        tolerance: Goal tolerance, px.
+        error: What the controller did wrong, in one line, for `outcome="error"`.
+        call_ms: Mean and 99th percentile of the time of a policy call, ms.
+        returned: What `run_episode` returned, for an episode driven by it.
+    """
+
+    name: str
+    held_out: bool
+    outcome: Outcome
+    trajectory: Trajectory
+    goal: tuple[float, float]
+    radius: float
+    tolerance: float
+    error: str | None = None
+    call_ms: tuple[float, float] = (0.0, 0.0)
+    returned: Any = None
+
+    @property
+    def reached(self) -> bool:
+        """Whether the goal was reached."""
+        return self.outcome == "reached"
+
+    @property
+    def collisions(self) -> int:
+        """Number of contacts."""
+        return self.trajectory.collisions
+
+    def distances(self, kind: str = "geodesic") -> NDArray[np.float64]:
+        """Distance to the goal before each step and at the end, px.
+
+        Args:
+            kind: `geodesic` (shortest free path) or `euclidean`.
+        """
+        if kind == "geodesic":
+            return self.trajectory.path_distances
+        delta = self.trajectory.poses[:, :2] - np.asarray(self.goal)
+        return np.asarray(np.hypot(delta[:, 0], delta[:, 1]))
