@@ -70,6 +70,7 @@ class MapParams(BaseModel):
     score_terms: ScoreTerms | None = None
     resolution: float | None = Field(None, description="Metres per pixel.")
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    notes: tuple[str, ...] = Field((), description="What was changed, e.g. by snap.")
 
     def save(self, path: Path) -> None:
         """Writes the file."""

@@ -1,0 +1,233 @@
+"""From a map picture to the occupancy grid that a task runs on (Algorithm 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.cleanup import clean
+from tdac_envs.errors import TaskError
+from tdac_envs.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.image import MapImage, from_array, load_image
+from tdac_envs.params import MapParams, RobotParams, ScoreTerms
+from tdac_envs.readings import Reading, Scene, plain_reading, readings
+from tdac_envs.score import Point, judge, nearest_free, score
+
+Preset = Literal["default", "paper"]
+Source = str | Path | NDArray[np.generic] | MapImage
+
+INFLATIONS = (0, 1, 2, 3)
+PAPER_CLEANUPS = (0, 4, 8, 12, 16)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A reading of the map with a planner's margin, judged.
+
+    Attributes:
+        reading: Which pixels are obstacles.
+        inflation: Planner's margin around the body, px.
+        failure: Why the task is infeasible on it; None where it is feasible.
+        terms: Terms of the score; None without a task or where it is infeasible.
+    """
+
+    reading: Reading
+    inflation: int = 0
+    failure: str | None = None
+    terms: ScoreTerms | None = None
+
+    @property
+    def score(self) -> float:
+        """Score of Algorithm 1; -inf where there is none."""
+        return -np.inf if self.terms is None else score(self.terms)
+
+
+def preprocess(
+    image: Source,
+    start: tuple[float, float] | None = None,
+    goal: tuple[float, float] | None = None,
+    robot_radius: float = 15.0,
+    *,
+    preset: Preset = "default",
+    snap: bool = False,
+    heading: float = 0.0,
+) -> tuple[OccupancyGrid, MapParams]:
+    """The occupancy grid of a map picture, and what was chosen to get it.
+
+    Args:
+        image: Path of a picture, a ROS `map.yaml` or a MovingAI `.map`; or an array:
+            bool (True = occupied), or uint8 grey, RGB or RGBA.
+        start: Pixel (x, y), or None to judge by the picture alone.
+        goal: Pixel (x, y), or None.
+        robot_radius: Body radius, px.
+        preset: "default" searches from the plain reading outwards and stops at the
+            first that is feasible; "paper" is the literal grid of Algorithm 1.
+        snap: Move start and goal to the nearest pixel that is free for the body;
+            `MapParams.notes` says from where.
+        heading: Start heading, rad, from +x towards +y.
+
+    Raises:
+        MapError: The image cannot be used.
+        TaskError: No reading of it makes the task feasible; says why.
+    """
+    source = _as_image(image)
+    ends = [_to_pixel(source, "start", start), _to_pixel(source, "goal", goal)]
+    notes: list[str] = []
+    if snap:
+        ends = [_snapped(source, ends, i, robot_radius, notes) for i in range(2)]
+    ranked = rank_candidates(source, *ends, robot_radius, preset=preset)
+    best = ranked[0]
+    if best.failure is not None:
+        raise TaskError(f"{source.name}: {_first_failure(ranked)}")
+    grid = OccupancyGrid(best.reading.cells, source.resolution, source.origin)
+    return grid, _params(source, best, ends, heading, robot_radius, notes)
+
+
+def rank_candidates(
+    image: Source,
+    start: Point | None,
+    goal: Point | None,
+    robot_radius: float = 15.0,
+    *,
+    preset: Preset = "default",
+) -> list[Candidate]:
+    """Every candidate that was looked at, the chosen one first.
+
+    Feasible ones come by falling score, then the infeasible ones in the order in
+    which they were tried, each with its failure.
+    """
+    scene = Scene.of(_as_image(image), start, goal, robot_radius)
+    search = _paper_grid if preset == "paper" else _staged_search
+    tried = list(search(scene))
+    return sorted(tried, key=lambda c: (c.failure is not None, -c.score))
+
+
+def _staged_search(scene: Scene) -> Iterator[Candidate]:
+    """Reading after reading, up to the first feasible one; its margins by score."""
+    for reading in readings(scene):
+        candidates = _with_margins(scene, reading, INFLATIONS)
+        yield from candidates
+        if candidates[0].failure is None:
+            return
+
+
+def _paper_grid(scene: Scene) -> Iterator[Candidate]:
+    """Polarity x cleanup x inflation, literally."""
+    given = scene.image.occupied
+    bases = (
+        [plain_reading(scene.luminance, light_free) for light_free in (True, False)]
+        if given is None
+        else [Reading(given, "given", scene.image.method)]
+    )
+    for base in bases:
+        for strength in PAPER_CLEANUPS:
+            cells = clean(base.cells, strength)
+            reading = Reading(
+                cells, base.polarity, base.method, base.threshold, strength
+            )
+            yield from _with_margins(scene, reading, INFLATIONS)
+
+
+def _with_margins(
+    scene: Scene, reading: Reading, inflations: tuple[int, ...]
+) -> list[Candidate]:
+    """The reading with each margin; only the first where that is infeasible."""
+    if scene.start is None or scene.goal is None:
+        return [Candidate(reading)]
+    clear = clearance(reading.cells)
+    candidates: list[Candidate] = []
+    for inflation in inflations:
+        verdict = judge(
+            reading.cells, clear, scene.start, scene.goal, scene.radius, inflation
+        )
+        candidates.append(Candidate(reading, inflation, verdict.failure, verdict.terms))
+        if verdict.failure is not None:
+            break
+    return candidates
+
+
+def _first_failure(ranked: list[Candidate]) -> str:
+    """What the plainest reading says: the others only explain more away."""
+    return str(ranked[0].failure)
+
+
+def _as_image(image: Source) -> MapImage:
+    if isinstance(image, MapImage):
+        return image
+    if isinstance(image, np.ndarray):
+        return from_array(image)
+    return load_image(image)
+
+
+def _to_pixel(
+    image: MapImage, name: str, point: tuple[float, float] | None
+) -> Point | None:
+    """The pixel that holds the point; refused outside the map."""
+    if point is None:
+        return None
+    height, width = image.colour.shape[:2]
+    x, y = int(np.floor(point[0] + 0.5)), int(np.floor(point[1] + 0.5))
+    if not (0 <= x < width and 0 <= y < height):
+        raise TaskError(
+            f"{name} ({point[0]:g}, {point[1]:g}) lies outside the map; expected "
+            f"0 <= x < {width} and 0 <= y < {height}"
+        )
+    return x, y
+
+
+def _snapped(
+    image: MapImage,
+    ends: list[Point | None],
+    index: int,
+    radius: float,
+    notes: list[str],
+) -> Point | None:
+    """The end moved to the nearest pixel that is free for the body."""
+    point = ends[index]
+    if point is None:
+        return None
+    reading = next(readings(Scene.of(image, None, None, radius)))
+    free = body_free(clearance(reading.cells), radius)
+    moved = nearest_free(free, *point)
+    if moved is None or moved == point:
+        return point
+    notes.append(f"{('start', 'goal')[index]} {point} moved to {moved}")
+    return moved
+
+
+def _params(
+    image: MapImage,
+    best: Candidate,
+    ends: list[Point | None],
+    heading: float,
+    radius: float,
+    notes: list[str],
+) -> MapParams:
+    height, width = image.colour.shape[:2]
+    reading = best.reading
+    return MapParams(
+        source=image.name,
+        source_sha256=image.sha256,
+        width=width,
+        height=height,
+        start=ends[0],
+        heading=heading,
+        goal=ends[1],
+        robot=RobotParams.disc(radius),
+        polarity=reading.polarity,
+        method=reading.method,
+        threshold=reading.threshold,
+        cleanup=reading.cleanup,
+        opening=reading.opening,
+        inflation=best.inflation,
+        score=None if best.terms is None else best.score,
+        score_terms=best.terms,
+        resolution=image.resolution,
+        origin=image.origin,
+        notes=tuple(notes),
+    )

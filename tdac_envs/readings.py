@@ -1,0 +1,213 @@
+"""Readings of a map picture, from the plain one outwards.
+
+A reading says which pixels are occupied. Later readings explain more of the picture
+away, and each does so only where the picture itself gives a reason: a strong colour,
+pieces too small for walls, lines too thin for this map's walls. None removes a stroke
+of the walls' own colour and thickness, so that a closed map stays closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from tdac_envs.binarize import (
+    disc,
+    floor_distance,
+    local_light,
+    otsu,
+    saturated,
+    unknown_level,
+)
+from tdac_envs.cleanup import thick_share, without_lines, without_specks
+from tdac_envs.grid import BoolGrid
+from tdac_envs.image import GreyImage, MapImage, luminance
+from tdac_envs.polarity import light_free_evidence
+from tdac_envs.score import Point
+
+Polarity = Literal["dark", "light", "mixed", "given"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """One way to tell obstacles from free space.
+
+    Attributes:
+        cells: Shape (height, width), bool, True = occupied.
+        polarity: Which pixels are obstacles.
+        method: What was done, in words.
+        threshold: Luminance at which the picture was cut, 0..255.
+        cleanup: Strength of `cleanup.clean` or largest speck dropped, px.
+        opening: Lines thinner than this were dropped, px.
+    """
+
+    cells: BoolGrid
+    polarity: Polarity
+    method: str
+    threshold: float | None = None
+    cleanup: int = 0
+    opening: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A picture with what is asked of it."""
+
+    image: MapImage
+    luminance: GreyImage
+    start: Point | None
+    goal: Point | None
+    radius: float
+
+    @classmethod
+    def of(
+        cls, image: MapImage, start: Point | None, goal: Point | None, radius: float
+    ) -> Scene:
+        """The scene of an image and a task; start and goal may be missing."""
+        return cls(image, luminance(image.colour), start, goal, radius)
+
+    @property
+    def ends(self) -> list[Point]:
+        """Start and goal, as far as given."""
+        return [point for point in (self.start, self.goal) if point is not None]
+
+
+def readings(scene: Scene) -> Iterator[Reading]:
+    """Readings of the likelier polarity, the plainest first.
+
+    Without start and goal there is only the plain one, marks ignored: nothing could
+    tell whether a bolder one is needed.
+    """
+    given = scene.image.occupied
+    if given is not None:
+        yield Reading(given, "given", scene.image.method)
+        return
+    plain = plain_reading(scene.luminance, decide_light_free(scene))
+    unmarked = _without_marks(scene.image, plain)
+    if not scene.ends:
+        yield unmarked or plain
+        return
+    yield plain
+    if unmarked is not None:
+        yield unmarked
+    base = unmarked or plain
+    yield from _mixed(scene)
+    yield from _bolder(base)
+    local = _local(scene, base)
+    if local is not None:
+        yield local
+        yield from _bolder(local)
+
+
+def plain_reading(grey: GreyImage, light_free: bool) -> Reading:
+    """Otsu's threshold; a map saver's "unknown" grey counts as occupied."""
+    threshold, method = otsu(grey), "otsu"
+    level = unknown_level(grey)
+    if level is not None:
+        safe = level + 4.0 if light_free else level - 4.0
+        stricter = max(threshold, safe) if light_free else min(threshold, safe)
+        if stricter != threshold:
+            threshold, method = stricter, f"otsu, unknown grey {level} not free"
+    return _cut(grey, threshold, light_free, method)
+
+
+def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Reading:
+    light = grey > threshold
+    cells = ~light if light_free else light
+    return Reading(cells, "dark" if light_free else "light", method, threshold)
+
+
+def decide_light_free(scene: Scene) -> bool:
+    """Whether the light side is free, from the picture, start and goal."""
+    light = scene.luminance > otsu(scene.luminance)
+    evidence = light_free_evidence(scene.luminance, light)
+    neutral = ~saturated(scene.image.colour)
+    for x, y in scene.ends:
+        around = disc(light.shape, x, y, scene.radius)
+        judged = around & neutral if (around & neutral).any() else around
+        evidence += _W_TASK * (2 * float(light[judged].mean()) - 1)
+    return evidence > 0
+
+
+# Start and goal of a real task are free with the body's disc around them, so two
+# clean discs outweigh a doubtful picture but not a clear one.
+_W_TASK = 2.0
+
+
+def _without_marks(image: MapImage, reading: Reading) -> Reading | None:
+    """Saturated marks and lines dropped, where walls are of another colour."""
+    marks = saturated(image.colour) & reading.cells
+    few = marks.sum() <= min(0.02 * marks.size, 0.4 * reading.cells.sum())
+    if not few or not marks.any():
+        return None
+    chroma = np.ptp(image.colour.astype(np.int16), axis=2)
+    near = cv2.dilate(marks.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    cells = reading.cells & ~(near & (chroma >= 30))
+    return replace(reading, cells=cells, method=f"{reading.method}, marks ignored")
+
+
+def _mixed(scene: Scene) -> Iterator[Reading]:
+    """Unlike the floor at start and goal, where both darker and lighter is not floor."""
+    floors = [
+        np.median(
+            scene.image.colour[disc(scene.luminance.shape, x, y, scene.radius / 2)],
+            axis=0,
+        )
+        for x, y in scene.ends
+    ]
+    floor = np.mean(floors, axis=0)
+    if max(float(np.abs(f - floor).max()) for f in floors) > 8:
+        return
+    grey = float(floor @ np.array([0.2126, 0.7152, 0.0722]))
+    darker = float((scene.luminance < grey - 15).mean())
+    lighter = float((scene.luminance > grey + 15).mean())
+    if min(darker, lighter) < 0.005:
+        return
+    distance = floor_distance(scene.image.colour, floor)
+    yield Reading(
+        np.asarray(distance > otsu(distance)), "mixed", "colour unlike the floor"
+    )
+
+
+def _bolder(base: Reading) -> Iterator[Reading]:
+    """Drops specks, then lines that are thin beside this map's walls."""
+    shape = base.cells.shape
+    for extent in (4, 8, 16, 32):
+        if extent <= 0.04 * min(shape):
+            cells = without_specks(base.cells, extent)
+            yield _note(base, cells, f"specks up to {extent} px ignored", extent, 0)
+    for width in (3, 5):
+        if thick_share(base.cells, 2 * width) < 0.5:
+            return
+        cells = without_lines(base.cells, width)
+        note = f"lines under {width} px ignored"
+        yield _note(base, cells, note, 0, width)
+        for extent in (8, 16, 32):
+            if extent <= 0.04 * min(shape):
+                fewer = without_specks(cells, extent)
+                both = f"{note}, specks up to {extent} px ignored"
+                yield _note(base, fewer, both, extent, width)
+
+
+def _note(
+    base: Reading, cells: BoolGrid, note: str, cleanup: int, opening: int
+) -> Reading:
+    return replace(
+        base,
+        cells=cells,
+        method=f"{base.method}, {note}",
+        cleanup=cleanup,
+        opening=opening,
+    )
+
+
+def _local(scene: Scene, base: Reading) -> Reading | None:
+    """A threshold that follows the lighting, where the lighting is uneven."""
+    grey = scene.luminance if base.polarity == "dark" else 255 - scene.luminance
+    window = 2 * (min(grey.shape) // 16) + 1
+    light = local_light(grey, max(window, 15))
+    return replace(base, cells=~light, method="local threshold", threshold=None)

@@ -1,0 +1,149 @@
+"""Is a grid feasible for the body, and how good is it (Algorithm 1)?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from tdac_envs.grid import BoolGrid, FloatGrid, body_free
+from tdac_envs.params import ScoreTerms
+from tdac_envs.plan import path_length, plan_path
+
+Point = tuple[int, int]
+
+_WEIGHTS = (2.5, -0.02, -1.2)
+
+
+def sharpness(cells: BoolGrid) -> float:
+    """Changes between free and occupied among neighbouring pixels, per pixel.
+
+    The boundary term of Algorithm 1 (the paper favours "boundary smoothness" and
+    leaves it undefined): 0 for an empty map, 2 for a chessboard.
+    """
+    flips = int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum())
+    return flips / cells.size
+
+
+def score(terms: ScoreTerms) -> float:
+    """`2.5 min_clearance - 0.02 path_length - 1.2 sharpness`."""
+    values = (terms.min_clearance, terms.path_length, terms.sharpness)
+    return sum(w * v for w, v in zip(_WEIGHTS, values, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Whether the body gets from start to goal.
+
+    Attributes:
+        failure: Why not; None where it does.
+        terms: Terms of the score; None where it does not.
+    """
+
+    failure: str | None
+    terms: ScoreTerms | None = None
+
+
+def judge(
+    cells: BoolGrid,
+    clear: FloatGrid,
+    start: Point,
+    goal: Point,
+    radius: float,
+    inflation: int = 0,
+) -> Judgement:
+    """Checks start, goal and the way between them, and scores the shortest path.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        clear: `clearance(cells)`.
+        start: Pixel (x, y).
+        goal: Pixel (x, y).
+        radius: Body radius, px.
+        inflation: Margin that the planner keeps around the body, px.
+    """
+    free = body_free(clear, radius + inflation)
+    failure = why_infeasible(cells, clear, free, start, goal, radius)
+    if failure is not None:
+        return Judgement(failure)
+    path = plan_path(free, start, goal)
+    columns, rows = path.astype(np.intp).T
+    terms = ScoreTerms(
+        min_clearance=float(clear[rows, columns].min()),
+        path_length=path_length(path),
+        sharpness=sharpness(cells),
+    )
+    return Judgement(None, terms)
+
+
+def why_infeasible(
+    cells: BoolGrid,
+    clear: FloatGrid,
+    free: BoolGrid,
+    start: Point,
+    goal: Point,
+    radius: float,
+) -> str | None:
+    """The first check that fails, where, and what would work; None if none does."""
+    for name, (x, y) in (("start", start), ("goal", goal)):
+        if free[y, x]:
+            continue
+        what = (
+            "lies in an obstacle"
+            if cells[y, x]
+            else f"is {clear[y, x]:.1f} px from an obstacle, too near"
+        )
+        return f"{name} ({x}, {y}) {what}; {_nearest_text(free, x, y, radius)}"
+    if connected(free, start, goal):
+        return None
+    widest = widest_radius(clear, start, goal)
+    advice = (
+        "no robot gets through: a wall closes the way"
+        if widest < 0.5
+        else f"the largest radius that gets through is {widest:.1f} px"
+    )
+    return (
+        f"start {start} and goal {goal} are not connected for a robot of "
+        f"{radius:g} px radius; {advice}"
+    )
+
+
+def _nearest_text(free: BoolGrid, x: int, y: int, radius: float) -> str:
+    nearest = nearest_free(free, x, y)
+    if nearest is None:
+        return f"a robot of {radius:g} px radius fits nowhere on this map"
+    return f"the nearest free pixel for a robot of {radius:g} px radius is {nearest}"
+
+
+def nearest_free(free: BoolGrid, x: int, y: int) -> Point | None:
+    """The free pixel nearest to (x, y), or None where there is none."""
+    rows, columns = np.nonzero(free)
+    if rows.size == 0:
+        return None
+    best = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
+    return int(columns[best]), int(rows[best])
+
+
+def connected(free: BoolGrid, start: Point, goal: Point) -> bool:
+    """Whether two free pixels are joined, without cutting a corner.
+
+    A diagonal step needs both pixels beside it, so 4-connectivity decides.
+    """
+    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    at_start, at_goal = labels[start[::-1]], labels[goal[::-1]]
+    return bool(at_start == at_goal and at_start > 0)
+
+
+def widest_radius(clear: FloatGrid, start: Point, goal: Point) -> float:
+    """Largest body radius that gets from start to goal, to 0.1 px; -1 if none."""
+    if not connected(body_free(clear, 0.0), start, goal):
+        return -1.0
+    low, high = 0.0, float(min(clear[start[::-1]], clear[goal[::-1]]))
+    while high - low > 0.1:
+        middle = (low + high) / 2
+        if connected(body_free(clear, middle), start, goal):
+            low = middle
+        else:
+            high = middle
+    return float(np.floor(low * 10) / 10)
