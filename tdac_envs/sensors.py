@@ -72,10 +72,9 @@ class Ultrasonic:
         occ = np.asarray(occ, dtype=np.bool_)
         self.height, self.width = occ.shape
         self.range_max = float(range_max)
-        fov = math.radians(field_of_view_deg)
-        steps = range(n_rays)
-        turns = [-fov / 2 + i * fov / (n_rays - 1) for i in steps if n_rays > 1]
-        self.angles = np.array(turns or [0.0])
+        fov = math.radians(field_of_view_deg) if n_rays > 1 else 0.0
+        self._first, self._step = 0.5 * fov, fov / max(n_rays - 1, 1)
+        self.angles = self._step * np.arange(n_rays) - self._first
         # A rim of obstacles stands for the outside; bytes are quick to index.
         self._cells = np.pad(occ, 1, constant_values=True).tobytes()
 
@@ -87,32 +86,36 @@ class Ultrasonic:
             (x, y) itself is occupied.
         """
         x, y, heading = float(x), float(y), float(heading)
-        hits = [self._cast(x, y, heading + turn) for turn in self.angles.tolist()]
+        first, step, n = heading - self._first, self._step, self.angles.size
+        hits = [self._cast(x, y, first + k * step) for k in range(n)]
         return np.array(hits, np.float32)
 
     def _cast(self, x: float, y: float, angle: float) -> float:
         """Walks from pixel to pixel in the order in which the ray enters them."""
-        i, j = math.floor(x + 0.5), math.floor(y + 0.5)
-        if not (0 <= i < self.width and 0 <= j < self.height):
+        u, v = x + 1.5, y + 1.5  # in the map with its rim
+        i, j = math.floor(u), math.floor(v)
+        if not (0 <= i < self.width + 2 and 0 <= j < self.height + 2):
             return 0.0
         cells, pitch = self._cells, self.width + 2
-        at = (j + 1) * pitch + i + 1
+        if cells[j * pitch + i]:
+            return 0.0
         dx, dy = math.cos(angle), math.sin(angle)
         step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
-        border_x, border_y = i + 0.5 * step_x, j + 0.5 * step_y
-        next_x = (border_x - x) / dx if dx else math.inf
-        next_y = (border_y - y) / dy if dy else math.inf
-        distance = 0.0
-        while distance < self.range_max:
-            if cells[at]:
-                return distance
+        ahead_x, ahead_y = (1 if dx > 0 else 0), (1 if dy > 0 else 0)
+        per_x, per_y = (1 / dx if dx else math.inf), (1 / dy if dy else math.inf)
+        next_x = (i + ahead_x - u) * per_x if dx else math.inf
+        next_y = (j + ahead_y - v) * per_y if dy else math.inf
+        while True:
             if next_x < next_y:
-                distance, border_x, at = next_x, border_x + step_x, at + step_x
-                next_x = (border_x - x) / dx
+                distance, i = next_x, i + step_x
+                next_x = (i + ahead_x - u) * per_x
             else:
-                distance, border_y, at = next_y, border_y + step_y, at + step_y * pitch
-                next_y = (border_y - y) / dy
-        return self.range_max
+                distance, j = next_y, j + step_y
+                next_y = (j + ahead_y - v) * per_y
+            if distance >= self.range_max:
+                return self.range_max
+            if cells[j * pitch + i]:
+                return max(distance, 0.0)
 
 
 class Graphics:
