@@ -78,18 +78,19 @@ def cast_ray(
         next_x = (i + ahead_x - u) * inv_x if dx != 0.0 else math.inf
         next_y = (j + ahead_y - v) * inv_y if dy != 0.0 else math.inf
         while True:
+            # A ray along a border may meet, after a leap, one that lies behind it.
             if next_x < next_y:
-                t = next_x
+                t = max(t, next_x)
                 i += step_x
                 next_x = (i + ahead_x - u) * inv_x
             else:
-                t = next_y
+                t = max(t, next_y)
                 j += step_y
                 next_y = (j + ahead_y - v) * inv_y
             if t >= range_max:
                 return range_max
             if cells[j, i]:
-                return max(t, 0.0)
+                return t
             if clear[j, i] > 3.0:
                 break
 
