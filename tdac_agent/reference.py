@@ -1,0 +1,178 @@
+"""The privileged reference: drives the oracle's path on the true pose.
+
+It shows that a task and its suite can be passed at all, so it may know what no
+controller knows. It turns in place and drives straight, and both end with an exact
+fractional step; nothing of it is shared with `builtin`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.grid import BoolGrid, body_free
+from tdac_envs.kernels import first_contact, wrap_angle
+from tdac_envs.plan import Path, descend, distance_field
+from tdac_envs.task2d import Map2DTask
+
+# Room beyond the body that is tried for the path, px, widest first. The last but one
+# keeps a float32 action clear of a corner that the path would graze at exactly 0.
+MARGINS = (4.0, 2.0, 1.0, 0.5, 0.05, 0.0)
+_ARRIVED = 1e-4  # px
+_ALIGNED = 1e-6  # rad
+_SAFE = 1e-3  # px kept beyond the body on a shortcut
+
+
+class Reference:
+    """Solves a feasible task without contact.
+
+    Args:
+        task: The task; its start is not used, any pose may be given to `act`.
+    """
+
+    def __init__(self, task: Map2DTask) -> None:
+        self.task = task
+        self._waypoints: list[tuple[float, float]] = []
+
+    def reset(self, pose: Sequence[float]) -> None:
+        """Plans from a pose (x, y, heading), px and rad."""
+        path = oracle_path(self.task, float(pose[0]), float(pose[1]))
+        self._waypoints = pull(self.task, path)[1:]
+
+    def act(self, pose: Sequence[float]) -> tuple[float, float]:
+        """Wheel fractions (left, right) for the next step at the true pose."""
+        x, y, heading = (float(value) for value in pose)
+        while self._waypoints and math.dist((x, y), self._waypoints[0]) < _ARRIVED:
+            self._waypoints.pop(0)
+        if not self._waypoints:
+            return 0.0, 0.0
+        to_x, to_y = self._waypoints[0]
+        robot = self.task.robot
+        step = robot.max_wheel_speed * self.task.dt
+        error = float(wrap_angle(math.atan2(to_y - y, to_x - x) - heading))
+        if abs(error) > _ALIGNED:
+            wheel = error * robot.axle_length / (2.0 * step)
+            wheel = min(max(wheel, -1.0), 1.0)
+            return wheel, -wheel
+        forward = min(math.hypot(to_x - x, to_y - y) / step, 1.0)
+        return forward, forward
+
+
+def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
+    """Path from (x, y) to the goal at the widest margin that still connects them.
+
+    Returns:
+        Shape (n, 2), px; both ends included; only the ends where nothing connects.
+    """
+    ends = np.array([[x, y], task.goal])
+    for margin in MARGINS:
+        free = _roomy(task, (x, y), margin)
+        last = _nearest(free, *task.goal)
+        if last is None:
+            continue
+        field = distance_field(free, last)
+        first = _entry(task, field, x, y)
+        if first is not None:
+            return np.vstack([ends[:1], descend(free, field, first), ends[1:]])
+    return ends
+
+
+def pull(task: Map2DTask, path: Path) -> list[tuple[float, float]]:
+    """Corners of the path after every shortcut that keeps the disc clear.
+
+    A shortcut is looked for by doubling and halving the number of path points that
+    it skips, so a long path costs n log n contact tests.
+    """
+    points = [(float(x), float(y)) for x, y in path]
+    corners, at = points[:1], 0
+    while at < len(points) - 1:
+        reach = 1
+        while at + 2 * reach < len(points) and _free(
+            task, points[at], points[at + 2 * reach], _SAFE
+        ):
+            reach *= 2
+        stride = reach
+        while stride >= 1:
+            beyond = at + reach + stride
+            if beyond < len(points) and _free(
+                task, points[at], points[beyond], _SAFE
+            ):
+                reach += stride
+            stride //= 2
+        at += reach
+        corners.append(points[at])
+    return corners
+
+
+def _free(
+    task: Map2DTask, begin: tuple[float, float], end: tuple[float, float], safe: float
+) -> bool:
+    """Whether the body, grown by `safe` px, gets straight from one point to another."""
+    terrain = task.terrain
+    length = math.dist(begin, end)
+    heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
+    # Short pieces: the contact test looks at all squares of a piece's bounding box.
+    pieces = max(math.ceil(length / max(task.robot.radius, 4.0)), 1)
+    for k in range(pieces):
+        touch = first_contact(
+            terrain.padded,
+            terrain.padded_clear,
+            begin[0] + (end[0] - begin[0]) * k / pieces,
+            begin[1] + (end[1] - begin[1]) * k / pieces,
+            heading,
+            length / pieces,
+            0.0,
+            task.robot.radius + safe,
+        )
+        if touch <= 1.0:
+            return False
+    return True
+
+
+def _roomy(task: Map2DTask, start: tuple[float, float], margin: float) -> BoolGrid:
+    """Pixels with room for the body and `margin` px, less of it near both ends."""
+    clear, radius = task.terrain.clear, task.robot.radius
+    free = body_free(clear, radius + margin)
+    if margin == 0.0:
+        return free
+    reach = math.ceil(radius + margin) + 2
+    for x, y in (start, task.goal):
+        column, row = math.floor(x + 0.5), math.floor(y + 0.5)
+        window = np.s_[
+            max(row - reach, 0) : row + reach + 1,
+            max(column - reach, 0) : column + reach + 1,
+        ]
+        free[window] = body_free(clear[window], radius + min(margin, 0.05))
+    return free
+
+
+def _near(x: float, y: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """The pixels (i, j) within 3 px of a point, nearest first."""
+    column, row = math.floor(x + 0.5), math.floor(y + 0.5)
+    pixels = [
+        (i, j)
+        for j in range(max(row - 3, 0), min(row + 4, shape[0]))
+        for i in range(max(column - 3, 0), min(column + 4, shape[1]))
+    ]
+    pixels.sort(key=lambda pixel: math.dist(pixel, (x, y)))
+    return np.array(pixels, np.int64).reshape(-1, 2)
+
+
+def _nearest(free: BoolGrid, x: float, y: float) -> tuple[int, int] | None:
+    for i, j in _near(x, y, free.shape):
+        if free[j, i]:
+            return int(i), int(j)
+    return None
+
+
+def _entry(
+    task: Map2DTask, field: NDArray[np.float64], x: float, y: float
+) -> tuple[int, int] | None:
+    """The nearest pixel with a way to the goal that the body can hop to."""
+    for i, j in _near(x, y, field.shape):
+        if np.isfinite(field[j, i]) and _free(task, (x, y), (i, j), 0.0):
+            return int(i), int(j)
+    return None
