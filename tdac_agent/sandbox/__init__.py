@@ -1,0 +1,43 @@
+"""Run an untrusted `controller.py` in a child process and talk with it.
+
+`start` gives a `Child`; the controller's results come back as plain data, its failures
+as `ControllerFault`s, and failures of the sandbox as `SandboxError`.
+"""
+
+from tdac_agent.sandbox.ending import ChildUsage
+from tdac_agent.sandbox.errors import (
+    ControllerDied,
+    ControllerError,
+    ControllerFault,
+    ControllerOutputFlood,
+    ControllerProtocolError,
+    ControllerTimeout,
+    EnvRefusalError,
+    SandboxError,
+)
+from tdac_agent.sandbox.inner.wire import Handle
+from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
+from tdac_agent.sandbox.process import Child, EpisodeEnv
+from tdac_agent.sandbox.start import best_tier, start
+from tdac_agent.sandbox.tiers import TIERS, Tier
+
+__all__ = [
+    "MAX_SOURCE_BYTES",
+    "TIERS",
+    "Child",
+    "ChildUsage",
+    "ControllerDied",
+    "ControllerError",
+    "ControllerFault",
+    "ControllerOutputFlood",
+    "ControllerProtocolError",
+    "ControllerTimeout",
+    "EnvRefusalError",
+    "EpisodeEnv",
+    "Handle",
+    "Limits",
+    "SandboxError",
+    "Tier",
+    "best_tier",
+    "start",
+]

@@ -1,0 +1,48 @@
+"""The command line of bubblewrap for one child."""
+
+from __future__ import annotations
+
+import shutil
+
+from tdac_agent.sandbox.errors import SandboxError
+from tdac_agent.sandbox.exposure import exposure
+from tdac_agent.sandbox.folder import PrivateFolder
+
+DEVICES = ("/dev/null", "/dev/zero", "/dev/urandom")
+
+
+def bubblewrap_command(
+    folder: PrivateFolder, lifeline: int, scratch_bytes: int
+) -> list[str]:
+    """Return the words that come before the child's own command.
+
+    Args:
+        folder: The private folder.
+        lifeline: Descriptor that bubblewrap's first process keeps open, out of the
+            controller's reach.
+        scratch_bytes: Size of the scratch folder.
+
+    Raises:
+        SandboxError: bubblewrap is not installed.
+    """
+    program = shutil.which("bwrap")
+    if program is None:
+        raise SandboxError("bubblewrap (bwrap) is not installed")
+    words = [program, "--unshare-user", "--unshare-net", "--unshare-pid"]
+    words += ["--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try"]
+    words += ["--uid", "65534", "--gid", "65534", "--cap-drop", "ALL"]
+    words += ["--sync-fd", str(lifeline)]
+    seen = exposure()
+    for path, target in seen.links:
+        words += ["--symlink", target, path]
+    words += _each("--ro-bind", seen.system)
+    for path in seen.hidden:
+        words += ["--tmpfs", path, "--remount-ro", path]
+    words += _each("--ro-bind", (*seen.packages, str(folder.root)))
+    words += _each("--dev-bind", DEVICES)
+    words += ["--size", str(scratch_bytes), "--tmpfs", str(folder.scratch)]
+    return [*words, "--remount-ro", "/", "--chdir", "/", "--"]
+
+
+def _each(option: str, paths: tuple[str, ...]) -> list[str]:
+    return [word for path in paths for word in (option, path, path)]

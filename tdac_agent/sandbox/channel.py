@@ -1,0 +1,169 @@
+"""The judge's end of the channel: frames with deadlines, and the drained output."""
+
+from __future__ import annotations
+
+import math
+import os
+import select
+import time
+
+from tdac_agent.sandbox.inner.wire import HEADER
+
+CHUNK = 1 << 16
+KEPT_OUTPUT = 4000
+
+
+class ChannelClosedError(Exception):
+    """The child closed its end, most likely by ending."""
+
+
+class DeadlineError(Exception):
+    """The deadline passed before a whole frame had come or gone."""
+
+
+class FrameError(Exception):
+    """The child sent bytes that are not the frame that was due."""
+
+
+class OutputFloodError(Exception):
+    """The child printed more than it may."""
+
+
+class Channel:
+    """Sends requests and receives answers; keeps head and tail of what is printed.
+
+    Args:
+        requests: Descriptor to write to; closed by `close`, as are the others.
+        answers: Descriptor to read from.
+        output: Descriptor of what the child prints.
+        frame_bytes: Largest payload.
+        output_bytes: Most that may be printed.
+    """
+
+    def __init__(
+        self,
+        requests: int,
+        answers: int,
+        output: int,
+        frame_bytes: int,
+        output_bytes: int,
+    ) -> None:
+        self._requests, self._answers, self._output = requests, answers, output
+        self._frame_bytes, self._output_bytes = frame_bytes, output_bytes
+        self._buffer = b""
+        self.output_head, self.output_tail, self.output_count = b"", b"", 0
+        self._poll = select.poll()
+        for descriptor in (requests, answers, output):
+            os.set_blocking(descriptor, False)
+        for descriptor in (answers, output):
+            self._poll.register(descriptor, select.POLLIN)
+        self._open = {requests, answers, output}
+
+    def send(self, kind: int, sequence: int, payload: bytes, deadline: float) -> None:
+        """Write one frame, draining output meanwhile."""
+        if len(payload) > self._frame_bytes:
+            raise FrameError(f"a request of {len(payload)} bytes is too large")
+        data = memoryview(HEADER.pack(len(payload), kind, sequence) + payload)
+        while data:
+            try:
+                data = data[os.write(self._requests, data) :]
+            except BlockingIOError:
+                self._wait_writable(deadline)
+            except BrokenPipeError:
+                raise ChannelClosedError from None
+
+    def _wait_writable(self, deadline: float) -> None:
+        self._poll.register(self._requests, select.POLLOUT)
+        try:
+            for descriptor, _ in self._events(deadline):
+                if descriptor == self._output:
+                    self._drain()
+                elif descriptor == self._answers:
+                    raise FrameError("an answer before the request was read")
+        finally:
+            self._poll.unregister(self._requests)
+
+    def receive(self, deadline: float) -> tuple[int, int, bytes]:
+        """Return kind, sequence number and payload of the one frame that is due."""
+        parts: list[bytes] = []
+        have, need = 0, HEADER.size
+        while have < need:
+            for descriptor, _ in self._events(deadline):
+                if descriptor == self._output:
+                    self._drain()
+                    continue
+                part = self._read()
+                parts.append(part)
+                have += len(part)
+            if need == HEADER.size and have >= need:
+                parts = [b"".join(parts)]
+                need = HEADER.size + self._size(parts[0])
+        if have > need:
+            raise FrameError(f"{have - need} bytes after an answer")
+        data = b"".join(parts)
+        _, kind, sequence = HEADER.unpack_from(data)
+        return kind, sequence, data[HEADER.size :]
+
+    def _size(self, data: bytes) -> int:
+        size = int(HEADER.unpack_from(data)[0])
+        if size > self._frame_bytes:
+            raise FrameError(f"a frame of {size} bytes (limit {self._frame_bytes})")
+        return size
+
+    def _read(self) -> bytes:
+        try:
+            part = os.read(self._answers, 16 * CHUNK)
+        except BlockingIOError:
+            return b""
+        if not part:
+            raise ChannelClosedError
+        return part
+
+    def _events(self, deadline: float) -> list[tuple[int, int]]:
+        left = deadline - time.monotonic()
+        if left <= 0:
+            raise DeadlineError
+        return self._poll.poll(math.ceil(left * 1000))
+
+    def _drain(self) -> bool:
+        """Read what has been printed; return whether more can come."""
+        try:
+            part = os.read(self._output, CHUNK)
+        except BlockingIOError:
+            return True
+        if not part:
+            self._poll.unregister(self._output)
+            return False
+        self.output_count += len(part)
+        room = KEPT_OUTPUT - len(self.output_head)
+        self.output_head += part[:room]
+        self.output_tail = (self.output_tail + part[room:])[-KEPT_OUTPUT:]
+        if self.output_count > self._output_bytes:
+            raise OutputFloodError
+        return True
+
+    def hang_up(self) -> None:
+        """Close the requests, which tells an idle child to end."""
+        self._close(self._requests)
+
+    def drain_until_end(self, deadline: float) -> None:
+        """Read output until every process that could print has ended."""
+        poll = select.poll()
+        poll.register(self._output, select.POLLIN)
+        while (left := deadline - time.monotonic()) > 0:
+            if poll.poll(math.ceil(left * 1000)):
+                try:
+                    if not self._drain():
+                        return
+                except OutputFloodError:
+                    continue
+
+    def close(self) -> None:
+        """Close all three descriptors."""
+        for descriptor in tuple(self._open):
+            self._close(descriptor)
+
+    def _close(self, descriptor: int) -> None:
+        if descriptor in self._open:
+            self._open.remove(descriptor)
+            os.close(descriptor)

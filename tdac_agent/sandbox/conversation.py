@@ -1,0 +1,122 @@
+"""Requests and answers with one child, each with a deadline; failures are typed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from tdac_agent.sandbox.channel import (
+    Channel,
+    ChannelClosedError,
+    DeadlineError,
+    FrameError,
+    OutputFloodError,
+)
+from tdac_agent.sandbox.ending import ChildUsage, has_ended
+from tdac_agent.sandbox.errors import (
+    ControllerDied,
+    ControllerOutputFlood,
+    ControllerProtocolError,
+    ControllerTimeout,
+)
+from tdac_agent.sandbox.explain import controller_error, explain_end
+from tdac_agent.sandbox.inner.decode import decode
+from tdac_agent.sandbox.inner.encode import encode
+from tdac_agent.sandbox.inner.wire import Kind, RemoteError, WireError
+from tdac_agent.sandbox.limits import Limits
+
+EXIT_SECONDS = 2.0
+
+
+class Conversation:
+    """Speaks the protocol over a channel, and ends the child at the first breach.
+
+    Args:
+        channel: Carries the frames.
+        pid: The child's first process.
+        limits: What the child may use.
+        root: The private folder, whose name is removed from messages.
+        end: Kills the child and returns what it used.
+    """
+
+    def __init__(
+        self,
+        channel: Channel,
+        pid: int,
+        limits: Limits,
+        root: Path,
+        end: Callable[[], ChildUsage],
+    ) -> None:
+        self._channel = channel
+        self._pid = pid
+        self._limits = limits
+        self._root = root
+        self._end = end
+        self._sequence = 0
+        self._fault: Exception | None = None
+
+    def request(self, kind: Kind, value: Any, phase: str, seconds: float) -> Any:
+        """Return the child's answer to one request."""
+        deadline = time.monotonic() + seconds
+        self.send(kind, value, phase, deadline, seconds)
+        answer, result = self.receive(phase, deadline, seconds)
+        if answer != Kind.VALUE:
+            self.breach("an answer that was not due", phase)
+        return result
+
+    def send(
+        self, kind: Kind, value: Any, phase: str, deadline: float, seconds: float
+    ) -> None:
+        """Send one frame."""
+        if self._fault is not None:
+            raise self._fault.with_traceback(None)
+        self._sequence = (self._sequence + 1) & 0xFFFFFFFF
+        payload = encode(value)
+        try:
+            self._channel.send(kind, self._sequence, payload, deadline)
+        except (ChannelClosedError, DeadlineError, FrameError, OutputFloodError) as e:
+            self._fail(e, phase, seconds)
+
+    def receive(self, phase: str, deadline: float, seconds: float) -> tuple[int, Any]:
+        """Return kind and value of the answer to the last frame that was sent."""
+        try:
+            kind, sequence, payload = self._channel.receive(deadline)
+            value = decode(payload)
+        except (ChannelClosedError, DeadlineError, FrameError, OutputFloodError) as e:
+            self._fail(e, phase, seconds)
+        except WireError as error:
+            self.breach(str(error), phase)
+        if sequence != self._sequence:
+            self.breach("an answer to another request", phase)
+        if kind == Kind.ERROR:
+            if type(value) is not RemoteError:
+                self.breach("an error that is none", phase)
+            raise controller_error(value, phase, self._root)
+        return kind, value
+
+    def breach(self, what: str, phase: str) -> NoReturn:
+        """End the child because it sent something that its own server never sends."""
+        message = f"wrote to the judge's channel at {phase}: {what}"
+        self.give_up(ControllerProtocolError(message, phase))
+
+    def give_up(self, fault: Exception) -> NoReturn:
+        """End the child and raise `fault`, now and at each further request."""
+        self._fault = fault
+        self._end()
+        raise fault
+
+    def _fail(self, error: Exception, phase: str, seconds: float) -> NoReturn:
+        if isinstance(error, DeadlineError):
+            self.give_up(ControllerTimeout(phase, seconds))
+        if isinstance(error, FrameError):
+            self.breach(str(error), phase)
+        if isinstance(error, OutputFloodError):
+            text = f"printed more than {self._limits.output_bytes} bytes at {phase}"
+            self.give_up(ControllerOutputFlood(text, phase))
+        if not has_ended(self._pid, EXIT_SECONDS):
+            self.breach("closed it", phase)
+        status = self._end().status
+        text = explain_end(status, phase, self._limits.cpu_seconds)
+        self.give_up(ControllerDied(text, phase, status))

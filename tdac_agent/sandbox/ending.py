@@ -1,0 +1,129 @@
+"""End a child and everything it may have started; what it used, how it ended."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.sandbox.folder import PrivateFolder
+from tdac_agent.sandbox.spawn import Spawned
+
+GRACE_SECONDS = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class ChildUsage:
+    """What a child used.
+
+    Attributes:
+        cpu_seconds: User and system time.
+        max_rss_bytes: Largest resident memory.
+        output_bytes: How much it printed, also what was not kept.
+        output_head: The first printed text.
+        output_tail: The last printed text, where it does not fit in the head.
+        status: Exit code, or minus the number of the signal that ended it.
+    """
+
+    cpu_seconds: float
+    max_rss_bytes: int
+    output_bytes: int
+    output_head: str
+    output_tail: str
+    status: int
+
+
+class Ending:
+    """Ends one child, once; every call returns what it used.
+
+    Args:
+        spawned: The child.
+        folder: Its private folder, deleted too.
+    """
+
+    def __init__(self, spawned: Spawned, folder: PrivateFolder) -> None:
+        self._spawned = spawned
+        self._folder = folder
+        self._usage: ChildUsage | None = None
+
+    def __call__(self) -> ChildUsage:
+        """Kill the process group, wait for it, and delete the folder."""
+        if self._usage is None:
+            self._usage = _end(self._spawned, self._folder)
+        return self._usage
+
+
+def _end(spawned: Spawned, folder: PrivateFolder) -> ChildUsage:
+    process, channel = spawned.process, spawned.channel
+    try:
+        cpu, rss = _usage_of_tree(process.pid)
+        # The leader is not reaped yet, so that the number is still its own.
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+        _, status, own = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        channel.drain_until_end(time.monotonic() + GRACE_SECONDS)
+    finally:
+        channel.close()
+        os.close(spawned.lifeline)
+        folder.remove()
+    scale = 1 if sys.platform == "darwin" else 1024
+    return ChildUsage(
+        cpu_seconds=max(cpu, own.ru_utime + own.ru_stime),
+        max_rss_bytes=max(rss, own.ru_maxrss * scale),
+        output_bytes=channel.output_count,
+        output_head=channel.output_head.decode("utf-8", "replace"),
+        output_tail=channel.output_tail.decode("utf-8", "replace"),
+        status=_signal_of_wrapper(process.returncode),
+    )
+
+
+def has_ended(pid: int, seconds: float) -> bool:
+    """Wait for the end of a process without reaping it."""
+    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
+    if sys.platform == "linux":
+        descriptor = os.pidfd_open(pid)
+        try:
+            poll = select.poll()
+            poll.register(descriptor, select.POLLIN)
+            return bool(poll.poll(seconds * 1000))
+        finally:
+            os.close(descriptor)
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if os.waitid(os.P_PID, pid, options) is not None:
+            return True
+        select.select([], [], [], 0.01)
+    return False
+
+
+def _signal_of_wrapper(status: int) -> int:
+    """Undo the shell's way of reporting a signal, which wrapping programs use."""
+    return 128 - status if 128 < status <= 128 + signal.NSIG else status
+
+
+def _usage_of_tree(pid: int) -> tuple[float, int]:
+    """Return CPU seconds and largest resident bytes of a process and those below."""
+    cpu, rss = 0.0, 0
+    pids = [pid]
+    while pids:
+        folder = Path(f"/proc/{pids.pop()}")
+        try:
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            peak = (folder / "status").read_text().partition("VmHWM:")[2].split()
+            children = [
+                int(child)
+                for task in (folder / "task").iterdir()
+                for child in (task / "children").read_text().split()
+            ]
+        except (OSError, ValueError):
+            continue
+        cpu += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        rss = max(rss, int(peak[0]) * 1024 if peak else 0)
+        pids += children
+    return cpu, rss

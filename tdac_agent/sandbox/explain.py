@@ -1,0 +1,55 @@
+"""Say in a sentence what a child's failure was."""
+
+from __future__ import annotations
+
+import re
+import signal
+from pathlib import Path
+
+from tdac_agent.sandbox.errors import ControllerError
+from tdac_agent.sandbox.inner.wire import RemoteError
+
+MAX_TEXT = 2000
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+|0x[0-9a-fA-F]{6,}")
+
+
+def controller_error(error: RemoteError, phase: str, root: Path) -> ControllerError:
+    """Return the exception for an error frame, with texts made safe to print."""
+    return ControllerError(
+        clean(error.type_name, root)[:200],
+        clean(error.message, root),
+        error.line,
+        clean(error.traceback, root),
+        phase,
+    )
+
+
+def clean(text: str, root: Path) -> str:
+    """Return `text` without paths of the private folder, addresses, odd characters."""
+    text = text[: 4 * MAX_TEXT].replace(f"{root / 'work'}/", "").replace(f"{root}/", "")
+    text = _ADDRESS.sub("", text).encode("utf-8", "replace").decode("utf-8")
+    text = "".join(
+        c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text
+    )
+    return text[:MAX_TEXT]
+
+
+def explain_end(status: int, phase: str, cpu_seconds: int) -> str:
+    """Return how a child ended, given its exit code or minus its signal."""
+    if status >= 0:
+        return f"ended its own process with exit code {status} at {phase}"
+    number = -status
+    if number == signal.SIGXCPU:
+        return f"killed at {phase}: used more than {cpu_seconds} s of CPU time"
+    if number == signal.SIGSYS:
+        return f"killed at {phase} by SIGSYS: a forbidden system call"
+    if number == signal.SIGKILL:
+        return f"killed at {phase} by SIGKILL: out of memory or of CPU time"
+    return f"crashed at {phase} with {_signal_name(number)}"
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"

@@ -1,0 +1,102 @@
+"""Which files of this machine a child may see."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+INNER = Path(__file__).resolve().parent / "inner"
+FOREIGN_PACKAGES = ("site-packages", "dist-packages")
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """Files that a child may read; everything else stays hidden.
+
+    Attributes:
+        interpreter: The Python program, past virtual environments.
+        system: The standard library, shared libraries and the loader.
+        hidden: Folders below `system` with other packages; not to be seen.
+        packages: numpy, its libraries, and the child's own code.
+        links: Symbolic links in the root folder, (path, target).
+    """
+
+    interpreter: str
+    system: tuple[str, ...]
+    hidden: tuple[str, ...]
+    packages: tuple[str, ...]
+    links: tuple[tuple[str, str], ...]
+
+
+@functools.cache
+def exposure() -> Exposure:
+    """Return what the interpreter that runs this needs."""
+    # `_base_executable` is the only name of the program behind a virtual environment.
+    program = os.path.realpath(getattr(sys, "_base_executable", sys.executable))
+    stdlib = os.path.dirname(os.path.realpath(os.__file__))
+    folders = _outermost({stdlib, *_extension_folders(), *_library_folders()})
+    # The parent is resolved, the file is not: programs ask for it by this name.
+    roots = [Path(folder).resolve() for folder in ("/lib", "/lib64")]
+    loaders = [str(path) for root in roots for path in root.glob("ld-*.so*")]
+    files = [program, *loaders, "/etc/ld.so.cache", "/etc/alternatives"]
+    system = (*folders, *(p for p in files if os.path.exists(p)))
+    return Exposure(
+        interpreter=program,
+        system=system,
+        hidden=tuple(_foreign(folders)),
+        packages=(*numpy_folders(), str(INNER)),
+        links=tuple(
+            (path, os.readlink(path))
+            for path in ("/lib", "/lib64", "/lib32", "/bin", "/sbin")
+            if os.path.islink(path)
+        ),
+    )
+
+
+def numpy_folders() -> tuple[str, ...]:
+    """Return the folders of numpy and of the libraries that came with it."""
+    package = Path(np.__file__).resolve().parent
+    return tuple(
+        str(folder)
+        for folder in (package, package.parent / "numpy.libs")
+        if folder.is_dir()
+    )
+
+
+def _extension_folders() -> set[str]:
+    return {os.path.realpath(p) for p in sys.path if p.endswith("lib-dynload")}
+
+
+def _library_folders() -> set[str]:
+    """Return the folders of the shared libraries that this process has mapped."""
+    with open("/proc/self/maps", encoding="utf-8", errors="replace") as maps:
+        paths = {line.split(maxsplit=5)[5].rstrip() for line in maps if ".so" in line}
+    return {
+        os.path.dirname(path)
+        for path in paths
+        if path.startswith("/") and not any(n in path for n in FOREIGN_PACKAGES)
+    }
+
+
+def _outermost(folders: set[str]) -> list[str]:
+    kept: list[str] = []
+    for folder in sorted(folders):
+        if os.path.isdir(folder) and not any(
+            folder.startswith(outer + os.sep) for outer in kept
+        ):
+            kept.append(folder)
+    return kept
+
+
+def _foreign(folders: list[str]) -> list[str]:
+    found: set[str] = set()
+    for folder in folders:
+        for name in FOREIGN_PACKAGES:
+            for pattern in (name, f"*/{name}"):
+                found.update(str(path) for path in Path(folder).glob(pattern))
+    return sorted(found)

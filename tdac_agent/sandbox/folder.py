@@ -1,0 +1,68 @@
+"""The private folder of one child: working folder, scratch folder, numpy."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from tdac_agent.sandbox.errors import SandboxError
+from tdac_agent.sandbox.exposure import numpy_folders
+
+MAX_FOLDER_BYTES = 256 << 20
+
+
+class PrivateFolder:
+    """A new folder with `work`, `scratch` and `site`, made for one child.
+
+    Attributes:
+        root: The folder.
+        work: What the controller sees as its working folder.
+        scratch: Where the controller may write.
+        site: Links to numpy and to nothing else.
+    """
+
+    def __init__(self) -> None:
+        self.root = Path(tempfile.mkdtemp(prefix="tdac-child-")).resolve()
+        self.work = self.root / "work"
+        self.scratch = self.root / "scratch"
+        self.site = self.root / "site"
+        for folder in (self.work, self.scratch, self.site):
+            folder.mkdir()
+        for target in numpy_folders():
+            (self.site / os.path.basename(target)).symlink_to(target)
+
+    def furnish(self, workdir: Path | None, source: bytes) -> None:
+        """Copy the files of `workdir` in and write the controller.
+
+        Raises:
+            SandboxError: The folder cannot be read or is too large.
+        """
+        try:
+            if workdir is not None:
+                self._copy(workdir)
+            (self.work / "controller.py").write_bytes(source)
+        except OSError as error:
+            raise SandboxError(f"cannot copy the working folder: {error}") from error
+
+    def _copy(self, workdir: Path) -> None:
+        room = MAX_FOLDER_BYTES
+        for entry in sorted(workdir.iterdir()):
+            if not entry.is_file() or entry.name == "controller.py":
+                continue
+            room -= entry.stat().st_size
+            if room < 0:
+                raise SandboxError(f"{workdir} holds more than {MAX_FOLDER_BYTES} B")
+            shutil.copyfile(entry, self.work / entry.name)
+
+    def remove(self) -> None:
+        """Delete the folder, whatever the controller left in it."""
+        try:
+            shutil.rmtree(self.root)
+        except (OSError, RecursionError):
+            # Folders without rights, or nested deeper than Python can follow.
+            root = str(self.root)
+            for command in (["chmod", "-R", "u+rwx", root], ["rm", "-rf", root]):
+                subprocess.run(command, check=False, capture_output=True)

@@ -1,0 +1,204 @@
+"""Decode one value of the wire format, from bytes that nobody has vouched for."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from .wire import (
+    DTYPES,
+    F64,
+    I64,
+    MAX_DEPTH,
+    MAX_DICT_ITEMS,
+    MAX_DIMENSIONS,
+    MAX_INT_BYTES,
+    MAX_ITEMS,
+    U32,
+    Handle,
+    RemoteError,
+    WireError,
+)
+
+Resolver = Callable[[Handle], object]
+
+
+class _Reader:
+    __slots__ = ("data", "depth", "dict_room", "pos", "resolve", "room")
+
+    def __init__(self, data: bytes, pos: int, resolve: Resolver | None) -> None:
+        self.data = data
+        self.pos = pos
+        self.resolve = resolve
+        self.depth = MAX_DEPTH
+        self.room = MAX_ITEMS
+        self.dict_room = MAX_DICT_ITEMS
+
+
+def decode(data: bytes, pos: int = 0, resolve: Resolver | None = None) -> Any:
+    """Decode one value that fills `data` from `pos` on.
+
+    Args:
+        data: The bytes.
+        pos: Where the value starts.
+        resolve: Gives the object behind a handle; without it handles stay handles.
+
+    Raises:
+        WireError: The bytes are not exactly one value.
+    """
+    reader = _Reader(data, pos, resolve)
+    try:
+        value = _take(reader)
+    except (struct.error, KeyError, IndexError, ValueError, TypeError) as error:
+        raise WireError(f"not a value: {error}") from None
+    if reader.pos != len(data):
+        raise WireError(f"{len(data) - reader.pos} bytes too many after a value")
+    return value
+
+
+def _take(r: _Reader) -> Any:
+    tag = r.data[r.pos]
+    r.pos += 1
+    return _TAKE[tag](r)
+
+
+def _cut(r: _Reader, size: int) -> bytes:
+    end = r.pos + size
+    if end > len(r.data):
+        raise WireError(f"expected {size} bytes, got {len(r.data) - r.pos}")
+    part = r.data[r.pos : end]
+    r.pos = end
+    return part
+
+
+def _take_u32(r: _Reader) -> int:
+    (number,) = U32.unpack_from(r.data, r.pos)
+    r.pos += 4
+    return int(number)
+
+
+def _take_constant(r: _Reader) -> bool | None:
+    return _CONSTANTS[r.data[r.pos - 1]]
+
+
+def _take_int(r: _Reader) -> int:
+    (number,) = I64.unpack_from(r.data, r.pos)
+    r.pos += 8
+    return int(number)
+
+
+def _take_big_int(r: _Reader) -> int:
+    size = _take_u32(r)
+    if size > MAX_INT_BYTES:
+        raise WireError(f"an int of {size} bytes")
+    return int.from_bytes(_cut(r, size), "little", signed=True)
+
+
+def _take_float(r: _Reader) -> float:
+    (number,) = F64.unpack_from(r.data, r.pos)
+    r.pos += 8
+    return float(number)
+
+
+def _take_str(r: _Reader) -> str:
+    return _cut(r, _take_u32(r)).decode("utf-8", "surrogatepass")
+
+
+def _take_bytes(r: _Reader) -> bytes:
+    return _cut(r, _take_u32(r))
+
+
+def _take_list(r: _Reader) -> list[Any]:
+    count = _take_u32(r)
+    r.room -= count
+    r.depth -= 1
+    if r.depth < 0 or r.room < 0:
+        raise WireError("a value is nested too deep or has too many items")
+    value = [_take(r) for _ in range(count)]
+    r.depth += 1
+    return value
+
+
+def _take_tuple(r: _Reader) -> tuple[Any, ...]:
+    return tuple(_take_list(r))
+
+
+def _take_dict(r: _Reader) -> dict[Any, Any]:
+    count = _take_u32(r)
+    r.dict_room -= count
+    r.depth -= 1
+    if r.depth < 0 or r.dict_room < 0:
+        raise WireError("a value is nested too deep or has too many dict items")
+    value = {_take(r): _take(r) for _ in range(count)}
+    r.depth += 1
+    if len(value) != count:
+        raise WireError("a dict with the same key twice")
+    return value
+
+
+def _take_array(r: _Reader) -> Any:
+    dtype, dimensions = DTYPES[r.data[r.pos]], r.data[r.pos + 1]
+    if dimensions > MAX_DIMENSIONS:
+        raise WireError(f"an array of {dimensions} dimensions")
+    shape = struct.unpack_from(f"<{dimensions}I", r.data, r.pos + 2)
+    r.pos += 2 + 4 * dimensions
+    count = prod(shape)
+    if count == 0:
+        return np.zeros(shape, dtype)
+    start = r.pos
+    r.pos += count * dtype.itemsize
+    if r.pos > len(r.data):
+        raise WireError("an array is longer than its frame")
+    return _numbers(r.data, dtype, count, start).reshape(shape).copy()
+
+
+def _take_scalar(r: _Reader) -> Any:
+    dtype = DTYPES[r.data[r.pos]]
+    r.pos += 1
+    return _numbers(_cut(r, dtype.itemsize), dtype, 1, 0)[0]
+
+
+def _numbers(data: bytes, dtype: np.dtype[Any], count: int, start: int) -> Any:
+    if dtype == np.bool_ and np.frombuffer(data, np.uint8, count, start).max() > 1:
+        raise WireError("a bool that is neither 0 nor 1")
+    return np.frombuffer(data, dtype, count, start)
+
+
+def _take_handle(r: _Reader) -> object:
+    number = _take_u32(r)
+    handle = Handle(number, _take_text(r))
+    return handle if r.resolve is None else r.resolve(handle)
+
+
+def _take_error(r: _Reader) -> RemoteError:
+    line = _take_u32(r)
+    return RemoteError(_take_text(r), _take_text(r), _take_text(r), line)
+
+
+def _take_text(r: _Reader) -> str:
+    if r.data[r.pos] != ord("s"):
+        raise WireError("expected a text")
+    r.pos += 1
+    return _take_str(r)
+
+
+_CONSTANTS = {ord("N"): None, ord("T"): True, ord("F"): False}
+_TAKE: dict[int, Callable[[_Reader], Any]] = {
+    **dict.fromkeys(_CONSTANTS, _take_constant),
+    ord("i"): _take_int,
+    ord("I"): _take_big_int,
+    ord("f"): _take_float,
+    ord("s"): _take_str,
+    ord("b"): _take_bytes,
+    ord("l"): _take_list,
+    ord("t"): _take_tuple,
+    ord("d"): _take_dict,
+    ord("a"): _take_array,
+    ord("n"): _take_scalar,
+    ord("h"): _take_handle,
+    ord("e"): _take_error,
+}

@@ -1,0 +1,58 @@
+"""Describe an exception of the controller by its own lines only."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from .wire import RemoteError
+
+FILE_NAME = "controller.py"
+MAX_MESSAGE = 2000
+MAX_LINES = 12
+
+
+def describe(error: BaseException, source: str) -> RemoteError:
+    """Return name, message, and where in the controller `error` was raised."""
+    try:
+        frames = _own_frames(error.__traceback__)
+        if isinstance(error, SyntaxError) and error.filename == FILE_NAME:
+            frames.append((error.lineno or 0, "<module>"))
+        lines = source.splitlines()
+        texts = [_frame_text(number, name, lines) for number, name in frames]
+        if len(texts) > MAX_LINES:
+            half = MAX_LINES // 2
+            texts[half:-half] = [f"  ... {len(texts) - MAX_LINES} more ..."]
+        line = frames[-1][0] if frames else 0
+        return RemoteError(
+            type_name(error), _message(error), "\n".join(texts), max(line, 0)
+        )
+    except BaseException:
+        return RemoteError(type_name(error), "", "", 0)
+
+
+def type_name(value: object) -> str:
+    """Return the name of the class of `value`, past any metaclass."""
+    return str(type.__dict__["__name__"].__get__(type(value)))[:200]
+
+
+def _message(error: BaseException) -> str:
+    try:
+        message = error.msg if isinstance(error, SyntaxError) else str(error)
+        return message[:MAX_MESSAGE]
+    except BaseException:
+        return "(its text cannot be read)"
+
+
+def _own_frames(traceback: TracebackType | None) -> list[tuple[int, str]]:
+    frames = []
+    while traceback is not None:
+        code = traceback.tb_frame.f_code
+        if code.co_filename == FILE_NAME:
+            frames.append((traceback.tb_lineno, code.co_name))
+        traceback = traceback.tb_next
+    return frames
+
+
+def _frame_text(number: int, name: str, lines: list[str]) -> str:
+    text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
+    return f"  line {number}, in {name}: {text[:160]}"

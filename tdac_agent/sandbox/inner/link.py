@@ -1,0 +1,64 @@
+"""The child's end of the channel: one frame in, one frame out, blocking."""
+
+from __future__ import annotations
+
+import os
+
+from .wire import HEADER, Kind, WireError
+
+CHUNK = 1 << 16
+
+
+class Link:
+    """Reads requests from one descriptor and writes answers to another.
+
+    Args:
+        requests: Descriptor to read from.
+        answers: Descriptor to write to.
+    """
+
+    def __init__(self, requests: int, answers: int) -> None:
+        self._requests = requests
+        self._answers = answers
+        self.frame_bytes = 1 << 20
+
+    def receive(self) -> tuple[int, int, bytes]:
+        """Return kind, sequence number and payload of the next request.
+
+        The process ends here when the judge has closed its end.
+        """
+        data = self._read(HEADER.size)
+        size, kind, sequence = HEADER.unpack_from(data)
+        data = data[HEADER.size :]
+        if len(data) < size:
+            parts = [data]
+            missing = size - len(data)
+            while missing:
+                parts.append(self._read(1, missing))
+                missing -= len(parts[-1])
+            data = b"".join(parts)
+        return kind, sequence, data
+
+    def _read(self, least: int, most: int = CHUNK) -> bytes:
+        data = b""
+        while len(data) < least:
+            part = os.read(self._requests, min(most, 1 << 20) - len(data))
+            if not part:
+                os._exit(0)
+            data += part
+        return data
+
+    def send(self, kind: Kind, sequence: int, payload: bytes) -> None:
+        """Write one frame.
+
+        Raises:
+            WireError: The payload is larger than a frame may be.
+        """
+        if len(payload) > self.frame_bytes:
+            raise WireError(
+                f"a value of {len(payload)} bytes is too large "
+                f"(limit {self.frame_bytes})"
+            )
+        data = memoryview(HEADER.pack(len(payload), kind, sequence) + payload)
+        while data:
+            data = data[os.write(self._answers, data) :]

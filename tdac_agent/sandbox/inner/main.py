@@ -1,0 +1,31 @@
+"""Entry of the child: read the setup, give up rights, serve."""
+
+from __future__ import annotations
+
+import sys
+
+from .confine import confine
+from .decode import decode
+from .encode import encode
+from .link import Link
+from .serve import Server
+from .wire import Kind
+
+
+def main(requests: int, answers: int, site: str) -> None:
+    """Serve the judge on two descriptors until it closes them.
+
+    Args:
+        requests: Descriptor that the judge writes to.
+        answers: Descriptor that the judge reads.
+        site: Folder from which numpy is imported.
+    """
+    link = Link(requests, answers)
+    _, sequence, payload = link.receive()
+    setup = decode(payload)
+    sys.argv = ["controller.py"]
+    sys.path[:] = [setup["work"], *sys.path[2:], site]
+    facts = confine(setup)
+    link.frame_bytes = setup["frame_bytes"]
+    link.send(Kind.VALUE, sequence, encode(facts))
+    Server(link).run()

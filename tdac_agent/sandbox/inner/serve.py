@@ -1,0 +1,135 @@
+"""Serve the judge's requests on one controller."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+from typing import Any
+
+from .decode import decode
+from .describe import FILE_NAME, describe, type_name
+from .encode import encode
+from .link import Link
+from .wire import Handle, Kind, WireError
+
+MAX_HANDLES = 10_000
+MAX_NAMES = 1000
+
+
+class Server:
+    """One controller module, the objects it has handed out, and the link.
+
+    Args:
+        link: The channel to the judge.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._objects: list[object] = []
+        self._numbers: dict[int, int] = {}
+        self._module = ModuleType("controller")
+        self._source = ""
+        self._sequence = 0
+
+    def run(self) -> None:
+        """Answer requests until the judge closes the channel."""
+        while True:
+            kind, self._sequence, payload = self._link.receive()
+            try:
+                answer = self._answer(kind, decode(payload, 0, self._object))
+                self._send(Kind.VALUE, answer)
+            except BaseException as error:
+                described = describe(error, self._source)
+            else:
+                continue
+            self._send(Kind.ERROR, described)
+
+    def _send(self, kind: Kind, value: object) -> None:
+        self._link.send(kind, self._sequence, encode(value, self._keep))
+
+    def _answer(self, kind: int, value: Any) -> Any:
+        if kind == Kind.POLICY:
+            return self._module.policy(value)
+        if kind == Kind.RESET:
+            reset = getattr(self._module, "reset", None)
+            return None if reset is None else reset(value)
+        if kind == Kind.CALL:
+            owner, name, args, kwargs = value
+            return self._target(owner, name)(*args, **kwargs)
+        if kind == Kind.GET:
+            return self._target(*value)
+        if kind == Kind.RUN_EPISODE:
+            return self._module.run_episode(Env(self), value)
+        if kind == Kind.LOAD:
+            return self._load()
+        raise WireError(f"not a request: {kind}")
+
+    def _target(self, owner: object, name: str | None) -> Any:
+        holder = self._module if owner is None else owner
+        return holder if name is None else getattr(holder, name)
+
+    def _load(self) -> dict[str, str]:
+        with open(FILE_NAME, "rb") as file:
+            source = file.read()
+        self._source = source.decode("utf-8", "replace")
+        code = compile(source, FILE_NAME, "exec", dont_inherit=True)
+        self._module.__file__ = FILE_NAME
+        sys.modules["controller"] = self._module
+        exec(code, self._module.__dict__)
+        names = [n for n in vars(self._module) if type(n) is str and n[:1] != "_"]
+        members = vars(self._module)
+        return {name[:200]: type_name(members[name]) for name in names[:MAX_NAMES]}
+
+    def _keep(self, value: object) -> Handle:
+        number = self._numbers.get(id(value))
+        if number is None:
+            number = len(self._objects)
+            if number >= MAX_HANDLES:
+                raise WireError(f"more than {MAX_HANDLES} objects handed out")
+            self._objects.append(value)
+            self._numbers[id(value)] = number
+        return Handle(number, type_name(value))
+
+    def _object(self, handle: Handle) -> object:
+        return self._objects[handle.id]
+
+    def ask(self, kind: Kind, value: object) -> Any:
+        """Send a request of the controller to the judge's environment.
+
+        Raises:
+            RuntimeError: The environment refused it.
+        """
+        self._send(kind, value)
+        kind_back, self._sequence, payload = self._link.receive()
+        reply = decode(payload, 0, self._object)
+        if kind_back == Kind.ENV_REFUSAL:
+            raise RuntimeError(reply)
+        return reply
+
+
+class Env:
+    """The judge's environment as `run_episode` sees it; every step is the judge's.
+
+    Args:
+        server: Carries the requests.
+    """
+
+    def __init__(self, server: Server) -> None:
+        self._server = server
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> Any:
+        """Return the first observation and info; seed and options are the judge's."""
+        del seed, options
+        return self._server.ask(Kind.ENV_RESET, None)
+
+    def step(self, action: Any) -> Any:
+        """Return observation, reward, terminated, truncated and info of one step."""
+        return self._server.ask(Kind.ENV_STEP, action)
+
+    def render(self) -> None:
+        """Show nothing."""
+
+    def close(self) -> None:
+        """Leave the environment to the judge."""

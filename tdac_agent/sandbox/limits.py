@@ -1,0 +1,42 @@
+"""What a controller may use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+MAX_SOURCE_BYTES = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Bounds on one child.
+
+    Attributes:
+        start_seconds: Wall time until the child is ready; ours, not the controller's.
+        import_seconds: Wall time of importing the controller.
+        reset_seconds: Wall time of one `reset`.
+        call_seconds: Wall time of one call, `policy` included.
+        cpu_seconds: CPU time of the child in all.
+        memory_bytes: Address space.
+        output_bytes: Printed output.
+        frame_bytes: One value on the wire.
+        scratch_bytes: The scratch folder (one file of it where the tier has no tmpfs).
+        open_files: Descriptors.
+    """
+
+    start_seconds: float = 10.0
+    import_seconds: float = 10.0
+    reset_seconds: float = 5.0
+    call_seconds: float = 10.0
+    cpu_seconds: int = 120
+    memory_bytes: int = 4 << 30
+    output_bytes: int = 1 << 20
+    frame_bytes: int = 32 << 20
+    scratch_bytes: int = 64 << 20
+    open_files: int = 64
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not value > 0:
+                raise ValueError(f"expected {field.name} above 0, got {value}")

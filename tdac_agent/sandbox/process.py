@@ -1,0 +1,183 @@
+"""The judge's side of one child: ask, with a deadline, and get a value or a fault."""
+
+from __future__ import annotations
+
+import time
+import weakref
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol
+
+from tdac_agent.sandbox.conversation import Conversation
+from tdac_agent.sandbox.ending import ChildUsage, Ending
+from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
+from tdac_agent.sandbox.folder import PrivateFolder
+from tdac_agent.sandbox.inner.wire import Handle, Kind
+from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
+from tdac_agent.sandbox.spawn import Spawned
+
+
+class EpisodeEnv(Protocol):
+    """What `run_episode` of a controller is given, on the judge's side."""
+
+    def reset(self) -> tuple[Any, dict[str, Any]]:
+        """Return the first observation and info."""
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Return observation, reward, terminated, truncated and info.
+
+        Raises:
+            EnvRefusalError: The controller sees a RuntimeError with this message.
+        """
+
+
+class Child:
+    """One sandboxed process with numpy loaded, for one controller and one use.
+
+    A context manager; `close` kills it. Every method that runs the controller raises
+    a `ControllerFault`; after any but a `ControllerError` the child is gone, and each
+    further request raises the same fault again.
+
+    Attributes:
+        tier: Name of the sandbox tier it runs in.
+        limits: What it may use.
+        pid: The leader of its process group.
+
+    Args:
+        tier: See above.
+        limits: See above.
+        folder: Its private folder.
+        spawned: Its process and channel.
+    """
+
+    def __init__(
+        self, tier: str, limits: Limits, folder: PrivateFolder, spawned: Spawned
+    ) -> None:
+        self.tier = tier
+        self.limits = limits
+        self._folder = folder
+        self.pid = spawned.process.pid
+        self._end = Ending(spawned, folder)
+        self._talk = Conversation(
+            spawned.channel, self.pid, limits, folder.root, self._end
+        )
+        weakref.finalize(self, self._end)
+
+    def __enter__(self) -> Child:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> ChildUsage:
+        """Kill the child and all it started, and return what it used."""
+        return self._end()
+
+    def set_up(self, setup: dict[str, Any]) -> dict[str, bool]:
+        """Have the child confine itself; return what it found to hold."""
+        seconds = self.limits.start_seconds
+        facts = self._talk.request(Kind.SETUP, setup, "start", seconds)
+        return dict(facts)
+
+    def furnish(self, workdir: Path | None, controller_source: str | bytes) -> None:
+        """Copy a working folder and a controller into a child started without.
+
+        Args:
+            workdir: Folder whose files the controller may read; not its subfolders.
+            controller_source: Text of `controller.py`.
+
+        Raises:
+            ControllerError: The source is larger than 200 kB.
+            SandboxError: The folder cannot be copied.
+        """
+        if isinstance(controller_source, str):
+            controller_source = controller_source.encode("utf-8", "surrogatepass")
+        if len(controller_source) > MAX_SOURCE_BYTES:
+            text = f"{len(controller_source)} bytes (limit {MAX_SOURCE_BYTES})"
+            raise ControllerError("SourceTooLarge", text, 0, "", "import")
+        self._folder.furnish(workdir, controller_source)
+
+    def load(self, timeout: float | None = None) -> dict[str, str]:
+        """Import the controller; return its public names, each with its type's name."""
+        seconds = timeout or self.limits.import_seconds
+        names = self._talk.request(Kind.LOAD, None, "import", seconds)
+        if type(names) is not dict:
+            self._talk.breach("expected the controller's names", "import")
+        return names
+
+    def get(
+        self, name: str, owner: Handle | None = None, timeout: float | None = None
+    ) -> Any:
+        """Return a value of the controller's module, or an attribute of an object."""
+        seconds = timeout or self.limits.call_seconds
+        return self._talk.request(Kind.GET, (owner, name), name, seconds)
+
+    def call(
+        self,
+        target: str | Handle | tuple[Handle, str],
+        args: tuple[Any, ...] = (),
+        kwargs: dict[str, Any] | None = None,
+        timeout: float | None = None,
+    ) -> Any:
+        """Call a function by name, a callable handle, or (handle, method name).
+
+        Arguments may hold handles; a result that the wire cannot carry is a handle.
+        """
+        owner, name = _split(target)
+        phase = name if name is not None else "call"
+        request = (owner, name, args, kwargs or {})
+        seconds = timeout or self.limits.call_seconds
+        return self._talk.request(Kind.CALL, request, phase, seconds)
+
+    def reset(self, observation: Any, timeout: float | None = None) -> Any:
+        """Call `reset(obs)`; None where the controller has none."""
+        seconds = timeout or self.limits.reset_seconds
+        return self._talk.request(Kind.RESET, observation, "reset", seconds)
+
+    def policy(self, observation: Any, timeout: float | None = None) -> Any:
+        """Return whatever `policy(obs)` returned; nothing about it is checked."""
+        seconds = timeout or self.limits.call_seconds
+        return self._talk.request(Kind.POLICY, observation, "policy", seconds)
+
+    def run_episode(self, env: EpisodeEnv, max_steps: int, timeout: float) -> Any:
+        """Call `run_episode(env, max_steps)`, each step of which is the judge's.
+
+        Args:
+            env: Answers the controller's requests, here, in this process.
+            max_steps: Passed on.
+            timeout: Seconds that the controller itself may take in all.
+        """
+        phase = "run_episode"
+        now = time.monotonic()
+        self._talk.send(Kind.RUN_EPISODE, max_steps, phase, now + timeout, timeout)
+        left = timeout
+        while True:
+            start = time.monotonic()
+            kind, value = self._talk.receive(phase, start + left, timeout)
+            left -= time.monotonic() - start
+            if kind == Kind.VALUE:
+                return value
+            if kind not in {Kind.ENV_RESET, Kind.ENV_STEP}:
+                self._talk.breach("an answer that was not due", phase)
+            try:
+                answer = env.reset() if kind == Kind.ENV_RESET else env.step(value)
+                reply: tuple[Kind, Any] = (Kind.ENV_REPLY, answer)
+            except EnvRefusalError as error:
+                reply = (Kind.ENV_REFUSAL, str(error))
+            except BaseException:
+                self.close()
+                raise
+            self._talk.send(*reply, phase, time.monotonic() + left, timeout)
+
+
+def _split(
+    target: str | Handle | tuple[Handle, str],
+) -> tuple[Handle | None, str | None]:
+    if isinstance(target, str):
+        return None, target
+    return (target, None) if isinstance(target, Handle) else target

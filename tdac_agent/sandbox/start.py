@@ -1,0 +1,118 @@
+"""Start a child: spawn it, confine it, and see that the confinement holds."""
+
+from __future__ import annotations
+
+import functools
+import os
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.sandbox.errors import ControllerFault, SandboxError
+from tdac_agent.sandbox.folder import PrivateFolder
+from tdac_agent.sandbox.limits import Limits
+from tdac_agent.sandbox.process import Child
+from tdac_agent.sandbox.spawn import spawn
+from tdac_agent.sandbox.tiers import TIERS, Tier
+
+# Files that exist nearly everywhere and that no controller may read.
+WITNESSES = ("/etc/passwd", "/etc/hostname", "/proc/1/status", "/proc/self/environ")
+
+
+def start(
+    workdir: Path | None = None,
+    controller_source: str | bytes | None = None,
+    *,
+    tier: str = "auto",
+    limits: Limits | None = None,
+) -> Child:
+    """Start a child in a sandbox, with numpy loaded and no controller imported yet.
+
+    Args:
+        workdir: Folder whose files the controller may read. Without a source nothing
+            is copied yet, see `Child.furnish`.
+        controller_source: Text of `controller.py`.
+        tier: Name of a tier, or "auto" for the best one that works here.
+        limits: What the child may use.
+
+    Raises:
+        ControllerError: The source is larger than 200 kB.
+        SandboxError: The tier does not work here or the child did not start.
+    """
+    limits = limits or Limits()
+    child = start_blank(_find(tier), limits)
+    try:
+        if controller_source is not None:
+            child.furnish(workdir, controller_source)
+    except BaseException:
+        child.close()
+        raise
+    return child
+
+
+def start_blank(tier: Tier, limits: Limits) -> Child:
+    """Start a child without files.
+
+    Raises:
+        SandboxError: It did not start, or the tier's promise does not hold.
+    """
+    folder = PrivateFolder()
+    try:
+        spawned = spawn(tier.name, folder, limits)
+    except BaseException:
+        folder.remove()
+        raise
+    child = Child(tier.name, limits, folder, spawned)
+    try:
+        facts = child.set_up(_setup(tier, limits, folder))
+    except ControllerFault as fault:
+        printed = child.close().output_head.strip()
+        raise SandboxError(f"{tier.name}: {printed or fault}") from None
+    except BaseException:
+        child.close()
+        raise
+    if tier.hides_files and not facts["files_hidden"]:
+        child.close()
+        raise SandboxError(f"{tier.name}: files outside the sandbox can be read")
+    return child
+
+
+@functools.cache
+def best_tier() -> Tier:
+    """Return the best tier in which a child starts here.
+
+    Raises:
+        SandboxError: None does.
+    """
+    reasons = []
+    for tier in TIERS:
+        try:
+            start_blank(tier, Limits()).close()
+        except SandboxError as error:
+            reasons.append(str(error))
+        else:
+            return tier
+    raise SandboxError("no sandbox tier works here: " + "; ".join(reasons))
+
+
+def _find(name: str) -> Tier:
+    if name == "auto":
+        return best_tier()
+    for tier in TIERS:
+        if tier.name == name:
+            return tier
+    names = ", ".join(tier.name for tier in TIERS)
+    raise SandboxError(f"expected a sandbox tier (auto, {names}), got {name!r}")
+
+
+def _setup(tier: Tier, limits: Limits, folder: PrivateFolder) -> dict[str, Any]:
+    return {
+        "steps": list(tier.steps),
+        "work": str(folder.work),
+        "scratch": str(folder.scratch),
+        "witnesses": [path for path in WITNESSES if os.access(path, os.R_OK)],
+        "cpu_seconds": limits.cpu_seconds,
+        "memory_bytes": limits.memory_bytes,
+        "frame_bytes": limits.frame_bytes,
+        "scratch_bytes": limits.scratch_bytes,
+        "open_files": limits.open_files,
+    }
