@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Group = Literal["static", "unit", "end to end", "judge"]
+Group = Literal["static", "unit", "end to end", "user", "judge"]
 Cause = Literal[
     "collision",
     "no motion",

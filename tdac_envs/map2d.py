@@ -255,6 +255,10 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._window.show(frame)
         return None
 
+    def pose(self) -> NDArray[np.float64]:
+        """The true pose, shape (3,): x, y (px), heading (rad)."""
+        return self._state.copy()
+
     def close(self) -> None:
         """Closes the window, if there is one."""
         if self._window is not None:

@@ -1,0 +1,204 @@
+"""One judged episode: the environment steps, the controller only answers."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_agent.sandbox import Child, ControllerFault, EnvRefusalError
+from tdac_agent.trajectory import Outcome, Rollout, Trajectory
+from tdac_envs.map2d import Map2DEnv, Observation
+from tdac_envs.task2d import Pose
+
+# A policy is cut off when its mean call is this many times too slow.
+SLOW_FACTOR = 2.0
+SLOW_AFTER_CALLS = 50
+
+
+@dataclass(slots=True)
+class Record:
+    """Steps an environment and writes down what happened.
+
+    Attributes:
+        env: The judge's environment.
+        start: Start pose.
+        max_steps: Steps after which the episode is stopped.
+    """
+
+    env: Map2DEnv
+    start: Pose
+    max_steps: int
+    outcome: Outcome | None = None
+    _poses: list[NDArray[np.float64]] = field(default_factory=list)
+    _actions: list[NDArray[np.float32]] = field(default_factory=list)
+    _distances: list[float] = field(default_factory=list)
+    _ranges: list[NDArray[np.float32]] = field(default_factory=list)
+    _collisions: int = 0
+
+    def reset(self) -> tuple[Observation, dict[str, Any]]:
+        """Puts the robot on its start; a second reset is refused.
+
+        Raises:
+            EnvRefusalError: The episode is under way.
+        """
+        if self._poses:
+            raise EnvRefusalError("reset() is allowed once, at the beginning")
+        observation, info = self.env.reset(options={"start": self.start})
+        self._note(observation, info)
+        return observation, info
+
+    def step(
+        self, action: Any
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Steps once.
+
+        Raises:
+            EnvRefusalError: Before reset, after the end, or no two finite numbers.
+        """
+        if not self._poses:
+            raise EnvRefusalError("step() before reset()")
+        if self.outcome is not None:
+            raise EnvRefusalError("step() after the episode ended")
+        wheels = as_wheels(action)
+        if wheels is None:
+            raise EnvRefusalError(wrong_action(action))
+        observation, reward, terminated, truncated, info = self.env.step(wheels)
+        self._actions.append(np.clip(wheels, -1.0, 1.0))
+        self._note(observation, info)
+        if info["collision"]:
+            self.outcome = "collision"
+        elif info["is_success"]:
+            self.outcome = "reached"
+        elif truncated:
+            self.outcome = "out of time"
+        elif len(self._actions) >= self.max_steps:
+            self.outcome = "stopped"
+            truncated = True
+        return observation, reward, terminated, truncated, info
+
+    def trajectory(self) -> Trajectory:
+        """What was recorded so far."""
+        return Trajectory(
+            np.array(self._poses, np.float64).reshape(-1, 3),
+            np.array(self._actions, np.float32).reshape(-1, 2),
+            np.array(self._distances, np.float64),
+            np.array(self._ranges, np.float32),
+            self._collisions,
+            self.env.task.dt,
+        )
+
+    def _note(self, observation: Observation, info: dict[str, Any]) -> None:
+        self._poses.append(self.env.pose())
+        self._distances.append(info["path_distance"])
+        self._ranges.append(observation["ranges"])
+        self._collisions = info["collisions"]
+
+
+def as_wheels(action: Any) -> NDArray[np.float32] | None:
+    """An answer of `policy` as two finite numbers, or None where it is not that."""
+    if isinstance(action, np.ndarray):
+        if action.shape != (2,) or action.dtype.kind not in "fiu":
+            return None
+        action = action.tolist()
+    if not isinstance(action, tuple | list) or len(action) != 2:
+        return None
+    for value in action:
+        number = isinstance(value, int | float | np.integer | np.floating)
+        if not number or isinstance(value, bool):
+            return None
+    try:
+        wheels = np.array([float(value) for value in action])
+    except OverflowError:
+        return None
+    return wheels.astype(np.float32) if np.abs(wheels).max() < 1e30 else None
+
+
+def wrong_action(action: Any) -> str:
+    """Says what is wrong with an answer of `policy`, in bounded length."""
+    text = repr(action)
+    text = text if len(text) <= 80 else f"{text[:77]}..."
+    return f"policy must return two finite numbers (left, right), got {text}"
+
+
+def run_policy(
+    child: Child, record: Record, name: str, *, held_out: bool
+) -> Rollout:
+    """Drives an episode by `policy(obs)`."""
+    calls: list[float] = []
+    error = None
+    try:
+        observation, _ = record.reset()
+        child.load()
+        child.reset(observation)
+        while record.outcome is None:
+            began = time.perf_counter()
+            action = child.policy(observation)
+            calls.append(time.perf_counter() - began)
+            observation = record.step(action)[0]
+            error = _too_slow(calls, record.env.task.dt)
+            if error is not None:
+                break
+    except ControllerFault as fault:
+        error = str(fault)
+    except EnvRefusalError as refusal:
+        error = str(refusal)
+    return _rollout(record, name, held_out, error, calls)
+
+
+def run_own_loop(child: Child, record: Record, name: str, *, timeout: float) -> Rollout:
+    """Lets the controller's `run_episode` step the judge's environment."""
+    error, returned = None, None
+    try:
+        child.load()
+        returned = child.run_episode(record, record.max_steps, timeout)
+    except ControllerFault as fault:
+        error = str(fault)
+    if error is None and record.outcome is None:
+        error = _ended_early(record)
+    return _rollout(record, name, False, error, [], returned)
+
+
+def _ended_early(record: Record) -> str:
+    done = record.trajectory().steps
+    return (
+        f"run_episode returned after {done} steps, before the episode ended "
+        f"and before max_steps = {record.max_steps}"
+    )
+
+
+def _too_slow(calls: list[float], dt: float) -> str | None:
+    if len(calls) < SLOW_AFTER_CALLS or len(calls) % SLOW_AFTER_CALLS:
+        return None
+    mean = math.fsum(calls) / len(calls)
+    if mean <= SLOW_FACTOR * dt:
+        return None
+    return f"policy takes {1000 * mean:.0f} ms a call, {1000 * dt:.0f} ms are allowed"
+
+
+def _rollout(
+    record: Record,
+    name: str,
+    held_out: bool,
+    error: str | None,
+    calls: list[float],
+    returned: Any = None,
+) -> Rollout:
+    times = 1000 * np.array(calls) if calls else np.zeros(1)
+    task = record.env.nominal
+    return Rollout(
+        name=name,
+        held_out=held_out,
+        outcome="error" if error is not None else record.outcome or "stopped",
+        trajectory=record.trajectory(),
+        goal=task.goal,
+        radius=task.robot.radius,
+        tolerance=task.goal_tolerance,
+        error=error,
+        call_ms=(float(times.mean()), float(np.percentile(times, 99))),
+        returned=returned,
+    )

@@ -1,0 +1,133 @@
+"""Answers that suites compare a controller's own functions with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.grid import BoolGrid
+from tdac_envs.plan import distance_field
+
+Point = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanCase:
+    """A planning question with its answer.
+
+    Attributes:
+        name: For messages.
+        occ: Shape (height, width), bool `[y, x]`, True = occupied.
+        start: Pixel (x, y).
+        goal: Pixel (x, y).
+        length: Octile length of the shortest path, px; inf where there is none.
+    """
+
+    name: str
+    occ: BoolGrid
+    start: Point
+    goal: Point
+    length: float
+
+
+class Oracle:
+    """Shortest paths, reachability and nearest free pixels, by exact search."""
+
+    def shortest_length(self, occ: BoolGrid, start: Point, goal: Point) -> float:
+        """Octile length of the shortest 8-connected path without corner cutting, px.
+
+        Args:
+            occ: Shape (height, width), bool `[y, x]`, True = occupied.
+            start: Pixel (x, y).
+            goal: Pixel (x, y).
+
+        Returns:
+            inf where an end is occupied or no path joins them.
+        """
+        field = distance_field(~occ, goal, until=start)
+        return float(field[start[1], start[0]])
+
+    def path_error(self, occ: BoolGrid, path: list[Point], cell: int = 1) -> str | None:
+        """What is wrong with a path of pixels, or None.
+
+        Args:
+            occ: Shape (height, width), bool `[y, x]`, True = occupied.
+            path: Pixels (x, y).
+            cell: Length of a straight step, px.
+        """
+        height, width = occ.shape
+        for x, y in path:
+            if not (0 <= x < width and 0 <= y < height):
+                return f"({x}, {y}) lies outside the map of {width} x {height} px"
+            if occ[y, x]:
+                return f"({x}, {y}) is occupied"
+        for (x0, y0), (x1, y1) in zip(path, path[1:], strict=False):
+            dx, dy = x1 - x0, y1 - y0
+            if max(abs(dx), abs(dy)) != cell or abs(dx) not in (0, abs(dy), cell):
+                return f"({x0}, {y0}) -> ({x1}, {y1}) is not a step to a neighbour"
+            if dx and dy and (occ[y0, x1] or occ[y1, x0]):
+                return f"({x0}, {y0}) -> ({x1}, {y1}) cuts an occupied corner"
+        return None
+
+    def path_length(self, path: list[Point]) -> float:
+        """Euclidean length of a polyline, px."""
+        return sum(math.dist(a, b) for a, b in zip(path, path[1:], strict=False))
+
+    def nearest_free_distance(self, occ: BoolGrid, x: int, y: int) -> float:
+        """Euclidean distance from (x, y) to the nearest free pixel, px."""
+        rows, columns = np.nonzero(~occ)
+        if rows.size == 0:
+            return math.inf
+        return float(np.sqrt(((columns - x) ** 2 + (rows - y) ** 2).min()))
+
+    def grid(
+        self, seed: int, width: int = 40, height: int = 30, density: float = 0.25
+    ) -> BoolGrid:
+        """A seeded random grid."""
+        random = np.random.default_rng(seed)
+        return np.asarray(random.random((height, width)) < density)
+
+    def plan_cases(self) -> list[PlanCase]:
+        """Fixed grids with traps, and seeded random ones."""
+        cases = [self._case(name, *rest) for name, *rest in _fixed_grids()]
+        for seed in range(12):
+            occ = self.grid(seed, 44, 31, 0.1 + 0.03 * seed)
+            random = np.random.default_rng(1000 + seed)
+            start, goal = (
+                (int(random.integers(44)), int(random.integers(31))) for _ in range(2)
+            )
+            if seed % 4:
+                occ[start[1], start[0]] = occ[goal[1], goal[0]] = False
+            cases.append(self._case(f"random grid {seed}", occ, start, goal))
+        return cases
+
+    def _case(self, name: str, occ: BoolGrid, start: Point, goal: Point) -> PlanCase:
+        return PlanCase(name, occ, start, goal, self.shortest_length(occ, start, goal))
+
+
+def _fixed_grids() -> list[tuple[str, BoolGrid, Point, Point]]:
+    def empty() -> NDArray[np.bool_]:
+        return np.zeros((30, 50), np.bool_)
+
+    trap = empty()
+    trap[5:25, 30] = trap[5, 10:31] = trap[24, 10:31] = True
+    wall = empty()
+    wall[:, 25] = True
+    gap = wall.copy()
+    gap[17, 25] = False
+    diagonal = empty()
+    for k in range(30):
+        diagonal[k, 10 + k] = True
+    return [
+        ("open grid", empty(), (2, 3), (47, 26)),
+        ("start is the goal", empty(), (7, 8), (7, 8)),
+        ("trap", trap, (20, 15), (45, 15)),
+        ("closed wall", wall, (3, 3), (46, 3)),
+        ("one-pixel gap", gap, (3, 3), (46, 3)),
+        ("diagonal wall, no corner cutting", diagonal, (5, 25), (45, 4)),
+        ("occupied start", wall, (25, 3), (3, 3)),
+        ("occupied goal", wall, (3, 3), (25, 3)),
+    ]

@@ -1,0 +1,197 @@
+"""A run on disk: everything that happened, in one self-contained folder."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tdac_agent.errors import RunError
+from tdac_agent.files import append_line, write_atomic
+from tdac_agent.provider import Reply, Request
+from tdac_agent.report import Report
+from tdac_agent.rules import RepairRule
+from tdac_agent.task import Task, portable_task_file, write_workdir
+
+Status = Literal["running", "verified", "not verified", "interrupted", "fault"]
+Event = Callable[[dict[str, Any]], None]
+
+
+class Attempt(BaseModel):
+    """One candidate (k, j)."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    k: int
+    j: int
+    valid: bool = Field(description="False where the model gave no code.")
+    passed: bool
+    failed_tests: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+class Run(BaseModel):
+    """`run.json`: one synthesis."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    schema_version: Literal[1] = 1
+    folder: Path = Field(exclude=True)
+    task: str
+    task_sha256: str
+    learner: str
+    optimizer: str
+    iterations: int = Field(description="K")
+    patience: int = Field(description="J")
+    seed: int
+    status: Status = "running"
+    tau: int | None = Field(None, description="Iteration k of the first success.")
+    attempts: list[Attempt] = []
+    tokens_in: int = 0
+    tokens_out: int = 0
+    started: str
+    seconds: float = 0.0
+
+    @property
+    def verified(self) -> bool:
+        """Whether a controller passed."""
+        return self.status == "verified"
+
+    @property
+    def controller(self) -> Path:
+        """Path of the verified controller."""
+        return self.folder / "controller.py"
+
+
+def load_run(folder: Path) -> Run:
+    """Reads a run folder.
+
+    Raises:
+        RunError: It holds no readable `run.json`.
+    """
+    path = folder / "run.json"
+    try:
+        return Run(folder=folder, **json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, json.JSONDecodeError, ValidationError, TypeError) as error:
+        reason = str(error).splitlines()[0]
+        raise RunError(f"{folder} is not a run folder: {reason}") from error
+
+
+@dataclass(slots=True)
+class Recorder:
+    """Writes a run folder while the run goes on.
+
+    Attributes:
+        run: The record so far.
+        on_event: Called with each journal record, for live progress.
+    """
+
+    run: Run
+    on_event: Event
+    _clock: float = field(default_factory=time.monotonic)
+    _previous: str = ""
+
+    def start(self, task: Task) -> None:
+        """Makes the folder: task, map image, working files, empty journal."""
+        folder = self.run.folder
+        write_workdir(folder, task)
+        write_atomic(folder / "task.yaml", portable_task_file(task))
+        if task.image is not None:
+            copy = folder / f"map{task.image.suffix}"
+            write_atomic(copy, task.image.read_bytes())
+        self.event("run.start", task=task.name, learner=self.run.learner)
+        self.save()
+
+    def event(self, kind: str, **facts: Any) -> None:
+        """Appends to the journal."""
+        record = {"event": kind, "seconds": round(self._elapsed(), 3), **facts}
+        append_line(self.run.folder / "journal.jsonl", record)
+        self.on_event(record)
+
+    def asked(self, request: Request) -> Path:
+        """Keeps a prompt before it is sent; returns the candidate's folder."""
+        _, k, j = request.sample
+        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / f"{request.kind}.prompt.md", request.prompt)
+        self.event("call.intent", kind=request.kind, k=k, j=j)
+        return folder
+
+    def answered(self, request: Request, reply: Reply) -> None:
+        """Keeps an answer as it came."""
+        _, k, j = request.sample
+        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        write_atomic(folder / f"{request.kind}.reply.md", reply.text)
+        self.run.tokens_in += reply.tokens_in
+        self.run.tokens_out += reply.tokens_out
+        self.event(
+            "call.reply",
+            kind=request.kind,
+            k=k,
+            j=j,
+            stop=reply.stop,
+            tokens_in=reply.tokens_in,
+            tokens_out=reply.tokens_out,
+            notes=list(reply.notes),
+        )
+
+    def candidate(self, k: int, j: int, source: str) -> Path:
+        """Keeps a candidate's source and its difference from the last one."""
+        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / "controller.py", source)
+        difference = difflib.unified_diff(
+            self._previous.splitlines(keepends=True),
+            source.splitlines(keepends=True),
+            "previous",
+            "controller.py",
+        )
+        write_atomic(folder / "controller.diff", "".join(difference))
+        self._previous = source
+        self.event("verify.start", k=k, j=j)
+        return folder
+
+    def judged(
+        self, k: int, j: int, report: Report | None, notes: tuple[str, ...]
+    ) -> None:
+        """Keeps a candidate's report; None where the model gave no code."""
+        failed = () if report is None else tuple(f.test for f in report.failures)
+        passed = report is not None and report.passed
+        attempt = Attempt(
+            k=k,
+            j=j,
+            valid=report is not None,
+            passed=passed,
+            failed_tests=failed,
+            notes=notes,
+        )
+        self.run.attempts.append(attempt)
+        self.event("verify.end", **attempt.model_dump(mode="json"))
+        self.save()
+
+    def rules(self, k: int, rules: tuple[RepairRule, ...]) -> None:
+        """Keeps the rules in force after an iteration."""
+        records = [{"id": r.id, "text": r.text, "born": r.born} for r in rules]
+        self.event("rules", k=k, rules=records)
+
+    def finish(self, status: Status, **facts: Any) -> None:
+        """Closes the run."""
+        self.run.status = status
+        self.event("run.end", status=status, **facts)
+        self.save()
+
+    def save(self) -> None:
+        """Writes `run.json`."""
+        self.run.seconds = round(self._elapsed(), 3)
+        write_atomic(
+            self.run.folder / "run.json", self.run.model_dump_json(indent=2) + "\n"
+        )
+
+    def _elapsed(self) -> float:
+        return time.monotonic() - self._clock

@@ -1,0 +1,139 @@
+"""Unit API (Table I): the controller's own map, utility and planner functions."""
+
+import math
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.paper
+
+
+@pytest.fixture
+def small_map(controller, oracle):
+    """The controller's map object over a grid that is not square."""
+    occ = oracle.grid(seed=3, width=37, height=23)
+    return occ, controller.call("OccMap2D", occ)
+
+
+def is_int_pair(value):
+    """Whether a value is a pair of Python ints."""
+    return (
+        isinstance(value, tuple)
+        and len(value) == 2
+        and all(type(item) is int for item in value)
+    )
+
+
+def test_robot_constants(controller, task):
+    """The robot's constants equal params.json."""
+    robot = task.params.robot
+    expected = {
+        "AXLE_LENGTH_PX": robot.axle_length,
+        "SENSOR_RANGE_PX": robot.range_max,
+        "SENSOR_FOV_DEG": robot.field_of_view_deg,
+        "N_RAYS": robot.n_rays,
+    }
+    for name, value in expected.items():
+        found = controller.constant(name)
+        assert isinstance(found, int | float), f"{name} is {found!r}, not a number"
+        assert math.isclose(found, value, rel_tol=1e-6), f"{name} = {found}, not {value}"
+
+
+@pytest.mark.parametrize("name", ["LOOKAHEAD", "STOP_DIST", "SLOW_DIST"])
+def test_tuning_constants(controller, name):
+    """The tuning constants are numbers that are not negative."""
+    value = controller.constant(name)
+    good = isinstance(value, int | float) and math.isfinite(value) and value >= 0
+    assert good, f"{name} is {value!r}, not a number of at least 0"
+
+
+@pytest.mark.parametrize("name", ["MAP_IMG", "PARAMS_JSON", "ROBOT_IMG"])
+def test_file_constants(controller, name):
+    """The file constants name a file of the working folder."""
+    known = {"occupancy.png", "occupancy.npy", "params.json", "robot.png"}
+    value = controller.constant(name)
+    assert isinstance(value, str), f"{name} is {value!r}, not a file name"
+    base = value.replace("\\", "/").rsplit("/", 1)[-1]
+    assert base in known, f"{name} = {value!r}, expected one of {', '.join(known)}"
+
+
+def test_is_occupied_inside(small_map):
+    """Every pixel of the map is answered as it is, indexed [y, x]."""
+    occ, own = small_map
+    for y, x in np.ndindex(occ.shape):
+        found = own.call("is_occupied", x, y)
+        assert found == occ[y, x], f"is_occupied({x}, {y}) is {found}, not {occ[y, x]}"
+
+
+def test_is_occupied_returns_bool(small_map):
+    """The answer is a Python bool, inside and outside."""
+    _, own = small_map
+    for x, y in ((0, 0), (5, 4), (36, 22), (-1, 3), (999, 999)):
+        found = own.call("is_occupied", x, y)
+        assert type(found) is bool, f"is_occupied({x}, {y}) is a {type(found).__name__}"
+
+
+def test_is_occupied_outside(small_map):
+    """Everything outside the map is occupied; nothing wraps around."""
+    _, own = small_map
+    for x, y in ((-1, 0), (0, -1), (37, 0), (0, 23), (-37, -23), (22, 36), (10**6, 3)):
+        found = own.call("is_occupied", x, y)
+        assert found, f"is_occupied({x}, {y}) outside a 37 x 23 map is {found}"
+
+
+def test_nearest_free_of_a_free_pixel(controller, small_map):
+    """A free pixel is its own nearest free pixel, as Python ints."""
+    occ, own = small_map
+    for y, x in np.argwhere(~occ)[::40].tolist():
+        found = controller.call("nearest_free", own, x, y, 10)
+        assert is_int_pair(found), f"nearest_free returned {found!r}, not (int, int)"
+        assert found == (x, y), f"nearest_free({x}, {y}) is {found} though it is free"
+
+
+def test_nearest_free_is_nearest(controller, oracle):
+    """From an occupied pixel: free, and as near as any."""
+    occ = oracle.grid(seed=11, width=40, height=30, density=0.85)
+    own = controller.call("OccMap2D", occ)
+    for y, x in np.argwhere(occ)[::60].tolist():
+        found = controller.call("nearest_free", own, x, y, 40)
+        assert is_int_pair(found), f"nearest_free returned {found!r}, not (int, int)"
+        fx, fy = found
+        inside = 0 <= fx < 40 and 0 <= fy < 30
+        assert inside, f"nearest_free({x}, {y}) is {found}: outside the map"
+        assert not occ[fy, fx], f"nearest_free({x}, {y}) is {found}: occupied"
+        best, got = oracle.nearest_free_distance(occ, x, y), math.dist((x, y), found)
+        assert got <= best + 1e-9, (
+            f"nearest_free({x}, {y}) is {found}, {got:.2f} px away; {best:.2f} is possible"
+        )
+
+
+def test_nearest_free_raises(controller):
+    """ValueError where there is no free pixel within max_rad."""
+    occ = np.ones((21, 31), np.bool_)
+    occ[2, 2] = False
+    own = controller.call("OccMap2D", occ)
+    message = "nearest_free without a free pixel in reach"
+    error = controller.error_of("nearest_free", own, 25, 15, 5)
+    assert error is not None, f"{message} returned instead of raising ValueError"
+    assert error.type_name == "ValueError", f"{message} raised {error.type_name}"
+
+
+def test_plan_path(controller, oracle):
+    """Cell 1: int pixels, both ends, free, connected, <= 1.1 x optimum, or []."""
+    for case in oracle.plan_cases():
+        own = controller.call("OccMap2D", case.occ)
+        path = controller.call("plan_path", own, case.start, case.goal, 1)
+        assert isinstance(path, list), f"{case.name}: a {type(path).__name__}, not a list"
+        if math.isinf(case.length):
+            assert path == [], f"{case.name}: {len(path)} points, expected []"
+            continue
+        assert path, f"{case.name}: [], but a path of {case.length:.1f} px exists"
+        assert all(map(is_int_pair, path)), f"{case.name}: points must be (int, int)"
+        ends = (path[0], path[-1])
+        assert ends == (case.start, case.goal), f"{case.name}: runs {ends}"
+        error = oracle.path_error(case.occ, path)
+        assert error is None, f"{case.name}: {error}"
+        length = oracle.path_length(path)
+        assert length <= 1.1 * case.length + 1e-6, (
+            f"{case.name}: {length:.1f} px long, the shortest is {case.length:.1f} px"
+        )

@@ -1,0 +1,141 @@
+"""Algorithm 2: test-driven synthesis of a controller."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from tdac_agent.builtin import Builtin
+from tdac_agent.dialogue import Candidate, Dialogue
+from tdac_agent.errors import Fault, RunError
+from tdac_agent.figures import draw_trajectories
+from tdac_agent.files import write_atomic
+from tdac_agent.provider import Provider
+from tdac_agent.records import Event, Recorder, Run
+from tdac_agent.report import Report
+from tdac_agent.task import Task
+from tdac_agent.verify import load_trajectories, verify
+from tdac_envs.errors import TaskError
+
+
+def synthesize(
+    task: Task,
+    learner: str | Provider = "builtin",
+    optimizer: str | Provider | None = None,
+    *,
+    out: Path,
+    iterations: int = 20,
+    patience: int = 1,
+    seed: int = 0,
+    start_from: str | None = None,
+    on_event: Event = lambda record: None,
+) -> Run:
+    """Writes, tests and repairs controllers until one is verified.
+
+    Args:
+        task: What the controller must do.
+        learner: LLM1 of the paper, writes controllers; a name or a provider.
+        optimizer: LLM2, edits code and writes rules; the learner by default.
+        out: New or empty folder for the run.
+        iterations: K.
+        patience: J, edits per iteration.
+        seed: Of the jittered starts.
+        start_from: Source of a controller to begin with instead of a generated one.
+        on_event: Called with each journal record.
+
+    Returns:
+        The run; `run.verified` tells whether `run.controller` was written.
+
+    Raises:
+        RunError: The folder cannot be used.
+        Fault: Sandbox, suite or provider broken; the run's record says so, too.
+    """
+    first = _provider(learner, task)
+    second = first if optimizer is None else _provider(optimizer, task)
+    recorder = _recorder(task, out, first, second, iterations, patience, seed, on_event)
+    dialogue = Dialogue(task, first, second, recorder)
+    given = Candidate(start_from) if start_from is not None else None
+    try:
+        for k in range(1, iterations + 1):
+            candidate = given or dialogue.generate(k)
+            given = None
+            for j in range(patience + 1):
+                source, notes = candidate
+                if source is None:
+                    recorder.judged(k, j, None, notes)
+                    break
+                folder = recorder.candidate(k, j, source)
+                report = verify(source, task, seed=seed, out=folder)
+                recorder.judged(k, j, report, notes)
+                if report.passed:
+                    return _deliver(recorder, task, k, source, report, folder)
+                if j < patience:
+                    candidate = dialogue.edit(k, j + 1, source, report)
+                else:
+                    dialogue.summarise(k, j, source, report)
+        recorder.finish("not verified")
+    except KeyboardInterrupt:
+        recorder.finish("interrupted")
+        raise
+    except Fault as error:
+        recorder.finish("fault", reason=str(error))
+        raise
+    return recorder.run
+
+
+def _deliver(
+    recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
+) -> Run:
+    """Puts the verified controller and its evidence at the top of the run."""
+    folder = recorder.run.folder
+    write_atomic(folder / "controller.py", source)
+    write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
+    (folder / "trajectories").mkdir(exist_ok=True)
+    for path in sorted((evidence / "trajectories").glob("*.npz")):
+        write_atomic(folder / "trajectories" / path.name, path.read_bytes())
+    draw_trajectories(
+        task, load_trajectories(folder / "trajectories"), folder / "trajectory.png"
+    )
+    recorder.run.tau = k
+    recorder.finish("verified", k=k)
+    return recorder.run
+
+
+def _provider(given: str | Provider, task: Task) -> Provider:
+    if not isinstance(given, str):
+        return given
+    if given != "builtin":
+        raise TaskError(f"unknown learner {given!r}; available: 'builtin' (no model)")
+    return Builtin(task.nominal, task.params)
+
+
+def _recorder(
+    task: Task,
+    out: Path,
+    learner: Provider,
+    optimizer: Provider,
+    iterations: int,
+    patience: int,
+    seed: int,
+    on_event: Event,
+) -> Recorder:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            raise RunError(f"the folder {out} is not empty; give a new one with --out")
+        run = Run(
+            folder=out,
+            task=task.name,
+            task_sha256=task.sha256(),
+            learner=learner.name,
+            optimizer=optimizer.name,
+            iterations=iterations,
+            patience=patience,
+            seed=seed,
+            started=datetime.now(UTC).isoformat(timespec="seconds"),
+        )
+        recorder = Recorder(run, on_event)
+        recorder.start(task)
+    except OSError as error:
+        raise RunError(f"cannot write to {out}: {error.strerror}") from error
+    return recorder

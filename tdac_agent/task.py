@@ -1,0 +1,255 @@
+"""`task.yaml`: what is asked for, and the feasible task it stands for."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tdac_envs.errors import TaskError
+from tdac_envs.grid import OccupancyGrid
+from tdac_envs.map2d import Map2DEnv
+from tdac_envs.maps import ROBOT_IMAGE, bundled_maps
+from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.preprocess import write_map
+from tdac_envs.source2d import Prepared, prepare
+from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
+
+Profile = Literal["policy", "paper"]
+SENSORS_FILE = Path(__file__).parent.parent / "tdac_envs" / "sensors.py"
+MIN_PROGRESS_STEPS = 400
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RobotSpec(_Strict):
+    """The robot's body, where it differs from the default."""
+
+    radius: float | None = Field(None, gt=0, description="px")
+    axle: float | None = Field(None, gt=0, description="px; default 2 x radius")
+    max_wheel_speed: float | None = Field(None, gt=0, description="px/s")
+    n_rays: int | None = Field(None, ge=1)
+    field_of_view: float | None = Field(None, gt=0, le=360, description="degrees")
+    range_max: float | None = Field(None, gt=0, description="px")
+    image: Path | None = Field(None, description="Picture of the robot, nose to +x.")
+
+
+class ProgressSpec(_Strict):
+    """The progress test: d_min <= fraction * d0 within so many steps."""
+
+    fraction: float = Field(0.7, gt=0, lt=1)
+    steps: int | None = Field(None, gt=0, description="Default max(400, 0.16 horizon).")
+    distance: Literal["geodesic", "euclidean"] = "geodesic"
+
+
+class TaskFile(_Strict):
+    """Contents of `task.yaml`, schema 1."""
+
+    schema_version: Literal[1] = Field(1, alias="schema")
+    env: Literal["TDAC-Map2D-v0"] = "TDAC-Map2D-v0"
+    map: str = Field("maze", description="Bundled name, or a path beside this file.")
+    robot: RobotSpec = RobotSpec()
+    start: tuple[float, float] | tuple[float, float, float] | None = None
+    goal: tuple[float, float] | None = None
+    snap: bool = Field(False, description="Move start and goal to a free place.")
+    tolerance: float | None = Field(None, gt=0, description="px")
+    dt: float = Field(0.05, gt=0, description="s")
+    horizon: int | None = Field(None, gt=0, description="steps")
+    progress: ProgressSpec = ProgressSpec()
+    variation: Literal["nominal", "jitter", "random"] = "jitter"
+    suite: Path | None = Field(None, description="Folder with further test files.")
+    profile: Profile = "paper"
+    instructions: str = Field("", description="The user's own text to the model.")
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """A task that was checked and found feasible.
+
+    Attributes:
+        name: For people.
+        spec: The file's contents.
+        params: Of the map, start, goal and robot filled in.
+        nominal: The feasible task.
+        image: Map image, where there is one.
+        robot_image: Picture of the robot.
+    """
+
+    name: str
+    spec: TaskFile
+    params: MapParams
+    nominal: Map2DTask
+    image: Path | None
+    robot_image: Path
+
+    @property
+    def progress_steps(self) -> int:
+        """Steps within which the progress test wants its progress."""
+        default = max(MIN_PROGRESS_STEPS, math.ceil(0.16 * self.nominal.horizon))
+        return self.spec.progress.steps or default
+
+    def env_kwargs(self) -> dict[str, Any]:
+        """Arguments that make this task's environment; see `Map2DEnv`."""
+        nominal, robot = self.nominal, self.nominal.robot
+        return {
+            "map": nominal.terrain.grid.cells,
+            "start": tuple(nominal.start),
+            "goal": nominal.goal,
+            "robot_radius": robot.radius,
+            "axle_length": robot.axle_length,
+            "max_wheel_speed": robot.max_wheel_speed,
+            "n_rays": robot.n_rays,
+            "field_of_view": robot.field_of_view_deg,
+            "range_max": robot.range_max,
+            "dt": nominal.dt,
+            "horizon": nominal.horizon,
+            "goal_tolerance": nominal.goal_tolerance,
+        }
+
+    def make_env(self, **options: Any) -> Map2DEnv:
+        """The environment of this task; options as for `Map2DEnv`."""
+        return Map2DEnv(**{**self.env_kwargs(), **options})
+
+    def sha256(self) -> str:
+        """Hash of everything that decides an episode."""
+        facts = {k: v for k, v in self.env_kwargs().items() if k != "map"}
+        facts["map"] = self.nominal.terrain.grid.sha256()
+        facts["progress"] = self.spec.progress.model_dump()
+        text = json.dumps(facts, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def load_task(source: str | Path | TaskFile, *, base: Path | None = None) -> Task:
+    """Reads and checks a task.
+
+    Args:
+        source: Name of a bundled task, path of a `task.yaml`, folder that holds
+            one, or its contents.
+        base: Folder that relative paths in the contents refer to; the file's own
+            by default.
+
+    Raises:
+        TaskError: The file or the task cannot be used; the message says what to do.
+        MapError: The map cannot be used.
+    """
+    name = "task"
+    if isinstance(source, TaskFile):
+        spec = source
+    elif str(source) in bundled_maps():
+        name, spec = str(source), TaskFile(map=str(source))
+    else:
+        path = Path(source)
+        path = path / "task.yaml" if path.is_dir() else path
+        spec, base = _read(path, source), base or path.parent
+        name = path.parent.resolve().name if path.name == "task.yaml" else path.stem
+    return _resolve(name, spec, base or Path())
+
+
+def _read(path: Path, asked: object) -> TaskFile:
+    try:
+        data = yaml.safe_load(path.read_text())
+    except OSError as error:
+        names = ", ".join(bundled_maps())
+        raise TaskError(
+            f"no task {str(asked)!r}: {error.strerror}; bundled tasks: {names}"
+        ) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        reason = " ".join(str(error).split())
+        raise TaskError(f"{path} is not a task file: {reason}") from error
+    if not isinstance(data, dict):
+        raise TaskError(f"{path} is not a task file: expected `key: value` lines")
+    try:
+        return TaskFile.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise TaskError(f"{path}: {where}: {first['msg']}") from error
+
+
+def _resolve(name: str, spec: TaskFile, base: Path) -> Task:
+    if spec.map in bundled_maps():
+        source, name = spec.map, spec.map if name == "task" else name
+    else:
+        source = str(base / spec.map)
+        name = Path(spec.map).stem if name == "task" else name
+    prepared = prepare(
+        source,
+        spec.start,
+        spec.goal,
+        robot_radius=spec.robot.radius,
+        snap=spec.snap,
+    )
+    params = _with_robot(prepared.params, spec.robot)
+    nominal = _feasible(prepared.grid, params, spec)
+    robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
+    if not robot_image.is_file():
+        raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
+    return Task(name, spec, params, nominal, prepared.image, robot_image)
+
+
+def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
+    given = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
+    fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
+    changes = {fields.get(key, key): value for key, value in given.items()}
+    robot = RobotParams(**{**params.robot.model_dump(), **changes})
+    return params.model_copy(update={"robot": robot})
+
+
+def _feasible(grid: OccupancyGrid, params: MapParams, spec: TaskFile) -> Map2DTask:
+    assert params.start is not None
+    assert params.goal is not None
+    return make_task(
+        Terrain.of(grid),
+        Pose(*params.start, params.heading),
+        params.goal,
+        params.robot,
+        dt=spec.dt,
+        goal_tolerance=spec.tolerance,
+        horizon=spec.horizon,
+    )
+
+
+def write_workdir(folder: Path, task: Task) -> None:
+    """Fills the folder a controller works in.
+
+    Writes `params.json`, `occupancy.npy`, `occupancy.png`, `robot.png` and
+    `sensors.py`; the controller itself comes beside them.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    write_map(folder, task.nominal.terrain.grid, task.params)
+    (folder / "robot.png").write_bytes(task.robot_image.read_bytes())
+    (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())
+
+
+def portable_task_file(task: Task) -> str:
+    """`task.yaml` for a run folder: the map is the working folder's own grid."""
+    robot = task.nominal.robot
+    spec = task.spec.model_dump(
+        mode="json", exclude_none=True, exclude={"snap", "suite"}, by_alias=True
+    )
+    spec["map"] = "work"
+    spec["start"] = [float(v) for v in task.nominal.start]
+    spec["goal"] = [float(v) for v in task.nominal.goal]
+    spec["tolerance"] = task.nominal.goal_tolerance
+    spec["horizon"] = task.nominal.horizon
+    spec["robot"] = {
+        "radius": robot.radius,
+        "axle": robot.axle_length,
+        "max_wheel_speed": robot.max_wheel_speed,
+        "n_rays": robot.n_rays,
+        "field_of_view": robot.field_of_view_deg,
+        "range_max": robot.range_max,
+        "image": "work/robot.png",
+    }
+    return yaml.safe_dump(spec, sort_keys=False)
