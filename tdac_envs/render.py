@@ -1,0 +1,215 @@
+"""Pictures of TDAC-Map2D-v0: frames of an episode, and whole trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import radians
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tdac_envs.canvas import GREY, INK, TRAIL, Canvas, Colour, Image
+from tdac_envs.grid import BoolGrid
+from tdac_envs.marks import (
+    LEFT_RAYS,
+    OUTCOMES,
+    RIGHT_RAYS,
+    draw_disc,
+    draw_outcome,
+    draw_rays,
+    draw_task,
+    load_sprite,
+)
+from tdac_envs.params import RobotParams
+
+ROBOT_IMAGE = Path(__file__).parent / "maps" / "robot.png"
+SMALLEST_BODY = 3.0
+SMALLEST_PICTURE = 6.0
+_RUN_COLOURS: tuple[Colour, ...] = (
+    TRAIL,
+    (0, 136, 126),
+    (206, 98, 0),
+    (186, 44, 138),
+    (24, 116, 205),
+    (122, 118, 0),
+    (146, 84, 44),
+    (96, 104, 118),
+)
+_ROW = 22
+
+
+class Status(NamedTuple):
+    """What the strip below the map says.
+
+    Attributes:
+        step: Steps so far.
+        horizon: Steps at most.
+        distance: Distance to the goal, px.
+        outcome: "reached", "collision", "out of time", or empty while it runs.
+    """
+
+    step: int
+    horizon: int
+    distance: float
+    outcome: str = ""
+
+
+class Scene:
+    """What stays the same in an episode's frames, drawn once.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        start: Pose (x, y, heading).
+        goal: Point (x, y), px.
+        goal_tolerance: px.
+        robot: Its body radius and its sensor.
+        path: Reference path, shape (n, 2).
+        robot_image: Picture of the robot looking right; where it is missing, or the
+            robot too small for it, a disc with a nose is drawn.
+    """
+
+    def __init__(
+        self,
+        cells: BoolGrid,
+        start: Sequence[float],
+        goal: Sequence[float],
+        *,
+        goal_tolerance: float,
+        robot: RobotParams,
+        path: ArrayLike = (),
+        robot_image: Path = ROBOT_IMAGE,
+    ) -> None:
+        self._canvas = Canvas(cells)
+        self._robot = robot
+        self._radius = max(robot.radius * self._canvas.scale, SMALLEST_BODY)
+        self._sprite = load_sprite(robot_image, self._radius)
+        draw_task(self._canvas, start, goal, goal_tolerance, path)
+
+    def frame(
+        self,
+        pose: Sequence[float],
+        ranges: ArrayLike = (),
+        trail: ArrayLike = (),
+        status: Status | None = None,
+    ) -> Image:
+        """The picture of one moment, uint8 RGB, both sides even.
+
+        Args:
+            pose: (x, y, heading).
+            ranges: Distances along the sensor's rays, px.
+            trail: Places so far, shape (n, 2).
+            status: Text for the strip; its outcome also marks the robot.
+        """
+        canvas, robot = self._canvas.copy(), self._robot
+        x, y, heading = (float(value) for value in pose)
+        fan, fov = np.asarray(ranges, np.float64), radians(robot.field_of_view_deg)
+        draw_rays(canvas, (x, y, heading), fan, fov, robot.range_max)
+        canvas.line(trail, TRAIL, 2)
+        if self._radius < SMALLEST_PICTURE:
+            canvas.disc((x, y), 3 * self._radius, TRAIL, 0.6, 1)
+        if self._sprite is None or self._radius < SMALLEST_PICTURE:
+            draw_disc(canvas, (x, y, heading), self._radius)
+        else:
+            canvas.paste((x, y), heading, self._sprite)
+        if status is not None:
+            draw_outcome(canvas, (x, y), self._radius, status.outcome)
+            _write_status(canvas, status)
+        return canvas.image
+
+
+def _write_status(canvas: Canvas, status: Status) -> None:
+    width, baseline = canvas.image.shape[1], canvas.strip_top + 20
+    x = canvas.text(10, baseline, f"step {status.step} / {status.horizon}", INK)
+    x = canvas.text(x + 14, baseline, f"goal {status.distance:.0f} px away", INK)
+    if status.outcome:
+        colour = OUTCOMES.get(status.outcome, INK)
+        x = canvas.text(x + 14, baseline, status.outcome, colour)
+    if width - x > 190:
+        at = canvas.text(width - 160, baseline, "left", LEFT_RAYS)
+        at = canvas.text(at + 2, baseline, "/", GREY)
+        canvas.text(at + 2, baseline, "right rays", RIGHT_RAYS)
+
+
+def trajectory_picture(
+    cells: BoolGrid,
+    trajectories: Sequence[ArrayLike],
+    start: Sequence[float],
+    goal: Sequence[float],
+    *,
+    goal_tolerance: float,
+    radius: float,
+    path: ArrayLike = (),
+    outcomes: Sequence[str] = (),
+    labels: Sequence[str] = (),
+) -> Image:
+    """The map with one or more trajectories and a legend, uint8 RGB.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        trajectories: Each of shape (T + 1, 3): x, y, heading.
+        start: Nominal start, (x, y) or a pose.
+        goal: Point (x, y), px.
+        goal_tolerance: px.
+        radius: Body radius, px.
+        path: Reference path, shape (n, 2).
+        outcomes: "reached", "collision" or "out of time" for each trajectory; sets
+            the mark at its end.
+        labels: A name for each trajectory.
+    """
+    runs = [np.asarray(run, np.float64).reshape(-1, 3) for run in trajectories]
+    ends = [*outcomes, *[""] * (len(runs) - len(outcomes))]
+    colours = [_RUN_COLOURS[k % len(_RUN_COLOURS)] for k in range(len(runs))]
+    entries = [(GREY, "shortest path")] if len(np.asarray(path)) > 1 else []
+    for k, (colour, end) in enumerate(zip(colours, ends, strict=True)):
+        name = labels[k] if k < len(labels) else f"run {k + 1}"
+        entries.append((colour, f"{name}: {end}" if end else name))
+    rows = _legend_rows(entries, Canvas.frame_width(cells))
+    canvas = Canvas(cells, strip=10 + _ROW * len(rows))
+    draw_task(canvas, start, goal, goal_tolerance, path)
+    body = max(radius * canvas.scale, SMALLEST_BODY)
+    for run, colour in zip(runs, colours, strict=True):
+        _draw_run(canvas, run, colour, body)
+    for run, end in zip(runs, ends, strict=True):
+        draw_outcome(canvas, run[-1, :2], body, end)
+    _write_legend(canvas, rows)
+    return canvas.image
+
+
+def _draw_run(
+    canvas: Canvas, run: NDArray[np.float64], colour: Colour, body: float
+) -> None:
+    """The line of a run and the outline of its body every three radii."""
+    steps = np.hypot(*np.diff(run[:, :2], axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(steps)]) * canvas.scale
+    stops = np.searchsorted(along, np.arange(0.0, along[-1], 3 * body))
+    for x, y, _ in run[stops]:
+        canvas.disc((x, y), body, colour, 0.35, 1)
+    canvas.line(run[:, :2], colour, 2, 0.9)
+    canvas.disc(run[-1, :2], body, colour, 0.25)
+    canvas.disc(run[-1, :2], body, colour, 1.0, 1)
+
+
+def _legend_rows(
+    entries: list[tuple[Colour, str]], width: int
+) -> list[list[tuple[int, Colour, str]]]:
+    """Entries with their x, broken into rows as wide as the frame."""
+    rows: list[list[tuple[int, Colour, str]]] = [[]]
+    x = 10
+    for colour, text in entries:
+        taken = 46 + Canvas.text_width(text)
+        if rows[-1] and x + taken > width:
+            rows.append([])
+            x = 10
+        rows[-1].append((x, colour, text))
+        x += taken
+    return rows
+
+
+def _write_legend(canvas: Canvas, rows: list[list[tuple[int, Colour, str]]]) -> None:
+    for row, entries in enumerate(rows):
+        baseline = canvas.strip_top + 21 + _ROW * row
+        for x, colour, text in entries:
+            canvas.image[baseline - 6 : baseline - 3, x : x + 18] = colour
+            canvas.text(x + 24, baseline, text, INK)
