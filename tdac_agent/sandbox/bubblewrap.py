@@ -5,10 +5,8 @@ from __future__ import annotations
 import shutil
 
 from tdac_agent.sandbox.errors import SandboxError
-from tdac_agent.sandbox.exposure import exposure
+from tdac_agent.sandbox.exposure import DEVICES, exposure
 from tdac_agent.sandbox.folder import PrivateFolder
-
-DEVICES = ("/dev/null", "/dev/zero", "/dev/urandom")
 
 
 def bubblewrap_command(

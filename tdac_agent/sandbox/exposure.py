@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 INNER = Path(__file__).resolve().parent / "inner"
+DEVICES = ("/dev/null", "/dev/zero", "/dev/urandom")
 FOREIGN_PACKAGES = ("site-packages", "dist-packages")
 
 
@@ -100,3 +101,24 @@ def _foreign(folders: list[str]) -> list[str]:
             for pattern in (name, f"*/{name}"):
                 found.update(str(path) for path in Path(folder).glob(pattern))
     return sorted(found)
+
+
+@functools.cache
+def entries_but_hidden(seen: Exposure) -> tuple[list[str], list[str]]:
+    """Return `system` without `hidden`, for a sandbox that cannot mask a folder.
+
+    Returns:
+        Paths to be read with all below them, and folders only to be listed.
+    """
+    readable, listable = [], []
+    waiting = list(seen.system)
+    while waiting:
+        path = waiting.pop()
+        if path in seen.hidden:
+            continue
+        if any(hidden.startswith(path + os.sep) for hidden in seen.hidden):
+            listable.append(path)
+            waiting += [entry.path for entry in os.scandir(path)]
+        else:
+            readable.append(path)
+    return readable, listable

@@ -18,8 +18,9 @@ from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
 
 BOOT = (
-    "import sys; sys.path[:0] = sys.argv[3:]; from inner.main import main; "
-    "main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[4])"
+    "import sys; *fds, code, site = sys.argv[1:]; "
+    "sys.path[:] = [code, *sys.path, site]; from inner.main import main; "
+    "main(*map(int, fds), site)"
 )
 # No `-I`: it would ignore PYTHONHASHSEED. The environment below is all there is.
 OPTIONS = ("-s", "-S", "-P", "-B", "-u", "-X", "utf8")
@@ -56,8 +57,9 @@ def spawn(tier: str, folder: PrivateFolder, limits: Limits) -> Spawned:
             outer.append(mine)
             inner.append(other)
         requests, answers, output, lifeline = inner
-        command = [exposure().interpreter, *OPTIONS, "-c", BOOT, str(requests)]
-        command += [str(answers), str(INNER.parent), str(folder.site)]
+        command = [exposure().interpreter, *OPTIONS, "-c", BOOT]
+        command += [str(end) for end in (requests, answers, lifeline)]
+        command += [str(INNER.parent), str(folder.site)]
         if tier == "bubblewrap":
             size = limits.scratch_bytes
             command = bubblewrap_command(folder, lifeline, size) + command

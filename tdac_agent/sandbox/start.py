@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.sandbox.errors import ControllerFault, SandboxError
+from tdac_agent.sandbox.exposure import DEVICES, entries_but_hidden, exposure
 from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
 from tdac_agent.sandbox.process import Child
@@ -70,9 +71,10 @@ def start_blank(tier: Tier, limits: Limits) -> Child:
     except BaseException:
         child.close()
         raise
-    if tier.hides_files and not facts["files_hidden"]:
+    broken = [promise for promise in tier.promises if not facts[promise]]
+    if broken:
         child.close()
-        raise SandboxError(f"{tier.name}: files outside the sandbox can be read")
+        raise SandboxError(f"{tier.name}: does not hold here: {', '.join(broken)}")
     return child
 
 
@@ -105,8 +107,19 @@ def _find(name: str) -> Tier:
 
 
 def _setup(tier: Tier, limits: Limits, folder: PrivateFolder) -> dict[str, Any]:
+    seen = exposure()
+    readable, listable = entries_but_hidden(seen)
     return {
         "steps": list(tier.steps),
+        "links": list(seen.links),
+        "system": list(seen.system),
+        "hidden": list(seen.hidden),
+        "packages": list(seen.packages),
+        "devices": list(DEVICES),
+        "readable": readable,
+        "listable": listable,
+        "root": str(folder.root),
+        "site": str(folder.site),
         "work": str(folder.work),
         "scratch": str(folder.scratch),
         "witnesses": [path for path in WITNESSES if os.access(path, os.R_OK)],

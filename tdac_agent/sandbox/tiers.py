@@ -9,20 +9,24 @@ from dataclasses import dataclass
 class Tier:
     """One way to confine a child.
 
+    Each start checks, in the child, that what the tier promises holds.
+
     Attributes:
         name: As named in a verdict.
         steps: What the child applies to itself after it has imported numpy.
-        hides_files: Whether it promises that other files cannot be read.
-        denies_network: Whether it promises that there is no network.
+        promises: Of `hides_files` (only what it needs can be read), `denies_network`
+            and `denies_processes` (no fork, no program, no thread).
     """
 
     name: str
     steps: tuple[str, ...]
-    hides_files: bool
-    denies_network: bool
+    promises: tuple[str, ...]
 
 
+ALL_PROMISES = ("hides_files", "denies_network", "denies_processes")
 TIERS = (
-    Tier("bubblewrap", ("rlimits",), True, True),
-    Tier("rlimits", ("rlimits",), False, False),
+    Tier("bubblewrap", ("rlimits", "seccomp"), ALL_PROMISES),
+    Tier("namespaces", ("namespaces", "rlimits", "seccomp"), ALL_PROMISES),
+    Tier("landlock", ("rlimits", "landlock", "seccomp"), ALL_PROMISES),
+    Tier("rlimits", ("rlimits", "seccomp if offered"), ()),
 )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 from typing import Any
+
+from . import kernel, landlock, namespaces, seccomp
 
 
 def confine(setup: dict[str, Any]) -> dict[str, bool]:
@@ -12,11 +15,18 @@ def confine(setup: dict[str, Any]) -> dict[str, bool]:
 
     Args:
         setup: The judge's setup frame.
+
+    Raises:
+        OSError: A step is not possible here.
     """
     for step in setup["steps"]:
         _STEPS[step](setup)
     os.chdir(setup["work"])
-    return {"files_hidden": _files_hidden(setup["witnesses"])}
+    return {
+        "hides_files": _files_hidden(setup["witnesses"]),
+        "denies_network": not kernel.can_open_socket(),
+        "denies_processes": not _can_fork(),
+    }
 
 
 def _limit_resources(setup: dict[str, Any]) -> None:
@@ -34,6 +44,27 @@ def _limit_resources(setup: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
 
+def _limit_files(setup: dict[str, Any]) -> None:
+    readable = [*setup["readable"], *setup["packages"], setup["work"], setup["site"]]
+    landlock.apply(
+        [
+            *((path, landlock.READ) for path in readable),
+            *((path, landlock.LIST) for path in setup["listable"]),
+            *((path, landlock.DEVICE) for path in setup["devices"]),
+            (setup["scratch"], landlock.SCRATCH),
+        ]
+    )
+
+
+def _limit_system_calls(setup: dict[str, Any]) -> None:
+    seccomp.apply(setup["lifeline"])
+
+
+def _limit_system_calls_if_offered(setup: dict[str, Any]) -> None:
+    with contextlib.suppress(OSError):
+        seccomp.apply(setup["lifeline"])
+
+
 def _files_hidden(witnesses: list[str]) -> bool:
     """Return whether none of some files that exist outside can be opened."""
     for path in witnesses:
@@ -45,4 +76,21 @@ def _files_hidden(witnesses: list[str]) -> bool:
     return True
 
 
-_STEPS = {"rlimits": _limit_resources}
+def _can_fork() -> bool:
+    try:
+        pid = os.fork()
+    except OSError:
+        return False
+    if pid == 0:
+        os._exit(0)
+    os.waitpid(pid, 0)
+    return True
+
+
+_STEPS = {
+    "namespaces": namespaces.enter,
+    "rlimits": _limit_resources,
+    "landlock": _limit_files,
+    "seccomp": _limit_system_calls,
+    "seccomp if offered": _limit_system_calls_if_offered,
+}

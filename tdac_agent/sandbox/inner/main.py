@@ -12,20 +12,22 @@ from .serve import Server
 from .wire import Kind
 
 
-def main(requests: int, answers: int, site: str) -> None:
+def main(requests: int, answers: int, lifeline: int, site: str) -> None:
     """Serve the judge on two descriptors until it closes them.
 
     Args:
         requests: Descriptor that the judge writes to.
         answers: Descriptor that the judge reads.
+        lifeline: Descriptor that has to stay open.
         site: Folder from which numpy is imported.
     """
     link = Link(requests, answers)
     _, sequence, payload = link.receive()
     setup = decode(payload)
+    ours = {"descriptors": [requests, answers], "lifeline": lifeline}
     sys.argv = ["controller.py"]
-    sys.path[:] = [setup["work"], *sys.path[2:], site]
-    facts = confine(setup)
+    sys.path[:] = [setup["work"], *sys.path[1:-1], site]
+    facts = confine({**setup, **ours})
     link.frame_bytes = setup["frame_bytes"]
     link.send(Kind.VALUE, sequence, encode(facts))
     Server(link).run()

@@ -1,0 +1,93 @@
+"""Allow-list of system calls, enforced by the kernel; all others give EPERM."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import struct
+
+from . import kernel, syscalls
+
+_LOAD, _IF_EQUAL, _IF_AT_LEAST, _RETURN = 0x20, 0x15, 0x35, 0x06
+_ALLOW, _KILL, _DENY = 0x7FFF0000, 0x80000000, 0x00050000 | errno.EPERM
+_X32 = 0x40000000
+_IOCTLS = (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451)
+_FCNTLS = (0, 1, 2, 3, 1030)
+
+Instruction = tuple[int, int, int, int]
+
+
+def apply(lifeline: int) -> None:
+    """Restrict this process for good.
+
+    Args:
+        lifeline: Descriptor that must stay open: the kernel kills the process through
+            it when the judge has gone.
+
+    Raises:
+        OSError: The kernel or the processor does not offer it.
+    """
+    code = b"".join(struct.pack("<HBBI", *step) for step in program(lifeline))
+    buffer = ctypes.create_string_buffer(code, len(code))
+    pointer = struct.pack("@HP", len(code) // 8, ctypes.addressof(buffer))
+    kernel.prctl(kernel.PR_SET_NO_NEW_PRIVS, 1)
+    kernel.syscall("seccomp", 1, 0, ctypes.create_string_buffer(pointer, len(pointer)))
+
+
+def program(lifeline: int) -> list[Instruction]:
+    """Return the filter for this processor and process."""
+    machine = os.uname().machine
+    if machine not in syscalls.MACHINES:
+        raise OSError(f"no table of system calls for {machine}")
+    steps = [
+        (_LOAD, 0, 0, 4),
+        (_IF_EQUAL, 1, 0, syscalls.MACHINES[machine][1]),
+        (_RETURN, 0, 0, _KILL),
+        (_LOAD, 0, 0, 0),
+        (_IF_AT_LEAST, 0, 1, _X32),
+        (_RETURN, 0, 0, _KILL),
+    ]
+    for number in syscalls.allowed(machine):
+        steps += [(_IF_EQUAL, 0, 1, number), (_RETURN, 0, 0, _ALLOW)]
+    guards = _guards(lifeline)
+    for name, number in syscalls.guarded(machine).items():
+        steps += [(_IF_EQUAL, 0, len(guards[name]), number), *guards[name]]
+    return [*steps, (_RETURN, 0, 0, _DENY)]
+
+
+def _guards(lifeline: int) -> dict[str, list[Instruction]]:
+    own = os.getpid()
+    keeps_lifeline = [*_is_not(0, lifeline), (_RETURN, 0, 0, _ALLOW)]
+    onto_lifeline = [*_is_not(1, lifeline), (_RETURN, 0, 0, _ALLOW)]
+    to_itself = _one_of(0, (own,))
+    return {
+        "close": keeps_lifeline,
+        "dup2": onto_lifeline,
+        "dup3": onto_lifeline,
+        "fcntl": [*_one_of(1, _FCNTLS), (_RETURN, 0, 0, _ALLOW)],
+        "ioctl": [*_one_of(1, _IOCTLS), (_RETURN, 0, 0, _ALLOW)],
+        "kill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
+        "tgkill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
+        # May read its own limits and set none.
+        "prlimit64": [
+            *_one_of(0, (0, own)),
+            *_one_of(2, (0,)),
+            *_one_of(2, (0,), high=True),
+            (_RETURN, 0, 0, _ALLOW),
+        ],
+    }
+
+
+def _one_of(
+    argument: int, values: tuple[int, ...], high: bool = False
+) -> list[Instruction]:
+    steps = [(_LOAD, 0, 0, 16 + 8 * argument + 4 * high)]
+    for index, value in enumerate(values):
+        steps.append((_IF_EQUAL, len(values) - index, 0, value))
+    return [*steps, (_RETURN, 0, 0, _DENY)]
+
+
+def _is_not(argument: int, value: int) -> list[Instruction]:
+    load = (_LOAD, 0, 0, 16 + 8 * argument)
+    return [load, (_IF_EQUAL, 0, 1, value), (_RETURN, 0, 0, _DENY)]
