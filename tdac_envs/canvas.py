@@ -137,10 +137,14 @@ class Canvas:
     ) -> None:
         """Draws a filled disc, or a circle of the given line width."""
         at = self.to_frame(centre)
-        corners = np.vstack([at - radius, at + radius])
-        patch, origin = self._patch(corners, max(width, 0) + 2)
-        (x, y), size = _fixed(at - origin)[0].tolist(), round(radius * (1 << _SHIFT))
-        cv2.circle(patch, (x, y), size, colour, width, cv2.LINE_AA, _SHIFT)
+        reach = radius + max(width, 0) / 2
+        patch, origin = self._patch(np.vstack([at - reach, at + reach]), 2)
+        turns = np.linspace(0, 2 * np.pi, round(np.clip(3 * reach, 24, 360)))
+        circle = np.column_stack([np.cos(turns), np.sin(turns)])
+        # Two outlines leave a hole; OpenCV's own thick circles are polygons.
+        radii = [reach] if width < 0 else [reach, max(radius - width / 2, 0.0)]
+        rims = [_fixed(at - origin + rim * circle) for rim in radii]
+        cv2.fillPoly(patch, rims, colour, cv2.LINE_AA, _SHIFT)
         self._blend(patch, origin, alpha)
 
     def paste(
@@ -187,7 +191,8 @@ class Canvas:
         alpha: float,
     ) -> None:
         patch, origin = self._patch(around, width + 2)
-        fixed = [_fixed(piece - origin) for piece in pieces]
+        # Many joints in a straight line would show as dots.
+        fixed = [cv2.approxPolyDP(_fixed(p - origin), 4, False) for p in pieces]
         cv2.polylines(patch, fixed, False, colour, width, cv2.LINE_AA, _SHIFT)
         self._blend(patch, origin, alpha)
 

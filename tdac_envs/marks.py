@@ -63,10 +63,10 @@ def draw_task(
     canvas.line(path, GREY, 1 if canvas.scale < 1 else 2, 0.75, dash=6)
     canvas.disc(start[:2], 5, FREE)
     canvas.disc(start[:2], 5, GREY, width=2)
-    ring = max(goal_tolerance * canvas.scale, 4.0)
+    ring = max(goal_tolerance * canvas.scale, 6.0)
     canvas.disc(goal, ring, GREEN, 0.16)
     canvas.disc(goal, ring, GREEN, width=2)
-    canvas.disc(goal, 3.5, GREEN)
+    canvas.disc(goal, min(3.5, ring / 3), GREEN)
 
 
 def draw_rays(
