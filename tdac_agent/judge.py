@@ -126,12 +126,15 @@ class Judge:
             return self._not_run(name, str(self._fault))
         if name != "nominal" and not self.rollout("nominal").reached:
             return self._not_run(name, "not run, since the nominal episode failed")
-        rollout = self._drive(name, steps, drive)
+        rollout = self.drive(name, steps, drive)
         if rollout.error is not None and " did not end within " in rollout.error:
-            rollout = self._drive(name, steps, drive)
+            rollout = self.drive(name, steps, drive)
         return rollout
 
-    def _drive(self, name: str, steps: int | None, drive: str) -> Rollout:
+    def drive(
+        self, name: str, steps: int | None = None, drive: str = "policy"
+    ) -> Rollout:
+        """Runs an episode in a fresh child; arguments as for `rollout`."""
         if self.cpu_seconds >= CPU_SECONDS:
             message = f"the controller used more than {CPU_SECONDS} s of CPU time"
             return self._not_run(name, message)

@@ -108,9 +108,9 @@ class Recorder:
         self.event("run.start", task=task.name, learner=self.run.learner)
         self.save()
 
-    def event(self, kind: str, **facts: Any) -> None:
+    def event(self, name: str, /, **facts: Any) -> None:
         """Appends to the journal."""
-        record = {"event": kind, "seconds": round(self._elapsed(), 3), **facts}
+        record = {"event": name, "seconds": round(self._elapsed(), 3), **facts}
         append_line(self.run.folder / "journal.jsonl", record)
         self.on_event(record)
 

@@ -93,9 +93,9 @@ def _deliver(
     (folder / "trajectories").mkdir(exist_ok=True)
     for path in sorted((evidence / "trajectories").glob("*.npz")):
         write_atomic(folder / "trajectories" / path.name, path.read_bytes())
-    draw_trajectories(
-        task, load_trajectories(folder / "trajectories"), folder / "trajectory.png"
-    )
+    outcomes = {episode.name: episode.outcome for episode in report.episodes}
+    trajectories = load_trajectories(folder / "trajectories")
+    draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
     recorder.run.tau = k
     recorder.finish("verified", k=k)
     return recorder.run

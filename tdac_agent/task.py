@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -16,10 +17,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.map2d import Map2DEnv
-from tdac_envs.maps import ROBOT_IMAGE, bundled_maps
+from tdac_envs.maps import bundled_maps
 from tdac_envs.params import MapParams, RobotParams
-from tdac_envs.preprocess import write_map
-from tdac_envs.source2d import Prepared, prepare
+from tdac_envs.render import ROBOT_IMAGE
+from tdac_envs.source2d import prepare
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
 
 Profile = Literal["policy", "paper"]
@@ -227,18 +228,21 @@ def write_workdir(folder: Path, task: Task) -> None:
     `sensors.py`; the controller itself comes beside them.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    write_map(folder, task.nominal.terrain.grid, task.params)
+    cells = task.nominal.terrain.grid.cells
+    np.save(folder / "occupancy.npy", cells)
+    cv2.imwrite(str(folder / "occupancy.png"), np.where(cells, 0, 255).astype(np.uint8))
+    task.params.save(folder / "params.json")
     (folder / "robot.png").write_bytes(task.robot_image.read_bytes())
     (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())
 
 
 def portable_task_file(task: Task) -> str:
-    """`task.yaml` for a run folder: the map is the working folder's own grid."""
+    """`task.yaml` for a run folder: the map is the folder's own grid."""
     robot = task.nominal.robot
     spec = task.spec.model_dump(
         mode="json", exclude_none=True, exclude={"snap", "suite"}, by_alias=True
     )
-    spec["map"] = "work"
+    spec["map"] = "."
     spec["start"] = [float(v) for v in task.nominal.start]
     spec["goal"] = [float(v) for v in task.nominal.goal]
     spec["tolerance"] = task.nominal.goal_tolerance
@@ -250,6 +254,6 @@ def portable_task_file(task: Task) -> str:
         "n_rays": robot.n_rays,
         "field_of_view": robot.field_of_view_deg,
         "range_max": robot.range_max,
-        "image": "work/robot.png",
+        "image": "robot.png",
     }
     return yaml.safe_dump(spec, sort_keys=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tdac_envs.errors import TaskError
 from tdac_envs.kernels import advance, cast_rays, path_distance, sees
 from tdac_envs.params import RobotParams
-from tdac_envs.render import Scene
+from tdac_envs.render import Scene, Status
 from tdac_envs.rewards import RewardWeights, step_reward
 from tdac_envs.source2d import MapSource, prepare
 from tdac_envs.task2d import (
@@ -24,7 +24,9 @@ from tdac_envs.task2d import (
     make_task,
     random_task,
 )
-from tdac_envs.window import Window
+
+if TYPE_CHECKING:
+    from tdac_envs.window import Window
 
 Observation = dict[str, NDArray[np.float32]]
 VARIATIONS = ("nominal", "jitter", "random")
@@ -251,6 +253,8 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         if self.render_mode == "rgb_array":
             return frame
         if self._window is None:
+            from tdac_envs.window import Window
+
             self._window = Window("TDAC-Map2D-v0", self.metadata["render_fps"])
         self._window.show(frame)
         return None
@@ -362,7 +366,19 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
             self.render()
 
     def _frame(self) -> NDArray[np.uint8]:
-        raise NotImplementedError
+        task = self.task
+        if self._scene is None:
+            self._scene = Scene(
+                task.terrain.grid.cells,
+                task.start,
+                task.goal,
+                goal_tolerance=task.goal_tolerance,
+                robot=task.robot,
+                path=task.path_from(task.start),
+            )
+        gap = math.dist(self._trail[-1], task.goal)
+        status = Status(self._steps, task.horizon, gap, self._status)
+        return self._scene.frame(self._state, self._ranges, self._trail, status)
 
 
 def observation_space(task: Map2DTask) -> spaces.Dict:

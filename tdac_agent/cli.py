@@ -1,0 +1,298 @@
+"""The command line: `tdac map | synth | verify | play | doctor`.
+
+Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastructure,
+4 budget, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Optional
+
+import typer
+
+app = typer.Typer(
+    name="tdac",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help=(
+        "Write a robot controller from tests, and know that it works.\n\n"
+        "Start with `tdac synth`: it turns the bundled maze image into a verified "
+        "`controller.py`, with no key and no network."
+    ),
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+TaskOption = Annotated[
+    Optional[str],  # noqa: UP045 - typer reads it at run time
+    typer.Option(
+        "--task", help="Bundled name, task.yaml, or run folder.  [default: maze]"
+    ),
+]
+MapOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--map", help="Map image, ROS map.yaml, MovingAI .map, or bundled."),
+]
+Start = Annotated[
+    Optional[tuple[float, float]],  # noqa: UP045
+    typer.Option("--start", metavar="X Y", help="Start, px (m with a map.yaml: use --metres)."),
+]
+Goal = Annotated[
+    Optional[tuple[float, float]],  # noqa: UP045
+    typer.Option("--goal", metavar="X Y", help="Goal, px."),
+]
+Radius = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--robot-radius", min=0.5, help="Body radius, px.  [default: 15]"),
+]
+Heading = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--heading", help="Start heading, rad, from +x towards +y (down)."),
+]
+Snap = Annotated[
+    bool, typer.Option("--snap", help="Move start and goal to the nearest free place.")
+]
+Metres = Annotated[
+    bool,
+    typer.Option("--metres", help="Lengths are metres in the map's frame (map.yaml)."),
+]
+Tier = Annotated[
+    str,
+    typer.Option(help="Sandbox tier; see `tdac doctor`."),
+]
+Profile = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(help="`policy` or `paper`.  [default: the task's own]"),
+]
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.")
+    ] = False,
+) -> None:
+    if version:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"tdac {installed('tdac')}")
+        raise typer.Exit
+
+
+@app.command("map", epilog="Example: `tdac map plan.png --start 90 302 --goal 178 386`")
+def map_command(
+    image: Annotated[str, typer.Argument(help="Map image or map file.")],
+    start: Start = None,
+    goal: Goal = None,
+    robot_radius: Radius = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    preset: Annotated[
+        str, typer.Option(help="`default`, or `paper` for the literal grid search.")
+    ] = "default",
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--out", help="Folder to write.  [default: NAME-map]"),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Turn a map image into an occupancy grid, and show how.
+
+    Without start and goal it writes a preview with rulers to read pixels off.
+    """
+    from tdac_agent.commands import maps
+
+    maps.run(image, start, goal, robot_radius, snap, metres, preset, out, as_json)
+
+
+@app.command(
+    epilog="Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 "
+    "--goal 178 386 --robot-radius 12`"
+)
+def synth(
+    task: TaskOption = None,
+    map_image: MapOption = None,
+    start: Start = None,
+    goal: Goal = None,
+    heading: Heading = None,
+    robot_radius: Radius = None,
+    robot_image: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Picture of the robot, nose to the right."),
+    ] = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    instructions: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(help="Your own text to the model, or a file with it."),
+    ] = None,
+    from_: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--from", help="Controller to begin with."),
+    ] = None,
+    k: Annotated[int, typer.Option("-K", min=1, help="Iterations at most.")] = 20,
+    j: Annotated[int, typer.Option("-J", min=0, help="Edits per iteration.")] = 1,
+    learner: Annotated[
+        str, typer.Option(help="Who writes: `builtin` is a template, no model.")
+    ] = "builtin",
+    optimizer: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(help="Who repairs.  [default: the learner]"),
+    ] = None,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--out", help="Run folder.  [default: runs/TASK-N]"),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Write, test and repair a controller until it is verified."""
+    from tdac_agent.commands import synth as command
+
+    spec = _flags(
+        task, map_image, start, goal, heading, robot_radius, robot_image, snap, metres,
+        instructions,
+    )  # fmt: skip
+    raise typer.Exit(
+        command.run(spec, from_, k, j, learner, optimizer, out, seed, as_json)
+    )
+
+
+@app.command(
+    epilog="Examples: `tdac verify controller.py --task maze`; `tdac verify runs/maze-1`"
+)
+def verify(
+    controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
+    task: TaskOption = None,
+    map_image: MapOption = None,
+    start: Start = None,
+    goal: Goal = None,
+    heading: Heading = None,
+    robot_radius: Radius = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    profile: Profile = None,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="Nominal start only, as in the paper.")
+    ] = False,
+    suite: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Folder with your own test_*.py files, run as well."),
+    ] = None,
+    tier: Tier = "auto",
+    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
+    junit: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Write a JUnit XML report."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Test a controller in the sandbox; exit 0 only if every test passed."""
+    from tdac_agent.commands import verify as command
+
+    spec = _flags(
+        task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
+    )
+    raise typer.Exit(
+        command.run(
+            controller, spec, profile, paper, suite, tier, seed, junit, as_json
+        )
+    )
+
+
+@app.command(
+    epilog="Example: `tdac play runs/maze-1 --video maze.mp4`"
+)
+def play(
+    controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
+    task: TaskOption = None,
+    map_image: MapOption = None,
+    start: Start = None,
+    goal: Goal = None,
+    heading: Heading = None,
+    robot_radius: Radius = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    video: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Write .mp4 or .gif instead of opening a window."),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, help="0: nominal start; N: jittered start N.")
+    ] = 0,
+    tier: Tier = "auto",
+) -> None:
+    """Show one episode of a controller, run in the sandbox."""
+    from tdac_agent.commands import play as command
+
+    spec = _flags(
+        task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
+    )
+    raise typer.Exit(command.run(controller, spec, video, seed, tier))
+
+
+@app.command(epilog="Example: `tdac doctor`")
+def doctor(as_json: Json = False) -> None:
+    """Say what works on this machine: sandbox tiers, window, video, versions."""
+    from tdac_agent.commands import doctor as command
+
+    raise typer.Exit(command.run(as_json))
+
+
+def _flags(
+    task: str | None,
+    map_image: str | None,
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+    heading: float | None,
+    robot_radius: float | None,
+    robot_image: Path | None,
+    snap: bool,
+    metres: bool,
+    instructions: str | None,
+) -> Any:
+    from tdac_agent.commands.flags import TaskFlags
+
+    return TaskFlags(
+        task=task,
+        map_image=map_image,
+        start=start,
+        goal=goal,
+        heading=heading,
+        robot_radius=robot_radius,
+        robot_image=robot_image,
+        snap=snap,
+        metres=metres,
+        instructions=instructions,
+    )
+
+
+def main() -> None:
+    """Entry point of the `tdac` script: every known error is one clear line."""
+    try:
+        app(prog_name="tdac")
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+    except Exception as error:
+        from tdac_agent.errors import Fault
+        from tdac_envs.errors import TdacError
+
+        if isinstance(error, TdacError):
+            _fail(f"error: {error}", 2)
+        if isinstance(error, Fault):
+            _fail(f"infrastructure fault: {error}", 3)
+        raise
+
+
+def _fail(message: str, code: int) -> None:
+    sys.stdout.flush()
+    print(" ".join(message.split()), file=sys.stderr)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

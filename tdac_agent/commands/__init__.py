@@ -1,0 +1,1 @@
+"""What the commands of `tdac` do; each module is imported when it is used."""

@@ -1,0 +1,63 @@
+"""A report on the terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from tdac_agent.report import Report
+
+GROUPS = ("static", "unit", "end to end", "user", "judge")
+FILES = {
+    "static": "test_static.py",
+    "unit": "test_unit.py",
+    "end to end": "test_end_to_end.py",
+}
+
+
+def show_report(report: Report, console: Console) -> None:
+    """Prints the verdict, the failures with their diagnosis, and the episodes."""
+    verdict, about = report.verdict, report.provenance
+    for warning in about.warnings:
+        console.print(f"[yellow]warning: {warning}[/]")
+    for failure in report.failures:
+        console.print(f"[red]failed[/] [bold]{escape(failure.test)}[/]")
+        console.print(Text(failure.message), style="default", soft_wrap=True)
+    shown: set[str] = set()
+    for failure in report.failures:
+        diagnosis = failure.diagnosis
+        if diagnosis is not None and diagnosis.text not in shown:
+            shown.add(diagnosis.text)
+            console.print(f"[cyan]diagnosis[/] {escape(diagnosis.cause)}")
+            console.print(Text(diagnosis.text), soft_wrap=True)
+    console.print(episode_table(report))
+    colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
+    console.print(
+        f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
+        f"passed in {report.seconds:.1f} s  (task {escape(about.task)}, profile "
+        f"{about.profile}, sandbox {about.sandbox})"
+    )
+
+
+def episode_table(report: Report) -> Table:
+    """The judged episodes, a row each."""
+    table = Table(title="Episodes, as the environment recorded them", title_justify="left")
+    table.add_column("start")
+    table.add_column("outcome")
+    for name in ("steps", "collisions", "path left, px", "straight left, px"):
+        table.add_column(name, justify="right")
+    table.add_column("ms a call", justify="right")
+    for episode in report.episodes:
+        colour = "green" if episode.outcome == "reached" else "red"
+        table.add_row(
+            episode.name,
+            f"[{colour}]{episode.outcome}[/]",
+            str(episode.steps),
+            str(episode.collisions),
+            f"{episode.d_min:.0f} of {episode.d0:.0f}",
+            f"{episode.d_min_euclidean:.0f} of {episode.d0_euclidean:.0f}",
+            f"{episode.call_ms_mean:.2f}",
+        )
+    return table

@@ -1,0 +1,157 @@
+"""`tdac synth`: live progress, then a table and the run folder."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.live import Live
+from rich.markup import escape
+from rich.spinner import Spinner
+from rich.table import Table
+
+from tdac_agent.commands.flags import TaskFlags
+from tdac_agent.records import Run
+from tdac_agent.synthesis import synthesize
+from tdac_agent.verify import read_source
+
+
+class Progress:
+    """Turns journal records into lines: what is going on, and what came of it."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._spinner = Spinner("dots", text="preparing")
+
+    def __enter__(self) -> Progress:
+        self._live = Live(
+            self._spinner,
+            console=self._console,
+            transient=True,
+            refresh_per_second=12,
+        )
+        self._live.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._live.stop()
+
+    def __call__(self, record: dict[str, Any]) -> None:
+        """Shows one record."""
+        kind = record["event"]
+        at = f"k={record.get('k')} j={record.get('j')}"
+        if kind == "call.intent":
+            verb = {"generate": "writing", "edit": "editing"}.get(
+                record["kind"], "writing rules from the failures of"
+            )
+            self._spinner.update(text=f"{at}  {verb} controller.py")
+        elif kind == "call.reply":
+            for note in record["notes"]:
+                self._console.print(f"  [dim]{at}  {escape(note)}[/]")
+        elif kind == "verify.start":
+            self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
+        elif kind == "verify.end":
+            self._print_attempt(at, record)
+
+    def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
+        if record["passed"]:
+            self._console.print(f"[green]✔ {at}  all tests passed[/]")
+        elif not record["valid"]:
+            self._console.print(f"[yellow]– {at}  no code in the answer[/]")
+        else:
+            failed = record["failed_tests"]
+            names = ", ".join(name.partition("::")[2] for name in failed[:3])
+            more = f" and {len(failed) - 3} more" if len(failed) > 3 else ""
+            self._console.print(
+                f"[red]✘ {at}  {len(failed)} failed:[/] {escape(names)}{more}"
+            )
+
+
+def run(
+    flags: TaskFlags,
+    start_from: Path | None,
+    k: int,
+    j: int,
+    learner: str,
+    optimizer: str | None,
+    out: Path | None,
+    seed: int,
+    as_json: bool,
+) -> int:
+    """Synthesises and prints; returns the exit code."""
+    console = Console(stderr=as_json)
+    source = None if start_from is None else read_source(start_from)
+    with console.status("preprocessing the map …"):
+        task = flags.load()
+    folder = out if out is not None else _next_folder(task.name)
+    nominal = task.nominal
+    console.print(
+        f"task [bold]{escape(task.name)}[/]: {nominal.shortest:.0f} px for a disc of "
+        f"{nominal.robot.radius:g} px, at most {nominal.horizon} steps; learner "
+        f"[bold]{escape(learner)}[/]" + _no_model(learner)
+    )
+    try:
+        with Progress(console) as progress:
+            result = synthesize(
+                task,
+                learner,
+                optimizer,
+                out=folder,
+                iterations=k,
+                patience=j,
+                seed=seed,
+                start_from=source,
+                on_event=progress,
+            )
+    except KeyboardInterrupt:
+        console.print(f"interrupted; the run so far is in {folder}")
+        raise
+    if as_json:
+        sys.stdout.write(result.model_dump_json(indent=2) + "\n")
+    else:
+        _show(result, console)
+    return 0 if result.verified else 1
+
+
+def _no_model(learner: str) -> str:
+    return " (a tuned template, no language model)" if learner == "builtin" else ""
+
+
+def _next_folder(name: str) -> Path:
+    for number in itertools.count(1):
+        folder = Path("runs") / f"{name}-{number}"
+        if not folder.exists():
+            return folder
+    raise AssertionError("unreachable")
+
+
+def _show(run: Run, console: Console) -> None:
+    table = Table(title=f"{run.task}: {run.learner}", title_justify="left")
+    table.add_column("k", justify="right")
+    table.add_column("j", justify="right")
+    table.add_column("result")
+    table.add_column("failed tests")
+    for attempt in run.attempts:
+        result = "[green]verified[/]" if attempt.passed else "[red]failed[/]"
+        if not attempt.valid:
+            result = "[yellow]invalid[/]"
+        names = [name.partition("::")[2] for name in attempt.failed_tests]
+        shown = ", ".join(names[:4]) + (" …" if len(names) > 4 else "")
+        table.add_row(str(attempt.k), str(attempt.j), result, escape(shown))
+    console.print(table)
+    if run.verified:
+        console.print(
+            f"[bold green]verified[/] in iteration {run.tau}, {run.seconds:.1f} s: "
+            f"{run.controller}\n"
+            f"  evidence: {run.folder / 'report.json'}, "
+            f"{run.folder / 'trajectory.png'}\n"
+            f"  see it drive: tdac play {run.folder} --video drive.mp4"
+        )
+    else:
+        console.print(
+            f"[bold red]not verified[/] after {run.iterations} iterations; "
+            f"the attempts are in {run.folder / 'iterations'}"
+        )

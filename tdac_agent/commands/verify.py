@@ -1,0 +1,91 @@
+"""`tdac verify`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+from rich.console import Console
+
+from tdac_agent.commands.flags import TaskFlags
+from tdac_agent.commands.report_view import show_report
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.files import write_atomic
+from tdac_agent.report import Report
+from tdac_agent.task import Task, load_task
+from tdac_agent.verify import verify
+from tdac_envs.errors import TaskError
+
+PROFILES = ("policy", "paper")
+
+
+def run(
+    controller: str,
+    flags: TaskFlags,
+    profile: str | None,
+    paper: bool,
+    suite: Path | None,
+    tier: str,
+    seed: int,
+    junit: Path | None,
+    as_json: bool,
+) -> int:
+    """Verifies and prints; returns the exit code."""
+    if profile not in (None, *PROFILES):
+        raise TaskError(f"unknown profile {profile!r}; expected policy or paper")
+    file, task = controller_and_task(controller, flags)
+    console = Console(stderr=as_json)
+    with console.status(f"verifying {file.name} on {task.name} …"):
+        report = verify(
+            file,
+            task,
+            profile=profile,  # type: ignore[arg-type]
+            paper=paper,
+            suite=suite,
+            tier=tier,
+            seed=seed,
+        )
+    if junit is not None:
+        write_junit(report, junit)
+    if as_json:
+        sys.stdout.write(report.model_dump_json(indent=2) + "\n")
+    else:
+        show_report(report, console)
+    return 0 if report.passed else 1
+
+
+def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
+    """The file and its task; a run folder brings its own."""
+    path = Path(controller)
+    if path.is_dir():
+        file = path / "controller.py"
+        if not file.is_file():
+            raise ControllerFileError(f"no controller.py in {controller!r}")
+        return file, flags.load() if flags.given() else load_task(path)
+    if not path.is_file():
+        raise ControllerFileError(f"no controller {controller!r}: no such file")
+    if not flags.given() and (path.parent / "task.yaml").is_file():
+        return path, load_task(path.parent)
+    return path, flags.load()
+
+
+def write_junit(report: Report, path: Path) -> None:
+    """Writes a JUnit XML file, a test case for each expected test."""
+    messages = {failure.test: failure.message for failure in report.failures}
+    suite = ElementTree.Element(
+        "testsuite",
+        name=f"tdac {report.provenance.task}",
+        tests=str(report.verdict.expected),
+        failures=str(report.verdict.failed_tests),
+        time=str(report.seconds),
+    )
+    for name in report.tests:
+        file, _, test = name.partition("::")
+        case = ElementTree.SubElement(suite, "testcase", classname=file, name=test)
+        if name in messages:
+            ElementTree.SubElement(case, "failure", message=messages[name])
+    try:
+        write_atomic(path, ElementTree.tostring(suite, encoding="utf-8"))
+    except OSError as error:
+        raise ControllerFileError(f"cannot write {path}: {error.strerror}") from error
