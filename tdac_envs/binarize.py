@@ -30,17 +30,49 @@ def otsu(luminance: GreyImage) -> float:
 def unknown_level(luminance: GreyImage) -> int | None:
     """The grey that a mapping tool wrote for "not seen", or None.
 
-    Map savers write 205 (ROS `map_saver`) or 127..128 between black and white; a
-    negative has 50. It counts only as one exact, large, flat level between the two.
+    Map savers write about 205 (ROS `map_saver`) or 128 between black and white; a
+    negative has 50 or 127. It counts only as one large, flat level between the two.
     """
     share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
-    if min(share[:20].sum(), share[-20:].sum()) < 0.002:
+    if min(share[:20].sum(), share[-20:].sum()) < 0.001:
         return None
-    for level in (205, 50, 128, 127):
-        around = share[level - 3 : level + 4].sum()
-        if share[level] >= 0.01 and share[level] > 0.8 * around:
+    # Grey walls are often about 128, so that level must fill an area.
+    for usual, least in ((205, 0.01), (50, 0.01), (128, 0.12), (127, 0.12)):
+        level = usual - 2 + int(np.argmax(share[usual - 2 : usual + 3]))
+        around = share[level - 6 : level + 7].sum()
+        if share[level] >= least and share[level] > 0.8 * around:
             return level
     return None
+
+
+def unevenly_lit(luminance: GreyImage, light: BoolGrid) -> bool:
+    """Whether the light side is a photograph's: no level holds much of it."""
+    counts = np.bincount(luminance[light], minlength=256)
+    return bool(counts.max() < 0.1 * counts.sum())
+
+
+def outside(luminance: GreyImage, light_free: bool) -> BoolGrid:
+    """The paper around a plan: what joins the border without crossing any faint line.
+
+    Half the contrast of Otsu's threshold makes a line here, so that a window drawn
+    in grey counts.
+
+    Returns:
+        Shape (height, width), bool; all False where no such piece holds half of the
+        border.
+    """
+    grey = luminance if light_free else 255 - luminance
+    cut = otsu(grey)
+    paper = int(np.bincount(grey[grey > cut], minlength=256).argmax())
+    free = (grey > paper - 0.5 * (paper - cut)).astype(np.uint8)
+    labels = cv2.connectedComponents(free, connectivity=4)[1]
+    rim = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    held = np.bincount(rim)
+    held[0] = 0
+    largest = int(held.argmax())
+    if held[largest] < 0.5 * rim.size:
+        return np.zeros(labels.shape, np.bool_)
+    return np.asarray(labels == largest)
 
 
 def saturated(colour: ColourImage) -> BoolGrid:

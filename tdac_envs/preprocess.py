@@ -75,7 +75,7 @@ def preprocess(
         MapError: The image cannot be used.
         TaskError: No reading of it makes the task feasible; says why.
     """
-    source = _as_image(image)
+    source = as_image(image)
     ends = [_to_pixel(source, "start", start), _to_pixel(source, "goal", goal)]
     notes: list[str] = []
     if snap:
@@ -101,7 +101,7 @@ def rank_candidates(
     Feasible ones come by falling score, then the infeasible ones in the order in
     which they were tried, each with its failure.
     """
-    scene = Scene.of(_as_image(image), start, goal, robot_radius)
+    scene = Scene.of(as_image(image), start, goal, robot_radius)
     search = _paper_grid if preset == "paper" else _staged_search
     tried = list(search(scene))
     return sorted(tried, key=lambda c: (c.failure is not None, -c.score))
@@ -120,7 +120,7 @@ def _paper_grid(scene: Scene) -> Iterator[Candidate]:
     """Polarity x cleanup x inflation, literally."""
     given = scene.image.occupied
     bases = (
-        [plain_reading(scene.luminance, light_free) for light_free in (True, False)]
+        [plain_reading(scene, light_free) for light_free in (True, False)]
         if given is None
         else [Reading(given, "given", scene.image.method)]
     )
@@ -156,7 +156,8 @@ def _first_failure(ranked: list[Candidate]) -> str:
     return str(ranked[0].failure)
 
 
-def _as_image(image: Source) -> MapImage:
+def as_image(image: Source) -> MapImage:
+    """The decoded map of a path, an array, or itself."""
     if isinstance(image, MapImage):
         return image
     if isinstance(image, np.ndarray):

@@ -20,7 +20,9 @@ from tdac_envs.binarize import (
     floor_distance,
     local_light,
     otsu,
+    outside,
     saturated,
+    unevenly_lit,
     unknown_level,
 )
 from tdac_envs.cleanup import thick_share, without_lines, without_specks
@@ -86,33 +88,96 @@ def readings(scene: Scene) -> Iterator[Reading]:
     if given is not None:
         yield Reading(given, "given", scene.image.method)
         return
-    plain = plain_reading(scene.luminance, decide_light_free(scene))
+    light_free = decide_light_free(scene)
+    plain = plain_reading(scene, light_free)
     unmarked = _without_marks(scene.image, plain)
     if not scene.ends:
         yield unmarked or plain
         return
+    beyond = _beyond_the_plan(scene, light_free)
+    for reading in _outwards(scene, plain, unmarked):
+        yield _walled_in(reading, beyond)
+
+
+def _outwards(
+    scene: Scene, plain: Reading, unmarked: Reading | None
+) -> Iterator[Reading]:
     yield plain
+    base = unmarked or plain
     if unmarked is not None:
         yield unmarked
-    base = unmarked or plain
     yield from _mixed(scene)
+    if _unknown(scene) is not None:
+        # A mapping tool's output: every dark pixel was measured, none was drawn.
+        return
     yield from _bolder(base)
-    local = _local(scene, base)
-    if local is not None:
+    if unevenly_lit(scene.luminance, ~plain.cells):
+        local = _local(scene, base)
         yield local
         yield from _bolder(local)
 
 
-def plain_reading(grey: GreyImage, light_free: bool) -> Reading:
-    """Otsu's threshold; a map saver's "unknown" grey counts as occupied."""
-    threshold, method = otsu(grey), "otsu"
-    level = unknown_level(grey)
+def _beyond_the_plan(scene: Scene, light_free: bool) -> BoolGrid:
+    """The outside, where start and goal are inside; empty otherwise."""
+    region = outside(scene.luminance, light_free)
+    if _on(region, scene.ends):
+        return np.zeros_like(region)
+    return region
+
+
+def _walled_in(reading: Reading, beyond: BoolGrid) -> Reading:
+    """The reading with the paper around the building closed.
+
+    Windows are drawn with thin or grey lines, and no robot leaves through them.
+    """
+    if reading.polarity == "mixed" or not (beyond & ~reading.cells).any():
+        return reading
+    note = f"{reading.method}, outside of the plan closed"
+    return replace(reading, cells=reading.cells | beyond, method=note)
+
+
+def plain_reading(scene: Scene, light_free: bool) -> Reading:
+    """Otsu's threshold, with two things that it cannot know.
+
+    A map saver's "unknown" grey counts as occupied, and where most walls are drawn in
+    strong colours, the light ones among these (green, yellow) are walls as well.
+    """
+    threshold, method = otsu(scene.luminance), "otsu"
+    level = _unknown(scene)
     if level is not None:
-        safe = level + 4.0 if light_free else level - 4.0
-        stricter = max(threshold, safe) if light_free else min(threshold, safe)
-        if stricter != threshold:
-            threshold, method = stricter, f"otsu, unknown grey {level} not free"
-    return _cut(grey, threshold, light_free, method)
+        threshold = _beside(level, threshold, light_free)
+        method = f"otsu, unknown grey {level} not free"
+    reading = _cut(scene.luminance, threshold, light_free, method)
+    strong = saturated(scene.image.colour)
+    coloured = int((strong & reading.cells).sum()) > 0.5 * int(reading.cells.sum())
+    if coloured and strong.mean() < 0.3 and not _on(strong, scene.ends):
+        method = f"{method}, coloured walls"
+        return replace(reading, cells=reading.cells | strong, method=method)
+    return reading
+
+
+def _unknown(scene: Scene) -> int | None:
+    """The "unknown" grey, unless the task stands on it."""
+    level = unknown_level(scene.luminance)
+    if level is None:
+        return None
+    known = np.abs(scene.luminance.astype(np.int16) - level) > 3
+    return None if _on(~known, scene.ends) else level
+
+
+def _beside(level: int, threshold: float, light_free: bool) -> float:
+    """A threshold that leaves the unknown grey on the occupied side.
+
+    Whatever is more free than a map saver's 205 is free by its own rule.
+    """
+    safe = level + 4.0 if light_free else level - 4.0
+    if level > 190 or level < 65:
+        return safe
+    return max(threshold, safe) if light_free else min(threshold, safe)
+
+
+def _on(mask: BoolGrid, points: list[Point]) -> bool:
+    return any(bool(mask[y, x]) for x, y in points)
 
 
 def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Reading:
@@ -183,14 +248,12 @@ def _bolder(base: Reading) -> Iterator[Reading]:
     for width in (3, 5):
         if thick_share(base.cells, 2 * width) < 0.5:
             return
-        cells = without_lines(base.cells, width)
-        note = f"lines under {width} px ignored"
-        yield _note(base, cells, note, 0, width)
+        opened = without_lines(base.cells, width)
         for extent in (8, 16, 32):
             if extent <= 0.04 * min(shape):
-                fewer = without_specks(cells, extent)
-                both = f"{note}, specks up to {extent} px ignored"
-                yield _note(base, fewer, both, extent, width)
+                cells = without_specks(opened, extent)
+                note = f"lines under {width} px and specks up to {extent} px ignored"
+                yield _note(base, cells, note, extent, width)
 
 
 def _note(
@@ -205,8 +268,8 @@ def _note(
     )
 
 
-def _local(scene: Scene, base: Reading) -> Reading | None:
-    """A threshold that follows the lighting, where the lighting is uneven."""
+def _local(scene: Scene, base: Reading) -> Reading:
+    """A threshold that follows the lighting."""
     grey = scene.luminance if base.polarity == "dark" else 255 - scene.luminance
     window = 2 * (min(grey.shape) // 16) + 1
     light = local_light(grey, max(window, 15))

@@ -1,0 +1,83 @@
+"""The files that preprocessing leaves: grid, picture, parameters, preview."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.errors import MapError
+from tdac_envs.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.params import MapParams
+from tdac_envs.plan import plan_path
+from tdac_envs.preprocess import Source, as_image
+from tdac_envs.preview import draw_preview
+
+FILES = ("occupancy.npy", "occupancy.png", "params.json", "preview.png")
+
+
+def write_map(
+    folder: str | Path, grid: OccupancyGrid, params: MapParams, image: Source
+) -> list[Path]:
+    """Writes the four files of a preprocessed map; all of them or none.
+
+    `occupancy.npy` is bool `[y, x]`, True = occupied; `occupancy.png` is 8-bit grey,
+    obstacles black on white; `params.json` holds `params`; `preview.png` is for people.
+
+    Args:
+        folder: Where to; made if missing.
+        grid: From `preprocess`.
+        params: From `preprocess`.
+        image: The source that `preprocess` got.
+
+    Returns:
+        The files, in the order above.
+
+    Raises:
+        MapError: The folder cannot be written.
+    """
+    folder = Path(folder)
+    preview = draw_preview(
+        as_image(image).colour, grid.cells, params, shortest_path(grid, params)
+    )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".map-", dir=folder) as work:
+            _write_all(Path(work), grid, params, preview)
+            for name in FILES:
+                os.replace(Path(work) / name, folder / name)
+    except OSError as error:
+        raise MapError(
+            f"{folder}: cannot be written: {error.strerror}; choose another folder"
+        ) from error
+    return [folder / name for name in FILES]
+
+
+def _write_all(
+    folder: Path, grid: OccupancyGrid, params: MapParams, preview: NDArray[np.uint8]
+) -> None:
+    np.save(folder / "occupancy.npy", grid.cells)
+    _save_png(folder / "occupancy.png", np.where(grid.cells, 0, 255).astype(np.uint8))
+    params.save(folder / "params.json")
+    _save_png(folder / "preview.png", cv2.cvtColor(preview, cv2.COLOR_RGB2BGR))
+
+
+def _save_png(path: Path, picture: NDArray[np.generic]) -> None:
+    path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+
+
+def shortest_path(grid: OccupancyGrid, params: MapParams) -> NDArray[np.float64]:
+    """The path from start to goal that keeps the planner's margin, px.
+
+    Returns:
+        Shape (n, 2), columns x and y; empty without a start and a goal.
+    """
+    if params.start is None or params.goal is None:
+        return np.empty((0, 2))
+    ends = [(round(x), round(y)) for x, y in (params.start, params.goal)]
+    margin = params.robot.radius + params.inflation
+    return plan_path(body_free(clearance(grid.cells), margin), ends[0], ends[1])
