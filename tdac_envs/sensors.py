@@ -141,7 +141,7 @@ class Graphics:
         self._pygame, self._robot = pygame, params["robot"]
         height, width = occ.shape
         self._scale = scale = min(1200 / width, 850 / height, 4.0)
-        pygame.init()
+        pygame.display.init()
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
         self._screen = pygame.display.set_mode(size)
         pygame.display.set_caption("TDAC-Map2D")
@@ -168,12 +168,13 @@ class Graphics:
         Returns:
             False once the window has been closed.
         """
-        pygame, screen, (x, y, heading) = self._pygame, self._screen, pose
+        pygame, screen = self._pygame, self._screen
+        x, y, heading = (float(value) for value in pose)
         centre = self._to_screen(x, y)
         self._trail.append(centre)
         screen.blit(self._map, (0, 0))
         fov = math.radians(self._robot["field_of_view_deg"])
-        for i, distance in enumerate(ranges):
+        for i, distance in enumerate(map(float, ranges)):
             turn = -fov / 2 + i * fov / (len(ranges) - 1) if len(ranges) > 1 else 0.0
             tip_x = x + distance * math.cos(heading + turn)
             tip_y = y + distance * math.sin(heading + turn)
@@ -199,7 +200,7 @@ class Graphics:
 
     def close(self) -> None:
         """Closes the window."""
-        self._pygame.quit()
+        self._pygame.display.quit()
 
 
 def show(
@@ -209,7 +210,8 @@ def show(
     """Runs one episode of this folder's task with `policy` and shows it.
 
     Opens a window where there is a display and pygame, else writes
-    `controller.mp4` beside this file; then prints how the episode ended.
+    `controller.mp4` beside this file; then prints how the episode ended. Closing the
+    window stops it.
 
     Args:
         policy: Maps an observation to (left, right), each in [-1, 1].
@@ -217,6 +219,7 @@ def show(
     """
     try:
         import gymnasium
+
         from tdac_envs.video import write_video
     except ImportError:
         raise SystemExit("show() needs the simulator: pip install tdac") from None
@@ -233,6 +236,8 @@ def show(
         else:
             write_video(frames, HERE / "controller.mp4", fps=30)
             print("no display: wrote", HERE / "controller.mp4")
+    except KeyboardInterrupt:
+        outcome.append("stopped")
     finally:
         env.close()
     print(outcome[0])
