@@ -114,6 +114,10 @@ REMEDIES: Mapping[Cause, Remedy] = MappingProxyType(
 )
 """Most telling cause first: of two that want the same parameter the first wins."""
 
+_MEANING: Mapping[str, Cause] = MappingProxyType(
+    {"test_progress": "too slow", "test_policy_is_fast_enough": "time-out"}
+)
+
 
 def repair(
     parameters: Parameters, report: Report, bounds: Bounds, attempt: int
@@ -151,11 +155,17 @@ def repair(
 
 
 def first_tests(report: Report) -> dict[Cause, str]:
-    """Each cause in a report with the first test that named it."""
+    """Each cause in a report with the first test that named it.
+
+    An episode that arrived has no diagnosis; then the test itself says what is wrong.
+    """
     tests: dict[Cause, str] = {}
     for failure in report.failures:
+        name = failure.test.rpartition("::")[2]
         if failure.diagnosis is not None:
             tests.setdefault(failure.diagnosis.cause, failure.test)
+        elif name in _MEANING:
+            tests.setdefault(_MEANING[name], failure.test)
     return tests
 
 
