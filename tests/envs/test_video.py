@@ -1,0 +1,115 @@
+"""write_video: a whole film, or none."""
+
+import re
+import subprocess
+
+import cv2
+import numpy as np
+import pytest
+from imageio_ffmpeg import get_ffmpeg_exe
+
+from tdac_envs.video import VideoError, write_video
+
+COLOURS = [(250, 249, 245), (56, 65, 81), (208, 38, 52), (14, 140, 92), (0, 128, 190)]
+
+
+def frames(count=12, shape=(48, 64)):
+    for k in range(count):
+        frame = np.full((*shape, 3), COLOURS[k % len(COLOURS)], np.uint8)
+        frame[:8, : 4 * k + 4] = (88, 72, 198)
+        yield frame
+
+
+def decode(path):
+    """Frame rate and all frames of a film."""
+    film = cv2.VideoCapture(str(path))
+    fps, found = film.get(cv2.CAP_PROP_FPS), []
+    while True:
+        more, frame = film.read()
+        if not more:
+            return fps, found
+        found.append(frame[..., ::-1])
+
+
+@pytest.mark.parametrize("name", ["film.mp4", "film.gif", "FILM.MP4"])
+def test_every_frame_comes_back_in_its_colours(tmp_path, name):
+    write_video(frames(), tmp_path / name, fps=20)
+    fps, film = decode(tmp_path / name)
+    assert fps == 20
+    assert len(film) == 12
+    for k, (ours, theirs) in enumerate(zip(frames(), film, strict=True)):
+        off = np.abs(ours[20, 32].astype(int) - theirs[20, 32]).max()
+        assert off <= 12, k
+
+
+def test_mp4_plays_in_browsers(tmp_path):
+    """H.264 in yuv420p, index first."""
+    write_video(frames(), tmp_path / "film.mp4", fps=20)
+    command = [get_ffmpeg_exe(), "-hide_banner", "-i", str(tmp_path / "film.mp4")]
+    about = subprocess.run(command, capture_output=True, text=True, check=False).stderr
+    assert re.search(r"Video: h264 .*yuv420p", about)
+    data = (tmp_path / "film.mp4").read_bytes()
+    assert 0 < data.find(b"moov") < data.find(b"mdat")
+
+
+def test_odd_sides_lose_one_pixel_in_mp4_and_none_in_gif(tmp_path):
+    for name, shape in (("film.mp4", (48, 64, 3)), ("film.gif", (49, 65, 3))):
+        write_video(frames(shape=(49, 65)), tmp_path / name, fps=10)
+        assert {frame.shape for frame in decode(tmp_path / name)[1]} == {shape}
+
+
+def test_frames_are_taken_one_by_one(tmp_path):
+    """A long episode never sits in memory: a used-up frame may be overwritten."""
+    frame = np.zeros((48, 64, 3), np.uint8)
+
+    def reused():
+        for k in range(5):
+            frame[:] = COLOURS[k]
+            yield frame
+
+    write_video(reused(), tmp_path / "film.gif", fps=10)
+    film = decode(tmp_path / "film.gif")[1]
+    for found, colour in zip(film, COLOURS, strict=True):
+        assert np.abs(found[9, 9].astype(int) - colour).max() <= 4
+
+
+def test_other_suffixes_are_refused_with_the_two_that_are_not(tmp_path):
+    with pytest.raises(VideoError, match=r"end in \.mp4 or \.gif, got 'film\.avi'"):
+        write_video(frames(), tmp_path / "film.avi", fps=10)
+
+
+def test_no_frames_is_an_error_and_leaves_nothing(tmp_path):
+    with pytest.raises(VideoError, match="at least one frame"):
+        write_video([], tmp_path / "film.mp4", fps=10)
+    assert not list(tmp_path.iterdir())
+
+
+def test_frames_of_another_size_are_refused(tmp_path):
+    mixed = [*frames(2), *frames(1, shape=(20, 20))]
+    with pytest.raises(
+        VideoError, match=r"shape \(48, 64, 3\), got uint8 \(20, 20, 3\)"
+    ):
+        write_video(mixed, tmp_path / "film.mp4", fps=10)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_failure_half_way_keeps_the_old_film(tmp_path):
+    def broken():
+        yield from frames(3)
+        raise RuntimeError("the episode broke")
+
+    (tmp_path / "film.mp4").write_bytes(b"old")
+    with pytest.raises(RuntimeError, match="the episode broke"):
+        write_video(broken(), tmp_path / "film.mp4", fps=10)
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"old"]
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(VideoError, match=r"cannot write .*No such file or directory"):
+        write_video(frames(), tmp_path / "nowhere" / "film.mp4", fps=10)
+
+
+def test_what_ffmpeg_says_is_passed_on(tmp_path):
+    with pytest.raises(VideoError, match="ffmpeg failed: "):
+        write_video(frames(), tmp_path / "film.mp4", fps=-1)
+    assert not list(tmp_path.iterdir())
