@@ -18,8 +18,8 @@ from tdac_agent.sandbox.errors import (
 from tdac_agent.sandbox.inner.wire import Handle
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
 from tdac_agent.sandbox.process import Child, EpisodeEnv
-from tdac_agent.sandbox.start import best_tier, start
-from tdac_agent.sandbox.tiers import TIERS, Tier
+from tdac_agent.sandbox.start import available_tiers, best_tier, start
+from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
 
 __all__ = [
     "MAX_SOURCE_BYTES",
@@ -38,6 +38,8 @@ __all__ = [
     "Limits",
     "SandboxError",
     "Tier",
+    "TierStatus",
+    "available_tiers",
     "best_tier",
     "start",
 ]

@@ -36,7 +36,7 @@ class Channel:
         requests: Descriptor to write to; closed by `close`, as are the others.
         answers: Descriptor to read from.
         output: Descriptor of what the child prints.
-        frame_bytes: Largest payload.
+        frame_bytes: Largest payload of an answer.
         output_bytes: Most that may be printed.
     """
 
@@ -57,12 +57,9 @@ class Channel:
             os.set_blocking(descriptor, False)
         for descriptor in (answers, output):
             self._poll.register(descriptor, select.POLLIN)
-        self._open = {requests, answers, output}
 
     def send(self, kind: int, sequence: int, payload: bytes, deadline: float) -> None:
         """Write one frame, draining output meanwhile."""
-        if len(payload) > self._frame_bytes:
-            raise FrameError(f"a request of {len(payload)} bytes is too large")
         data = memoryview(HEADER.pack(len(payload), kind, sequence) + payload)
         while data:
             try:
@@ -142,10 +139,6 @@ class Channel:
             raise OutputFloodError
         return True
 
-    def hang_up(self) -> None:
-        """Close the requests, which tells an idle child to end."""
-        self._close(self._requests)
-
     def drain_until_end(self, deadline: float) -> None:
         """Read output until every process that could print has ended."""
         poll = select.poll()
@@ -160,10 +153,5 @@ class Channel:
 
     def close(self) -> None:
         """Close all three descriptors."""
-        for descriptor in tuple(self._open):
-            self._close(descriptor)
-
-    def _close(self, descriptor: int) -> None:
-        if descriptor in self._open:
-            self._open.remove(descriptor)
+        for descriptor in (self._requests, self._answers, self._output):
             os.close(descriptor)

@@ -20,6 +20,7 @@ from tdac_agent.sandbox.errors import (
     ControllerOutputFlood,
     ControllerProtocolError,
     ControllerTimeout,
+    SandboxError,
 )
 from tdac_agent.sandbox.explain import controller_error, explain_end
 from tdac_agent.sandbox.inner.decode import decode
@@ -27,7 +28,7 @@ from tdac_agent.sandbox.inner.encode import encode
 from tdac_agent.sandbox.inner.wire import Kind, RemoteError, WireError
 from tdac_agent.sandbox.limits import Limits
 
-EXIT_SECONDS = 2.0
+EXIT_SECONDS = 1.0
 
 
 class Conversation:
@@ -100,6 +101,11 @@ class Conversation:
         """End the child because it sent something that its own server never sends."""
         message = f"wrote to the judge's channel at {phase}: {what}"
         self.give_up(ControllerProtocolError(message, phase))
+
+    def stop(self) -> ChildUsage:
+        """End the child; further requests are refused, or raise its fault again."""
+        self._fault = self._fault or SandboxError("the child has ended")
+        return self._end()
 
     def give_up(self, fault: Exception) -> NoReturn:
         """End the child and raise `fault`, now and at each further request."""

@@ -7,7 +7,7 @@ class SandboxError(Exception):
     """The sandbox itself failed; says nothing about the controller."""
 
 
-class ControllerFault(Exception):  # noqa: N818
+class ControllerFault(Exception):
     """The controller did something that a verdict counts as failed.
 
     Args:

@@ -57,11 +57,9 @@ class Child:
         self.limits = limits
         self._folder = folder
         self.pid = spawned.process.pid
-        self._end = Ending(spawned, folder)
-        self._talk = Conversation(
-            spawned.channel, self.pid, limits, folder.root, self._end
-        )
-        weakref.finalize(self, self._end)
+        end = Ending(spawned, folder)
+        self._talk = Conversation(spawned.channel, self.pid, limits, folder.root, end)
+        weakref.finalize(self, end)
 
     def __enter__(self) -> Child:
         return self
@@ -76,7 +74,7 @@ class Child:
 
     def close(self) -> ChildUsage:
         """Kill the child and all it started, and return what it used."""
-        return self._end()
+        return self._talk.stop()
 
     def set_up(self, setup: dict[str, Any]) -> dict[str, bool]:
         """Have the child confine itself; return what it found to hold."""

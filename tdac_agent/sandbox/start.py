@@ -13,7 +13,7 @@ from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
 from tdac_agent.sandbox.process import Child
 from tdac_agent.sandbox.spawn import spawn
-from tdac_agent.sandbox.tiers import TIERS, Tier
+from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
 
 # Files that exist nearly everywhere and that no controller may read.
 WITNESSES = ("/etc/passwd", "/etc/hostname", "/proc/1/status", "/proc/self/environ")
@@ -78,22 +78,33 @@ def start_blank(tier: Tier, limits: Limits) -> Child:
     return child
 
 
+def available_tiers() -> list[TierStatus]:
+    """Return every tier, best first, each tried by starting a child in it."""
+    return [_status(tier) for tier in TIERS]
+
+
 @functools.cache
 def best_tier() -> Tier:
-    """Return the best tier in which a child starts here.
+    """Return the best tier that works here.
 
     Raises:
         SandboxError: None does.
     """
     reasons = []
     for tier in TIERS:
-        try:
-            start_blank(tier, Limits()).close()
-        except SandboxError as error:
-            reasons.append(str(error))
-        else:
+        status = _status(tier)
+        if status.works:
             return tier
+        reasons.append(status.reason)
     raise SandboxError("no sandbox tier works here: " + "; ".join(reasons))
+
+
+def _status(tier: Tier) -> TierStatus:
+    try:
+        start_blank(tier, Limits()).close()
+    except SandboxError as error:
+        return TierStatus(tier, False, str(error))
+    return TierStatus(tier, True, "")
 
 
 def _find(name: str) -> Tier:
@@ -108,7 +119,9 @@ def _find(name: str) -> Tier:
 
 def _setup(tier: Tier, limits: Limits, folder: PrivateFolder) -> dict[str, Any]:
     seen = exposure()
-    readable, listable = entries_but_hidden(seen)
+    readable, listable = (
+        entries_but_hidden(seen) if "landlock" in tier.steps else ([], [])
+    )
     return {
         "steps": list(tier.steps),
         "links": list(seen.links),

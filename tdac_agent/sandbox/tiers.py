@@ -30,3 +30,23 @@ TIERS = (
     Tier("landlock", ("rlimits", "landlock", "seccomp"), ALL_PROMISES),
     Tier("rlimits", ("rlimits", "seccomp if offered"), ()),
 )
+
+
+@dataclass(frozen=True, slots=True)
+class TierStatus:
+    """Whether a tier works on this machine.
+
+    Attributes:
+        tier: The tier.
+        works: Whether a child starts in it and finds its promises to hold.
+        reason: Why it does not work, or an empty text.
+    """
+
+    tier: Tier
+    works: bool
+    reason: str
+
+    @property
+    def withdrawn(self) -> tuple[str, ...]:
+        """What this tier does not promise."""
+        return tuple(p for p in ALL_PROMISES if p not in self.tier.promises)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .wire import (
+    CODES,
     DTYPES,
     F64,
     I64,
@@ -24,6 +25,9 @@ from .wire import (
     WireError,
 )
 
+SIZES = [dtype.itemsize for dtype in DTYPES]
+BOOL = CODES[np.dtype(np.bool_)]
+SHAPES = [struct.Struct(f"<{count}I") for count in range(MAX_DIMENSIONS + 1)]
 Resolver = Callable[[Handle], object]
 
 
@@ -141,31 +145,32 @@ def _take_dict(r: _Reader) -> dict[Any, Any]:
 
 
 def _take_array(r: _Reader) -> Any:
-    dtype, dimensions = DTYPES[r.data[r.pos]], r.data[r.pos + 1]
+    data, pos = r.data, r.pos
+    code, dimensions = data[pos], data[pos + 1]
     if dimensions > MAX_DIMENSIONS:
         raise WireError(f"an array of {dimensions} dimensions")
-    shape = struct.unpack_from(f"<{dimensions}I", r.data, r.pos + 2)
-    r.pos += 2 + 4 * dimensions
+    shape = SHAPES[dimensions].unpack_from(data, pos + 2)
+    pos += 2 + 4 * dimensions
     count = prod(shape)
-    if count == 0:
-        return np.zeros(shape, dtype)
-    start = r.pos
-    r.pos += count * dtype.itemsize
-    if r.pos > len(r.data):
+    r.pos = pos + count * SIZES[code]
+    if r.pos > len(data):
         raise WireError("an array is longer than its frame")
-    return _numbers(r.data, dtype, count, start).reshape(shape).copy()
+    if count == 0:
+        return np.zeros(shape, DTYPES[code])
+    array = _numbers(data, code, count, pos).copy()
+    return array if dimensions == 1 else array.reshape(shape)
 
 
 def _take_scalar(r: _Reader) -> Any:
-    dtype = DTYPES[r.data[r.pos]]
+    code = r.data[r.pos]
     r.pos += 1
-    return _numbers(_cut(r, dtype.itemsize), dtype, 1, 0)[0]
+    return _numbers(_cut(r, SIZES[code]), code, 1, 0)[0]
 
 
-def _numbers(data: bytes, dtype: np.dtype[Any], count: int, start: int) -> Any:
-    if dtype == np.bool_ and np.frombuffer(data, np.uint8, count, start).max() > 1:
+def _numbers(data: bytes, code: int, count: int, start: int) -> Any:
+    if code == BOOL and np.frombuffer(data, np.uint8, count, start).max() > 1:
         raise WireError("a bool that is neither 0 nor 1")
-    return np.frombuffer(data, dtype, count, start)
+    return np.frombuffer(data, DTYPES[code], count, start)
 
 
 def _take_handle(r: _Reader) -> object:

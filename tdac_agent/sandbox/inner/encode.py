@@ -24,6 +24,7 @@ from .wire import (
     WireError,
 )
 
+ARRAYS = [struct.Struct(f"<cBB{count}I") for count in range(MAX_DIMENSIONS + 1)]
 BUILTINS = (dict, list, tuple, str, bytes, int, float)
 # On Linux these are int64 and uint64 under a second name.
 SCALARS = {*(dtype.type for dtype in DTYPES), np.longlong, np.ulonglong}
@@ -158,16 +159,24 @@ def _put_dict(w: _Writer, value: dict[Any, Any]) -> None:
 
 
 def _put_array(w: _Writer, value: Any) -> None:
-    dtype = value.dtype.newbyteorder("<")
-    code = CODES.get(dtype)
-    if code is None or value.ndim > MAX_DIMENSIONS:
-        if w.keep is None:
-            raise WireError(f"an array of {value.dtype}, {value.ndim}-D cannot be sent")
-        _put_handle(w, w.keep(value))
-        return
+    code = CODES.get(value.dtype)
     shape = value.shape
-    w.add(struct.pack(f"<cBB{len(shape)}I", b"a", code, len(shape), *shape))
-    w.add(value.astype(dtype, copy=False).tobytes())
+    if code is None or len(shape) > MAX_DIMENSIONS:
+        _put_other_array(w, value)
+        return
+    w.add(ARRAYS[len(shape)].pack(b"a", code, len(shape), *shape))
+    w.add(value.tobytes())
+
+
+def _put_other_array(w: _Writer, value: Any) -> None:
+    """Encode an array whose bytes are swapped; the rest have no encoding."""
+    dtype = value.dtype.newbyteorder("<")
+    if dtype in CODES and value.ndim <= MAX_DIMENSIONS:
+        _put_array(w, value.astype(dtype))
+    elif w.keep is None:
+        raise WireError(f"an array of {value.dtype}, {value.ndim}-D cannot be sent")
+    else:
+        _put_handle(w, w.keep(value))
 
 
 def _put_scalar(w: _Writer, value: Any) -> None:

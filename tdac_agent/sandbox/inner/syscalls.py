@@ -7,7 +7,7 @@ rights or shared memory, looks into another process, or leaves the process group
 from __future__ import annotations
 
 # Name, number on x86_64, number on aarch64 (`-` where it has none).
-_ALLOWED = """
+ALLOWED = """
 read 0 63, write 1 64, readv 19 65, writev 20 66, pread64 17 67, pwrite64 18 68,
 lseek 8 62, openat 257 56, open 2 -, creat 85 -, fstat 5 80, newfstatat 262 79,
 stat 4 -, lstat 6 -, statx 332 291, access 21 -, faccessat 269 48,
@@ -54,7 +54,7 @@ def _column(table: str, machine: str) -> dict[str, int]:
 
 def allowed(machine: str) -> list[int]:
     """Return the numbers that are allowed with any arguments."""
-    return list(_column(_ALLOWED, machine).values())
+    return list(_column(ALLOWED, machine).values())
 
 
 def guarded(machine: str) -> dict[str, int]:

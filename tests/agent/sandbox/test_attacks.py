@@ -1,0 +1,379 @@
+"""What a hostile controller tries, on every tier, and how each attempt ends."""
+
+import os
+import textwrap
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tdac_agent.sandbox import (
+    ControllerDied,
+    ControllerError,
+    ControllerOutputFlood,
+    ControllerProtocolError,
+    ControllerTimeout,
+    Limits,
+)
+from tdac_agent.sandbox.inner import syscalls, wire
+
+SHORT = Limits(import_seconds=0.5, call_seconds=0.5, cpu_seconds=20)
+OBS = {"pose": np.zeros(3, np.float32)}
+
+
+def loaded(launch, tier, source, limits=SHORT):
+    child = launch(textwrap.dedent(source), tier, limits)
+    child.load(timeout=5)
+    return child
+
+
+IMPORTS = {
+    "a syntax error": ("def f(:", ControllerError, "SyntaxError"),
+    "a null byte": ("x = 1\0", ControllerError, "SyntaxError|ValueError"),
+    "not utf-8": (b"x = '\xff'", ControllerError, "SyntaxError"),
+    "an error": ("1 / 0", ControllerError, "ZeroDivisionError at import .line 1"),
+    "a missing module": ("import torch", ControllerError, "torch"),
+    "sys.exit": ("import sys; sys.exit(0)", ControllerError, "SystemExit at import"),
+    "os._exit": ("import os; os._exit(0)", ControllerDied, "exit code 0 at import"),
+    "interrupt": ("raise KeyboardInterrupt", ControllerError, "KeyboardInterrupt"),
+    "endless": ("while True: pass", ControllerTimeout, "import did not end within 0.5"),
+    "sleeping": ("import time; time.sleep(99)", ControllerTimeout, "import"),
+    "crash": ("import ctypes; ctypes.string_at(0)", ControllerDied, "SIGSEGV"),
+    "recursion": ("def f(): f()\nf()", ControllerError, "RecursionError"),
+    "memory": ("x = bytearray(50 << 30)", ControllerError, "MemoryError"),
+    "an evil error": (
+        "class E(Exception):\n    def __str__(self): raise SystemExit\nraise E",
+        ControllerError,
+        "E at import",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", IMPORTS)
+def test_an_import_that_fails(launch, tier, name):
+    source, fault, match = IMPORTS[name]
+    start = time.monotonic()
+    with pytest.raises(fault, match=match):
+        launch(source, tier, SHORT).load()
+    assert time.monotonic() - start < 8
+
+
+CALLS = {
+    "endless": ("while True: pass", ControllerTimeout, "policy did not end"),
+    "exit": ("import sys; sys.exit()", ControllerError, "SystemExit at policy"),
+    "hard exit": ("import os; os._exit(7)", ControllerDied, "exit code 7 at policy"),
+    "recursion": ("return policy(obs)", ControllerError, "RecursionError"),
+    "deep value": (
+        "a = []\n    for _ in range(9999): a = [a]\n    return a",
+        ControllerError,
+        "nested deeper",
+    ),
+    "memory": (
+        "import numpy as np; return np.ones(50 << 27)",
+        ControllerError,
+        "MemoryError",
+    ),
+    "many objects": (
+        "return [object() for _ in range(20000)]",
+        ControllerError,
+        "10000",
+    ),
+    "flood": (
+        "\n    while True: print('x' * 10000)",
+        ControllerOutputFlood,
+        "printed more than 1048576 bytes at policy",
+    ),
+    "quiet flood": (
+        "import os\n    while True: os.write(2, b'x' * 9999)",
+        ControllerOutputFlood,
+        "printed more",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_call_that_fails(launch, tier, name):
+    body, fault, match = CALLS[name]
+    limits = Limits(call_seconds=0.5 if name == "endless" else 5)
+    child = loaded(launch, tier, f"def policy(obs):\n    {body}\n", limits)
+    with pytest.raises(fault, match=match):
+        child.policy(OBS)
+
+
+def test_cpu_time_is_limited(launch, tier):
+    child = loaded(
+        launch,
+        tier,
+        "import signal\ndef policy(obs):\n    while True: pass\n",
+        Limits(cpu_seconds=1, call_seconds=10),
+    )
+    with pytest.raises(ControllerDied, match="CPU time"):
+        child.policy(OBS)
+
+
+PROCESSES = """
+    import os, subprocess, sys, threading
+
+    def fork():
+        while True: os.fork()
+
+    def daemon():
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                while True: pass
+
+    def program(): subprocess.run([sys.executable or "/bin/sh", "-c", "1"], check=True)
+    def spawn(): os.posix_spawn("/proc/self/exe", ["x"], {})
+    def replace(): os.execv("/bin/sh", ["sh"])
+    def thread(): threading.Thread(target=print).start()
+    def leave_session(): os.setsid()
+    def kill_all(): os.kill(-1, 9)
+    def kill_group(): os.killpg(0, 9)
+    def kill_judge(pid): os.kill(pid, 9)
+    def kill_parent(): os.kill(os.getppid(), 9)
+    def loosen():
+        import resource
+        resource.setrlimit(resource.RLIMIT_CPU, (1, 1))
+"""
+
+
+DENIED = ("fork", "daemon", "program", "spawn", "replace", "thread", "leave_session")
+DENIED += ("kill_all", "kill_group", "kill_judge", "kill_parent", "loosen")
+REFUSALS = {"PermissionError", "BlockingIOError", "RuntimeError", "ValueError"}
+
+
+def test_processes_and_signals_are_denied(launch, tier):
+    child = loaded(launch, tier, PROCESSES, Limits(call_seconds=5))
+    for name in DENIED:
+        arguments = (os.getpid(),) if name == "kill_judge" else ()
+        with pytest.raises(ControllerError) as caught:
+            child.call(name, arguments)
+        assert caught.value.type_name in REFUSALS, name
+
+
+def test_there_is_no_network(launch, promising_tier):
+    source = """
+        import socket
+        FAMILIES = [socket.AF_INET, socket.AF_INET6, socket.AF_UNIX, socket.AF_NETLINK]
+        def attempt(kind):
+            socket.socket(FAMILIES[kind // 2], kind % 2 + 1)
+        def pair(): socket.socketpair()
+        def look_up(): socket.create_connection(("127.0.0.1", 80))
+    """
+    child = loaded(launch, promising_tier, source)
+    for kind in range(8):
+        with pytest.raises(ControllerError, match="PermissionError"):
+            child.call("attempt", (kind,))
+    for name in ("pair", "look_up"):
+        with pytest.raises(ControllerError, match="PermissionError"):
+            child.call(name)
+
+
+# x86_64 and aarch64: clone, ptrace, mount, unshare, io_uring_setup, bpf, keyctl,
+# memfd_create, process_vm_readv, setns, symlinkat, open_by_handle_at, personality.
+RAW = {
+    "x86_64": (56, 101, 165, 272, 425, 321, 250, 319, 310, 308, 266, 304, 135),
+    "aarch64": (220, 117, 40, 97, 425, 280, 219, 279, 270, 268, 36, 265, 92),
+}
+
+
+def test_raw_system_calls_are_denied(launch, promising_tier):
+    machine = os.uname().machine
+    if machine not in RAW:
+        pytest.skip(machine)
+    source = """
+        import ctypes
+        libc = ctypes.CDLL(None, use_errno=True)
+        def attempt(number):
+            result = libc.syscall(ctypes.c_long(number), *[ctypes.c_long(0)] * 6)
+            return result, ctypes.get_errno()
+    """
+    child = loaded(launch, promising_tier, source)
+    for number in RAW[machine]:
+        assert child.call("attempt", (number,)) == (-1, 1)
+        assert number not in syscalls.allowed(machine)
+
+
+def test_the_environment_holds_no_secret(launch, tier, monkeypatch):
+    monkeypatch.setenv("ANTHROPIC_API_KEY", "canary-in-the-environment")
+    child = loaded(launch, tier, "import os\ndef policy(obs): return dict(os.environ)")
+    environment = child.policy(OBS)
+    assert set(environment) <= {
+        "HOME",
+        "TMPDIR",
+        "LANG",
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "PYTHONHASHSEED",
+        "LD_LIBRARY_PATH",
+        "PWD",
+    }
+    assert "canary" not in repr(environment)
+
+
+READ = "def read(path):\n    with open(path, 'rb') as file: return file.read(100)\n"
+
+
+def test_files_outside_are_hidden(launch, promising_tier, tmp_path):
+    canary = tmp_path / "canary"
+    canary.write_text("secret")
+    pid = os.getpid()
+    child = loaded(launch, promising_tier, READ)
+    for path in (
+        canary,
+        "/etc/passwd",
+        "/etc/hostname",
+        Path.home() / ".bashrc",
+        f"/proc/{pid}/environ",
+        f"/proc/{pid}/cmdline",
+        f"/proc/{pid}/root/etc/passwd",
+        "/proc/self/environ",
+        "/proc/self/mem",
+        "/dev/mem",
+        __file__,
+        np.__file__.replace("numpy/__init__", "pytest/__init__"),
+    ):
+        with pytest.raises(ControllerError, match=r"FileNotFoundError|PermissionError"):
+            child.call("read", (str(path),))
+    assert child.call("read", ("params.json",)) == b"{}"
+
+
+LISTING = """
+    import os
+
+    def entries(path):
+        try:
+            return os.listdir(path)
+        except OSError:
+            return []
+"""
+
+
+def test_folders_outside_are_hidden(launch, promising_tier, tmp_path):
+    (tmp_path / "canary").write_text("secret")
+    child = loaded(launch, promising_tier, LISTING)
+    assert "canary" not in child.call("entries", (str(tmp_path),))
+    for path in ("/etc/ssl", "/home", "/var", "/opt", "/root/.ssh", "/proc", "/sys"):
+        assert child.call("entries", (path,)) == []
+
+
+WRITES = """
+    import os
+
+    def create(path):
+        with open(path, "w") as file: file.write("x")
+
+    def append(path):
+        with open(path, "a") as file: file.write("x")
+
+    def remove(path): os.remove(path)
+    def rename(path): os.rename(path, path + ".old")
+    def truncate(path): os.truncate(path, 0)
+    def chmod(path): os.chmod(path, 0o777)
+    def link(path): os.symlink("/etc/passwd", path + ".link")
+    def folder(path): os.mkdir(path + ".d")
+"""
+
+
+def test_nothing_but_scratch_can_be_written(launch, promising_tier, workdir):
+    child = loaded(launch, promising_tier, WRITES)
+    names = ("create", "append", "remove", "rename", "truncate", "chmod", "link")
+    for path in ("controller.py", "params.json", "sensors.py", wire.__file__):
+        for attempt in (*names, "folder"):
+            with pytest.raises(ControllerError, match=r"PermissionError|OSError"):
+                child.call(attempt, (path,))
+    assert (workdir / "params.json").read_text() == "{}"
+
+
+SCRATCH = """
+    import os, tempfile
+
+    def look(): return os.listdir(os.environ["TMPDIR"])
+
+    def use():
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a")
+            with open(path, "w") as file: file.write("kept")
+            os.rename(path, path + "b")
+            with open(path + "b") as file: return file.read()
+
+    def fill():
+        size = 0
+        for number in range(10):
+            with open(f"{os.environ['TMPDIR']}/{number}", "wb") as file:
+                file.write(bytes(1 << 20))
+            size += 1 << 20
+        return size
+
+    def bury():
+        os.chdir(os.environ["TMPDIR"])
+        for _ in range(1100):
+            os.mkdir("d")
+            os.chdir("d")
+
+    def link(): os.symlink("/etc/passwd", os.environ["TMPDIR"] + "/link")
+
+    def open_many():
+        return [open(f"{os.environ['TMPDIR']}/{n}", "w") for n in range(1000)]
+"""
+
+
+def test_scratch_is_empty_and_writable(launch, tier):
+    child = loaded(launch, tier, SCRATCH)
+    assert child.call("look") == []
+    assert child.call("use", timeout=5) == "kept"
+
+
+def test_scratch_is_bounded(launch, tier):
+    limits = Limits(
+        scratch_bytes=(4 << 20) if tier in {"bubblewrap", "namespaces"} else 1000
+    )
+    child = loaded(launch, tier, SCRATCH, limits)
+    with pytest.raises(ControllerError, match="OSError"):
+        child.call("fill")
+
+
+def test_scratch_is_removed_however_deep(launch, tier):
+    loaded(launch, tier, SCRATCH, Limits(call_seconds=5)).call("bury")
+
+
+def test_links_cannot_be_made_in_scratch(launch, tier):
+    with pytest.raises(ControllerError, match="PermissionError"):
+        loaded(launch, tier, SCRATCH).call("link")
+
+
+def test_descriptors_are_bounded(launch, tier):
+    with pytest.raises(ControllerError, match="Too many open files"):
+        loaded(launch, tier, SCRATCH).call("open_many")
+
+
+def test_closing_the_channel_is_noticed(launch, tier):
+    child = loaded(
+        launch,
+        tier,
+        "import os\ndef policy(obs):\n    os.closerange(3, 64)\n    while True: pass\n",
+        Limits(call_seconds=9),
+    )
+    with pytest.raises(
+        ControllerProtocolError, match=r"wrote to the judge's channel.*closed it"
+    ):
+        child.policy(OBS)
+
+
+def test_patched_builtins_harm_only_the_child(launch, tier):
+    source = """
+        import builtins, json, os, sys
+        def broken(*args, **kwargs): raise KeyError("patched")
+        for name in ("len", "isinstance", "open", "print", "dict", "type", "getattr"):
+            setattr(builtins, name, broken)
+        for module in list(sys.modules.values()):
+            if module.__name__.startswith("inner."):
+                for name in list(vars(module)):
+                    if name[:2] != "__": setattr(module, name, broken)
+        def policy(obs): return 1.0, 1.0
+    """
+    child = launch(textwrap.dedent(source), tier, SHORT)
+    with pytest.raises((ControllerError, ControllerDied, ControllerTimeout)):
+        child.load()

@@ -1,0 +1,129 @@
+"""Which tiers there are, what they promise, and that a judge's end is theirs."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+from pathlib import Path
+
+import pytest
+
+import tdac_agent
+from tdac_agent.sandbox import (
+    TIERS,
+    SandboxError,
+    available_tiers,
+    best_tier,
+    start,
+)
+from tdac_agent.sandbox.inner import syscalls
+
+ROOT = str(Path(next(iter(tdac_agent.__path__))).parent)
+
+
+def test_every_tier_is_reported_with_a_reason_where_it_does_not_work():
+    statuses = available_tiers()
+    assert [status.tier for status in statuses] == list(TIERS)
+    for status in statuses:
+        assert status.works == (status.reason == "")
+    assert statuses[-1].withdrawn == (
+        "hides_files",
+        "denies_network",
+        "denies_processes",
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the better tiers are Linux's")
+def test_on_linux_a_tier_works_that_promises_everything():
+    working = [status.tier for status in available_tiers() if status.works]
+    assert working[0].promises != ()
+    assert best_tier() == working[0]
+
+
+def test_a_missing_bubblewrap_is_the_reason(monkeypatch):
+    monkeypatch.setenv("PATH", "/nonexistent")
+    with pytest.raises(SandboxError, match=r"bwrap.* is not installed"):
+        start(tier="bubblewrap")
+
+
+def test_a_broken_bubblewrap_says_what_it_printed(monkeypatch, tmp_path):
+    program = tmp_path / "bwrap"
+    program.write_text("#!/bin/sh\necho no namespaces for you >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
+    with pytest.raises(SandboxError, match="no namespaces for you"):
+        start(tier="bubblewrap")
+
+
+def test_a_tier_that_does_not_confine_is_refused(monkeypatch, tmp_path):
+    program = tmp_path / "bwrap"
+    program.write_text(
+        '#!/bin/sh\nwhile [ "$1" != -- ]; do shift; done\nshift\nexec "$@"\n'
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
+    with pytest.raises(SandboxError, match="does not hold here: hides_files"):
+        start(tier="bubblewrap")
+
+
+@pytest.mark.parametrize("machine", syscalls.MACHINES)
+def test_no_process_socket_or_rights_call_is_in_the_table(machine):
+    names = {row.split()[0] for row in syscalls.ALLOWED.replace("\n", " ").split(",")}
+    forbidden = (
+        "clone clone3 fork vfork execve execveat socket socketpair connect bind ptrace "
+        "unshare setns mount symlink symlinkat link linkat chmod fchmod chown setsid "
+        "setpgid setrlimit prctl seccomp io_uring_setup memfd_create bpf kcmp tkill "
+        "process_vm_readv process_vm_writev pidfd_open pidfd_send_signal "
+        "rt_sigqueueinfo rt_tgsigqueueinfo close_range shmget mknod "
+        "mknodat open_by_handle_at"
+    )
+    assert not names & set(forbidden.split())
+    numbers = syscalls.allowed(machine) + list(syscalls.guarded(machine).values())
+    assert len(numbers) == len(set(numbers))
+
+
+JUDGE = """
+    import sys
+    from tdac_agent.sandbox import start
+    child = start(None, "def policy(obs):\\n    while True: pass\\n", tier=sys.argv[1])
+    child.load()
+    print(child.pid, flush=True)
+    child.policy({}, timeout=60)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_a_child_ends_with_its_judge(tier, tmp_path, number, wait_until_gone):
+    judge = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(JUDGE), tier],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": ROOT},
+    )
+    with judge:
+        pid = int(judge.stdout.readline())
+        judge.send_signal(number)
+        judge.wait(10)
+    assert wait_until_gone(pid, tmp_path) == []
+    if number == signal.SIGINT:
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_forgotten_child_ends(tier, wait_until_gone):
+    child = start(tier=tier)
+    pid = child.pid
+    del child
+    assert wait_until_gone(pid, f"/nonexistent/{pid}") == []
+
+
+def test_a_child_outlives_the_thread_that_started_it(tier):
+    children = []
+    thread = threading.Thread(target=lambda: children.append(start(tier=tier)))
+    thread.start()
+    thread.join()
+    with children[0] as child:
+        child.furnish(None, "def policy(obs): return obs\n")
+        child.load()
+        assert child.policy(1) == 1

@@ -1,0 +1,236 @@
+"""The wire carries exact values and types; any bytes are a value or a WireError."""
+
+import collections
+import contextlib
+import enum
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from tdac_agent.sandbox.inner import wire
+from tdac_agent.sandbox.inner.decode import decode
+from tdac_agent.sandbox.inner.encode import encode
+from tdac_agent.sandbox.inner.wire import Handle, RemoteError, WireError
+
+texts = st.text(st.characters(exclude_categories=()), max_size=20)
+dtypes = st.sampled_from(wire.DTYPES)
+scalars = dtypes.flatmap(lambda d: hnp.arrays(d, ())).map(lambda a: a[()])
+arrays = dtypes.flatmap(
+    lambda d: hnp.arrays(d, hnp.array_shapes(min_dims=0, max_dims=4, min_side=0))
+)
+hashable = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**200), 2**200)
+    | st.floats()
+    | texts
+    | st.binary(max_size=20)
+    | st.builds(Handle, st.integers(0, 2**32 - 1), texts),
+    lambda inner: st.lists(inner, max_size=4).map(tuple),
+    max_leaves=6,
+)
+values = st.recursive(
+    hashable | scalars | arrays,
+    lambda inner: (
+        st.lists(inner, max_size=5)
+        | st.lists(inner, max_size=5).map(tuple)
+        | st.dictionaries(hashable, inner, max_size=5)
+    ),
+    max_leaves=20,
+)
+
+
+def same(a, b):
+    """Equal in value and in type all the way down; NaN equals NaN."""
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, np.ndarray | np.generic):
+        return a.dtype == b.dtype and np.array_equal(
+            a, b, equal_nan=a.dtype.kind == "f"
+        )
+    if isinstance(a, list | tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, dict):
+        return same(list(a.items()), list(b.items()))
+    if isinstance(a, float) and math.isnan(a):
+        return math.isnan(b)
+    return a == b and (
+        not isinstance(a, float) or math.copysign(1, a) == math.copysign(1, b)
+    )
+
+
+@given(values)
+def test_a_value_comes_back_equal_and_of_the_same_types(value):
+    assert same(decode(encode(value)), value)
+
+
+@settings(max_examples=400)
+@given(st.binary(max_size=200))
+def test_any_bytes_are_a_value_or_a_wire_error(data):
+    try:
+        value = decode(data)
+    except WireError:
+        return
+    assert same(decode(encode(value)), value)
+
+
+@settings(max_examples=300)
+@given(values, st.data())
+def test_damaged_values_are_a_value_or_a_wire_error(value, data):
+    raw = bytearray(encode(value))
+    index = data.draw(st.integers(0, len(raw) - 1))
+    raw[index] = data.draw(st.integers(0, 255))
+    end = data.draw(st.integers(0, len(raw)))
+    for damaged in (bytes(raw), bytes(raw[:end])):
+        with contextlib.suppress(WireError):
+            decode(damaged)
+
+
+@pytest.mark.slow
+@settings(max_examples=10_000)
+@given(st.binary(max_size=300))
+def test_many_bytes_are_a_value_or_a_wire_error(data):
+    with contextlib.suppress(WireError):
+        decode(data)
+
+
+class Direction(enum.IntEnum):
+    LEFT = 1
+
+
+Point = collections.namedtuple("Point", "x y")
+
+
+class Loud(str):
+    def __getitem__(self, index):
+        raise RuntimeError
+
+    def encode(self, *args):
+        raise RuntimeError
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (Direction.LEFT, 1),
+        (Point(1, 2.0), (1, 2.0)),
+        (collections.OrderedDict(a=1), {"a": 1}),
+        (collections.defaultdict(list, {1: 2}), {1: 2}),
+        (Loud("x"), "x"),
+        (np.str_("x"), "x"),
+        (np.longlong(3), np.int64(3)),
+        (np.array([1, 2], ">i4"), np.array([1, 2], "<i4")),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_subclasses_come_back_as_the_built_in(value, expected):
+    assert same(decode(encode(value)), expected)
+
+
+def test_an_array_comes_back_writable_and_in_its_layout():
+    array = np.asfortranarray(np.arange(6.0).reshape(2, 3))
+    back = decode(encode(array))
+    back[0, 0] = 7
+    assert back.tolist() == [[7, 1, 2], [3, 4, 5]]
+
+
+def test_numpy_scalars_stay_apart_from_python_numbers():
+    assert type(decode(encode(np.int64(1)))) is np.int64
+    assert type(decode(encode(np.bool_(True)))) is np.bool_
+    assert type(decode(encode(np.float64(1)))) is np.float64
+    assert type(decode(encode(True))) is bool
+
+
+def test_an_error_keeps_its_parts():
+    error = RemoteError("ValueError", "no", "  line 3, in f: raise", 3)
+    assert decode(encode(error)) == error
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        object(),
+        {1, 2},
+        1j,
+        np.array(["a"]),
+        np.array([1j]),
+        np.zeros(2, "M8[s]"),
+        iter([]),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_what_has_no_encoding_is_kept_as_a_handle(value):
+    kept = []
+
+    def keep(item):
+        kept.append(item)
+        return Handle(7, type(item).__name__)
+
+    assert decode(encode([value], keep)) == [Handle(7, type(value).__name__)]
+    assert kept[0] is value
+    with pytest.raises(WireError, match="cannot be sent"):
+        encode(value)
+
+
+def test_a_handle_is_resolved_where_the_object_lives():
+    assert decode(encode([Handle(3, "M")]), 0, lambda h: h.id + 1) == [4]
+
+
+def nested(depth):
+    value = 0
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+@pytest.mark.parametrize(
+    ("value", "match"),
+    [
+        (nested(wire.MAX_DEPTH + 1), "nested deeper"),
+        ([0] * (wire.MAX_ITEMS + 1), "more than 1000000 items"),
+        (dict.fromkeys(range(wire.MAX_DICT_ITEMS + 1)), "dict items"),
+        (1 << (8 * wire.MAX_INT_BYTES), "too large"),
+        (np.zeros((1,) * 9), "cannot be sent"),
+    ],
+)
+def test_values_beyond_the_limits_are_refused(value, match):
+    with pytest.raises(WireError, match=match):
+        encode(value)
+
+
+def test_a_list_that_holds_itself_is_refused():
+    value = []
+    value.append(value)
+    with pytest.raises(WireError, match="nested deeper"):
+        encode(value)
+
+
+@pytest.mark.parametrize(
+    ("data", "match"),
+    [
+        (b"", "not a value"),
+        (b"?", "not a value"),
+        (b"NN", "1 bytes too many"),
+        (b"l\xff\xff\xff\xff", "too many items"),
+        (b"d\x02\0\0\0NNNN", "same key twice"),
+        (b"d\x01\0\0\0l\0\0\0\0N", "unhashable"),
+        (b"d\xff\xff\0\0", "too many dict items"),
+        (b"s\x01\0\0\0\xff", "utf-8"),
+        (b"b\xff\xff\xff\xff", "expected 4294967295 bytes"),
+        (b"I\xff\xff\xff\xff", "an int of 4294967295 bytes"),
+        (b"a\x0b\x01\xff\xff\xff\xff", "longer than its frame"),
+        (b"a\x00\x09", "9 dimensions"),
+        (b"a\x0b\x03\0\0\0\0\xff\xff\xff\xff\xff\xff\xff\xff", "not a value"),
+        (b"n\x00\x07", "neither 0 nor 1"),
+        (b"n\x63", "not a value"),
+        (b"h\0\0\0\0N", "expected a text"),
+        (b"l\x01\0\0\0" * 40, "nested too deep"),
+    ],
+)
+def test_forged_bytes_are_refused(data, match):
+    with pytest.raises(WireError, match=match):
+        decode(data)
