@@ -60,7 +60,7 @@ def draw_task(
     path: ArrayLike,
 ) -> None:
     """Draws the reference path, the start with its heading, and the goal."""
-    canvas.line(path, GREY, 1 if canvas.scale < 1 else 2, 0.75, dash=6)
+    canvas.line(path, GREY, 1 if canvas.scale < 1 else 2, 0.75, dash=7)
     canvas.disc(start[:2], 5, FREE)
     canvas.disc(start[:2], 5, GREY, width=2)
     ring = max(goal_tolerance * canvas.scale, 6.0)
