@@ -1,4 +1,4 @@
-"""Draws the bundled maps: `python -m tdac_envs.maps.draw DIR`.
+"""Draws the bundled maps and the robot: `python -m tdac_envs.maps.draw DIR`.
 
 The same files come out of every run.
 """
@@ -19,6 +19,7 @@ from tdac_envs.maps.draw_ground import draw_cave, draw_warehouse
 from tdac_envs.maps.draw_ink import Image
 from tdac_envs.maps.draw_paper import draw_maze, draw_spiral
 from tdac_envs.maps.draw_plans import draw_light_on_dark, draw_office, draw_thin_walls
+from tdac_envs.maps.draw_robot import draw_robot
 from tdac_envs.maps.draw_town import draw_clutter, draw_rooms, draw_street
 
 
@@ -145,8 +146,9 @@ def save_png(path: Path, image: Image) -> None:
 
 
 def draw_maps(folder: Path) -> None:
-    """Writes each map's `<name>.png` and `<name>.json` into the folder."""
+    """Writes each map's `<name>.png` and `<name>.json`, and `robot.png`."""
     folder.mkdir(parents=True, exist_ok=True)
+    save_png(folder / "robot.png", draw_robot())
     for name, (draw, task) in _MAPS.items():
         rng = np.random.default_rng(list(name.encode()))
         save_png(folder / f"{name}.png", draw(rng))

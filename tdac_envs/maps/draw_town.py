@@ -98,12 +98,12 @@ def draw_street(rng: np.random.Generator) -> Image:
         for left, right in spans:
             _block(page, rng, (left, top, right, bottom), 42)
     _plot(page, (641, 641, 791, 791), _LAWN)
-    for at in ((668, 668), (738, 676), (680, 744), (760, 750)):
-        _tree(page, rng, at, 15)
+    for tree in ((668, 668), (738, 676), (680, 744), (760, 750)):
+        _tree(page, rng, tree, 15)
     # The gateway, narrower than three body radii.
     _plot(page, (536, 434, 584, 467), _PAVING)
-    for at in ((386, 388), (514, 510), (386, 514)):
-        _tree(page, rng, at, 9)
+    for tree in ((386, 388), (514, 510), (386, 514)):
+        _tree(page, rng, tree, 9)
     for x, y in (
         (330, 304),
         (480, 270),
@@ -210,7 +210,9 @@ def draw_clutter(rng: np.random.Generator) -> Image:
         for x in range(30 + 97 * (y // 35) % 180, 900, 180):
             line(page, [(x, y), (x, y + 35)], 0.8, (212, 190, 150))
     line(page, [(0, 0), (899, 0), (899, 699), (0, 699)], 24, (92, 70, 56), closed=True)
-    taken = [(x, y) for x in range(235, 690, 20) for y in range(235, 470, 20)]
+    taken: list[Point] = [
+        (x, y) for x in range(235, 690, 20) for y in range(235, 470, 20)
+    ]
     while len(taken) < 276 + 26:
         at = (float(rng.integers(70, 830)), float(rng.integers(70, 630)))
         if all(math.hypot(at[0] - x, at[1] - y) > 84 for x, y in taken):
