@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any, Literal, Optional
 
 import typer
 
@@ -39,7 +39,7 @@ MapOption = Annotated[
 ]
 Start = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
-    typer.Option("--start", metavar="X Y", help="Start, px (m with a map.yaml: use --metres)."),
+    typer.Option("--start", metavar="X Y", help="Start, px."),
 ]
 Goal = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
@@ -65,8 +65,8 @@ Tier = Annotated[
     typer.Option(help="Sandbox tier; see `tdac doctor`."),
 ]
 Profile = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option(help="`policy` or `paper`.  [default: the task's own]"),
+    Optional[Literal["policy", "paper"]],  # noqa: UP045
+    typer.Option(help="What the file must define.  [default: the task's own]"),
 ]
 
 
@@ -92,7 +92,8 @@ def map_command(
     snap: Snap = False,
     metres: Metres = False,
     preset: Annotated[
-        str, typer.Option(help="`default`, or `paper` for the literal grid search.")
+        Literal["default", "paper"],
+        typer.Option(help="`default`, or `paper` for the literal grid search."),
     ] = "default",
     out: Annotated[
         Optional[Path],  # noqa: UP045
@@ -163,7 +164,8 @@ def synth(
 
 
 @app.command(
-    epilog="Examples: `tdac verify controller.py --task maze`; `tdac verify runs/maze-1`"
+    epilog="Examples: `tdac verify controller.py --task maze`; "
+    "`tdac verify runs/maze-1`"
 )
 def verify(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
@@ -198,15 +200,11 @@ def verify(
         task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
     )
     raise typer.Exit(
-        command.run(
-            controller, spec, profile, paper, suite, tier, seed, junit, as_json
-        )
+        command.run(controller, spec, profile, paper, suite, tier, seed, junit, as_json)
     )
 
 
-@app.command(
-    epilog="Example: `tdac play runs/maze-1 --video maze.mp4`"
-)
+@app.command(epilog="Example: `tdac play runs/maze-1 --video maze.mp4`")
 def play(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
     task: TaskOption = None,

@@ -6,8 +6,23 @@ import ast
 from collections.abc import Callable, Iterator
 
 ALLOWED_IMPORTS = frozenset(
-    "math heapq json re collections itertools functools dataclasses typing bisect "
-    "random time numpy sensors __future__".split()
+    [
+        "math",
+        "heapq",
+        "json",
+        "re",
+        "collections",
+        "itertools",
+        "functools",
+        "dataclasses",
+        "typing",
+        "bisect",
+        "random",
+        "time",
+        "numpy",
+        "sensors",
+        "__future__",
+    ]
 )
 CONSTANTS_2D = (
     "MAP_IMG",
@@ -22,7 +37,7 @@ CONSTANTS_2D = (
     "SLOW_DIST",
 )
 FORBIDDEN_CALLS = frozenset(
-    "eval exec compile __import__ breakpoint input globals vars".split()
+    ["eval", "exec", "compile", "__import__", "breakpoint", "input", "globals", "vars"]
 )
 SEEDED_CONSTRUCTORS = frozenset({"Random", "default_rng", "Generator", "SeedSequence"})
 MAX_SOURCE_BYTES = 200_000
@@ -62,8 +77,8 @@ def import_problems(tree: ast.Module) -> list[str]:
         else:
             continue
         for module in modules:
-            if module.split(".")[0] not in ALLOWED_IMPORTS:
-                problems.append(f"line {node.lineno}: import of {module!r}")
+            allowed = module.split(".")[0] in ALLOWED_IMPORTS
+            problems += [] if allowed else [f"line {node.lineno}: import of {module!r}"]
         if node not in top:
             problems.append(f"line {node.lineno}: import not at the top level")
     return problems
@@ -117,10 +132,12 @@ def sleeps(tree: ast.Module) -> Iterator[str]:
     for node in _calls(tree):
         if _call_name(node) == "sleep":
             yield f"line {node.lineno}: sleep()"
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module == "time":
-            if any(alias.name == "sleep" for alias in node.names):
-                yield f"line {node.lineno}: import of time.sleep"
+    for statement in ast.walk(tree):
+        if isinstance(statement, ast.ImportFrom) and statement.module == "time":
+            names = {alias.name for alias in statement.names}
+            yield from (f"line {statement.lineno}: import of sleep",) * (
+                "sleep" in names
+            )
 
 
 def swallowed_errors(tree: ast.Module) -> Iterator[str]:

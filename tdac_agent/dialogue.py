@@ -46,7 +46,9 @@ class Dialogue:
     def generate(self, k: int) -> Candidate:
         """A new controller under the rules in force."""
         prompt = generate_prompt(self.task, self.rules)
-        request = Request("generate", prompt, rules=self._texts(), sample=self._at(k, 0))
+        request = Request(
+            "generate", prompt, rules=self._texts(), sample=self._at(k, 0)
+        )
         return self._code(self.learner, request)
 
     def edit(self, k: int, j: int, source: str, report: Report) -> Candidate:

@@ -125,9 +125,7 @@ def wrong_action(action: Any) -> str:
     return f"policy must return two finite numbers (left, right), got {text}"
 
 
-def run_policy(
-    child: Child, record: Record, name: str, *, held_out: bool
-) -> Rollout:
+def run_policy(child: Child, record: Record, name: str, *, held_out: bool) -> Rollout:
     """Drives an episode by `policy(obs)`."""
     calls: list[float] = []
     error = None

@@ -18,7 +18,7 @@ from tdac_agent.sandbox import (
     start,
 )
 from tdac_agent.task import Task
-from tdac_agent.trajectory import Rollout
+from tdac_agent.trajectory import Outcome, Rollout
 from tdac_envs.task2d import Pose, jittered_start
 
 JITTERS = 5
@@ -123,9 +123,10 @@ class Judge:
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
         if self._fault is not None and self._fault.phase == "import":
-            return self._not_run(name, str(self._fault))
+            return self._skipped(name, "error", str(self._fault))
         if name != "nominal" and not self.rollout("nominal").reached:
-            return self._not_run(name, "not run, since the nominal episode failed")
+            reason = "not run, since the nominal episode failed"
+            return self._skipped(name, "not run", reason)
         rollout = self.drive(name, steps, drive)
         if rollout.error is not None and " did not end within " in rollout.error:
             rollout = self.drive(name, steps, drive)
@@ -137,7 +138,7 @@ class Judge:
         """Runs an episode in a fresh child; arguments as for `rollout`."""
         if self.cpu_seconds >= CPU_SECONDS:
             message = f"the controller used more than {CPU_SECONDS} s of CPU time"
-            return self._not_run(name, message)
+            return self._skipped(name, "error", message)
         limit = steps if steps is not None else self.task.nominal.horizon
         record = Record(self._env, self.start_pose(name), limit)
         child = self._start()
@@ -149,14 +150,14 @@ class Judge:
         finally:
             self.cpu_seconds += child.close().cpu_seconds
 
-    def _not_run(self, name: str, reason: str) -> Rollout:
+    def _skipped(self, name: str, outcome: Outcome, reason: str) -> Rollout:
         record = Record(self._env, self.start_pose(name), 1)
         record.reset()
         task = self.task.nominal
         return Rollout(
             name,
             self._held_out(name),
-            "error",
+            outcome,
             record.trajectory(),
             task.goal,
             task.robot.radius,

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict
 
+from tdac_agent.diagnosis import diagnose
 from tdac_agent.errors import Fault
 from tdac_agent.files import write_atomic
 from tdac_agent.judge import Judge
@@ -91,8 +92,6 @@ def _arguments(job: Job) -> list[str]:
 
 
 def _findings(task: Task, judge: Judge, plugin: JudgePlugin) -> Findings:
-    from tdac_agent.diagnosis import diagnose
-
     episodes = [
         _episode(rollout, task)
         for (_, steps, drive), rollout in judge.rollouts.items()
@@ -101,7 +100,7 @@ def _findings(task: Task, judge: Judge, plugin: JudgePlugin) -> Findings:
     diagnoses = {
         rollout_key(*key): diagnose(rollout, task.nominal).model_dump_json()
         for key, rollout in judge.rollouts.items()
-        if not rollout.reached and rollout.outcome != "stopped"
+        if rollout.outcome not in ("reached", "stopped", "not run")
     }
     return Findings(
         expected=plugin.expected,
@@ -131,7 +130,7 @@ def _episode(rollout: Rollout, task: Task) -> Episode:
         call_ms_mean=round(rollout.call_ms[0], 3),
         call_ms_p99=round(rollout.call_ms[1], 3),
         error=rollout.error,
-        **figures,  # type: ignore[arg-type]
+        **figures,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ class Oracle:
                 return f"({x}, {y}) lies outside the map of {width} x {height} px"
             if occ[y, x]:
                 return f"({x}, {y}) is occupied"
-        for (x0, y0), (x1, y1) in zip(path, path[1:], strict=False):
+        for (x0, y0), (x1, y1) in pairwise(path):
             dx, dy = x1 - x0, y1 - y0
             if max(abs(dx), abs(dy)) != cell or abs(dx) not in (0, abs(dy), cell):
                 return f"({x0}, {y0}) -> ({x1}, {y1}) is not a step to a neighbour"
@@ -74,7 +75,7 @@ class Oracle:
 
     def path_length(self, path: list[Point]) -> float:
         """Euclidean length of a polyline, px."""
-        return sum(math.dist(a, b) for a, b in zip(path, path[1:], strict=False))
+        return sum(math.dist(a, b) for a, b in pairwise(path))
 
     def nearest_free_distance(self, occ: BoolGrid, x: int, y: int) -> float:
         """Euclidean distance from (x, y) to the nearest free pixel, px."""
@@ -92,7 +93,7 @@ class Oracle:
 
     def plan_cases(self) -> list[PlanCase]:
         """Fixed grids with traps, and seeded random ones."""
-        cases = [self._case(name, *rest) for name, *rest in _fixed_grids()]
+        cases = [self._case(*question) for question in _fixed_grids()]
         for seed in range(12):
             occ = self.grid(seed, 44, 31, 0.1 + 0.03 * seed)
             random = np.random.default_rng(1000 + seed)

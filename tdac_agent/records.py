@@ -93,7 +93,7 @@ class Recorder:
     """
 
     run: Run
-    on_event: Event
+    on_event: Event | None
     _clock: float = field(default_factory=time.monotonic)
     _previous: str = ""
 
@@ -112,7 +112,8 @@ class Recorder:
         """Appends to the journal."""
         record = {"event": name, "seconds": round(self._elapsed(), 3), **facts}
         append_line(self.run.folder / "journal.jsonl", record)
-        self.on_event(record)
+        if self.on_event is not None:
+            self.on_event(record)
 
     def asked(self, request: Request) -> Path:
         """Keeps a prompt before it is sent; returns the candidate's folder."""

@@ -97,9 +97,7 @@ def pull(task: Map2DTask, path: Path) -> list[tuple[float, float]]:
         stride = reach
         while stride >= 1:
             beyond = at + reach + stride
-            if beyond < len(points) and _free(
-                task, points[at], points[beyond], _SAFE
-            ):
+            if beyond < len(points) and _free(task, points[at], points[beyond], _SAFE):
                 reach += stride
             stride //= 2
         at += reach

@@ -110,9 +110,7 @@ class JudgePlugin:
         config.addinivalue_line("markers", "paper: only in the profile `paper`")
         config.addinivalue_line("markers", "jitter: not with `--paper`")
 
-    def pytest_collection_modifyitems(
-        self, config: pytest.Config, items: list[pytest.Item]
-    ) -> None:
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Leaves out the tests of other profiles, and fixes what must run."""
         chosen = [i for i in items if not self._left_out & _marker_names(i)]
         items[:] = chosen

@@ -14,7 +14,7 @@ from tdac_agent.provider import Provider
 from tdac_agent.records import Event, Recorder, Run
 from tdac_agent.report import Report
 from tdac_agent.task import Task
-from tdac_agent.verify import load_trajectories, verify
+from tdac_agent.verification import load_trajectories, verify
 from tdac_envs.errors import TaskError
 
 
@@ -28,7 +28,7 @@ def synthesize(
     patience: int = 1,
     seed: int = 0,
     start_from: str | None = None,
-    on_event: Event = lambda record: None,
+    on_event: Event | None = None,
 ) -> Run:
     """Writes, tests and repairs controllers until one is verified.
 
@@ -41,7 +41,7 @@ def synthesize(
         patience: J, edits per iteration.
         seed: Of the jittered starts.
         start_from: Source of a controller to begin with instead of a generated one.
-        on_event: Called with each journal record.
+        on_event: Called with each journal record, if given.
 
     Returns:
         The run; `run.verified` tells whether `run.controller` was written.
@@ -117,7 +117,7 @@ def _recorder(
     iterations: int,
     patience: int,
     seed: int,
-    on_event: Event,
+    on_event: Event | None,
 ) -> Recorder:
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -56,6 +56,7 @@ class TaskFile(_Strict):
     """Contents of `task.yaml`, schema 1."""
 
     schema_version: Literal[1] = Field(1, alias="schema")
+    name: str | None = Field(None, description="For people.")
     env: Literal["TDAC-Map2D-v0"] = "TDAC-Map2D-v0"
     map: str = Field("maze", description="Bundled name, or a path beside this file.")
     robot: RobotSpec = RobotSpec()
@@ -196,7 +197,7 @@ def _resolve(name: str, spec: TaskFile, base: Path) -> Task:
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
-    return Task(name, spec, params, nominal, prepared.image, robot_image)
+    return Task(spec.name or name, spec, params, nominal, prepared.image, robot_image)
 
 
 def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
@@ -242,6 +243,7 @@ def portable_task_file(task: Task) -> str:
     spec = task.spec.model_dump(
         mode="json", exclude_none=True, exclude={"snap", "suite"}, by_alias=True
     )
+    spec["name"] = task.name
     spec["map"] = "."
     spec["start"] = [float(v) for v in task.nominal.start]
     spec["goal"] = [float(v) for v in task.nominal.goal]

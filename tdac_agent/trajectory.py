@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Outcome = Literal["reached", "collision", "out of time", "stopped", "error"]
+Outcome = Literal["reached", "collision", "out of time", "stopped", "not run", "error"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,12 +72,13 @@ class Rollout:
         name: `nominal`, `jitter 1` ….
         held_out: Whether feedback may tell only pass or fail of it.
         outcome: How it ended; `error` where the controller failed, `stopped` where
-            it ran for fewer steps than the horizon on purpose.
+            it ran for fewer steps than the horizon on purpose, `not run` where an
+            earlier failure made it pointless.
         trajectory: The judge's record.
         goal: (x, y), px.
         radius: Body radius, px.
         tolerance: Goal tolerance, px.
-        error: What the controller did wrong, in one line, for `outcome="error"`.
+        error: What the controller did wrong, in one line, for `error` and `not run`.
         call_ms: Mean and 99th percentile of the time of a policy call, ms.
         returned: What `run_episode` returned, for an episode driven by it.
     """

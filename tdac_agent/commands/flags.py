@@ -5,9 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tdac_agent.task import RobotSpec, Task, TaskFile, load_task
 from tdac_envs.errors import TaskError
-from tdac_envs.maps import bundled_maps
+from tdac_envs.grid import OccupancyGrid
+from tdac_envs.image import load_image
+from tdac_envs.maps import bundled_map, bundled_maps
+from tdac_envs.metric import resolution_of, to_pixels
+
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,16 +58,17 @@ class TaskFlags:
         names = ("map_image", "start", "goal", "heading", "robot_radius")
         given = [name for name in names if getattr(self, name) is not None]
         if given:
-            flags = ", ".join("--" + n.replace("_image", "").replace("_", "-") for n in given)
+            words = [n.replace("_image", "").replace("_", "-") for n in given]
+            flags = ", ".join(f"--{word}" for word in words)
             raise TaskError(f"--task already says it all: leave out {flags}")
 
     def _spec(self, source: str) -> TaskFile:
         start: tuple[float, ...] | None = self.start
         goal, radius = self.goal, self.robot_radius
         if self.metres:
-            from tdac_envs.source2d import metres_to_pixels
-
-            start, goal, radius = metres_to_pixels(source, self.start, goal, radius)
+            start, goal, radius = in_pixels(Path(source), self.start, goal, radius)
+        if source in bundled_maps() and start is None:
+            start = bundled_map(source).start
         if start is not None and self.heading is not None:
             start = (*start, self.heading)
         return TaskFile.model_validate(
@@ -73,6 +81,26 @@ class TaskFlags:
                 "instructions": _text(self.instructions),
             }
         )
+
+
+def in_pixels(
+    path: Path, start: Point | None, goal: Point | None, radius: float | None
+) -> tuple[Point | None, Point | None, float | None]:
+    """Start, goal and body radius given in metres of the map's frame, in pixels.
+
+    Raises:
+        MapError: The map has no resolution.
+    """
+    image = load_image(path)
+    frame = OccupancyGrid(
+        np.zeros(image.colour.shape[:2], np.bool_), image.resolution, image.origin
+    )
+    resolution = resolution_of(frame)
+    return (
+        None if start is None else to_pixels(frame, *start),
+        None if goal is None else to_pixels(frame, *goal),
+        None if radius is None else radius / resolution,
+    )
 
 
 def _text(given: str | None) -> str:

@@ -16,7 +16,7 @@ from tdac_agent.commands.verify import controller_and_task
 from tdac_agent.judge import Judge
 from tdac_agent.task import Task, write_workdir
 from tdac_agent.trajectory import Rollout
-from tdac_agent.verify import read_source
+from tdac_agent.verification import read_source
 from tdac_envs.errors import TaskError
 from tdac_envs.render import Scene, Status
 from tdac_envs.video import write_video

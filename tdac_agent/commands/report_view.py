@@ -43,13 +43,15 @@ def show_report(report: Report, console: Console) -> None:
 
 def episode_table(report: Report) -> Table:
     """The judged episodes, a row each."""
-    table = Table(title="Episodes, as the environment recorded them", title_justify="left")
+    table = Table(
+        title="Episodes as the environment recorded them (px)", title_justify="left"
+    )
     table.add_column("start")
     table.add_column("outcome")
-    for name in ("steps", "collisions", "path left, px", "straight left, px"):
+    for name in ("steps", "contacts", "path left", "straight left"):
         table.add_column(name, justify="right")
     table.add_column("ms a call", justify="right")
-    for episode in report.episodes:
+    for episode in (e for e in report.episodes if e.outcome != "not run"):
         colour = "green" if episode.outcome == "reached" else "red"
         table.add_row(
             episode.name,

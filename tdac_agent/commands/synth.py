@@ -16,7 +16,7 @@ from rich.table import Table
 from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.records import Run
 from tdac_agent.synthesis import synthesize
-from tdac_agent.verify import read_source
+from tdac_agent.verification import read_source
 
 
 class Progress:

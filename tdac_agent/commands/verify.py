@@ -13,17 +13,14 @@ from tdac_agent.commands.report_view import show_report
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
 from tdac_agent.report import Report
-from tdac_agent.task import Task, load_task
-from tdac_agent.verify import verify
-from tdac_envs.errors import TaskError
-
-PROFILES = ("policy", "paper")
+from tdac_agent.task import Profile, Task, load_task
+from tdac_agent.verification import verify
 
 
 def run(
     controller: str,
     flags: TaskFlags,
-    profile: str | None,
+    profile: Profile | None,
     paper: bool,
     suite: Path | None,
     tier: str,
@@ -32,15 +29,13 @@ def run(
     as_json: bool,
 ) -> int:
     """Verifies and prints; returns the exit code."""
-    if profile not in (None, *PROFILES):
-        raise TaskError(f"unknown profile {profile!r}; expected policy or paper")
     file, task = controller_and_task(controller, flags)
     console = Console(stderr=as_json)
     with console.status(f"verifying {file.name} on {task.name} …"):
         report = verify(
             file,
             task,
-            profile=profile,  # type: ignore[arg-type]
+            profile=profile,
             paper=paper,
             suite=suite,
             tier=tier,

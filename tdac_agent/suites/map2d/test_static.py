@@ -53,7 +53,9 @@ def test_main(controller):
     """`main()` calls `sensors.show(policy)`, and the `__main__` guard calls it."""
     main = contract.top_level_names(controller.tree).get("main")
     assert isinstance(main, ast.FunctionDef), "no `def main()` at the top level"
-    assert "show" in contract.calls_in(main), "main() does not call sensors.show(policy)"
+    assert "show" in contract.calls_in(main), (
+        "main() does not call sensors.show(policy)"
+    )
     guarded = contract.has_main_guard(controller.tree)
     assert guarded, 'no `if __name__ == "__main__": main()`'
 

@@ -36,7 +36,9 @@ def test_robot_constants(controller, task):
     for name, value in expected.items():
         found = controller.constant(name)
         assert isinstance(found, int | float), f"{name} is {found!r}, not a number"
-        assert math.isclose(found, value, rel_tol=1e-6), f"{name} = {found}, not {value}"
+        assert math.isclose(found, value, rel_tol=1e-6), (
+            f"{name} = {found}, not {value}"
+        )
 
 
 @pytest.mark.parametrize("name", ["LOOKAHEAD", "STOP_DIST", "SLOW_DIST"])
@@ -103,7 +105,7 @@ def test_nearest_free_is_nearest(controller, oracle):
         assert not occ[fy, fx], f"nearest_free({x}, {y}) is {found}: occupied"
         best, got = oracle.nearest_free_distance(occ, x, y), math.dist((x, y), found)
         assert got <= best + 1e-9, (
-            f"nearest_free({x}, {y}) is {found}, {got:.2f} px away; {best:.2f} is possible"
+            f"nearest_free({x}, {y}) is {found}, {got:.2f} px away, not {best:.2f}"
         )
 
 
@@ -123,7 +125,9 @@ def test_plan_path(controller, oracle):
     for case in oracle.plan_cases():
         own = controller.call("OccMap2D", case.occ)
         path = controller.call("plan_path", own, case.start, case.goal, 1)
-        assert isinstance(path, list), f"{case.name}: a {type(path).__name__}, not a list"
+        assert isinstance(path, list), (
+            f"{case.name}: a {type(path).__name__}, not a list"
+        )
         if math.isinf(case.length):
             assert path == [], f"{case.name}: {len(path)} points, expected []"
             continue

@@ -1,0 +1,115 @@
+"""`tdac doctor`: what works on this machine."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import json
+import platform
+import sys
+from dataclasses import asdict, dataclass
+
+from rich.console import Console
+from rich.markup import escape
+
+from tdac_agent.commands.play import has_display
+from tdac_agent.sandbox import available_tiers
+
+EXTRAS = {
+    "human": "pygame",
+    "sb3": "stable_baselines3",
+    "openai": "openai",
+    "ray": "ray",
+}
+PACKAGES = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that was tried.
+
+    Attributes:
+        name: What.
+        works: Whether it works here.
+        detail: How, or why not and what to do.
+        needed: Whether nothing works without it.
+    """
+
+    name: str
+    works: bool
+    detail: str
+    needed: bool = False
+
+
+def run(as_json: bool) -> int:
+    """Tries everything and prints it; 3 where something needed does not work."""
+    checks = [*_sandbox(), _video(), _window(), *_extras()]
+    if as_json:
+        record = {
+            "checks": [asdict(check) for check in checks],
+            "versions": _versions(),
+        }
+        sys.stdout.write(json.dumps(record, indent=2) + "\n")
+    else:
+        _show(checks)
+    return 3 if any(c.needed and not c.works for c in checks) else 0
+
+
+def _sandbox() -> list[Check]:
+    tiers = available_tiers()
+    checks = [
+        Check(
+            f"sandbox: {s.tier.name}", s.works, s.reason or ", ".join(s.tier.promises)
+        )
+        for s in tiers
+    ]
+    best = next((status.tier.name for status in tiers if status.works), None)
+    if best == "rlimits":
+        detail = "rlimits only: verdicts make no claim about files and network; on "
+        detail += "Debian and Ubuntu: apt install bubblewrap"
+        return [*checks, Check("sandbox in use", True, detail, needed=True)]
+    detail = best or "none works: controllers cannot be run here"
+    return [*checks, Check("sandbox in use", best is not None, detail, needed=True)]
+
+
+def _video() -> Check:
+    import imageio_ffmpeg
+
+    try:
+        version = imageio_ffmpeg.get_ffmpeg_version()
+    except RuntimeError as error:
+        return Check("video (.mp4, .gif)", False, str(error))
+    return Check("video (.mp4, .gif)", True, f"ffmpeg {version}")
+
+
+def _window() -> Check:
+    if importlib.util.find_spec("pygame") is None:
+        return Check("window", False, 'pip install "tdac[human]"')
+    if not has_display():
+        return Check("window", False, "no display here; videos work without one")
+    return Check("window", True, "pygame")
+
+
+def _extras() -> list[Check]:
+    checks = []
+    for extra, module in EXTRAS.items():
+        found = importlib.util.find_spec(module) is not None
+        detail = module if found else f'optional: pip install "tdac[{extra}]"'
+        checks.append(Check(f"extra {extra}", found, detail))
+    return checks
+
+
+def _versions() -> dict[str, str]:
+    versions = {name: importlib.metadata.version(name) for name in PACKAGES}
+    return {"python": platform.python_version(), **versions}
+
+
+def _show(checks: list[Check]) -> None:
+    console = Console()
+    for check in checks:
+        mark = "[green]✔[/]" if check.works else "[yellow]–[/]"
+        if check.needed and not check.works:
+            mark = "[red]✘[/]"
+        console.print(f"{mark} {check.name:<22} {escape(check.detail)}")
+    versions = ", ".join(f"{name} {value}" for name, value in _versions().items())
+    console.print(f"\n{versions}", highlight=False)
