@@ -255,7 +255,7 @@ def _dashes(points: NDArray[np.float64], dash: float) -> list[NDArray[np.float64
 def _text_mask(text: str) -> NDArray[np.float32]:
     """Coverage of some text, drawn large and shrunk, since OpenCV's own is coarse."""
     zoom = TEXT_SIZE * _TEXT_ZOOM
-    font, weight = cv2.FONT_HERSHEY_SIMPLEX, max(1, round(zoom))
+    font, weight = cv2.FONT_HERSHEY_SIMPLEX, max(1, round(1.6 * zoom))
     (width, height), _ = cv2.getTextSize(text, font, zoom, weight)
     rows = (round(height * 1.8) // _TEXT_ZOOM + 1) * _TEXT_ZOOM
     columns = (width // _TEXT_ZOOM + 2) * _TEXT_ZOOM

@@ -3,7 +3,6 @@
 import re
 import subprocess
 
-import cv2
 import numpy as np
 import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
@@ -21,21 +20,20 @@ def frames(count=12, shape=(48, 64)):
 
 
 def decode(path):
-    """Frame rate and all frames of a film."""
-    film = cv2.VideoCapture(str(path))
-    fps, found = film.get(cv2.CAP_PROP_FPS), []
-    while True:
-        more, frame = film.read()
-        if not more:
-            return fps, found
-        found.append(frame[..., ::-1])
+    """What ffmpeg says about the picture, and all frames."""
+    command = [get_ffmpeg_exe(), "-hide_banner", "-i", str(path)]
+    raw = ["-fps_mode", "passthrough", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(command + raw, capture_output=True, check=True)
+    about = re.search(r"Video: .*", done.stderr.decode()).group()
+    width, height = map(int, re.search(r" (\d{2,})x(\d{2,})\b", about).groups())
+    return about, np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)
 
 
 @pytest.mark.parametrize("name", ["film.mp4", "film.gif", "FILM.MP4"])
 def test_every_frame_comes_back_in_its_colours(tmp_path, name):
     write_video(frames(), tmp_path / name, fps=20)
-    fps, film = decode(tmp_path / name)
-    assert fps == 20
+    about, film = decode(tmp_path / name)
+    assert " 20 fps" in about
     assert len(film) == 12
     for k, (ours, theirs) in enumerate(zip(frames(), film, strict=True)):
         off = np.abs(ours[20, 32].astype(int) - theirs[20, 32]).max()
@@ -45,9 +43,8 @@ def test_every_frame_comes_back_in_its_colours(tmp_path, name):
 def test_mp4_plays_in_browsers(tmp_path):
     """H.264 in yuv420p, index first."""
     write_video(frames(), tmp_path / "film.mp4", fps=20)
-    command = [get_ffmpeg_exe(), "-hide_banner", "-i", str(tmp_path / "film.mp4")]
-    about = subprocess.run(command, capture_output=True, text=True, check=False).stderr
-    assert re.search(r"Video: h264 .*yuv420p", about)
+    about, _ = decode(tmp_path / "film.mp4")
+    assert re.search(r"h264 .*yuv420p", about)
     data = (tmp_path / "film.mp4").read_bytes()
     assert 0 < data.find(b"moov") < data.find(b"mdat")
 
@@ -55,7 +52,7 @@ def test_mp4_plays_in_browsers(tmp_path):
 def test_odd_sides_lose_one_pixel_in_mp4_and_none_in_gif(tmp_path):
     for name, shape in (("film.mp4", (48, 64, 3)), ("film.gif", (49, 65, 3))):
         write_video(frames(shape=(49, 65)), tmp_path / name, fps=10)
-        assert {frame.shape for frame in decode(tmp_path / name)[1]} == {shape}
+        assert decode(tmp_path / name)[1].shape[1:] == shape
 
 
 def test_frames_are_taken_one_by_one(tmp_path):
