@@ -39,7 +39,7 @@ def squares(occ, reach):
 
 def slab_distance(boxes, x, y, angle, grow):
     """Distance to the nearest closed box along a ray, by the slab method."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         per_x, per_y = np.float64(1) / math.cos(angle), np.float64(1) / math.sin(angle)
         at_x = np.sort((boxes[:, 0::2] + [-grow, grow] - x) * per_x, axis=1)
         at_y = np.sort((boxes[:, 1::2] + [-grow, grow] - y) * per_y, axis=1)
