@@ -35,106 +35,48 @@ class _Task:
 
 
 _UP = round(-math.pi / 2, 4)
-
 _DOWN = -_UP
-_BACK = round(math.pi, 4)
 
 _MAPS: dict[str, tuple[Callable[[np.random.Generator], Image], _Task]] = {
     "maze": (
         draw_maze,
-        _Task(
-            (173, 289),
-            _UP,
-            (245, 505),
-            15,
-            "A maze in felt pen, three cells as the crow flies.",
-        ),
+        _Task((173, 289), _UP, (245, 505), 15, "A felt-pen maze; the goal is near."),
     ),
     "cave": (
         draw_cave,
-        _Task(
-            (370, 180),
-            _UP,
-            (430, 425),
-            12,
-            "A cave survey; the goal lies in a hall behind a squeeze.",
-        ),
+        _Task((370, 180), _UP, (430, 425), 12, "A cave; a squeeze leads to the hall."),
     ),
     "clutter": (
         draw_clutter,
-        _Task(
-            (345, 350),
-            0.0,
-            (575, 350),
-            14,
-            "A playroom: out of one pen and into the other.",
-        ),
+        _Task((345, 350), 0.0, (575, 350), 14, "A playroom; from one pen to another."),
     ),
     "light_on_dark": (
         draw_light_on_dark,
-        _Task(
-            (810, 260),
-            0.0,
-            (610, 265),
-            10,
-            "A ship's deck as a blueprint, light walls on dark blue.",
-        ),
+        _Task((810, 260), 0.0, (610, 265), 10, "A ship's deck, light lines on dark."),
     ),
     "office": (
         draw_office,
-        _Task(
-            (500, 100),
-            0.0,
-            (500, 370),
-            12,
-            "An office floor: from room 103 to the meeting room.",
-        ),
+        _Task((500, 100), 0.0, (500, 370), 12, "An office; to the meeting room."),
     ),
     "rooms": (
         draw_rooms,
-        _Task(
-            (140, 400),
-            0.0,
-            (400, 400),
-            15,
-            "A furnished flat; the next room is a walk around.",
-        ),
+        _Task((140, 400), 0.0, (400, 400), 15, "A furnished flat; to the next room."),
     ),
     "spiral": (
         draw_spiral,
-        _Task(
-            (350, 100), 0.0, (350, 350), 10, "A brush spiral with a ring at its centre."
-        ),
+        _Task((350, 100), 0.0, (350, 350), 10, "A spiral with a ring at its centre."),
     ),
     "street": (
         draw_street,
-        _Task(
-            (288, 430),
-            -1.4486,
-            (450, 450),
-            12,
-            "Streets from above; the goal is a court with one gateway.",
-        ),
+        _Task((288, 430), -1.4486, (450, 450), 12, "Streets; to a court with a gate."),
     ),
     "thin_walls": (
         draw_thin_walls,
-        _Task(
-            (81, 405),
-            _DOWN,
-            (350, 350),
-            10,
-            "Nested octagons whose walls are a pixel or two thin.",
-        ),
+        _Task((81, 405), _DOWN, (350, 350), 10, "Nested octagons of thin walls."),
     ),
     "warehouse": (
         draw_warehouse,
-        _Task(
-            (560, 221),
-            0.0,
-            (560, 385),
-            12,
-            "Racking in a warehouse; the goal aisle has one end.",
-        ),
+        _Task((560, 221), 0.0, (560, 385), 12, "Racking; the goal aisle has one end."),
     ),
 }
 

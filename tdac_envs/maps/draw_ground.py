@@ -58,7 +58,7 @@ def draw_cave(rng: np.random.Generator) -> Image:
     page[fine > 0] = (58, 46, 38)
     page[fine > 5] = (92, 74, 58)
     page[fine > 26] = (80, 64, 50)
-    return scan(page, rng, 0.0)
+    return scan(page, rng, 0.3)
 
 
 _FLOOR: Colour = (226, 227, 225)

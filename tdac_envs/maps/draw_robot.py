@@ -28,7 +28,7 @@ _METAL: Colour = (176, 184, 192)
 
 
 def draw_robot() -> Image:
-    """The robot from above, RGBA: its nose towards +x, its body as wide as the image."""
+    """The robot from above, RGBA: nose towards +x, the body as wide as the image."""
     page, mask = sheet(_SIZE, _SIZE, _RIM), sheet(_SIZE, _SIZE, (0, 0, 0))
     disc(mask, _MIDDLE, 63, (255, 255, 255))
     disc(page, _MIDDLE, 58, _SHELL)
