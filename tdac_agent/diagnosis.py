@@ -8,11 +8,13 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_agent.reference import pull
 from tdac_agent.report import Cause, Diagnosis
 from tdac_agent.trajectory import Rollout, Trajectory
 from tdac_envs.task2d import Map2DTask, Pose
 
 LAST_POSES = 6
+_PATH_AHEAD = 400
 # A wheel this near its limit counts as saturated.
 _SATURATED = 0.999
 # A step nearer than this, px, is no progress: it is what a turn in place drifts.
@@ -112,9 +114,9 @@ def _no_arrival(rollout: Rollout, task: Map2DTask) -> Diagnosis:
     away = float(distances[-1] - distances[best])
     if distances[best] <= near and away > 2.0 * rollout.radius:
         text = (
-            f"{rollout.name}: missed the goal: {distances[best]:.1f} px before it "
-            f"(tolerance {rollout.tolerance:.1f} px) in step {best}, then passed by and "
-            f"went {away:.1f} px away. "
+            f"{rollout.name}: missed the goal: in step {best} it was "
+            f"{distances[best]:.1f} px off (tolerance {rollout.tolerance:.1f} px); "
+            f"then it passed by and went {away:.1f} px away. "
         )
         return _diagnosis(rollout, "missed goal", text, best)
     return _stalled(rollout, best)
@@ -245,8 +247,9 @@ def _heading_error(trajectory: Trajectory, task: Map2DTask) -> float | None:
     for x, y, heading in trajectory.poses[:-20:-1]:
         path = task.path_from(Pose(float(x), float(y), float(heading)))
         if len(path) > 1:
-            ahead = path[min(math.ceil(task.robot.radius) + 1, len(path) - 1)]
-            bearing = math.atan2(ahead[1] - y, ahead[0] - x)
+            # A shortest path on a grid has many forms; a pulled one has a direction.
+            _, (to_x, to_y), *_ = pull(task, path[:_PATH_AHEAD])
+            bearing = math.atan2(to_y - y, to_x - x)
             return math.remainder(bearing - float(heading), 2.0 * math.pi)
     return None
 
