@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -71,11 +72,17 @@ class Row:
 
 def verify_builtin(image: ColourImage, start: Point, goal: Point, radius: int) -> bool:
     """Whether the builtin learner's controller is verified on the map."""
-    from tdac_agent import synthesize
-    from tdac_agent.task import map_task
+    from tdac_agent import load_task, synthesize
+    from tdac_agent.task import RobotSpec, TaskFile
 
-    task = map_task(image, start, goal, robot_radius=radius)
-    return bool(synthesize(task, learner="builtin").verified)
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "map.png"
+        cv2.imwrite(str(path), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+        spec = TaskFile(
+            map=str(path), start=start, goal=goal, robot=RobotSpec(radius=radius)
+        )
+        run = synthesize(load_task(spec), "builtin", out=Path(name) / "run")
+    return run.verified
 
 
 def select(entries: list[Entry], radius: str) -> list[tuple[Entry, int]]:
