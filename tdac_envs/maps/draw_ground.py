@@ -55,9 +55,9 @@ def draw_cave(rng: np.random.Generator) -> Image:
     fine = cv2.resize(depth, (900 * FINE, 700 * FINE), interpolation=cv2.INTER_LINEAR)
     page = sheet(900, 700, (232, 222, 200))
     page[fine > -3] = (196, 180, 150)
-    page[fine > 0] = (58, 46, 38)
-    page[fine > 5] = (92, 74, 58)
-    page[fine > 26] = (80, 64, 50)
+    page[fine > 0] = (54, 42, 36)
+    page[fine > 5] = (90, 72, 60)
+    page[fine > 26] = (78, 60, 48)
     return scan(page, rng, 0.3)
 
 
