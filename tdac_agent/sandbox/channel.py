@@ -10,6 +10,8 @@ import time
 from tdac_agent.sandbox.inner.wire import HEADER
 
 CHUNK = 1 << 16
+# Most answers are short, and a large buffer costs more than the whole round trip.
+SHORT = 1 << 12
 KEPT_OUTPUT = 4000
 
 
@@ -89,7 +91,7 @@ class Channel:
                 if descriptor == self._output:
                     self._drain()
                     continue
-                part = self._read()
+                part = self._read(CHUNK if parts else SHORT)
                 parts.append(part)
                 have += len(part)
             if need == HEADER.size and have >= need:
@@ -107,9 +109,9 @@ class Channel:
             raise FrameError(f"a frame of {size} bytes (limit {self._frame_bytes})")
         return size
 
-    def _read(self) -> bytes:
+    def _read(self, most: int) -> bytes:
         try:
-            part = os.read(self._answers, 16 * CHUNK)
+            part = os.read(self._answers, most)
         except BlockingIOError:
             return b""
         if not part:

@@ -7,6 +7,7 @@ import os
 from .wire import HEADER, Kind, WireError
 
 CHUNK = 1 << 16
+SHORT = 1 << 12
 
 
 class Link:
@@ -27,25 +28,24 @@ class Link:
 
         The process ends here when the judge has closed its end.
         """
-        data = self._read(HEADER.size)
+        data = self._read(SHORT)
+        while len(data) < HEADER.size:
+            data += self._read(SHORT)
         size, kind, sequence = HEADER.unpack_from(data)
         data = data[HEADER.size :]
         if len(data) < size:
             parts = [data]
             missing = size - len(data)
             while missing:
-                parts.append(self._read(1, missing))
+                parts.append(self._read(min(missing, CHUNK)))
                 missing -= len(parts[-1])
             data = b"".join(parts)
         return kind, sequence, data
 
-    def _read(self, least: int, most: int = CHUNK) -> bytes:
-        data = b""
-        while len(data) < least:
-            part = os.read(self._requests, min(most, 1 << 20) - len(data))
-            if not part:
-                os._exit(0)
-            data += part
+    def _read(self, most: int) -> bytes:
+        data = os.read(self._requests, most)
+        if not data:
+            os._exit(0)
         return data
 
     def send(self, kind: Kind, sequence: int, payload: bytes) -> None:

@@ -28,6 +28,8 @@ def loaded(launch, tier, source, limits=SHORT):
     return child
 
 
+# What ends the process is tried on each tier, what Python itself reports on one.
+FATAL = ("os._exit", "hard exit", "endless", "crash", "memory", "quiet flood")
 IMPORTS = {
     "a syntax error": ("def f(:", ControllerError, "SyntaxError"),
     "a null byte": ("x = 1\0", ControllerError, "SyntaxError|ValueError"),
@@ -50,8 +52,22 @@ IMPORTS = {
 }
 
 
-@pytest.mark.parametrize("name", IMPORTS)
-def test_an_import_that_fails(launch, tier, name):
+def on_tiers(cases, on_every_tier):
+    """Return parameters: some cases on each tier, the rest on the best one."""
+    return [name for name in cases if (name in FATAL) == on_every_tier]
+
+
+@pytest.mark.parametrize("name", on_tiers(IMPORTS, True))
+def test_an_import_that_fails_on_each_tier(launch, tier, name):
+    check_import(launch, tier, name)
+
+
+@pytest.mark.parametrize("name", on_tiers(IMPORTS, False))
+def test_an_import_that_fails(launch, name):
+    check_import(launch, "auto", name)
+
+
+def check_import(launch, tier, name):
     source, fault, match = IMPORTS[name]
     start = time.monotonic()
     with pytest.raises(fault, match=match):
@@ -92,8 +108,17 @@ CALLS = {
 }
 
 
-@pytest.mark.parametrize("name", CALLS)
-def test_a_call_that_fails(launch, tier, name):
+@pytest.mark.parametrize("name", on_tiers(CALLS, True))
+def test_a_call_that_fails_on_each_tier(launch, tier, name):
+    check_call(launch, tier, name)
+
+
+@pytest.mark.parametrize("name", on_tiers(CALLS, False))
+def test_a_call_that_fails(launch, name):
+    check_call(launch, "auto", name)
+
+
+def check_call(launch, tier, name):
     body, fault, match = CALLS[name]
     limits = Limits(call_seconds=0.5 if name == "endless" else 5)
     child = loaded(launch, tier, f"def policy(obs):\n    {body}\n", limits)

@@ -94,8 +94,16 @@ JUDGE = """
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_a_child_ends_with_its_judge(tier, tmp_path, number, wait_until_gone):
+def test_a_child_ends_with_its_killed_judge(tier, tmp_path, wait_until_gone):
+    end_judge(tier, tmp_path, signal.SIGKILL, wait_until_gone)
+
+
+def test_an_interrupted_judge_leaves_nothing(tmp_path, wait_until_gone):
+    end_judge("auto", tmp_path, signal.SIGINT, wait_until_gone)
+    assert list(tmp_path.iterdir()) == []
+
+
+def end_judge(tier, tmp_path, number, wait_until_gone):
     judge = subprocess.Popen(
         [sys.executable, "-c", textwrap.dedent(JUDGE), tier],
         stdout=subprocess.PIPE,
@@ -107,8 +115,6 @@ def test_a_child_ends_with_its_judge(tier, tmp_path, number, wait_until_gone):
         judge.send_signal(number)
         judge.wait(10)
     assert wait_until_gone(pid, tmp_path) == []
-    if number == signal.SIGINT:
-        assert list(tmp_path.iterdir()) == []
 
 
 def test_a_forgotten_child_ends(tier, wait_until_gone):
