@@ -2,13 +2,16 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: synth test slow lint bench clean
+.PHONY: synth test slow slow-sample lint clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
 
 test: $(VENV)/.test-installed
 	$(BIN)/pytest -q -n 2 -m "not slow"
+
+slow-sample: $(VENV)/.test-installed
+	TDAC_SLOW_SAMPLE=1 $(BIN)/pytest -q -n 2 -m slow
 
 slow: $(VENV)/.test-installed
 	$(BIN)/pytest -q -n 2 -m slow

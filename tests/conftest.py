@@ -1,0 +1,39 @@
+"""Options that all tests share."""
+
+from __future__ import annotations
+
+import os
+import random
+import zlib
+from pathlib import Path
+
+import pytest
+
+SAMPLE = 12
+REAL_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """Maps and worlds by other people; tests that need them skip without."""
+    if not REAL_DATA.is_dir():
+        pytest.skip(f"{REAL_DATA.name} is not beside this checkout")
+    return REAL_DATA
+
+
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
+    """With TDAC_SLOW_SAMPLE set, keeps a seeded sample of the slow tests."""
+    seed = os.environ.get("TDAC_SLOW_SAMPLE")
+    slow = sorted((i for i in items if i.get_closest_marker("slow")), key=_order)
+    if seed is None or len(slow) <= SAMPLE:
+        return
+    kept = set(random.Random(seed).sample(slow, SAMPLE))
+    dropped = [item for item in slow if item not in kept]
+    config.hook.pytest_deselected(items=dropped)
+    items[:] = [item for item in items if item not in dropped]
+
+
+def _order(item: pytest.Item) -> int:
+    return zlib.crc32(item.nodeid.encode())
