@@ -15,7 +15,11 @@ from tdac_envs.image import GreyImage
 # known. Every term changes its sign with the picture's negative, so that a map and
 # its negative are decided alike.
 _W_CONNECTED, _W_BORDER, _W_WIDTH, _W_PIECES = 1.5, -1.7, 1.1, -1.5
-_W_EXTREMES, _W_SAVER = 2.0, 3.0
+_W_THIN, _W_OUTSIDE, _W_EXTREMES, _W_SAVER = 1.0, 1.0, 4.0, 3.0
+_TOO_THIN = 2.5
+"""Mean distance to the other side, px, below which no robot fits."""
+_WIDE = 0.01
+"""The same as a share of the picture's side, above which a shape is no wall."""
 
 
 def light_free_evidence(luminance: GreyImage, light: BoolGrid) -> float:
@@ -28,20 +32,57 @@ def light_free_evidence(luminance: GreyImage, light: BoolGrid) -> float:
         luminance: Shape (height, width), uint8.
         light: Shape (height, width), bool, the pixels above the threshold.
     """
-    share = float(light.mean())
-    border = np.concatenate([light[0], light[-1], light[:, 0], light[:, -1]]).mean()
+    light = _without_frame(light)
+    share, border = float(light.mean()), float(_rim(light).mean())
     connected_l, pieces_l = _pieces(light)
     connected_d, pieces_d = _pieces(~light)
-    width = math.log(_mean_width(light) / _mean_width(~light))
+    width_l, width_d = _mean_width(light), _mean_width(~light)
     pieces = math.log((pieces_l + 3) / (pieces_d + 3))
     return (
         _W_CONNECTED * (connected_l - connected_d)
-        + _W_BORDER * (float(border) - 0.5) * (1 - abs(2 * share - 1))
-        + _W_WIDTH * _clip(width, 3.0)
+        + _W_BORDER * (border - 0.5) * (1 - abs(2 * share - 1))
+        + _W_WIDTH * _clip(math.log(width_l / width_d), 3.0)
         + _W_PIECES * _clip(pieces, 1.0)
+        + _W_THIN * (_thinness(width_d) - _thinness(width_l))
+        + _W_OUTSIDE * _outside(border, width_l, width_d, math.sqrt(light.size))
         + _W_EXTREMES * _extremes(luminance)
         + _W_SAVER * _map_saver(luminance)
     )
+
+
+def _rim(side: BoolGrid) -> BoolGrid:
+    return np.concatenate([side[0], side[-1], side[:, 0], side[:, -1]])
+
+
+def _without_frame(light: BoolGrid) -> BoolGrid:
+    """The picture without a narrow one-coloured margin (5 % on each side at most)."""
+    if _rim(light).min() != _rim(light).max():
+        return light
+    rows, columns = np.nonzero(light != light[0, 0])
+    if rows.size == 0:
+        return light
+    top, bottom = int(rows.min()), int(rows.max()) + 1
+    left, right = int(columns.min()), int(columns.max()) + 1
+    height, width = light.shape
+    widest = max(top / height, 1 - bottom / height, left / width, 1 - right / width)
+    inner = light[top:bottom, left:right]
+    return inner if widest <= 0.05 and inner.min() != inner.max() else light
+
+
+def _thinness(width: float) -> float:
+    return _clip(_TOO_THIN - width, 1.5) if width < _TOO_THIN else 0.0
+
+
+def _outside(border: float, width_l: float, width_d: float, side: float) -> float:
+    """Whether the side that fills the border is the outside of a free area.
+
+    It is if the other side is too wide for walls; else it is the paper around them.
+    """
+    if abs(2 * border - 1) < 0.9:
+        return 0.0
+    inner = width_d if border > 0.5 else width_l
+    wide = _clip(math.log(inner / side / _WIDE), 1.0)
+    return -wide if border > 0.5 else wide
 
 
 def _clip(value: float, limit: float) -> float:

@@ -102,11 +102,17 @@ def readings(scene: Scene) -> Iterator[Reading]:
 def _outwards(
     scene: Scene, plain: Reading, unmarked: Reading | None
 ) -> Iterator[Reading]:
+    mixed = _mixed(scene)
+    if mixed is not None:
+        yield mixed
+        for extent in (4, 8, 16):
+            cells = without_specks(mixed.cells, extent)
+            yield _note(mixed, cells, f"specks up to {extent} px ignored", extent, 0)
+        return
     yield plain
     base = unmarked or plain
     if unmarked is not None:
         yield unmarked
-    yield from _mixed(scene)
     if _unknown(scene) is not None:
         # A mapping tool's output: every dark pixel was measured, none was drawn.
         return
@@ -170,7 +176,7 @@ def _beside(level: int, threshold: float, light_free: bool) -> float:
 
     Whatever is more free than a map saver's 205 is free by its own rule.
     """
-    safe = level + 4.0 if light_free else level - 4.0
+    safe = level + 0.5 if light_free else level - 0.5
     if level > 190 or level < 65:
         return safe
     return max(threshold, safe) if light_free else min(threshold, safe)
@@ -215,27 +221,28 @@ def _without_marks(image: MapImage, reading: Reading) -> Reading | None:
     return replace(reading, cells=cells, method=f"{reading.method}, marks ignored")
 
 
-def _mixed(scene: Scene) -> Iterator[Reading]:
-    """Unlike the floor at start and goal, where both darker and lighter is not floor."""
-    floors = [
-        np.median(
-            scene.image.colour[disc(scene.luminance.shape, x, y, scene.radius / 2)],
-            axis=0,
-        )
-        for x, y in scene.ends
-    ]
-    floor = np.mean(floors, axis=0)
-    if max(float(np.abs(f - floor).max()) for f in floors) > 8:
-        return
-    grey = float(floor @ np.array([0.2126, 0.7152, 0.0722]))
-    darker = float((scene.luminance < grey - 15).mean())
-    lighter = float((scene.luminance > grey + 15).mean())
-    if min(darker, lighter) < 0.005:
-        return
-    distance = floor_distance(scene.image.colour, floor)
-    yield Reading(
-        np.asarray(distance > otsu(distance)), "mixed", "colour unlike the floor"
-    )
+def _mixed(scene: Scene) -> Reading | None:
+    """What is unlike the floor at start and goal, where that is of a middle tone.
+
+    Only where both darker and lighter pixels border on the floor: then no threshold
+    separates it.
+    """
+    shape, colour = scene.luminance.shape, scene.image.colour
+    spots = [disc(shape, x, y, scene.radius / 2) for x, y in scene.ends]
+    floors = np.array([np.median(colour[spot], axis=0) for spot in spots])
+    if float(np.ptp(floors, axis=0).max()) > 16:
+        return None
+    floor = floors.mean(axis=0)
+    grey = int(luminance(np.rint(floor).astype(np.uint8)[None, None])[0, 0])
+    gap = scene.luminance.astype(np.int16) - grey
+    like = (np.abs(gap) < 8).astype(np.uint8)
+    beside = cv2.dilate(like, np.ones((5, 5), np.uint8)) > 0
+    shares = [float((beside & far).mean()) for far in (gap <= -20, gap >= 20)]
+    if like.mean() < 0.02 or min(shares) < 0.003 or (gap <= -20).mean() < 0.03:
+        return None
+    distance = floor_distance(colour, floor)
+    cells = np.asarray(distance > otsu(distance))
+    return Reading(cells, "mixed", "colour unlike the floor")
 
 
 def _bolder(base: Reading) -> Iterator[Reading]:
@@ -245,7 +252,7 @@ def _bolder(base: Reading) -> Iterator[Reading]:
         if extent <= 0.04 * min(shape):
             cells = without_specks(base.cells, extent)
             yield _note(base, cells, f"specks up to {extent} px ignored", extent, 0)
-    for width in (3, 5):
+    for width in (3, 5) if min(shape) >= 1500 else (3,):
         if thick_share(base.cells, 2 * width) < 0.5:
             return
         opened = without_lines(base.cells, width)
