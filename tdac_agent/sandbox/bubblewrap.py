@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 
 from tdac_agent.sandbox.errors import SandboxError
-from tdac_agent.sandbox.exposure import DEVICES, exposure
+from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.sandbox.folder import PrivateFolder
 
 
@@ -37,7 +37,7 @@ def bubblewrap_command(
     for path in seen.hidden:
         words += ["--tmpfs", path, "--remount-ro", path]
     words += _each("--ro-bind", (*seen.packages, str(folder.root)))
-    words += _each("--dev-bind", DEVICES)
+    words += _each("--dev-bind", seen.devices)
     words += ["--size", str(scratch_bytes), "--tmpfs", str(folder.scratch)]
     return [*words, "--remount-ro", "/", "--chdir", "/", "--"]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class SandboxError(Exception):
     """The sandbox itself failed; says nothing about the controller."""
@@ -18,6 +20,18 @@ class ControllerFault(Exception):
     def __init__(self, message: str, phase: str) -> None:
         super().__init__(message)
         self.phase = phase
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _revive, (type(self), self.args, self.__dict__)
+
+
+def _revive(
+    kind: type[ControllerFault], arguments: tuple[Any, ...], state: dict[str, Any]
+) -> ControllerFault:
+    """Rebuild a fault that a worker process has sent."""
+    fault = kind.__new__(kind, *arguments)
+    fault.__dict__.update(state)
+    return fault
 
 
 class ControllerError(ControllerFault):

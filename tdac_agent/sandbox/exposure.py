@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 INNER = Path(__file__).resolve().parent / "inner"
-DEVICES = ("/dev/null", "/dev/zero", "/dev/urandom")
 FOREIGN_PACKAGES = ("site-packages", "dist-packages")
 
 
@@ -24,6 +23,7 @@ class Exposure:
         system: The standard library, shared libraries and the loader.
         hidden: Folders below `system` with other packages; not to be seen.
         packages: numpy, its libraries, and the child's own code.
+        devices: Harmless devices.
         links: Symbolic links in the root folder, (path, target).
     """
 
@@ -31,6 +31,7 @@ class Exposure:
     system: tuple[str, ...]
     hidden: tuple[str, ...]
     packages: tuple[str, ...]
+    devices: tuple[str, ...]
     links: tuple[tuple[str, str], ...]
 
 
@@ -45,12 +46,12 @@ def exposure() -> Exposure:
     roots = [Path(folder).resolve() for folder in ("/lib", "/lib64")]
     loaders = [str(path) for root in roots for path in root.glob("ld-*.so*")]
     files = [program, *loaders, "/etc/ld.so.cache", "/etc/alternatives"]
-    system = (*folders, *(p for p in files if os.path.exists(p)))
     return Exposure(
         interpreter=program,
-        system=system,
+        system=(*folders, *_existing(*files)),
         hidden=tuple(_foreign(folders)),
         packages=(*numpy_folders(), str(INNER)),
+        devices=_existing("/dev/null", "/dev/zero", "/dev/urandom"),
         links=tuple(
             (path, os.readlink(path))
             for path in ("/lib", "/lib64", "/lib32", "/bin", "/sbin")
@@ -67,6 +68,10 @@ def numpy_folders() -> tuple[str, ...]:
         for folder in (package, package.parent / "numpy.libs")
         if folder.is_dir()
     )
+
+
+def _existing(*paths: str) -> tuple[str, ...]:
+    return tuple(path for path in paths if os.path.exists(path))
 
 
 def _extension_folders() -> set[str]:

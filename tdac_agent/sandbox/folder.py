@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 import tempfile
 from pathlib import Path
 
@@ -58,11 +57,21 @@ class PrivateFolder:
             shutil.copyfile(entry, self.work / entry.name)
 
     def remove(self) -> None:
-        """Delete the folder, whatever the controller left in it."""
-        try:
-            shutil.rmtree(self.root)
-        except (OSError, RecursionError):
-            # Folders without rights, or nested deeper than Python can follow.
-            root = str(self.root)
-            for command in (["chmod", "-R", "u+rwx", root], ["rm", "-rf", root]):
-                subprocess.run(command, check=False, capture_output=True)
+        """Delete the folder, whatever the controller left in it.
+
+        Folders are lifted to the top before they are emptied: the controller may have
+        nested them deeper than a path can say, and taken away rights.
+        """
+        folders = [self.root]
+        for count, folder in enumerate(folders):
+            for entry in os.scandir(folder):
+                if entry.is_dir(follow_symlinks=False):
+                    lifted = self.root / f"lifted-{len(folders)}"
+                    os.chmod(entry.path, 0o700)
+                    if count:
+                        os.rename(entry.path, lifted)
+                    folders.append(lifted if count else Path(entry.path))
+                else:
+                    os.unlink(entry.path)
+        for folder in reversed(folders):
+            folder.rmdir()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.sandbox.errors import ControllerFault, SandboxError
-from tdac_agent.sandbox.exposure import DEVICES, entries_but_hidden, exposure
+from tdac_agent.sandbox.exposure import entries_but_hidden, exposure
 from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
 from tdac_agent.sandbox.process import Child
@@ -128,7 +128,7 @@ def _setup(tier: Tier, limits: Limits, folder: PrivateFolder) -> dict[str, Any]:
         "system": list(seen.system),
         "hidden": list(seen.hidden),
         "packages": list(seen.packages),
-        "devices": list(DEVICES),
+        "devices": list(seen.devices),
         "readable": readable,
         "listable": listable,
         "root": str(folder.root),

@@ -335,7 +335,8 @@ SCRATCH = """
     def bury():
         os.chdir(os.environ["TMPDIR"])
         for _ in range(1100):
-            os.mkdir("d")
+            os.mkdir("d", 0o700)
+            os.mkdir("lifted-7", 0o000)
             os.chdir("d")
 
     def link(): os.symlink("/etc/passwd", os.environ["TMPDIR"] + "/link")

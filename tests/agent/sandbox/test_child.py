@@ -1,5 +1,6 @@
 """What a judge can ask of a child, and what comes back."""
 
+import pickle
 import textwrap
 
 import numpy as np
@@ -230,6 +231,13 @@ def test_a_fault_is_final(launch):
             child.policy(OBS)
     assert caught.value.status == 3
     assert child.close().status == 3
+
+
+def test_a_fault_survives_a_process_pool():
+    fault = ControllerError("KeyError", "'x'", 3, "  line 3", "policy")
+    back = pickle.loads(pickle.dumps(fault))
+    assert type(back) is ControllerError
+    assert (str(back), back.line, back.phase) == (str(fault), 3, "policy")
 
 
 def test_close_may_be_repeated_and_ends_the_use(child):
