@@ -28,7 +28,7 @@ class Parameters:
     )
     lookahead: float = _tunable(
         120.0,
-        8.0,
+        20.0,
         240.0,
         "px",
         "length of way in which a point to aim at is looked for",

@@ -109,7 +109,11 @@ REMEDIES: Mapping[Cause, Remedy] = MappingProxyType(
             }
         ),
         "time-out": Remedy(scale={"lookahead": 0.5}),
-        "held out": Remedy(margin="wider", scale={"lookahead": 0.75}),
+        "held out": Remedy(
+            margin="wider",
+            add={"turn_gain": 0.15},
+            scale={"lookahead": 0.7, "turn_in_place": 0.7},
+        ),
     }
 )
 """Most telling cause first: of two that want the same parameter the first wins."""
@@ -136,22 +140,23 @@ def repair(
     changes: dict[str, Change] = {}
     tests = first_tests(report)
     for cause, remedy in REMEDIES.items():
-        if cause not in tests:
-            continue
-        wanted = remedy.apply(parameters, bounds)
-        for name in _NAMES:
-            before, after = getattr(parameters, name), getattr(wanted, name)
-            if before != after and name not in changes:
-                changes[name] = Change(tests[cause], cause, name, before, after)
+        if cause in tests:
+            wanted = remedy.apply(parameters, bounds)
+            for change in _compare(parameters, wanted, tests[cause], cause):
+                changes.setdefault(change.name, change)
     if not changes and tests:
         cause, test = next(iter(tests.items()))
         wanted = _random_step(parameters, attempt)
-        for name in _NAMES:
-            before, after = getattr(parameters, name), getattr(wanted, name)
-            if before != after:
-                changes[name] = Change(test, cause, name, before, after)
-    after_all = {name: change.after for name, change in changes.items()}
-    return parameters.changed(**after_all), list(changes.values())
+        changes = {c.name: c for c in _compare(parameters, wanted, test, cause)}
+    after = {name: change.after for name, change in changes.items()}
+    return parameters.changed(**after), list(changes.values())
+
+
+def _compare(
+    parameters: Parameters, wanted: Parameters, test: str, cause: Cause
+) -> list[Change]:
+    pairs = [(n, getattr(parameters, n), getattr(wanted, n)) for n in _NAMES]
+    return [Change(test, cause, n, was, now) for n, was, now in pairs if was != now]
 
 
 def first_tests(report: Report) -> dict[Cause, str]:
@@ -169,12 +174,13 @@ def first_tests(report: Report) -> dict[Cause, str]:
     return tests
 
 
-def _random_step(parameters: Parameters, attempt: int) -> Parameters:
-    random = np.random.default_rng(attempt)
-    factors = np.exp(random.uniform(-0.7, 0.7, len(_NAMES)))
+def _random_step(parameters: Parameters, seed: int) -> Parameters:
+    """Half-way to a random point within the limits."""
+    random = np.random.default_rng(seed)
     values = {
-        name: float(factor) * getattr(parameters, name)
-        for name, factor in zip(_NAMES, factors, strict=True)
+        item.name: 0.5 * getattr(parameters, item.name)
+        + 0.5 * random.uniform(item.metadata["low"], item.metadata["high"])
+        for item in fields(parameters)
     }
     return parameters.changed(**values)
 
