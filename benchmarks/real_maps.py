@@ -90,9 +90,8 @@ def select(entries: list[Entry], radius: str) -> list[tuple[Entry, int]]:
     chosen = []
     for entry in entries:
         largest = entry["max_robot_radius_px"]
-        if entry["expected"] != "feasible":
-            chosen.append((entry, 12))
-        elif radius == "12" and largest >= 13:
+        infeasible = entry["expected"] != "feasible"
+        if infeasible or (radius == "12" and largest >= 13):
             chosen.append((entry, 12))
         elif radius == "fit" and largest >= 3:
             chosen.append((entry, min(12, largest - 1)))
@@ -119,7 +118,7 @@ def measure(folder: Path, negate: bool, verify: bool, task: tuple[Entry, int]) -
         if not row.refused:
             row.note("infeasible task accepted")
         return row
-    truth = cv2.imread(str(folder / entry["truth"]), cv2.IMREAD_GRAYSCALE) < 128
+    truth = luminance(load_image(folder / entry["truth"]).colour) < 128
     _polarity_columns(row, entry, negate, image, start, goal)
     _grid_columns(row, entry, image, truth)
     if verify and row.solvable:

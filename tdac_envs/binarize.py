@@ -75,10 +75,16 @@ def outside(luminance: GreyImage, light_free: bool) -> BoolGrid:
     return np.asarray(labels == largest)
 
 
+def chroma(colour: ColourImage) -> GreyImage:
+    """Largest minus smallest of red, green and blue."""
+    red, green, blue = colour[..., 0], colour[..., 1], colour[..., 2]
+    largest = np.maximum(np.maximum(red, green), blue)
+    return np.asarray(largest - np.minimum(np.minimum(red, green), blue))
+
+
 def saturated(colour: ColourImage) -> BoolGrid:
     """Pixels of strong colour, where marks and coloured lines are drawn."""
-    chroma = colour.max(axis=2).astype(np.int16) - colour.min(axis=2)
-    return np.asarray(chroma >= MARK_CHROMA)
+    return np.asarray(chroma(colour) >= MARK_CHROMA)
 
 
 def local_light(luminance: GreyImage, window: int) -> BoolGrid:
@@ -109,4 +115,5 @@ def disc(shape: tuple[int, ...], x: float, y: float, radius: float) -> BoolGrid:
 def floor_distance(colour: ColourImage, floor: NDArray[np.float64]) -> GreyImage:
     """How unlike the floor each pixel is: RGB distance, clipped to 255."""
     gap = colour.astype(np.float32) - floor.astype(np.float32)
-    return np.clip(np.rint(np.linalg.norm(gap, axis=2)), 0, 255).astype(np.uint8)
+    distance = np.rint(np.linalg.norm(gap, axis=2))
+    return np.asarray(np.clip(distance, 0, 255), np.uint8)

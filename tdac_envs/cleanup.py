@@ -43,14 +43,19 @@ def _pieces(
     found = cv2.connectedComponentsWithStats(
         mask.astype(np.uint8), connectivity=connectivity
     )
-    return found[1], found[2]
+    return np.asarray(found[1], np.int32), np.asarray(found[2], np.int32)
 
 
 def without_specks(cells: BoolGrid, extent: int) -> BoolGrid:
-    """Drops obstacle pieces that fit in a box of `extent` px: noise, letters, dashes."""
+    """Drops obstacle pieces within a box of `extent` px: noise, letters, dashes.
+
+    Solid ones of 6 px and more stay, since they are pillars rather than letters.
+    """
     labels, stats = _pieces(cells, 8)
-    longest = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
-    keep = longest > extent
+    sides = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]
+    filled = stats[:, cv2.CC_STAT_AREA] > 0.6 * sides.prod(axis=1)
+    pillar = filled & (sides.min(axis=1) >= 6)
+    keep = (sides.max(axis=1) > extent) | pillar
     keep[0] = False
     return np.asarray(keep[labels])
 
@@ -60,8 +65,8 @@ def without_lines(cells: BoolGrid, width: int) -> BoolGrid:
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
     framed = np.pad(cells, width, mode="edge").astype(np.uint8)
     opened = cv2.morphologyEx(framed, cv2.MORPH_OPEN, kernel)
-    regrown = cv2.dilate(opened, kernel) & framed
-    return np.asarray(regrown[width:-width, width:-width] > 0)
+    regrown = (cv2.dilate(opened, kernel) > 0) & (framed > 0)
+    return np.asarray(regrown[width:-width, width:-width])
 
 
 def thick_share(cells: BoolGrid, width: int) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -66,7 +67,7 @@ def _write_all(
     _save_png(folder / "preview.png", cv2.cvtColor(preview, cv2.COLOR_RGB2BGR))
 
 
-def _save_png(path: Path, picture: NDArray[np.generic]) -> None:
+def _save_png(path: Path, picture: NDArray[Any]) -> None:
     path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
 

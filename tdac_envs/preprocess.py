@@ -15,8 +15,9 @@ from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.image import MapImage, from_array, load_image
 from tdac_envs.params import MapParams, RobotParams, ScoreTerms
-from tdac_envs.readings import Reading, Scene, plain_reading, readings
-from tdac_envs.score import Point, judge, nearest_free, score
+from tdac_envs.readings import plain_reading, readings
+from tdac_envs.scene import Reading, Scene
+from tdac_envs.score import Point, Trip, judge, nearest_free, score
 
 Preset = Literal["default", "paper"]
 Source = str | Path | NDArray[np.generic] | MapImage
@@ -76,16 +77,19 @@ def preprocess(
         TaskError: No reading of it makes the task feasible; says why.
     """
     source = as_image(image)
-    ends = [_to_pixel(source, "start", start), _to_pixel(source, "goal", goal)]
     notes: list[str] = []
-    if snap:
-        ends = [_snapped(source, ends, i, robot_radius, notes) for i in range(2)]
-    ranked = rank_candidates(source, *ends, robot_radius, preset=preset)
-    best = ranked[0]
+    ends: list[Point | None] = []
+    for name, point in (("start", start), ("goal", goal)):
+        pixel = None if point is None else _to_pixel(source, name, point)
+        if pixel is not None and snap:
+            pixel = _snapped(source, name, pixel, robot_radius, notes)
+        ends.append(pixel)
+    scene = Scene.of(source, ends[0], ends[1], robot_radius)
+    best = _ranked(scene, preset)[0]
     if best.failure is not None:
-        raise TaskError(f"{source.name}: {_first_failure(ranked)}")
+        raise TaskError(f"{source.name}: {best.failure}")
     grid = OccupancyGrid(best.reading.cells, source.resolution, source.origin)
-    return grid, _params(source, best, ends, heading, robot_radius, notes)
+    return grid, _params(scene, best, heading, notes)
 
 
 def rank_candidates(
@@ -101,9 +105,19 @@ def rank_candidates(
     Feasible ones come by falling score, then the infeasible ones in the order in
     which they were tried, each with its failure.
     """
-    scene = Scene.of(as_image(image), start, goal, robot_radius)
+    return _ranked(Scene.of(as_image(image), start, goal, robot_radius), preset)
+
+
+def _ranked(scene: Scene, preset: Preset) -> list[Candidate]:
+    if scene.start is not None and scene.start == scene.goal:
+        raise TaskError(
+            f"start and goal are the same pixel {scene.start}; give two places"
+        )
+    if not scene.radius > 0:
+        raise TaskError(f"expected a robot radius above 0 px, got {scene.radius:g}")
     search = _paper_grid if preset == "paper" else _staged_search
     tried = list(search(scene))
+    # The plainest reading's failure comes first: the others only explain more away.
     return sorted(tried, key=lambda c: (c.failure is not None, -c.score))
 
 
@@ -139,21 +153,15 @@ def _with_margins(
     """The reading with each margin; only the first where that is infeasible."""
     if scene.start is None or scene.goal is None:
         return [Candidate(reading)]
+    trip = Trip(scene.start, scene.goal, scene.radius)
     clear = clearance(reading.cells)
     candidates: list[Candidate] = []
     for inflation in inflations:
-        verdict = judge(
-            reading.cells, clear, scene.start, scene.goal, scene.radius, inflation
-        )
+        verdict = judge(reading.cells, clear, trip, inflation)
         candidates.append(Candidate(reading, inflation, verdict.failure, verdict.terms))
         if verdict.failure is not None:
             break
     return candidates
-
-
-def _first_failure(ranked: list[Candidate]) -> str:
-    """What the plainest reading says: the others only explain more away."""
-    return str(ranked[0].failure)
 
 
 def as_image(image: Source) -> MapImage:
@@ -165,12 +173,8 @@ def as_image(image: Source) -> MapImage:
     return load_image(image)
 
 
-def _to_pixel(
-    image: MapImage, name: str, point: tuple[float, float] | None
-) -> Point | None:
+def _to_pixel(image: MapImage, name: str, point: tuple[float, float]) -> Point:
     """The pixel that holds the point; refused outside the map."""
-    if point is None:
-        return None
     height, width = image.colour.shape[:2]
     x, y = int(np.floor(point[0] + 0.5)), int(np.floor(point[1] + 0.5))
     if not (0 <= x < width and 0 <= y < height):
@@ -182,44 +186,32 @@ def _to_pixel(
 
 
 def _snapped(
-    image: MapImage,
-    ends: list[Point | None],
-    index: int,
-    radius: float,
-    notes: list[str],
-) -> Point | None:
-    """The end moved to the nearest pixel that is free for the body."""
-    point = ends[index]
-    if point is None:
-        return None
+    image: MapImage, name: str, point: Point, radius: float, notes: list[str]
+) -> Point:
+    """The point moved to the nearest pixel that is free for the body."""
     reading = next(readings(Scene.of(image, None, None, radius)))
     free = body_free(clearance(reading.cells), radius)
     moved = nearest_free(free, *point)
     if moved is None or moved == point:
         return point
-    notes.append(f"{('start', 'goal')[index]} {point} moved to {moved}")
+    notes.append(f"{name} moved from {point} to {moved}")
     return moved
 
 
 def _params(
-    image: MapImage,
-    best: Candidate,
-    ends: list[Point | None],
-    heading: float,
-    radius: float,
-    notes: list[str],
+    scene: Scene, best: Candidate, heading: float, notes: list[str]
 ) -> MapParams:
-    height, width = image.colour.shape[:2]
-    reading = best.reading
+    image, reading = scene.image, best.reading
+    height, width = scene.luminance.shape
     return MapParams(
         source=image.name,
         source_sha256=image.sha256,
         width=width,
         height=height,
-        start=ends[0],
+        start=scene.start,
         heading=heading,
-        goal=ends[1],
-        robot=RobotParams.disc(radius),
+        goal=scene.goal,
+        robot=RobotParams.disc(scene.radius),
         polarity=reading.polarity,
         method=reading.method,
         threshold=reading.threshold,

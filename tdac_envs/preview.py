@@ -78,7 +78,7 @@ def _draw_task(canvas: Canvas, params: MapParams, path: Path) -> None:
         nose = np.array(params.start) + turn * body / canvas.scale
         canvas.disc(params.start, body, TRAIL, 0.85)
         canvas.disc(params.start, body, FREE, width=2)
-        canvas.line([params.start, nose], FREE, 2)
+        canvas.line(np.array([params.start, nose]), FREE, 2)
     if params.goal is not None:
         canvas.disc(params.goal, body, GREEN, 0.35)
         canvas.disc(params.goal, body, GREEN, width=2)

@@ -9,13 +9,13 @@ of the walls' own colour and thickness, so that a closed map stays closed.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
 from tdac_envs.binarize import (
+    chroma,
     disc,
     floor_distance,
     local_light,
@@ -23,59 +23,11 @@ from tdac_envs.binarize import (
     outside,
     saturated,
     unevenly_lit,
-    unknown_level,
 )
 from tdac_envs.cleanup import thick_share, without_lines, without_specks
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage, MapImage, luminance
-from tdac_envs.polarity import light_free_evidence
-from tdac_envs.score import Point
-
-Polarity = Literal["dark", "light", "mixed", "given"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reading:
-    """One way to tell obstacles from free space.
-
-    Attributes:
-        cells: Shape (height, width), bool, True = occupied.
-        polarity: Which pixels are obstacles.
-        method: What was done, in words.
-        threshold: Luminance at which the picture was cut, 0..255.
-        cleanup: Strength of `cleanup.clean` or largest speck dropped, px.
-        opening: Lines thinner than this were dropped, px.
-    """
-
-    cells: BoolGrid
-    polarity: Polarity
-    method: str
-    threshold: float | None = None
-    cleanup: int = 0
-    opening: int = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene:
-    """A picture with what is asked of it."""
-
-    image: MapImage
-    luminance: GreyImage
-    start: Point | None
-    goal: Point | None
-    radius: float
-
-    @classmethod
-    def of(
-        cls, image: MapImage, start: Point | None, goal: Point | None, radius: float
-    ) -> Scene:
-        """The scene of an image and a task; start and goal may be missing."""
-        return cls(image, luminance(image.colour), start, goal, radius)
-
-    @property
-    def ends(self) -> list[Point]:
-        """Start and goal, as far as given."""
-        return [point for point in (self.start, self.goal) if point is not None]
+from tdac_envs.scene import Reading, Scene, decide_light_free, touches, unknown_of
 
 
 def readings(scene: Scene) -> Iterator[Reading]:
@@ -113,7 +65,7 @@ def _outwards(
     base = unmarked or plain
     if unmarked is not None:
         yield unmarked
-    if _unknown(scene) is not None:
+    if unknown_of(scene) is not None:
         # A mapping tool's output: every dark pixel was measured, none was drawn.
         return
     yield from _bolder(base)
@@ -126,7 +78,7 @@ def _outwards(
 def _beyond_the_plan(scene: Scene, light_free: bool) -> BoolGrid:
     """The outside, where start and goal are inside; empty otherwise."""
     region = outside(scene.luminance, light_free)
-    if _on(region, scene.ends):
+    if touches(region, scene.ends):
         return np.zeros_like(region)
     return region
 
@@ -149,26 +101,17 @@ def plain_reading(scene: Scene, light_free: bool) -> Reading:
     strong colours, the light ones among these (green, yellow) are walls as well.
     """
     threshold, method = otsu(scene.luminance), "otsu"
-    level = _unknown(scene)
+    level = unknown_of(scene)
     if level is not None:
         threshold = _beside(level, threshold, light_free)
         method = f"otsu, unknown grey {level} not free"
     reading = _cut(scene.luminance, threshold, light_free, method)
     strong = saturated(scene.image.colour)
     coloured = int((strong & reading.cells).sum()) > 0.5 * int(reading.cells.sum())
-    if coloured and strong.mean() < 0.3 and not _on(strong, scene.ends):
+    if coloured and strong.mean() < 0.3 and not touches(strong, scene.ends):
         method = f"{method}, coloured walls"
         return replace(reading, cells=reading.cells | strong, method=method)
     return reading
-
-
-def _unknown(scene: Scene) -> int | None:
-    """The "unknown" grey, unless the task stands on it."""
-    level = unknown_level(scene.luminance)
-    if level is None:
-        return None
-    known = np.abs(scene.luminance.astype(np.int16) - level) > 3
-    return None if _on(~known, scene.ends) else level
 
 
 def _beside(level: int, threshold: float, light_free: bool) -> float:
@@ -182,31 +125,10 @@ def _beside(level: int, threshold: float, light_free: bool) -> float:
     return max(threshold, safe) if light_free else min(threshold, safe)
 
 
-def _on(mask: BoolGrid, points: list[Point]) -> bool:
-    return any(bool(mask[y, x]) for x, y in points)
-
-
 def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Reading:
     light = grey > threshold
     cells = ~light if light_free else light
     return Reading(cells, "dark" if light_free else "light", method, threshold)
-
-
-def decide_light_free(scene: Scene) -> bool:
-    """Whether the light side is free, from the picture, start and goal."""
-    light = scene.luminance > otsu(scene.luminance)
-    evidence = light_free_evidence(scene.luminance, light)
-    neutral = ~saturated(scene.image.colour)
-    for x, y in scene.ends:
-        around = disc(light.shape, x, y, scene.radius)
-        judged = around & neutral if (around & neutral).any() else around
-        evidence += _W_TASK * (2 * float(light[judged].mean()) - 1)
-    return evidence > 0
-
-
-# Start and goal of a real task are free with the body's disc around them, so two
-# clean discs outweigh a doubtful picture but not a clear one.
-_W_TASK = 2.0
 
 
 def _without_marks(image: MapImage, reading: Reading) -> Reading | None:
@@ -215,9 +137,8 @@ def _without_marks(image: MapImage, reading: Reading) -> Reading | None:
     few = marks.sum() <= min(0.02 * marks.size, 0.4 * reading.cells.sum())
     if not few or not marks.any():
         return None
-    chroma = np.ptp(image.colour.astype(np.int16), axis=2)
     near = cv2.dilate(marks.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    cells = reading.cells & ~(near & (chroma >= 30))
+    cells = reading.cells & ~(near & (chroma(image.colour) >= 30))
     return replace(reading, cells=cells, method=f"{reading.method}, marks ignored")
 
 

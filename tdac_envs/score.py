@@ -33,6 +33,15 @@ def score(terms: ScoreTerms) -> float:
 
 
 @dataclass(frozen=True, slots=True)
+class Trip:
+    """What the body has to do: pixels (x, y), and its radius in px."""
+
+    start: Point
+    goal: Point
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
 class Judgement:
     """Whether the body gets from start to goal.
 
@@ -46,28 +55,21 @@ class Judgement:
 
 
 def judge(
-    cells: BoolGrid,
-    clear: FloatGrid,
-    start: Point,
-    goal: Point,
-    radius: float,
-    inflation: int = 0,
+    cells: BoolGrid, clear: FloatGrid, trip: Trip, inflation: int = 0
 ) -> Judgement:
     """Checks start, goal and the way between them, and scores the shortest path.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
         clear: `clearance(cells)`.
-        start: Pixel (x, y).
-        goal: Pixel (x, y).
-        radius: Body radius, px.
+        trip: Start, goal and body.
         inflation: Margin that the planner keeps around the body, px.
     """
-    free = body_free(clear, radius + inflation)
-    failure = why_infeasible(cells, clear, free, start, goal, radius)
+    free = body_free(clear, trip.radius + inflation)
+    failure = why_infeasible(cells, clear, free, trip)
     if failure is not None:
         return Judgement(failure)
-    path = plan_path(free, start, goal)
+    path = plan_path(free, trip.start, trip.goal)
     columns, rows = path.astype(np.intp).T
     terms = ScoreTerms(
         min_clearance=float(clear[rows, columns].min()),
@@ -78,14 +80,10 @@ def judge(
 
 
 def why_infeasible(
-    cells: BoolGrid,
-    clear: FloatGrid,
-    free: BoolGrid,
-    start: Point,
-    goal: Point,
-    radius: float,
+    cells: BoolGrid, clear: FloatGrid, free: BoolGrid, trip: Trip
 ) -> str | None:
     """The first check that fails, where, and what would work; None if none does."""
+    start, goal, radius = trip.start, trip.goal, trip.radius
     for name, (x, y) in (("start", start), ("goal", goal)):
         if free[y, x]:
             continue

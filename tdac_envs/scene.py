@@ -1,0 +1,88 @@
+"""A picture with what is asked of it, and what a reading of it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tdac_envs.binarize import disc, otsu, saturated, unknown_level
+from tdac_envs.grid import BoolGrid
+from tdac_envs.image import GreyImage, MapImage, luminance
+from tdac_envs.polarity import light_free_evidence
+from tdac_envs.score import Point
+
+Polarity = Literal["dark", "light", "mixed", "given"]
+
+# Start and goal of a real task are free with the body's disc around them, so two
+# clean discs outweigh a doubtful picture but not a clear one.
+_W_TASK = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """One way to tell obstacles from free space.
+
+    Attributes:
+        cells: Shape (height, width), bool, True = occupied.
+        polarity: Which pixels are obstacles.
+        method: What was done, in words.
+        threshold: Luminance at which the picture was cut, 0..255.
+        cleanup: Strength of `cleanup.clean` or largest speck dropped, px.
+        opening: Lines thinner than this were dropped, px.
+    """
+
+    cells: BoolGrid
+    polarity: Polarity
+    method: str
+    threshold: float | None = None
+    cleanup: int = 0
+    opening: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A picture with what is asked of it."""
+
+    image: MapImage
+    luminance: GreyImage
+    start: Point | None
+    goal: Point | None
+    radius: float
+
+    @classmethod
+    def of(
+        cls, image: MapImage, start: Point | None, goal: Point | None, radius: float
+    ) -> Scene:
+        """The scene of an image and a task; start and goal may be missing."""
+        return cls(image, luminance(image.colour), start, goal, radius)
+
+    @property
+    def ends(self) -> list[Point]:
+        """Start and goal, as far as given."""
+        return [point for point in (self.start, self.goal) if point is not None]
+
+
+def decide_light_free(scene: Scene) -> bool:
+    """Whether the light side is free, from the picture, start and goal."""
+    light = scene.luminance > otsu(scene.luminance)
+    evidence = light_free_evidence(scene.luminance, light)
+    neutral = ~saturated(scene.image.colour)
+    for x, y in scene.ends:
+        around = disc(light.shape, x, y, scene.radius)
+        judged = around & neutral if (around & neutral).any() else around
+        evidence += _W_TASK * (2 * float(light[judged].mean()) - 1)
+    return evidence > 0
+
+
+def unknown_of(scene: Scene) -> int | None:
+    """The "unknown" grey, unless start and goal both stand on it."""
+    level = unknown_level(scene.luminance)
+    if level is None:
+        return None
+    shades = [abs(int(scene.luminance[y, x]) - level) for x, y in scene.ends]
+    return None if shades and max(shades) <= 3 else level
+
+
+def touches(mask: BoolGrid, points: list[Point]) -> bool:
+    """Whether any of the points lies on the mask."""
+    return any(bool(mask[y, x]) for x, y in points)
