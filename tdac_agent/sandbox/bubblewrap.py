@@ -35,8 +35,11 @@ def bubblewrap_command(
         words += ["--symlink", target, path]
     words += _each("--ro-bind", seen.system)
     for path in seen.hidden:
-        words += ["--tmpfs", path, "--remount-ro", path]
+        words += ["--tmpfs", path]
+    # numpy may lie in a hidden folder, so that this can be closed only afterwards.
     words += _each("--ro-bind", (*seen.packages, str(folder.root)))
+    for path in seen.hidden:
+        words += ["--remount-ro", path]
     words += _each("--dev-bind", seen.devices)
     words += ["--size", str(scratch_bytes), "--tmpfs", str(folder.scratch)]
     return [*words, "--remount-ro", "/", "--chdir", "/", "--"]

@@ -123,6 +123,6 @@ class Conversation:
             self.give_up(ControllerOutputFlood(text, phase))
         if not has_ended(self._pid, EXIT_SECONDS):
             self.breach("closed it", phase)
-        status = self._end().status
-        text = explain_end(status, phase, self._limits.cpu_seconds)
-        self.give_up(ControllerDied(text, phase, status))
+        used, limit = self._end(), self._limits.cpu_seconds
+        text = explain_end(used.status, phase, used.cpu_seconds, limit)
+        self.give_up(ControllerDied(text, phase, used.status))

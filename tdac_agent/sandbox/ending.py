@@ -54,6 +54,8 @@ class Ending:
     def __call__(self) -> ChildUsage:
         """Kill the process group, wait for it, and delete the folder."""
         if self._usage is None:
+            # Stands if the next line is interrupted: nothing is closed twice.
+            self._usage = ChildUsage(0.0, 0, 0, "", "", -signal.SIGKILL)
             self._usage = _end(self._spawned, self._folder)
         return self._usage
 
@@ -65,22 +67,33 @@ def _end(spawned: Spawned, folder: PrivateFolder) -> ChildUsage:
         # The leader is not reaped yet, so that the number is still its own.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
-        _, status, own = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
+        process.returncode, own_cpu, own_rss = _reap(process.pid)
         channel.drain_until_end(time.monotonic() + GRACE_SECONDS)
     finally:
         channel.close()
         os.close(spawned.lifeline)
-        folder.remove()
-    scale = 1 if sys.platform == "darwin" else 1024
+        # A folder that cannot be removed is no reason to lose a verdict.
+        with contextlib.suppress(OSError):
+            folder.remove()
     return ChildUsage(
-        cpu_seconds=max(cpu, own.ru_utime + own.ru_stime),
-        max_rss_bytes=max(rss, own.ru_maxrss * scale),
+        cpu_seconds=max(cpu, own_cpu),
+        max_rss_bytes=max(rss, own_rss),
         output_bytes=channel.output_count,
         output_head=channel.output_head.decode("utf-8", "replace"),
         output_tail=channel.output_tail.decode("utf-8", "replace"),
         status=_signal_of_wrapper(process.returncode),
     )
+
+
+def _reap(pid: int) -> tuple[int, float, int]:
+    """Return exit code, CPU seconds and largest resident bytes of a process."""
+    try:
+        _, status, used = os.wait4(pid, 0)
+    except ChildProcessError:  # Somebody else has waited for it.
+        return -signal.SIGKILL, 0.0, 0
+    scale = 1 if sys.platform == "darwin" else 1024
+    code = os.waitstatus_to_exitcode(status)
+    return code, used.ru_utime + used.ru_stime, used.ru_maxrss * scale
 
 
 def has_ended(pid: int, seconds: float) -> bool:

@@ -34,17 +34,24 @@ def clean(text: str, root: Path) -> str:
     return text[:MAX_TEXT]
 
 
-def explain_end(status: int, phase: str, cpu_seconds: int) -> str:
-    """Return how a child ended, given its exit code or minus its signal."""
+def explain_end(status: int, phase: str, cpu_seconds: float, cpu_limit: float) -> str:
+    """Return how a child ended.
+
+    Args:
+        status: Exit code, or minus the number of the signal.
+        phase: What the controller was doing.
+        cpu_seconds: CPU time it used.
+        cpu_limit: CPU time it might use.
+    """
     if status >= 0:
         return f"ended its own process with exit code {status} at {phase}"
     number = -status
-    if number == signal.SIGXCPU:
-        return f"killed at {phase}: used more than {cpu_seconds} s of CPU time"
+    if number == signal.SIGXCPU or cpu_seconds >= cpu_limit:
+        return f"killed at {phase}: used more than {cpu_limit} s of CPU time"
     if number == signal.SIGSYS:
         return f"killed at {phase} by SIGSYS: a forbidden system call"
     if number == signal.SIGKILL:
-        return f"killed at {phase} by SIGKILL: out of memory or of CPU time"
+        return f"killed at {phase} by SIGKILL, as the machine does when out of memory"
     return f"crashed at {phase} with {_signal_name(number)}"
 
 
