@@ -16,9 +16,9 @@ from tdac_agent.sandbox.errors import (
     SandboxError,
 )
 from tdac_agent.sandbox.inner.wire import Handle
+from tdac_agent.sandbox.launch import available_tiers, best_tier, start
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
 from tdac_agent.sandbox.process import Child, EpisodeEnv
-from tdac_agent.sandbox.start import available_tiers, best_tier, start
 from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
 
 __all__ = [

@@ -41,11 +41,12 @@ class Child:
     Attributes:
         tier: Name of the sandbox tier it runs in.
         limits: What it may use.
+        folder: Its private folder.
         pid: The leader of its process group.
 
     Args:
-        tier: See above.
-        limits: See above.
+        tier: See above, as for the next two.
+        limits: What it may use.
         folder: Its private folder.
         spawned: Its process and channel.
     """
@@ -55,7 +56,7 @@ class Child:
     ) -> None:
         self.tier = tier
         self.limits = limits
-        self._folder = folder
+        self.folder = folder
         self.pid = spawned.process.pid
         end = Ending(spawned, folder)
         self._talk = Conversation(spawned.channel, self.pid, limits, folder.root, end)
@@ -98,7 +99,7 @@ class Child:
         if len(controller_source) > MAX_SOURCE_BYTES:
             text = f"{len(controller_source)} bytes (limit {MAX_SOURCE_BYTES})"
             raise ControllerError("SourceTooLarge", text, 0, "", "import")
-        self._folder.furnish(workdir, controller_source)
+        self.folder.furnish(workdir, controller_source)
 
     def load(self, timeout: float | None = None) -> dict[str, str]:
         """Import the controller; return its public names, each with its type's name."""

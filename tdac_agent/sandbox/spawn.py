@@ -12,7 +12,6 @@ from signal import SIGKILL
 
 from tdac_agent.sandbox.bubblewrap import bubblewrap_command
 from tdac_agent.sandbox.channel import Channel
-from tdac_agent.sandbox.errors import SandboxError
 from tdac_agent.sandbox.exposure import INNER, exposure
 from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
@@ -45,7 +44,8 @@ def spawn(tier: str, folder: PrivateFolder, limits: Limits) -> Spawned:
     """Start a child that waits for its setup frame.
 
     Raises:
-        SandboxError: The tier cannot be used or the program cannot be started.
+        SandboxError: The tier cannot be used.
+        OSError: The program cannot be started.
     """
     with contextlib.ExitStack() as theirs, contextlib.ExitStack() as ours:
         inner, outer = [], []
@@ -63,19 +63,16 @@ def spawn(tier: str, folder: PrivateFolder, limits: Limits) -> Spawned:
         if tier == "bubblewrap":
             size = limits.scratch_bytes
             command = bubblewrap_command(folder, lifeline, size) + command
-        try:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                pass_fds=(requests, answers, lifeline),
-                start_new_session=True,
-                cwd="/",
-                env=_environment(folder),
-            )
-        except OSError as error:
-            raise SandboxError(f"cannot start {command[0]}: {error}") from error
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            pass_fds=(requests, answers, lifeline),
+            start_new_session=True,
+            cwd="/",
+            env=_environment(folder),
+        )
         _tie(lifeline, process.pid)
         ours.pop_all()
     write, read, printed, line = outer

@@ -1,4 +1,11 @@
-"""The tiers of the sandbox, best first, and what each of them promises."""
+"""The tiers of the sandbox, best first, and what each of them promises.
+
+Every tier limits time, memory, descriptors, file size and output, scrubs the
+environment, and ends the child with its judge. Where the kernel filters system calls,
+`rlimits` denies network and processes too, yet promises nothing. Under `landlock` a
+controller can learn whether a path exists, and its scratch folder is bounded by the
+file and not in all; a tmpfs bounds it under the two tiers above.
+"""
 
 from __future__ import annotations
 

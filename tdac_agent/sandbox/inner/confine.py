@@ -38,10 +38,18 @@ def _limit_resources(setup: dict[str, Any]) -> None:
         resource.RLIMIT_NPROC: 0,
     }
     for name, value in limits.items():
-        resource.setrlimit(name, (value, value))
+        _lower(name, value, value)
     seconds = setup["cpu_seconds"]
     # The first is a signal that says why; the second cannot be caught.
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    _lower(resource.RLIMIT_CPU, seconds, seconds + 1)
+
+
+def _lower(name: int, soft: int, hard: int) -> None:
+    """Set a limit, or keep a lower one that this process was started with."""
+    _, ceiling = resource.getrlimit(name)
+    if ceiling != resource.RLIM_INFINITY:
+        soft, hard = min(soft, ceiling), min(hard, ceiling)
+    resource.setrlimit(name, (soft, hard))
 
 
 def _limit_files(setup: dict[str, Any]) -> None:

@@ -27,7 +27,10 @@ def main(requests: int, answers: int, lifeline: int, site: str) -> None:
     ours = {"descriptors": [requests, answers], "lifeline": lifeline}
     sys.argv = ["controller.py"]
     sys.path[:] = [setup["work"], *sys.path[1:-1], site]
-    facts = confine({**setup, **ours})
+    try:
+        facts = confine({**setup, **ours})
+    except OSError as error:
+        sys.exit(str(error))
     link.frame_bytes = setup["frame_bytes"]
     link.send(Kind.VALUE, sequence, encode(facts))
     Server(link).run()

@@ -13,12 +13,16 @@ import pytest
 import tdac_agent
 from tdac_agent.sandbox import (
     TIERS,
+    Limits,
     SandboxError,
+    Tier,
     available_tiers,
     best_tier,
     start,
 )
 from tdac_agent.sandbox.inner import syscalls
+from tdac_agent.sandbox.launch import start_blank
+from tdac_agent.sandbox.tiers import ALL_PROMISES
 
 ROOT = str(Path(next(iter(tdac_agent.__path__))).parent)
 
@@ -46,6 +50,29 @@ def test_a_missing_bubblewrap_is_the_reason(monkeypatch):
     monkeypatch.setenv("PATH", "/nonexistent")
     with pytest.raises(SandboxError, match=r"bwrap.* is not installed"):
         start(tier="bubblewrap")
+
+
+@pytest.mark.parametrize("step", ["namespaces", "landlock", "seccomp"])
+def test_what_the_kernel_refuses_is_said_in_one_line(step):
+    # A child that is already filtered can do none of these any more.
+    tier = Tier("nested", ("seccomp", step), ALL_PROMISES)
+    with pytest.raises(SandboxError, match=r"^nested: .*Operation not permitted$"):
+        start_blank(tier, Limits())
+
+
+def test_a_missing_temporary_folder_is_a_fault_of_the_sandbox(monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", "/nonexistent")
+    with pytest.raises(SandboxError, match="cannot start a child"):
+        start(tier="rlimits")
+
+
+def test_lower_limits_of_the_user_are_kept(tmp_path):
+    script = (
+        "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40));"
+        "from tdac_agent.sandbox import start; start(tier='rlimits').close()"
+    )
+    environment = {**os.environ, "PYTHONPATH": ROOT}
+    subprocess.run([sys.executable, "-c", script], check=True, env=environment)
 
 
 def test_a_broken_bubblewrap_says_what_it_printed(monkeypatch, tmp_path):

@@ -56,15 +56,9 @@ def start_blank(tier: Tier, limits: Limits) -> Child:
     Raises:
         SandboxError: It did not start, or the tier's promise does not hold.
     """
-    folder = PrivateFolder()
+    child = _spawn_child(tier, limits)
     try:
-        spawned = spawn(tier.name, folder, limits)
-    except BaseException:
-        folder.remove()
-        raise
-    child = Child(tier.name, limits, folder, spawned)
-    try:
-        facts = child.set_up(_setup(tier, limits, folder))
+        facts = child.set_up(_setup(tier, limits, child.folder))
     except ControllerFault as fault:
         printed = child.close().output_head.strip()
         raise SandboxError(f"{tier.name}: {printed or fault}") from None
@@ -76,6 +70,18 @@ def start_blank(tier: Tier, limits: Limits) -> Child:
         child.close()
         raise SandboxError(f"{tier.name}: does not hold here: {', '.join(broken)}")
     return child
+
+
+def _spawn_child(tier: Tier, limits: Limits) -> Child:
+    try:
+        folder = PrivateFolder()
+        try:
+            return Child(tier.name, limits, folder, spawn(tier.name, folder, limits))
+        except BaseException:
+            folder.remove()
+            raise
+    except OSError as error:
+        raise SandboxError(f"{tier.name}: cannot start a child: {error}") from error
 
 
 def available_tiers() -> list[TierStatus]:
