@@ -160,12 +160,13 @@ def _compare(
 
 
 def first_tests(report: Report) -> dict[Cause, str]:
-    """Each cause in a report with the first test that named it.
+    """Each cause in a report with a test that showed it, the plainest one.
 
     An episode that arrived has no diagnosis; then the test itself says what is wrong.
     """
     tests: dict[Cause, str] = {}
-    for failure in report.failures:
+    plainest = "::test_no_collisions"
+    for failure in sorted(report.failures, key=lambda f: plainest not in f.test):
         name = failure.test.rpartition("::")[2]
         if failure.diagnosis is not None:
             tests.setdefault(failure.diagnosis.cause, failure.test)

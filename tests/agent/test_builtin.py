@@ -268,6 +268,18 @@ def test_drives_on_random_grids(seed, tmp_path, monkeypatch):
     assert rollout.reached, rollout.outcome
 
 
+@pytest.mark.parametrize("name", ["maze", "thin_walls"])
+@pytest.mark.parametrize("nodes", [100_000, 20_000])
+def test_large_maps_are_planned_on_a_lattice(name, nodes, tmp_path, monkeypatch):
+    """With fewer nodes than pixels, or too few to get through, it still arrives."""
+    env = Map2DEnv(name)
+    text = render_controller(TUNED, env.nominal.robot, env.nominal.dt)
+    text = text.replace("MAX_NODES = 1_500_000", f"MAX_NODES = {nodes}")
+    module = import_controller(text, env, tmp_path, monkeypatch)
+    rollout = drive(env, steer(module))
+    assert rollout.reached, rollout.outcome
+
+
 @pytest.mark.parametrize("name", bundled_maps())
 def test_drives_on_bundled_maps(name, tmp_path, monkeypatch):
     """After one repair every bundled map is solved, from jittered starts, too."""
