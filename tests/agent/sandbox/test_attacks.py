@@ -334,10 +334,11 @@ SCRATCH = """
 
     def bury():
         os.chdir(os.environ["TMPDIR"])
-        for _ in range(1100):
-            os.mkdir("d", 0o700)
+        # 8000 characters of path, twice what a system call takes.
+        for _ in range(40):
+            os.mkdir("d" * 200, 0o700)
             os.mkdir("lifted-7", 0o000)
-            os.chdir("d")
+            os.chdir("d" * 200)
 
     def link(): os.symlink("/etc/passwd", os.environ["TMPDIR"] + "/link")
 
