@@ -6,7 +6,9 @@ Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastruc
 
 from __future__ import annotations
 
+import signal
 import sys
+import traceback
 from pathlib import Path
 from typing import Annotated, Any, Literal, Optional
 
@@ -271,6 +273,8 @@ def _flags(
 
 def main() -> None:
     """Entry point of the `tdac` script: every known error is one clear line."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
     try:
         app(prog_name="tdac")
     except KeyboardInterrupt:
@@ -283,7 +287,8 @@ def main() -> None:
             _fail(f"error: {error}", 2)
         if isinstance(error, Fault):
             _fail(f"infrastructure fault: {error}", 3)
-        raise
+        traceback.print_exc()
+        _fail("internal error: please report the lines above", 3)
 
 
 def _fail(message: str, code: int) -> None:

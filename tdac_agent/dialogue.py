@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from tdac_agent.errors import Fault
 from tdac_agent.extract import extract_source
 from tdac_agent.prompt import generate_prompt, repair_prompt
-from tdac_agent.provider import Provider, ProviderFault, Reply, Request
+from tdac_agent.provider import Kind, Provider, ProviderFault, Reply, Request
 from tdac_agent.records import Recorder
 from tdac_agent.report import Report
 from tdac_agent.rules import RepairRule, add_rules, parse_rules
@@ -53,9 +53,8 @@ class Dialogue:
 
     def edit(self, k: int, j: int, source: str, report: Report) -> Candidate:
         """A repaired controller, candidate (k, j)."""
-        return self._code(
-            self.optimizer, self._repair("edit", source, report, self._at(k, j))
-        )
+        request = self._repair("edit", source, report, self._at(k, j))
+        return self._code(self.optimizer, request)
 
     def summarise(self, k: int, j: int, source: str, report: Report) -> None:
         """Adds what is to be learnt from a failure to the rules."""
@@ -66,12 +65,11 @@ class Dialogue:
         self.recorder.rules(k, self.rules)
 
     def _repair(
-        self, kind: str, source: str, report: Report, sample: tuple[int, int, int]
+        self, kind: Kind, source: str, report: Report, sample: tuple[int, int, int]
     ) -> Request:
         prompt = generate_prompt(self.task, self.rules)
         question = repair_prompt(kind, prompt, source, report)
-        request = Request("edit", question, source, report, self._texts(), sample)
-        return request if kind == "edit" else replace(request, kind="summarise")
+        return Request(kind, question, source, report, self._texts(), sample)
 
     def _code(self, model: Provider, request: Request) -> Candidate:
         """Asks until a whole answer holds code; a refused one is asked again twice."""

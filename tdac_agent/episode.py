@@ -10,7 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.sandbox import Child, ControllerFault, EnvRefusalError
+from tdac_agent.sandbox import (
+    Child,
+    ControllerFault,
+    ControllerTimeout,
+    EnvRefusalError,
+)
 from tdac_agent.trajectory import Outcome, Rollout, Trajectory
 from tdac_envs.map2d import Map2DEnv, Observation
 from tdac_envs.task2d import Pose
@@ -125,13 +130,22 @@ def wrong_action(action: Any) -> str:
     return f"policy must return two finite numbers (left, right), got {text}"
 
 
-def run_policy(child: Child, record: Record, name: str, *, held_out: bool) -> Rollout:
-    """Drives an episode by `policy(obs)`."""
+def run_policy(
+    child: Child, record: Record, name: str, *, held_out: bool, deadline: float
+) -> Rollout:
+    """Drives an episode by `policy(obs)`.
+
+    Args:
+        child: With the controller imported.
+        record: Steps the environment.
+        name: Of the episode.
+        held_out: Whether feedback may tell only pass or fail of it.
+        deadline: When to stop at the latest, by `time.monotonic`.
+    """
     calls: list[float] = []
-    error = None
+    error: str | ControllerFault | EnvRefusalError | None = None
     try:
         observation, _ = record.reset()
-        child.load()
         child.reset(observation)
         while record.outcome is None:
             began = time.perf_counter()
@@ -139,23 +153,23 @@ def run_policy(child: Child, record: Record, name: str, *, held_out: bool) -> Ro
             calls.append(time.perf_counter() - began)
             observation = record.step(action)[0]
             error = _too_slow(calls, record.env.task.dt)
+            if time.monotonic() > deadline:
+                error = "stopped: the verification as a whole took too long"
             if error is not None:
                 break
-    except ControllerFault as fault:
-        error = str(fault)
-    except EnvRefusalError as refusal:
-        error = str(refusal)
+    except (ControllerFault, EnvRefusalError) as fault:
+        error = fault
     return _rollout(record, name, held_out, error, calls)
 
 
 def run_own_loop(child: Child, record: Record, name: str, *, timeout: float) -> Rollout:
     """Lets the controller's `run_episode` step the judge's environment."""
-    error, returned = None, None
+    error: str | ControllerFault | None = None
+    returned = None
     try:
-        child.load()
         returned = child.run_episode(record, record.max_steps, timeout)
     except ControllerFault as fault:
-        error = str(fault)
+        error = fault
     if error is None and record.outcome is None:
         error = _ended_early(record)
     return _rollout(record, name, False, error, [], returned)
@@ -182,12 +196,13 @@ def _rollout(
     record: Record,
     name: str,
     held_out: bool,
-    error: str | None,
+    error: str | Exception | None,
     calls: list[float],
     returned: Any = None,
 ) -> Rollout:
     times = 1000 * np.array(calls) if calls else np.zeros(1)
     task = record.env.nominal
+    mean = float(times.mean())
     return Rollout(
         name=name,
         held_out=held_out,
@@ -196,7 +211,8 @@ def _rollout(
         goal=task.goal,
         radius=task.robot.radius,
         tolerance=task.goal_tolerance,
-        error=error,
-        call_ms=(float(times.mean()), float(np.percentile(times, 99))),
+        error=None if error is None else str(error),
+        call_ms=(mean, float(np.percentile(times, 99))),
         returned=returned,
+        timed_out=isinstance(error, ControllerTimeout) or mean > 1000 * task.dt,
     )

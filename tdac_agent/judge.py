@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +25,7 @@ from tdac_envs.task2d import Pose, jittered_start
 
 JITTERS = 5
 SHOWN_JITTERS = 2
-CPU_SECONDS = 120
+WALL_SECONDS = 600.0
 
 
 class Judge:
@@ -31,10 +33,11 @@ class Judge:
 
     Args:
         task: What the controller must do.
-        source: Text of `controller.py`.
+        source: Bytes of `controller.py`.
         workdir: Folder whose files the controller may read.
         tier: Sandbox tier, or `auto`.
         seed: Of the jittered starts.
+        limits: Of each child; `cpu_seconds` is for all of them together.
 
     Attributes:
         tier: Name of the tier that was used.
@@ -44,7 +47,14 @@ class Judge:
     """
 
     def __init__(
-        self, task: Task, source: str, workdir: Path, *, tier: str, seed: int
+        self,
+        task: Task,
+        source: bytes,
+        workdir: Path,
+        *,
+        tier: str = "auto",
+        seed: int = 0,
+        limits: Limits | None = None,
     ) -> None:
         self.task = task
         self.source = source
@@ -54,21 +64,32 @@ class Judge:
         self.fault: str | None = None
         self._workdir = workdir
         self._seed = seed
+        self._limits = limits or Limits()
+        self._deadline = time.monotonic() + WALL_SECONDS
         self._env = task.make_env()
-        self._unit_child: Child | None = None
-        self._fault: ControllerFault | None = None
+        self._unit: Unit | None = None
+        self._import_fault: ControllerFault | None = None
 
     def unit(self) -> Unit:
         """The imported controller, for calls of its own functions.
 
+        A call that ends its process spoils only the test that made it: the next one
+        gets a fresh process.
+
         Raises:
-            ControllerFault: It cannot be imported, or an earlier call ended it.
+            ControllerFault: It cannot be imported.
         """
-        if self._fault is not None:
-            raise self._fault.with_traceback(None)
-        if self._unit_child is None:
-            self._unit_child = self._load()
-        return Unit(self._unit_child)
+        if self._unit is not None and self._unit.fault is not None:
+            self.close()
+        if self._unit is None:
+            self._unit = Unit(self._load(), self._deadline)
+        return self._unit
+
+    def call_timed_out(self) -> bool:
+        """Whether the latest call of a function of the controller took too long."""
+        return self._unit is not None and isinstance(
+            self._unit.fault, ControllerTimeout
+        )
 
     def rollout(
         self, name: str = "nominal", *, steps: int | None = None, drive: str = "policy"
@@ -86,10 +107,10 @@ class Judge:
         return self.rollouts[key]
 
     def close(self) -> None:
-        """Ends the children."""
-        if self._unit_child is not None:
-            self.cpu_seconds += self._unit_child.close().cpu_seconds
-            self._unit_child = None
+        """Ends the child that `unit` calls."""
+        if self._unit is not None:
+            self.cpu_seconds += self._unit.close().cpu_seconds
+            self._unit = None
 
     def start_pose(self, name: str) -> Pose:
         """Start of a named episode."""
@@ -101,15 +122,50 @@ class Judge:
         random = np.random.default_rng([self._seed, int(number)])
         return jittered_start(self.task.nominal, random)
 
+    def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
+        if name != "nominal" and not self.rollout("nominal").reached:
+            reason = "not run, since the nominal episode failed"
+            return self._skipped(name, "not run", reason)
+        rollout = self.drive(name, steps, drive)
+        # A time-out may be the machine's doing, so it is tried once more.
+        return self.drive(name, steps, drive) if rollout.timed_out else rollout
+
+    def drive(
+        self, name: str, steps: int | None = None, drive: str = "policy"
+    ) -> Rollout:
+        """Runs an episode in a fresh child; arguments as for `rollout`."""
+        limit = steps if steps is not None else self.task.nominal.horizon
+        record = Record(self._env, self.start_pose(name), limit)
+        try:
+            child = self._load()
+        except ControllerFault as fault:
+            return self._skipped(name, "error", str(fault))
+        try:
+            if drive == "run_episode":
+                seconds = child.limits.reset_seconds + 2 * limit * self.task.nominal.dt
+                return run_own_loop(child, record, name, timeout=seconds)
+            held_out = self._held_out(name)
+            return run_policy(
+                child, record, name, held_out=held_out, deadline=self._deadline
+            )
+        finally:
+            self.cpu_seconds += child.close().cpu_seconds
+
     def _load(self) -> Child:
-        """A child with the controller imported; a time-out is tried once more."""
+        """A fresh child with the controller imported; a time-out is tried once more.
+
+        Raises:
+            ControllerFault: It cannot be imported; the same at each later request.
+        """
+        if self._import_fault is not None:
+            raise self._import_fault.with_traceback(None)
         try:
             try:
                 return self._loaded_child()
             except ControllerTimeout:
                 return self._loaded_child()
         except ControllerFault as fault:
-            self._fault = fault
+            self._import_fault = fault
             raise
 
     def _loaded_child(self) -> Child:
@@ -120,35 +176,6 @@ class Judge:
             self.cpu_seconds += child.close().cpu_seconds
             raise
         return child
-
-    def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
-        if self._fault is not None and self._fault.phase == "import":
-            return self._skipped(name, "error", str(self._fault))
-        if name != "nominal" and not self.rollout("nominal").reached:
-            reason = "not run, since the nominal episode failed"
-            return self._skipped(name, "not run", reason)
-        rollout = self.drive(name, steps, drive)
-        if rollout.error is not None and " did not end within " in rollout.error:
-            rollout = self.drive(name, steps, drive)
-        return rollout
-
-    def drive(
-        self, name: str, steps: int | None = None, drive: str = "policy"
-    ) -> Rollout:
-        """Runs an episode in a fresh child; arguments as for `rollout`."""
-        if self.cpu_seconds >= CPU_SECONDS:
-            message = f"the controller used more than {CPU_SECONDS} s of CPU time"
-            return self._skipped(name, "error", message)
-        limit = steps if steps is not None else self.task.nominal.horizon
-        record = Record(self._env, self.start_pose(name), limit)
-        child = self._start()
-        try:
-            if drive == "run_episode":
-                seconds = child.limits.reset_seconds + 2 * limit * self.task.nominal.dt
-                return run_own_loop(child, record, name, timeout=seconds)
-            return run_policy(child, record, name, held_out=self._held_out(name))
-        finally:
-            self.cpu_seconds += child.close().cpu_seconds
 
     def _skipped(self, name: str, outcome: Outcome, reason: str) -> Rollout:
         record = Record(self._env, self.start_pose(name), 1)
@@ -169,14 +196,17 @@ class Judge:
         return name != "nominal" and int(name.split()[1]) > SHOWN_JITTERS
 
     def _start(self) -> Child:
-        left = max(int(CPU_SECONDS - self.cpu_seconds), 1)
-        try:
-            child = start(
-                self._workdir,
-                self.source,
-                tier=self.tier,
-                limits=Limits(cpu_seconds=left),
+        left = int(self._limits.cpu_seconds - self.cpu_seconds)
+        if left < 1:
+            used = f"used {self._limits.cpu_seconds} s of CPU time, all it may"
+            raise ControllerFault(f"the controller {used}", "import")
+        if time.monotonic() > self._deadline:
+            raise ControllerFault(
+                f"the verification took longer than {WALL_SECONDS:g} s", "import"
             )
+        limits = replace(self._limits, cpu_seconds=left)
+        try:
+            child = start(self._workdir, self.source, tier=self.tier, limits=limits)
         except SandboxError as error:
             self.fault = f"the sandbox failed: {error}"
             raise Fault(self.fault) from error

@@ -11,13 +11,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.errors import Fault
 from tdac_agent.files import write_atomic
 from tdac_agent.judge import Judge
 from tdac_agent.report import Episode
+from tdac_agent.sandbox import Limits
 from tdac_agent.suite_plugin import JudgePlugin, rollout_key
 from tdac_agent.task import Profile, Task, load_task
 from tdac_agent.trajectory import Rollout
@@ -30,11 +31,12 @@ class Job(BaseModel):
 
     task: Path
     controller: Path
-    suites: list[Path]
+    suites: list[Path] = Field(description="In the order in which they run.")
     profile: Profile
     paper: bool
     tier: str
     seed: int
+    limits: Limits
     out: Path
 
 
@@ -55,8 +57,14 @@ def main() -> None:
     """Runs a suite as its only argument asks, and writes the findings."""
     job = Job.model_validate_json(Path(sys.argv[1]).read_text(encoding="utf-8"))
     task = load_task(job.task)
-    source = job.controller.read_bytes().decode("utf-8", "replace")
-    judge = Judge(task, source, job.task, tier=job.tier, seed=job.seed)
+    judge = Judge(
+        task,
+        job.controller.read_bytes(),
+        job.task,
+        tier=job.tier,
+        seed=job.seed,
+        limits=job.limits,
+    )
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
     try:
         pytest.main(_arguments(job), plugins=[plugin])
@@ -73,10 +81,11 @@ def main() -> None:
 
 
 def _arguments(job: Job) -> list[str]:
+    root = job.suites[0].parent
     return [
         *(str(folder) for folder in job.suites),
-        f"--rootdir={job.suites[0]}",
-        f"--confcutdir={job.suites[0]}",
+        f"--rootdir={root}",
+        f"--confcutdir={root}",
         "-c",
         os.devnull,
         "-p",
@@ -100,7 +109,8 @@ def _findings(task: Task, judge: Judge, plugin: JudgePlugin) -> Findings:
     diagnoses = {
         rollout_key(*key): diagnose(rollout, task.nominal).model_dump_json()
         for key, rollout in judge.rollouts.items()
-        if rollout.outcome not in ("reached", "stopped", "not run")
+        if rollout.outcome != "not run"
+        and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))
     }
     return Findings(
         expected=plugin.expected,

@@ -23,12 +23,12 @@ class Policy:
     process. A context manager; `close` ends the process.
 
     Args:
-        source: Text of `controller.py`.
+        source: Bytes of `controller.py`.
         task: Whose working folder it sees.
         tier: Sandbox tier, or `auto`.
     """
 
-    def __init__(self, source: str, task: Task, tier: str = "auto") -> None:
+    def __init__(self, source: bytes, task: Task, tier: str = "auto") -> None:
         self._source = source
         self._tier = tier
         self._folder = tempfile.TemporaryDirectory(prefix="tdac-policy-")

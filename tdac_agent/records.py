@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import difflib
 import json
+import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +21,7 @@ from tdac_agent.rules import RepairRule
 from tdac_agent.task import Task, portable_task_file, write_workdir
 
 Status = Literal["running", "verified", "not verified", "interrupted", "fault"]
+OWN_SUITE = "suite"
 Event = Callable[[dict[str, Any]], None]
 
 
@@ -98,10 +100,15 @@ class Recorder:
     _previous: str = ""
 
     def start(self, task: Task) -> None:
-        """Makes the folder: task, map image, working files, empty journal."""
+        """Makes the folder: task, map image, suite, working files, empty journal."""
         folder = self.run.folder
         write_workdir(folder, task)
-        write_atomic(folder / "task.yaml", portable_task_file(task))
+        write_atomic(
+            folder / "task.yaml", portable_task_file(task, own_suite=OWN_SUITE)
+        )
+        if task.suite is not None:
+            ignored = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(task.suite, folder / OWN_SUITE, ignore=ignored)
         if task.image is not None:
             copy = folder / f"map{task.image.suffix}"
             write_atomic(copy, task.image.read_bytes())
@@ -115,20 +122,22 @@ class Recorder:
         if self.on_event is not None:
             self.on_event(record)
 
-    def asked(self, request: Request) -> Path:
-        """Keeps a prompt before it is sent; returns the candidate's folder."""
+    def asked(self, request: Request) -> None:
+        """Keeps a prompt before it is sent."""
         _, k, j = request.sample
-        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / f"{request.kind}.prompt.md", request.prompt)
+        path = self._folder(k, j) / f"{request.kind}.prompt.md"
+        write_atomic(path, request.prompt)
         self.event("call.intent", kind=request.kind, k=k, j=j)
-        return folder
 
     def answered(self, request: Request, reply: Reply) -> None:
-        """Keeps an answer as it came."""
+        """Keeps an answer as it came, beside earlier ones to the same prompt."""
         _, k, j = request.sample
-        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
-        write_atomic(folder / f"{request.kind}.reply.md", reply.text)
+        folder = self._folder(k, j)
+        path, number = folder / f"{request.kind}.reply.md", 1
+        while path.exists():
+            number += 1
+            path = folder / f"{request.kind}.reply-{number}.md"
+        write_atomic(path, reply.text)
         self.run.tokens_in += reply.tokens_in
         self.run.tokens_out += reply.tokens_out
         self.event(
@@ -144,8 +153,7 @@ class Recorder:
 
     def candidate(self, k: int, j: int, source: str) -> Path:
         """Keeps a candidate's source and its difference from the last one."""
-        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = self._folder(k, j)
         write_atomic(folder / "controller.py", source)
         difference = difflib.unified_diff(
             self._previous.splitlines(keepends=True),
@@ -178,8 +186,7 @@ class Recorder:
 
     def rules(self, k: int, rules: tuple[RepairRule, ...]) -> None:
         """Keeps the rules in force after an iteration."""
-        records = [{"id": r.id, "text": r.text, "born": r.born} for r in rules]
-        self.event("rules", k=k, rules=records)
+        self.event("rules", k=k, rules=[asdict(rule) for rule in rules])
 
     def finish(self, status: Status, **facts: Any) -> None:
         """Closes the run."""
@@ -193,6 +200,11 @@ class Recorder:
         write_atomic(
             self.run.folder / "run.json", self.run.model_dump_json(indent=2) + "\n"
         )
+
+    def _folder(self, k: int, j: int) -> Path:
+        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
 
     def _elapsed(self) -> float:
         return time.monotonic() - self._clock

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from typing import Any
 
-from tdac_agent.sandbox import Child, Handle
+from tdac_agent.sandbox import (
+    Child,
+    ChildUsage,
+    ControllerError,
+    ControllerFault,
+    ControllerTimeout,
+    Handle,
+)
 
 
 class Remote:
@@ -14,8 +23,8 @@ class Remote:
         type_name: Name of its class.
     """
 
-    def __init__(self, child: Child, handle: Handle) -> None:
-        self._child = child
+    def __init__(self, unit: Unit, handle: Handle) -> None:
+        self._unit = unit
         self._handle = handle
         self.type_name = handle.type_name
 
@@ -24,19 +33,28 @@ class Remote:
 
     def call(self, method: str, *args: Any, **kwargs: Any) -> Any:
         """Calls a method; values as for `Unit.call`."""
-        target = (self._handle, method)
-        return _wrap(self._child, self._child.call(target, _send(args), kwargs))
+        return self._unit.send((self._handle, method), args, kwargs)
 
 
 class Unit:
-    """The top level of a controller that was imported in its sandbox."""
+    """The top level of a controller that was imported in its sandbox.
 
-    def __init__(self, child: Child) -> None:
+    Args:
+        child: With the controller imported.
+        deadline: When the last call must be over, by `time.monotonic`.
+
+    Attributes:
+        fault: Why the process is gone, None while it answers.
+    """
+
+    def __init__(self, child: Child, deadline: float) -> None:
         self._child = child
+        self._deadline = deadline
+        self.fault: ControllerFault | None = None
 
     def get(self, name: str) -> Any:
         """Value of a top-level name."""
-        return _wrap(self._child, self._child.get(name))
+        return self._ask(lambda seconds: self._child.get(name, timeout=seconds))
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         """Calls a top-level function or class.
@@ -46,16 +64,40 @@ class Unit:
         Raises:
             ControllerFault: It raised, took too long or ended its process.
         """
-        return _wrap(self._child, self._child.call(name, _send(args), kwargs))
+        return self.send(name, args, kwargs)
 
+    def send(
+        self,
+        target: str | tuple[Handle, str],
+        args: tuple[Any, ...],
+        kwargs: dict[str, Any],
+    ) -> Any:
+        """Calls a function by name, or a method of an object."""
+        values = tuple(a._handle if isinstance(a, Remote) else a for a in args)
+        return self._ask(
+            lambda seconds: self._child.call(target, values, kwargs, seconds)
+        )
 
-def _send(args: tuple[Any, ...]) -> tuple[Any, ...]:
-    return tuple(a._handle if isinstance(a, Remote) else a for a in args)
+    def close(self) -> ChildUsage:
+        """Ends the process."""
+        return self._child.close()
 
+    def _ask(self, request: Callable[[float], Any]) -> Any:
+        left = self._deadline - time.monotonic()
+        seconds = min(self._child.limits.call_seconds, left)
+        try:
+            if seconds <= 0:
+                raise ControllerTimeout("the verification", 0)
+            return self._wrap(request(seconds))
+        except ControllerError:
+            raise
+        except ControllerFault as fault:
+            self.fault = fault
+            raise
 
-def _wrap(child: Child, value: Any) -> Any:
-    if isinstance(value, Handle):
-        return Remote(child, value)
-    if type(value) in (list, tuple):
-        return type(value)(_wrap(child, item) for item in value)
-    return value
+    def _wrap(self, value: Any) -> Any:
+        if isinstance(value, Handle):
+            return Remote(self, value)
+        if type(value) in (list, tuple):
+            return type(value)(self._wrap(item) for item in value)
+        return value

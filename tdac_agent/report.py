@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
+GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
 Cause = Literal[
     "collision",
     "no motion",
@@ -86,6 +87,7 @@ class Provenance(_Record):
     paper: bool = Field(description="Nominal start only.")
     seed: int
     sandbox: str = Field(description="Tier that held the controller.")
+    limits: dict[str, float] = Field(description="Of the controller's processes.")
     warnings: tuple[str, ...] = ()
     versions: dict[str, str]
 
@@ -115,3 +117,13 @@ class Report(_Record):
     def passed(self) -> bool:
         """Whether the controller is verified."""
         return self.verdict.passed
+
+
+def group_of(test: str) -> Group:
+    """Which part of a suite a test belongs to."""
+    files: dict[str, Group] = {
+        "test_static.py": "static",
+        "test_unit.py": "unit",
+        "test_end_to_end.py": "end to end",
+    }
+    return files.get(test.partition("::")[0], "user")

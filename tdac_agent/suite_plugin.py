@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import ast
 import json
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import pytest
+from _pytest.runner import runtestprotocol
 
+from tdac_agent.contract import MAX_SOURCE_BYTES
 from tdac_agent.judge import Judge
 from tdac_agent.oracle import Oracle
+from tdac_agent.report import GROUPS, group_of
 from tdac_agent.sandbox import ControllerError
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Rollout
+
+SHIPPED, OWN = "shipped", "own"
 
 
 class Controller:
@@ -26,16 +30,24 @@ class Controller:
 
     def __init__(self, judge: Judge) -> None:
         self._judge = judge
-        self.source = judge.source
+        self.source = judge.source.decode("utf-8", "replace")
 
     @property
     def tree(self) -> ast.Module:
         """Syntax tree of the source; a source that does not parse fails the test."""
+        size = len(self._judge.source)
+        if size > MAX_SOURCE_BYTES:
+            limit = f"at most {MAX_SOURCE_BYTES} are allowed"
+            pytest.fail(f"the source has {size} bytes, {limit}", pytrace=False)
         try:
-            return ast.parse(self.source)
-        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            line = f" (line {error.lineno})" if isinstance(error, SyntaxError) else ""
-            pytest.fail(f"the source does not parse: {error}{line}", pytrace=False)
+            # The bytes, as Python itself reads them: they may declare an encoding.
+            return ast.parse(self._judge.source)
+        except SyntaxError as error:
+            line = f" (line {error.lineno})" if error.lineno else ""
+            reason = f"{error.msg}{line}"
+        except (ValueError, RecursionError, MemoryError) as error:
+            reason = str(error) or type(error).__name__
+        pytest.fail(f"the source does not parse: {reason}", pytrace=False)
 
     def constant(self, name: str) -> Any:
         """Value of a top-level name."""
@@ -110,11 +122,32 @@ class JudgePlugin:
         config.addinivalue_line("markers", "paper: only in the profile `paper`")
         config.addinivalue_line("markers", "jitter: not with `--paper`")
 
+    @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Leaves out the tests of other profiles, and fixes what must run."""
+        """Leaves out the tests of other profiles, and fixes what must run.
+
+        What another hook leaves out afterwards is missing, and so has failed.
+        """
         chosen = [i for i in items if not self._left_out & _marker_names(i)]
-        items[:] = chosen
-        self.expected = [test_id(item.nodeid) for item in chosen]
+        # What costs little and explains most comes first.
+        items[:] = sorted(
+            chosen, key=lambda i: GROUPS.index(group_of(test_id(i.nodeid)))
+        )
+        self.expected = [test_id(item.nodeid) for item in items]
+
+    def pytest_runtest_protocol(
+        self, item: pytest.Item, nextitem: pytest.Item | None
+    ) -> bool:
+        """Runs a test; one in which a call took too long is run once more."""
+        item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+        reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        if self._judge.call_timed_out():
+            item._initrequest()  # type: ignore[attr-defined]
+            reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        for report in reports:
+            item.ihook.pytest_runtest_logreport(report=report)
+        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        return True
 
 
 def rollout_key(name: str, steps: int | None, drive: str) -> str:
@@ -127,18 +160,8 @@ def _marker_names(item: pytest.Item) -> set[str]:
 
 
 def test_id(nodeid: str) -> str:
-    """A test's id without folders: `test_unit.py::test_plan_path`."""
-    path, _, rest = nodeid.partition("::")
-    return f"{Path(path).name}::{rest}"
+    """A test's id: `test_unit.py::test_plan_path`, `own/test_mine.py::test_gap`."""
+    return nodeid.removeprefix(f"{SHIPPED}/")
 
 
 test_id.__test__ = False  # type: ignore[attr-defined]
-
-
-def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The records of a report log; a torn last line ends it."""
-    for line in path.read_text(encoding="utf-8").splitlines():
-        try:
-            yield json.loads(line)
-        except json.JSONDecodeError:
-            return

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tdac_agent.builtin import Builtin
 from tdac_agent.dialogue import Candidate, Dialogue
-from tdac_agent.errors import Fault, RunError
+from tdac_agent.errors import RunError
 from tdac_agent.figures import draw_trajectories
 from tdac_agent.files import write_atomic
 from tdac_agent.provider import Provider
@@ -65,7 +65,7 @@ def synthesize(
                     recorder.judged(k, j, None, notes)
                     break
                 folder = recorder.candidate(k, j, source)
-                report = verify(source, task, seed=seed, out=folder)
+                report = verify(folder / "controller.py", task, seed=seed, out=folder)
                 recorder.judged(k, j, report, notes)
                 if report.passed:
                     return _deliver(recorder, task, k, source, report, folder)
@@ -77,7 +77,7 @@ def synthesize(
     except KeyboardInterrupt:
         recorder.finish("interrupted")
         raise
-    except Fault as error:
+    except Exception as error:
         recorder.finish("fault", reason=str(error))
         raise
     return recorder.run

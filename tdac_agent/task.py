@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import cv2
-import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.map2d import Map2DEnv
+from tdac_envs.map_folder import write_grid
 from tdac_envs.maps import bundled_maps
 from tdac_envs.params import MapParams, RobotParams
 from tdac_envs.render import ROBOT_IMAGE
@@ -86,6 +85,7 @@ class Task:
         nominal: The feasible task.
         image: Map image, where there is one.
         robot_image: Picture of the robot.
+        suite: Folder with further test files, where there is one.
     """
 
     name: str
@@ -94,6 +94,7 @@ class Task:
     nominal: Map2DTask
     image: Path | None
     robot_image: Path
+    suite: Path | None = None
 
     @property
     def progress_steps(self) -> int:
@@ -197,7 +198,9 @@ def _resolve(name: str, spec: TaskFile, base: Path) -> Task:
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
-    return Task(spec.name or name, spec, params, nominal, prepared.image, robot_image)
+    suite = None if spec.suite is None else base / spec.suite
+    name = spec.name or name
+    return Task(name, spec, params, nominal, prepared.image, robot_image, suite)
 
 
 def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
@@ -229,22 +232,26 @@ def write_workdir(folder: Path, task: Task) -> None:
     `sensors.py`; the controller itself comes beside them.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    cells = task.nominal.terrain.grid.cells
-    np.save(folder / "occupancy.npy", cells)
-    cv2.imwrite(str(folder / "occupancy.png"), np.where(cells, 0, 255).astype(np.uint8))
-    task.params.save(folder / "params.json")
+    write_grid(folder, task.nominal.terrain.grid, task.params)
     (folder / "robot.png").write_bytes(task.robot_image.read_bytes())
     (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())
 
 
-def portable_task_file(task: Task) -> str:
-    """`task.yaml` for a run folder: the map is the folder's own grid."""
+def portable_task_file(task: Task, own_suite: str | None = None) -> str:
+    """`task.yaml` for a run folder: the map is the folder's own grid.
+
+    Args:
+        task: Any.
+        own_suite: Name of the subfolder that holds the task's suite, if it has one.
+    """
     robot = task.nominal.robot
     spec = task.spec.model_dump(
         mode="json", exclude_none=True, exclude={"snap", "suite"}, by_alias=True
     )
     spec["name"] = task.name
     spec["map"] = "."
+    if task.suite is not None and own_suite is not None:
+        spec["suite"] = own_suite
     spec["start"] = [float(v) for v in task.nominal.start]
     spec["goal"] = [float(v) for v in task.nominal.goal]
     spec["tolerance"] = task.nominal.goal_tolerance

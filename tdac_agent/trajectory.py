@@ -81,6 +81,7 @@ class Rollout:
         error: What the controller did wrong, in one line, for `error` and `not run`.
         call_ms: Mean and 99th percentile of the time of a policy call, ms.
         returned: What `run_episode` returned, for an episode driven by it.
+        timed_out: Whether the controller was too slow, in one call or on average.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Rollout:
     error: str | None = None
     call_ms: tuple[float, float] = (0.0, 0.0)
     returned: Any = None
+    timed_out: bool = False
 
     @property
     def reached(self) -> bool:

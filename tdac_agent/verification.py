@@ -12,31 +12,32 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import asdict
 from pathlib import Path
-
-from pydantic import ValidationError
 
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.files import write_atomic
 from tdac_agent.judging import Findings, Job
-from tdac_agent.report import Diagnosis, Failure, Group, Provenance, Report, Verdict
-from tdac_agent.sandbox import MAX_SOURCE_BYTES
-from tdac_agent.suite_plugin import lines, test_id
+from tdac_agent.report import Provenance, Report
+from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
+from tdac_agent.sandbox import Limits
+from tdac_agent.suite_plugin import OWN, SHIPPED
 from tdac_agent.task import Profile, Task, portable_task_file, write_workdir
 from tdac_agent.trajectory import Trajectory
 
 SHIPPED_SUITE = Path(__file__).parent / "suites" / "map2d"
 DEADLINE_SECONDS = 900.0
-GROUPS: dict[str, Group] = {
-    "test_static.py": "static",
-    "test_unit.py": "unit",
-    "test_end_to_end.py": "end to end",
-}
+MAX_FILE_BYTES = 64 << 20
+# What of Python's own environment the judge's process keeps: where things are. The
+# rest can change a verdict; PYTHONOPTIMIZE, for one, takes away every assertion.
+KEPT_VARIABLES = frozenset(
+    ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
+)
 VERSIONED = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
 
 
 def verify(
-    controller: str | Path,
+    controller: str | bytes | Path,
     task: Task,
     *,
     profile: Profile | None = None,
@@ -44,18 +45,21 @@ def verify(
     suite: Path | None = None,
     tier: str = "auto",
     seed: int = 0,
+    limits: Limits | None = None,
     out: Path | None = None,
 ) -> Report:
     """Tests a controller in the sandbox against everything the task asks for.
 
     Args:
-        controller: Path of the file, or its source.
+        controller: Path of the file, or its source (text of several lines, or bytes).
         task: What it must do.
         profile: `policy` or `paper`; the task's own by default.
         paper: Nominal start only, as in the paper.
-        suite: Folder with further tests beside the shipped ones.
+        suite: Folder with further tests beside the shipped ones; the task's own by
+            default.
         tier: Sandbox tier, `auto` for the best one here.
         seed: Of the jittered starts.
+        limits: Of the controller's processes; `cpu_seconds` is for all of them.
         out: Folder for `report.json` and `trajectories/`; none by default.
 
     Returns:
@@ -67,34 +71,30 @@ def verify(
     """
     began = time.monotonic()
     source = read_source(controller)
-    suites = [SHIPPED_SUITE]
-    extra = suite or task.spec.suite
+    suites = {SHIPPED: SHIPPED_SUITE}
+    extra = suite or task.suite
     if extra is not None:
-        suites.append(_suite_folder(extra))
+        suites[OWN] = _suite_folder(extra)
     with tempfile.TemporaryDirectory(prefix="tdac-verify-") as name:
         folder = Path(name)
-        results = folder / "results"
-        results.mkdir()
-        work = folder / "work"
-        write_workdir(work, task)
-        write_atomic(work / "task.yaml", portable_task_file(task))
-        write_atomic(folder / "controller.py", source)
         job = Job(
-            task=work,
+            task=folder / "work",
             controller=folder / "controller.py",
-            suites=suites,
+            suites=[folder / "suites" / name for name in suites],
             profile=profile or task.spec.profile,
             paper=paper,
             tier=tier,
             seed=seed,
-            out=results,
+            limits=limits or Limits(),
+            out=folder / "results",
         )
+        _prepare(job, task, source, suites)
         output = _run_judge(job, folder)
-        findings = _read_findings(results, output)
-        tests, failures = _outcomes(results / "report.jsonl", findings)
+        findings = read_findings(job.out, output)
+        tests, failures = read_outcomes(job.out / "report.jsonl", findings)
         report = Report(
-            verdict=_verdict(tests),
-            provenance=_provenance(task, source, job, findings),
+            verdict=verdict_of(tests),
+            provenance=_provenance(task, source, job, suites, findings),
             failures=tuple(failures),
             tests=tests,
             episodes=tuple(findings.episodes),
@@ -102,26 +102,46 @@ def verify(
             seconds=round(time.monotonic() - began, 3),
         )
         if out is not None:
-            _keep(report, results, out)
+            _keep(report, job.out, out)
     return report
 
 
-def read_source(controller: str | Path) -> str:
-    """Source of a controller given as a path or as text.
+def read_source(controller: str | bytes | Path) -> bytes:
+    """Source of a controller given as a path, as text of several lines or as bytes.
 
     Raises:
-        ControllerFileError: The file cannot be read.
+        ControllerFileError: The file cannot be read, or is far too large.
     """
-    if isinstance(controller, str) and "\n" in controller:
+    if isinstance(controller, bytes):
         return controller
-    path = Path(controller)
+    if isinstance(controller, str) and "\n" in controller:
+        return controller.encode("utf-8", "surrogatepass")
     try:
-        with path.open("rb") as file:
-            raw = file.read(2 * MAX_SOURCE_BYTES)
-    except OSError as error:
-        message = f"cannot read the controller {str(path)!r}: {error.strerror}"
+        with Path(controller).open("rb") as file:
+            raw = file.read(MAX_FILE_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        message = f"cannot read the controller {str(controller)!r}: {reason}"
         raise ControllerFileError(message) from error
-    return raw.decode("utf-8", "surrogateescape")
+    if len(raw) > MAX_FILE_BYTES:
+        size = f"larger than {MAX_FILE_BYTES >> 20} MB"
+        raise ControllerFileError(f"{str(controller)!r} is no controller: {size}")
+    return raw
+
+
+def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> None:
+    """Lays out the judge's folder.
+
+    The suites are linked side by side, so that no `conftest.py` or `pytest.ini` from
+    above one of them takes part.
+    """
+    job.out.mkdir()
+    write_workdir(job.task, task)
+    write_atomic(job.task / "task.yaml", portable_task_file(task))
+    write_atomic(job.controller, source)
+    for link, folder in zip(job.suites, suites.values(), strict=True):
+        link.parent.mkdir(exist_ok=True)
+        link.symlink_to(folder, target_is_directory=True)
 
 
 def load_trajectories(folder: Path) -> dict[str, Trajectory]:
@@ -146,11 +166,14 @@ def _run_judge(job: Job, folder: Path) -> str:
     """Runs the judge's process to its end; returns what it printed."""
     request = folder / "job.json"
     request.write_text(job.model_dump_json(), encoding="utf-8")
-    environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    for name in ("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
-        environment.pop(name, None)
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHON", "PYTEST")) or name in KEPT_VARIABLES
+    }
+    environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
     process = subprocess.Popen(
-        [sys.executable, "-m", "tdac_agent.judging", str(request)],
+        [sys.executable, "-P", "-m", "tdac_agent.judging", str(request)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -168,96 +191,15 @@ def _run_judge(job: Job, folder: Path) -> str:
                 f"the judge did not end within {DEADLINE_SECONDS:g} s"
             ) from error
         raise
-    return output.decode("utf-8", "replace")
+    return output.decode("utf-8", "replace").replace(f"{folder}/", "")
 
 
-def _read_findings(results: Path, output: str) -> Findings:
-    path = results / "findings.json"
-    try:
-        findings = Findings.model_validate_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValidationError) as error:
-        raise Fault(f"the judge left no findings: {_tail(output)}") from error
-    if findings.fault is not None:
-        raise Fault(findings.fault)
-    if not findings.expected:
-        raise Fault(f"the suite could not be collected: {_tail(output)}")
-    return findings
-
-
-def _outcomes(path: Path, findings: Findings) -> tuple[dict[str, str], list[Failure]]:
-    """Outcome of each expected test; what is missing from the log has failed."""
-    tests = dict.fromkeys(findings.expected, "missing")
-    failures: dict[str, Failure] = {}
-    for record in lines(path) if path.exists() else ():
-        if (
-            record.get("$report_type") == "CollectReport"
-            and record["outcome"] != "passed"
-        ):
-            raise Fault(f"the suite is broken: {_crash(record)}")
-        if record.get("$report_type") != "TestReport":
-            continue
-        name = test_id(record["nodeid"])
-        if name not in tests:
-            raise Fault(f"the suite ran a test that was not expected: {name}")
-        if record["outcome"] != "passed" or "wasxfail" in record:
-            tests[name] = "failed" if record["outcome"] == "failed" else "skipped"
-            failures.setdefault(name, _failure(name, record, findings))
-        elif record["when"] == "call" and tests[name] == "missing":
-            tests[name] = "passed"
-    for name, outcome in tests.items():
-        if outcome == "missing":
-            message = "the test did not run to its end"
-            failures[name] = Failure(test=name, group="judge", message=message)
-    return tests, [failures[name] for name in tests if name in failures]
-
-
-def _failure(name: str, record: dict[str, object], findings: Findings) -> Failure:
-    diagnosis = None
-    for key, value in record.get("user_properties", []):  # type: ignore[attr-defined]
-        if key == "rollout" and value in findings.diagnoses:
-            diagnosis = Diagnosis.model_validate_json(findings.diagnoses[value])
-    return Failure(
-        test=name,
-        group=GROUPS.get(name.partition("::")[0], "user"),
-        message=_crash(record),
-        diagnosis=diagnosis,
-    )
-
-
-def _crash(record: dict[str, object]) -> str:
-    """The message of a failed test, without the assertion's source or a path."""
-    details = record.get("longrepr")
-    if isinstance(details, dict):
-        text = str((details.get("reprcrash") or {}).get("message", ""))
-    else:
-        text = str(details)
-    for prefix in ("AssertionError: ", "Failed: "):
-        text = text.removeprefix(prefix)
-    # Exceptions are shown with their module; the class says enough.
-    head, separator, tail = text.partition(": ")
-    if separator and head.startswith("tdac_agent."):
-        text = tail
-    return text
-
-
-def _tail(output: str) -> str:
-    kept = [line for line in output.strip().splitlines() if line.strip()][-6:]
-    return " | ".join(kept) or "no output"
-
-
-def _verdict(tests: dict[str, str]) -> Verdict:
-    passed = sum(outcome == "passed" for outcome in tests.values())
-    return Verdict(
-        passed=passed == len(tests),
-        expected=len(tests),
-        passed_tests=passed,
-        failed_tests=len(tests) - passed,
-    )
-
-
-def _provenance(task: Task, source: str, job: Job, findings: Findings) -> Provenance:
+def _provenance(
+    task: Task, source: bytes, job: Job, suites: dict[str, Path], findings: Findings
+) -> Provenance:
     weak = findings.tier == "rlimits"
     warning = "this sandbox tier cannot withhold the network and other files"
+    hashes = {name: _suite_hash(folder) for name, folder in suites.items()}
     versions = {name: importlib.metadata.version(name) for name in VERSIONED}
     return Provenance(
         task=task.name,
@@ -265,20 +207,24 @@ def _provenance(task: Task, source: str, job: Job, findings: Findings) -> Proven
         map_sha256=task.nominal.terrain.grid.sha256(),
         params_sha256=_sha(task.params.model_dump_json().encode()),
         sensors_sha256=_sha((job.task / "sensors.py").read_bytes()),
-        controller_sha256=_sha(source.encode("utf-8", "surrogateescape")),
-        suite=" + ".join(folder.name for folder in job.suites),
-        suite_sha256=_sha(json.dumps([_suite_hash(s) for s in job.suites]).encode()),
+        controller_sha256=_sha(source),
+        suite=" + ".join(folder.name for folder in suites.values()),
+        suite_sha256=_sha(json.dumps(hashes, sort_keys=True).encode()),
         profile=job.profile,
         paper=job.paper,
         seed=job.seed,
         sandbox=findings.tier,
+        limits=asdict(job.limits),
         warnings=(warning,) if weak else (),
         versions={"python": platform.python_version(), **versions},
     )
 
 
 def _suite_hash(folder: Path) -> dict[str, str]:
-    return {path.name: _sha(path.read_bytes()) for path in sorted(folder.glob("*.py"))}
+    return {
+        str(path.relative_to(folder)): _sha(path.read_bytes())
+        for path in sorted(folder.rglob("*.py"))
+    }
 
 
 def _sha(data: bytes) -> str:

@@ -48,7 +48,9 @@ def write_map(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".map-", dir=folder) as work:
-            _write_all(Path(work), grid, params, preview)
+            write_grid(Path(work), grid, params)
+            picture = cv2.cvtColor(preview, cv2.COLOR_RGB2BGR)
+            _save_png(Path(work) / "preview.png", picture)
             for name in FILES:
                 os.replace(Path(work) / name, folder / name)
     except OSError as error:
@@ -58,13 +60,11 @@ def write_map(
     return [folder / name for name in FILES]
 
 
-def _write_all(
-    folder: Path, grid: OccupancyGrid, params: MapParams, preview: NDArray[np.uint8]
-) -> None:
+def write_grid(folder: Path, grid: OccupancyGrid, params: MapParams) -> None:
+    """Writes `occupancy.npy`, `occupancy.png` and `params.json` into a folder."""
     np.save(folder / "occupancy.npy", grid.cells)
     _save_png(folder / "occupancy.png", np.where(grid.cells, 0, 255).astype(np.uint8))
     params.save(folder / "params.json")
-    _save_png(folder / "preview.png", cv2.cvtColor(preview, cv2.COLOR_RGB2BGR))
 
 
 def _save_png(path: Path, picture: NDArray[Any]) -> None:

@@ -51,7 +51,7 @@ def run(
     return 0 if rollout.reached else 1
 
 
-def drive(task: Task, source: str, seed: int, tier: str) -> Rollout:
+def drive(task: Task, source: bytes, seed: int, tier: str) -> Rollout:
     """One judged episode: the nominal start, or jittered start `seed`."""
     name = "nominal" if seed == 0 else f"jitter {seed}"
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:

@@ -9,29 +9,25 @@ from rich.text import Text
 
 from tdac_agent.report import Report
 
-GROUPS = ("static", "unit", "end to end", "user", "judge")
-FILES = {
-    "static": "test_static.py",
-    "unit": "test_unit.py",
-    "end to end": "test_end_to_end.py",
-}
-
 
 def show_report(report: Report, console: Console) -> None:
     """Prints the verdict, the failures with their diagnosis, and the episodes."""
     verdict, about = report.verdict, report.provenance
     for warning in about.warnings:
         console.print(f"[yellow]warning: {warning}[/]")
+    tests: dict[str, list[str]] = {}
     for failure in report.failures:
-        console.print(f"[red]failed[/] [bold]{escape(failure.test)}[/]")
-        console.print(Text(failure.message), style="default", soft_wrap=True)
+        tests.setdefault(failure.message, []).append(failure.test)
+    for message, names in tests.items():
+        console.print(f"[red]failed[/] [bold]{escape(', '.join(names))}[/]")
+        console.print(Text(f"  {message}"), style="default", soft_wrap=True)
     shown: set[str] = set()
     for failure in report.failures:
         diagnosis = failure.diagnosis
         if diagnosis is not None and diagnosis.text not in shown:
             shown.add(diagnosis.text)
             console.print(f"[cyan]diagnosis[/] {escape(diagnosis.cause)}")
-            console.print(Text(diagnosis.text), soft_wrap=True)
+            console.print(Text(f"  {diagnosis.text}"), soft_wrap=True)
     console.print(episode_table(report))
     colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
     console.print(

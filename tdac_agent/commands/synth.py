@@ -14,6 +14,7 @@ from rich.spinner import Spinner
 from rich.table import Table
 
 from tdac_agent.commands.flags import TaskFlags
+from tdac_agent.errors import ControllerFileError
 from tdac_agent.records import Run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.verification import read_source
@@ -83,7 +84,7 @@ def run(
 ) -> int:
     """Synthesises and prints; returns the exit code."""
     console = Console(stderr=as_json)
-    source = None if start_from is None else read_source(start_from)
+    source = None if start_from is None else read_text(start_from)
     with console.status("preprocessing the map …"):
         task = flags.load()
     folder = out if out is not None else _next_folder(task.name)
@@ -114,6 +115,20 @@ def run(
     else:
         _show(result, console)
     return 0 if result.verified else 1
+
+
+def read_text(path: Path) -> str:
+    """Text of a controller file.
+
+    Raises:
+        ControllerFileError: It cannot be read, or is not UTF-8.
+    """
+    try:
+        return read_source(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ControllerFileError(
+            f"{path} is not UTF-8 text: {error.reason}"
+        ) from error
 
 
 def _no_model(learner: str) -> str:

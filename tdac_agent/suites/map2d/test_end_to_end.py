@@ -94,5 +94,5 @@ def test_jittered_start(rollout, number):
     episode = rollout(f"jitter {number}")
     figures = not episode.held_out or episode.outcome == "not run"
     ending = episode.error or episode.outcome if figures else "failed"
-    assert episode.reached, f"jittered start {number}: {ending}"
-    assert episode.collisions == 0, f"jittered start {number}: failed"
+    assert episode.reached, ending
+    assert episode.collisions == 0, "failed"

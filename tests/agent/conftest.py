@@ -1,0 +1,89 @@
+"""A small task, a controller that solves it, and what must be gone afterwards."""
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from tdac_agent.builtin import Parameters, render_controller
+from tdac_agent.sandbox import Limits
+from tdac_agent.task import load_task
+
+QUICK = Limits(import_seconds=1.5, reset_seconds=1.5, call_seconds=1.5, cpu_seconds=30)
+
+
+def small_cells():
+    """A room of 160 x 120 px with a wall that ends 40 px above the lower side."""
+    cells = np.zeros((120, 160), np.bool_)
+    cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = True
+    cells[:80, 70:76] = True
+    return cells
+
+
+def write_small_task(folder: Path, **changes) -> Path:
+    """A folder with the small map and a task.yaml; `changes` go into the file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    np.save(folder / "map.npy", small_cells())
+    content = {
+        "schema": 1,
+        "map": "map.npy",
+        "start": [30, 30],
+        "goal": [130, 30],
+        "robot": {"radius": 6},
+        "name": "small",
+    }
+    (folder / "task.yaml").write_text(yaml.safe_dump(content | changes))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_task(tmp_path_factory):
+    """A task that a verification needs little time for."""
+    return load_task(write_small_task(tmp_path_factory.mktemp("small")))
+
+
+@pytest.fixture(scope="session")
+def good_source(small_task):
+    """A controller that is verified on the small task."""
+    task = small_task
+    return render_controller(Parameters(), task.params.robot, task.nominal.dt)
+
+
+@pytest.fixture
+def quick():
+    """Limits with which a controller that hangs is soon given up."""
+    return QUICK
+
+
+def mentioning(text: str) -> list[int]:
+    """Running processes with a text in their command line, environment or folder."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+            about = (folder / "cmdline").read_bytes() + (folder / "environ").read_bytes()
+            about += os.fsencode(os.readlink(folder / "cwd"))
+        except OSError:
+            continue
+        mine = int(folder.name) == os.getpid()
+        if state not in "ZX" and not mine and os.fsencode(text) in about:
+            found.append(int(folder.name))
+    return found
+
+
+@pytest.fixture
+def no_traces(tmp_path, monkeypatch):
+    """After the test nothing runs that it started, and no temporary file is left."""
+    base = tmp_path / "temporary"
+    base.mkdir()
+    monkeypatch.setenv("TMPDIR", str(base))
+    monkeypatch.setattr("tempfile.tempdir", str(base))
+    yield base
+    deadline = time.monotonic() + 5.0
+    while (left := mentioning(str(base))) and time.monotonic() < deadline:
+        os.sched_yield()
+    assert left == []
+    assert list(base.iterdir()) == []
