@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tdac_envs.errors import MapError
@@ -43,6 +46,19 @@ class OccupancyGrid:
         cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, OccupancyGrid) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # NumPy's own pickles are writable again.
+        return OccupancyGrid, (self.cells, self.resolution, self.origin)
+
+    def _key(self) -> tuple[Any, ...]:
+        return self.sha256(), self.resolution, self.origin
+
     @property
     def width(self) -> int:
         """Number of columns, px."""
@@ -69,9 +85,7 @@ class OccupancyGrid:
 def clearance(cells: BoolGrid) -> FloatGrid:
     """Exact distance from each pixel centre to the nearest occupied square, in px.
 
-    The border of the map counts as occupied. The point of a unit square that is
-    nearest to a pixel centre always lies on the half-pixel lattice, so a distance
-    transform on that lattice is exact.
+    The border of the map counts as occupied.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
@@ -79,19 +93,69 @@ def clearance(cells: BoolGrid) -> FloatGrid:
     Returns:
         Shape (height, width), float32; 0 inside obstacles.
     """
+    clear: FloatGrid = _clearance(np.ascontiguousarray(cells, np.bool_))
+    return clear
+
+
+@njit(cache=True, nogil=True)
+def _clearance(cells: BoolGrid) -> FloatGrid:
+    """Distance transform after Felzenszwalb and Huttenlocher (2012), for squares.
+
+    From x, the square in another column x' is as far as its centre line is from
+    x - 1/2 or x + 1/2, whichever is nearer. So the lower envelope of the columns'
+    parabolas is read at half pixels; it is never too low, and the column x itself is
+    the vertical distance.
+    """
     height, width = cells.shape
-    lattice = np.ones((2 * height + 3, 2 * width + 3), np.uint8)
-    free = lattice[1:-1, 1:-1]
-    occupied = cells.astype(np.uint8)
-    for dy in range(3):
-        for dx in range(3):
-            window = free[dy : dy + 2 * height : 2, dx : dx + 2 * width : 2]
-            window &= 1 - occupied
-    for edge in (lattice[:2], lattice[-2:], lattice[:, :2], lattice[:, -2:]):
-        edge[...] = 0
-    distance = cv2.distanceTransform(lattice, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    centres = distance[2 : 2 + 2 * height : 2, 2 : 2 + 2 * width : 2]
-    return np.ascontiguousarray(centres * np.float32(0.5))
+    clear = np.empty((height, width), np.float32)
+    up = _rows_to_obstacle(cells)
+    site = np.empty(width + 2, np.int64)
+    square = np.empty(width + 2)
+    begin = np.empty(width + 3)
+    for y in range(height):
+        last = -1
+        for x in range(-1, width + 1):
+            rows = up[y, x] if 0 <= x < width else 0
+            value = (rows - 0.5) ** 2 if rows else 0.0
+            cross = -math.inf
+            while last >= 0:
+                span = x - site[last]
+                cross = 0.5 * (x + site[last] + (value - square[last]) / span)
+                if cross > begin[last]:
+                    break
+                last, cross = last - 1, -math.inf
+            last += 1
+            site[last], square[last], begin[last] = x, value, cross
+        begin[last + 1] = math.inf
+        part, before = 0, 0.0
+        for x in range(width + 1):
+            while begin[part + 1] < x - 0.5:
+                part += 1
+            after = (x - 0.5 - site[part]) ** 2 + square[part]
+            if x > 0:
+                rows = up[y, x - 1]
+                here = (rows - 0.5) ** 2 if rows else 0.0
+                clear[y, x - 1] = math.sqrt(min(here, before, after))
+            before = after
+    return clear
+
+
+@njit(cache=True, nogil=True)
+def _rows_to_obstacle(cells: BoolGrid) -> NDArray[np.int32]:
+    """Rows from each pixel to the nearest occupied one of its column."""
+    height, width = cells.shape
+    rows = np.empty((height, width), np.int32)
+    for x in range(width):
+        rows[0, x] = 0 if cells[0, x] else 1
+    for y in range(1, height):
+        for x in range(width):
+            rows[y, x] = 0 if cells[y, x] else rows[y - 1, x] + 1
+    for x in range(width):
+        rows[height - 1, x] = min(rows[height - 1, x], 1)
+    for y in range(height - 2, -1, -1):
+        for x in range(width):
+            rows[y, x] = min(rows[y, x], rows[y + 1, x] + 1)
+    return rows
 
 
 def clearance_at(cells: BoolGrid, x: float, y: float, limit: float) -> float:
@@ -110,7 +174,7 @@ def clearance_at(cells: BoolGrid, x: float, y: float, limit: float) -> float:
     x0, x1 = max(i - reach, 0), min(i + reach + 1, width)
     y0, y1 = max(j - reach, 0), min(j + reach + 1, height)
     rows, columns = np.nonzero(cells[y0:y1, x0:x1])
-    best = max(min(edge, limit), 0.0)
+    best: float = max(min(edge, limit), 0.0)
     if rows.size:
         dx = np.maximum(np.abs(columns + x0 - x) - 0.5, 0.0)
         dy = np.maximum(np.abs(rows + y0 - y) - 0.5, 0.0)

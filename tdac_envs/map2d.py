@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections import deque
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from tdac_envs.errors import TaskError
-from tdac_envs.kernels import advance, cast_rays, path_distance, sees
+from tdac_envs.kernels import GOAL_X, GOAL_Y, drive, sense
 from tdac_envs.params import RobotParams
 from tdac_envs.render import Scene, Status
 from tdac_envs.rewards import RewardWeights, step_reward
@@ -20,9 +23,13 @@ from tdac_envs.task2d import (
     Map2DTask,
     Pose,
     Terrain,
+    default_horizon,
+    finite_numbers,
     jittered_start,
     make_task,
+    positive,
     random_task,
+    whole_number,
 )
 
 if TYPE_CHECKING:
@@ -106,7 +113,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
     * v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012 - as declared by gym.Env
         "render_modes": ["rgb_array", "human"],
         "render_fps": 20,
     }
@@ -138,12 +145,6 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         _choose("on_collision", on_collision, ("terminate", "block"))
         _choose("variation", variation, VARIATIONS)
         _choose("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        _not_negative(
-            range_noise=range_noise,
-            wheel_slip=wheel_slip,
-            motor_lag=motor_lag,
-            delay=delay,
-        )
         prepared = prepare(
             map, start, goal, heading=heading, robot_radius=robot_radius, snap=snap
         )
@@ -153,7 +154,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
             axle_length=axle_length,
             max_wheel_speed=max_wheel_speed,
             n_rays=n_rays,
-            field_of_view_deg=field_of_view,
+            field_of_view=field_of_view,
             range_max=range_max,
         )
         assert params.start is not None
@@ -171,16 +172,23 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.task = self.nominal
         self.on_collision = on_collision
         self.variation = variation
-        self.range_noise = range_noise
-        self.wheel_slip = wheel_slip
-        self.motor_lag = motor_lag
-        self.delay = delay
+        self.range_noise = _not_negative("range_noise", range_noise)
+        self.wheel_slip = _not_negative("wheel_slip", wheel_slip)
+        self.motor_lag = _not_negative("motor_lag", motor_lag)
+        self.delay = whole_number("delay", delay, 0)
         self.weights = RewardWeights()
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / dt)}
-        self.observation_space = observation_space(self.nominal)
+        fps = max(round(1.0 / self.nominal.dt), 1)
+        self.metadata = {**self.metadata, "render_fps": fps}
+        space = observation_space(self.nominal)
+        self.observation_space = space  # type: ignore[assignment]
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self._state = np.zeros(3)
+        self._fixed_horizon = horizon is not None
+        self._full_step = robot.max_wheel_speed * self.nominal.dt
+        self._constants = _constants(self.nominal, self.motor_lag)
+        self._state = np.zeros(4)
+        self._pose = np.zeros(3, np.float32)
+        self._wheel_speeds = np.zeros(2, np.float32)
         self._ranges = np.zeros(robot.n_rays, np.float32)
         self._scene: Scene | None = None
         self._window: Window | None = None
@@ -188,21 +196,39 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for `options`."""
+        """Starts an episode; see the class for `options`.
+
+        Raises:
+            TaskError: The options name something else than a start and a goal, or
+                these are not feasible.
+        """
         super().reset(seed=seed)
-        self.task = self._draw_task(options or {})
-        self._state[:] = self.task.start
-        self._state[2] = math.remainder(self._state[2], 2.0 * math.pi)
-        self._speeds = np.zeros(2, np.float32)
-        self._queue = [np.zeros(2, np.float32)] * self.delay
+        self.task = task = self._draw_task(options or {})
+        self._constants[GOAL_X : GOAL_Y + 1] = task.goal
+        self._state[:] = *task.start, task.shortest
+        self._goal = np.array(task.goal, np.float32)
+        self._wheel_speeds[:] = 0.0
+        self._queue = deque([(0.0, 0.0)] * self.delay)
         self._steps = self._collisions = self._clipped = 0
-        self._remaining = self.task.shortest
-        self._trail = [(float(self._state[0]), float(self._state[1]))]
+        self._remaining = task.shortest
+        self._trail = [task.start[:2]]
         self._status = ""
         self._scene = None
+        terrain = task.terrain
+        sense(
+            terrain.padded,
+            terrain.padded_clear,
+            self._constants,
+            self._state,
+            self._pose,
+            self._ranges,
+        )
+        gap = math.dist(task.start[:2], task.goal)
+        column, row = (math.floor(v + 0.5) for v in task.start[:2])
+        info = self._info(False, False, gap, float(terrain.clear[row, column]))
         if self.render_mode == "human":
             self.render()
-        return self._observation(), self._info(reached=False, collided=False)
+        return self._observation(), info
 
     def step(
         self, action: NDArray[np.float32]
@@ -212,39 +238,39 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         Raises:
             ValueError: The action is not two finite numbers.
         """
-        left, right = self._wheels(action)
-        task, robot = self.task, self.task.robot
+        left, right = self._wanted(action)
+        slip_left = slip_right = 1.0
+        if self.wheel_slip:
+            slip_left, slip_right = self.np_random.normal(1.0, self.wheel_slip, 2)
+        task = self.task
         terrain = task.terrain
-        collided = advance(
+        collided, reached, remaining, gap, room = drive(
             terrain.padded,
             terrain.padded_clear,
+            task.field,
+            self._constants,
             self._state,
-            left * robot.max_wheel_speed,
-            right * robot.max_wheel_speed,
-            robot.axle_length,
-            task.dt,
-            robot.radius,
+            self._pose,
+            self._wheel_speeds,
+            self._ranges,
+            left,
+            right,
+            slip_left,
+            slip_right,
         )
         self._steps += 1
         self._collisions += collided
-        x, y = float(self._state[0]), float(self._state[1])
-        remaining = float(path_distance(task.field, x, y, self._remaining))
-        full_step = robot.max_wheel_speed * task.dt
-        progress = (self._remaining - remaining) / full_step
+        progress = (self._remaining - remaining) / self._full_step
         self._remaining = remaining
-        gap = math.hypot(task.goal[0] - x, task.goal[1] - y)
-        reached = gap <= task.goal_tolerance and sees(
-            terrain.padded, terrain.padded_clear, x, y, task.goal[0], task.goal[1]
-        )
-        terminated = bool(reached or (collided and self.on_collision == "terminate"))
+        terminated = reached or (collided and self.on_collision == "terminate")
         truncated = not terminated and self._steps >= task.horizon
         if self.render_mode is not None:
-            self._note(x, y, reached, collided, truncated)
+            self._note(reached, collided, truncated)
         reward = step_reward(self.weights, progress, reached, collided)
-        info = self._info(reached=bool(reached), collided=bool(collided))
+        info = self._info(reached, collided, gap, room)
         return self._observation(), reward, terminated, truncated, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """The current frame, uint8 (height, width, 3), or None in a window."""
         if self.render_mode is None:
             gym.logger.warn("render() needs gym.make(..., render_mode='rgb_array')")
@@ -261,7 +287,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     def pose(self) -> NDArray[np.float64]:
         """The true pose, shape (3,): x, y (px), heading (rad)."""
-        return self._state.copy()
+        return self._state[:3].copy()
 
     def close(self) -> None:
         """Closes the window, if there is one."""
@@ -270,92 +296,81 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
             self._window = None
 
     def _draw_task(self, options: dict[str, Any]) -> Map2DTask:
-        unknown = set(options) - {"start", "goal"}
+        unknown = sorted(map(str, options.keys() - {"start", "goal"}))
         if unknown:
-            raise ValueError(f"unknown reset options {sorted(unknown)}")
+            raise TaskError(
+                f"unknown reset options {unknown}; expected 'start' and 'goal'"
+            )
         task = self.nominal
         if options:
-            start = Pose(*options.get("start", task.start))
-            goal = tuple(options.get("goal", task.goal))
-            return make_task(
+            start = (*options.get("start", task.start), task.start.heading)[:3]
+            drawn = make_task(
                 task.terrain,
                 start,
-                (float(goal[0]), float(goal[1])),
+                options.get("goal", task.goal),
                 task.robot,
                 dt=task.dt,
                 goal_tolerance=task.goal_tolerance,
                 horizon=task.horizon,
             )
-        if self.variation == "jitter":
+        elif self.variation == "random":
+            drawn = random_task(task, self.np_random)
+        elif self.variation == "jitter":
             return task.moved(jittered_start(task, self.np_random))
-        if self.variation == "random":
-            return random_task(task, self.np_random)
-        return task
+        else:
+            return task
+        if self._fixed_horizon or drawn.goal == task.goal:
+            return drawn
+        steps = default_horizon(drawn.shortest, drawn.robot, drawn.dt)
+        return replace(drawn, horizon=steps)
 
-    def _wheels(self, action: Any) -> tuple[float, float]:
-        """Clips, delays, lags and slips an action; returns what the wheels do."""
-        wanted = np.asarray(action, np.float32)
-        if wanted.shape != (2,) or not np.isfinite(wanted).all():
-            raise ValueError(
-                f"expected an action of two finite numbers in [-1, 1], got {action!r}"
-            )
-        applied = np.clip(wanted, -1.0, 1.0)
-        self._clipped += int((applied != wanted).any())
+    def _wanted(self, action: Any) -> tuple[float, float]:
+        """The wheel speeds of an action, clipped and delayed."""
+        wanted = np.asarray(action)
+        try:
+            left, right = wanted.tolist()
+            usual = -1.0 <= left <= 1.0 and -1.0 <= right <= 1.0
+            wheels = float(left), float(right)
+        except (TypeError, ValueError):
+            raise ValueError(_not_an_action(action)) from None
+        if not usual:
+            if not (math.isfinite(left) and math.isfinite(right)):
+                raise ValueError(_not_an_action(action))
+            self._clipped += 1
+            wheels = _clip(wheels[0]), _clip(wheels[1])
         if self.delay:
-            self._queue.append(applied)
-            applied = self._queue.pop(0)
-        if self.motor_lag > 0.0:
-            keep = math.exp(-self.task.dt / self.motor_lag)
-            applied = applied + np.float32(keep) * (self._speeds - applied)
-        self._speeds = applied
-        if self.wheel_slip > 0.0:
-            factor = 1.0 + self.wheel_slip * self.np_random.standard_normal(2)
-            applied = np.clip(applied * factor, -1.0, 1.0)
-        return float(applied[0]), float(applied[1])
+            self._queue.append(wheels)
+            wheels = self._queue.popleft()
+        return wheels
 
     def _observation(self) -> Observation:
-        robot, terrain = self.task.robot, self.task.terrain
-        x, y, heading = self._state
-        fan = math.radians(robot.field_of_view_deg)
-        cast_rays(
-            terrain.padded,
-            terrain.padded_clear,
-            x,
-            y,
-            heading,
-            fan,
-            robot.range_max,
-            self._ranges,
-        )
         ranges = self._ranges.copy()
-        if self.range_noise > 0.0:
-            noise = self.range_noise * self.np_random.standard_normal(ranges.size)
-            ranges = np.clip(ranges * (1.0 + noise), 0, robot.range_max)
+        if self.range_noise:
+            noise = self.np_random.normal(1.0, self.range_noise, ranges.size)
+            np.clip(ranges * noise, 0.0, self.task.robot.range_max, out=noise)
+            ranges[:] = noise
         return {
-            "pose": self._state.astype(np.float32),
-            "goal": np.array(self.task.goal, np.float32),
-            "wheel_speeds": self._speeds.copy(),
-            "ranges": ranges.astype(np.float32, copy=False),
+            "pose": self._pose.copy(),
+            "goal": self._goal.copy(),
+            "wheel_speeds": self._wheel_speeds.copy(),
+            "ranges": ranges,
         }
 
-    def _info(self, *, reached: bool, collided: bool) -> dict[str, Any]:
-        x, y = float(self._state[0]), float(self._state[1])
-        goal = self.task.goal
-        clear = self.task.terrain.clear
+    def _info(
+        self, reached: bool, collided: bool, gap: float, room: float
+    ) -> dict[str, Any]:
         return {
             "is_success": reached,
             "collision": collided,
             "collisions": self._collisions,
             "clipped": self._clipped,
-            "distance_to_goal": math.hypot(goal[0] - x, goal[1] - y),
+            "distance_to_goal": gap,
             "path_distance": self._remaining,
-            "clearance": float(clear[math.floor(y + 0.5), math.floor(x + 0.5)]),
+            "clearance": room,
         }
 
-    def _note(
-        self, x: float, y: float, reached: bool, collided: bool, truncated: bool
-    ) -> None:
-        self._trail.append((x, y))
+    def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
+        self._trail.append((float(self._state[0]), float(self._state[1])))
         if reached:
             self._status = "reached"
         elif collided:
@@ -378,7 +393,9 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
             )
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)
-        return self._scene.frame(self._state, self._ranges, self._trail, status)
+        return self._scene.frame(
+            self._state[:3].tolist(), self._ranges, self._trail, status
+        )
 
 
 def observation_space(task: Map2DTask) -> spaces.Dict:
@@ -397,9 +414,41 @@ def observation_space(task: Map2DTask) -> spaces.Dict:
     )
 
 
+def _constants(task: Map2DTask, motor_lag: float) -> NDArray[np.float64]:
+    """What `kernels.drive` takes as `constants`, in its order."""
+    robot = task.robot
+    return np.array(
+        [
+            robot.axle_length,
+            robot.max_wheel_speed,
+            task.dt,
+            robot.radius,
+            math.radians(robot.field_of_view_deg),
+            robot.range_max,
+            *task.goal,
+            task.goal_tolerance,
+            math.exp(-task.dt / motor_lag) if motor_lag else 0.0,
+        ]
+    )
+
+
 def _override(robot: RobotParams, **given: float | None) -> RobotParams:
-    changes = {name: value for name, value in given.items() if value is not None}
-    return RobotParams(**{**robot.model_dump(), **changes})
+    """The robot with the options that were given."""
+    changes: dict[str, float] = {}
+    for name, value in given.items():
+        if value is None:
+            continue
+        if name == "n_rays":
+            changes[name] = whole_number(name, int(value), 1)
+        else:
+            field = "field_of_view_deg" if name == "field_of_view" else name
+            changes[field] = positive(name, value)
+    try:
+        return RobotParams.model_validate({**robot.model_dump(), **changes})
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0]).removesuffix("_deg")
+        raise TaskError(f"{name} {first['input']!r}: {first['msg']}") from None
 
 
 def _choose(name: str, value: object, allowed: tuple[object, ...]) -> None:
@@ -408,7 +457,16 @@ def _choose(name: str, value: object, allowed: tuple[object, ...]) -> None:
         raise TaskError(f"expected {name} to be one of {choices}, got {value!r}")
 
 
-def _not_negative(**given: float) -> None:
-    for name, value in given.items():
-        if not value >= 0:
-            raise TaskError(f"expected {name} of at least 0, got {value!r}")
+def _not_negative(name: str, value: float) -> float:
+    (number,) = finite_numbers(name, (value,), 1)
+    if number < 0.0:
+        raise TaskError(f"expected {name} of at least 0, got {value!r}")
+    return number
+
+
+def _not_an_action(action: Any) -> str:
+    return f"expected an action of two finite numbers in [-1, 1], got {action!r}"
+
+
+def _clip(value: float) -> float:
+    return min(max(value, -1.0), 1.0)

@@ -16,7 +16,7 @@ _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _SQRT2 = 2.0**0.5
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _push(bucket: NDArray[np.int64], count: int, cell: int) -> NDArray[np.int64]:
     if count == bucket.size:
         grown = np.empty(2 * bucket.size, np.int64)
@@ -26,7 +26,7 @@ def _push(bucket: NDArray[np.int64], count: int, cell: int) -> NDArray[np.int64]
     return bucket
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _spread(free: BoolGrid, goal_x: int, goal_y: int, stop: int) -> Field:
     """Dijkstra in buckets of width 1.
 
@@ -96,7 +96,7 @@ def distance_field(
     return field
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _descend(
     free: BoolGrid, field: Field, start_x: int, start_y: int
 ) -> NDArray[np.int64]:

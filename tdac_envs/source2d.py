@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.errors import MapError, TaskError
-from tdac_envs.grid import OccupancyGrid
-from tdac_envs.maps import bundled_map, bundled_maps
+from tdac_envs.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.image import load_image, read_bytes
+from tdac_envs.maps import BundledMap, bundled_map, bundled_maps
+from tdac_envs.metric import Point, resolution_of, to_pixels
 from tdac_envs.params import MapParams, RobotParams
 from tdac_envs.preprocess import preprocess
+from tdac_envs.score import nearest_free
+from tdac_envs.task2d import finite_numbers, finite_point, positive
 
-MapSource = str | Path | NDArray[Any]
+MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
+
+_YAML = {".yaml", ".yml"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +46,8 @@ class Prepared:
 
 def prepare(
     source: MapSource,
-    start: tuple[float, ...] | None = None,
-    goal: tuple[float, float] | None = None,
+    start: Sequence[float] | None = None,
+    goal: Sequence[float] | None = None,
     *,
     heading: float | None = None,
     robot_radius: float | None = None,
@@ -49,7 +58,7 @@ def prepare(
     Args:
         source: Bundled name; path of an image, ROS `map.yaml`, MovingAI `.map` or
             `.npy` grid; folder with `occupancy.npy` and `params.json`; or a bool
-            array `[y, x]`, True = occupied.
+            array `[y, x]`, True = occupied, also as nested lists of bools or 0 and 1.
         start: (x, y) or (x, y, heading), px and rad; from the params if None.
         goal: (x, y), px; from the params if None.
         heading: rad; wins over `start[2]`.
@@ -58,71 +67,167 @@ def prepare(
 
     Raises:
         MapError: The map cannot be read or used.
-        TaskError: No start or goal is known.
+        TaskError: No start or goal is known, or a number is not usable.
     """
-    if start is not None and len(start) == 3 and heading is None:
-        heading = start[2]
-    point = None if start is None else (float(start[0]), float(start[1]))
-    if isinstance(source, np.ndarray):
-        prepared = _from_cells(source, "array")
-    elif Path(source).is_dir():
-        prepared = _from_folder(Path(source))
-    elif Path(source).suffix == ".npy":
-        prepared = _from_npy(Path(source))
-    elif str(source) in bundled_maps():
-        bundled = bundled_map(str(source))
-        point, goal = point or bundled.start, goal or bundled.goal
-        heading = bundled.heading if heading is None else heading
-        robot_radius = robot_radius or bundled.robot_radius
-        prepared = _from_image(bundled.image, point, goal, robot_radius, snap)
-    else:
-        _check_exists(Path(source))
-        prepared = _from_image(Path(source), point, goal, robot_radius, snap)
-    return Prepared(
-        prepared.grid,
-        _settle(prepared.params, point, goal, heading, robot_radius, snap),
-        prepared.image,
-    )
+    if robot_radius is not None:
+        robot_radius = positive("robot_radius", robot_radius)
+    given = _Given.of(start, goal, heading, robot_radius, snap)
+    if not isinstance(source, str | Path):
+        return _settled(_from_cells(_as_cells(source), "array"), given)
+    # A folder that happens to have a bundled map's name is `./maze`.
+    if isinstance(source, str) and source in bundled_maps():
+        bundled = bundled_map(source)
+        return _from_image(bundled.image, given.or_else(bundled))
+    path = Path(source)
+    if path.is_dir():
+        return _settled(_from_folder(path), given)
+    if path.suffix == ".npy":
+        return _settled(_from_npy(path), given)
+    _check_exists(path)
+    return _from_image(path, given)
 
 
-def _settle(
-    params: MapParams,
-    start: tuple[float, float] | None,
-    goal: tuple[float, float] | None,
-    heading: float | None,
-    robot_radius: float | None,
-    snap: bool,
-) -> MapParams:
-    """Fills in what was given; a point that was snapped stays where it is."""
-    changes: dict[str, Any] = {}
-    if start is not None and not (snap and params.start):
-        changes["start"] = start
-    if goal is not None and not (snap and params.goal):
-        changes["goal"] = goal
-    if heading is not None:
-        changes["heading"] = float(heading)
-    if robot_radius is not None and robot_radius != params.robot.radius:
-        changes["robot"] = RobotParams.disc(robot_radius)
-    settled = params.model_copy(update=changes)
-    missing = [name for name in ("start", "goal") if getattr(settled, name) is None]
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """What the caller says about the task; None where the map is to say it."""
+
+    start: Point | None
+    goal: Point | None
+    heading: float | None
+    robot_radius: float | None
+    snap: bool
+
+    @classmethod
+    def of(
+        cls,
+        start: Sequence[float] | None,
+        goal: Sequence[float] | None,
+        heading: float | None,
+        robot_radius: float | None,
+        snap: bool,
+    ) -> _Given:
+        at = end = None
+        if start is not None:
+            count = 3 if np.size(start) == 3 else 2
+            numbers = finite_numbers("start", start, count)
+            at = (numbers[0], numbers[1])
+            heading = numbers[-1] if count == 3 and heading is None else heading
+        if goal is not None:
+            end = finite_point("goal", goal)
+        if heading is not None:
+            (heading,) = finite_numbers("heading", (heading,), 1)
+        return cls(at, end, heading, robot_radius, snap)
+
+    def or_else(self, bundled: BundledMap) -> _Given:
+        """The same with a bundled map's own task where nothing was given."""
+        return _Given(
+            self.start or bundled.start,
+            self.goal or bundled.goal,
+            bundled.heading if self.heading is None else self.heading,
+            self.robot_radius or bundled.robot_radius,
+            self.snap,
+        )
+
+
+def _settled(prepared: Prepared, given: _Given) -> Prepared:
+    """Puts what was given in place of the params' own task."""
+    changes: dict[str, Any] = {
+        name: value
+        for name in ("start", "goal", "heading")
+        if (value := getattr(given, name)) is not None
+    }
+    robot, radius = prepared.params.robot, given.robot_radius
+    if radius is not None and radius != robot.radius:
+        body = {"radius": radius, "axle_length": 2 * radius}
+        changes["robot"] = RobotParams(**{**robot.model_dump(), **body})
+    params = prepared.params.model_copy(update=changes)
+    missing = [name for name in ("start", "goal") if getattr(params, name) is None]
     if missing:
         raise TaskError(
             f"no {' and no '.join(missing)} for {params.source}: give start and goal "
             "in pixels (`tdac map IMAGE` draws rulers to read them off)"
         )
-    return settled
+    if given.snap:
+        params = _snapped(prepared.grid, params)
+    return Prepared(prepared.grid, params, prepared.image)
 
 
-def _from_image(
-    image: Path,
-    start: tuple[float, float] | None,
-    goal: tuple[float, float] | None,
+def _snapped(grid: OccupancyGrid, params: MapParams) -> MapParams:
+    """Start and goal moved to the nearest pixels that hold the body."""
+    free = body_free(clearance(grid.cells), params.robot.radius)
+    changes: dict[str, Any] = {}
+    notes = list(params.notes)
+    for name in ("start", "goal"):
+        x, y = point = getattr(params, name)
+        if grid.is_occupied(x, y) or not free[math.floor(y + 0.5), math.floor(x + 0.5)]:
+            moved = nearest_free(free, round(x), round(y))
+            if moved is not None:
+                changes[name] = moved
+                notes.append(f"{name} {point} moved to {moved}")
+    return params.model_copy(update={**changes, "notes": tuple(notes)})
+
+
+def metres_to_pixels(
+    source: str | Path,
+    start: Point | None,
+    goal: Point | None,
     robot_radius: float | None,
+) -> tuple[Point | None, Point | None, float | None]:
+    """Start, goal and body radius in pixels, from metres in the map's own frame.
+
+    Raises:
+        MapError: The map cannot be read, or has no resolution.
+    """
+    _check_exists(Path(source))
+    if Path(source).is_dir():
+        grid = _from_folder(Path(source)).grid
+    else:
+        image = load_image(source)
+        empty = np.zeros(image.colour.shape[:2], np.bool_)
+        grid = OccupancyGrid(empty, image.resolution, image.origin)
+    scale = resolution_of(grid)
+    points = [None if p is None else to_pixels(grid, *p) for p in (start, goal)]
+    return points[0], points[1], None if robot_radius is None else robot_radius / scale
+
+
+def _from_image(image: Path, given: _Given) -> Prepared:
+    # Of a ROS map, the picture is in another file than the one that is named.
+    read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
+    radius = given.robot_radius or RobotParams().radius
+    prepared = read(image, _digest(image), given.start, given.goal, radius, given.snap)
+    # A point that was snapped stays where preprocessing put it.
+    start, goal = (None, None) if given.snap else (given.start, given.goal)
+    return _settled(prepared, _Given(start, goal, given.heading, radius, False))
+
+
+# Preprocessing takes most of the time of `gym.make`; a grid has one byte a pixel.
+@lru_cache(maxsize=16)
+def _read_image(
+    image: Path,
+    digest: str,  # noqa: ARG001 - tells apart what one path held at different times
+    start: Point | None,
+    goal: Point | None,
+    radius: float,
     snap: bool,
 ) -> Prepared:
-    radius = RobotParams().radius if robot_radius is None else robot_radius
     grid, params = preprocess(image, start, goal, robot_radius=radius, snap=snap)
     return Prepared(grid, params, image)
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(read_bytes(path)).hexdigest()
+
+
+def _as_cells(source: NDArray[Any] | Sequence[Sequence[Any]]) -> NDArray[Any]:
+    """A map given as an array or, from JSON, as rows of bools or of 0 and 1."""
+    if isinstance(source, np.ndarray):
+        return source
+    try:
+        rows = np.array(source)
+    except ValueError:
+        raise MapError("expected a map of rows of the same length") from None
+    whole = rows.dtype.kind in "iu" and np.isin(rows, (0, 1)).all()
+    return rows.astype(np.bool_) if whole else rows
 
 
 def _from_folder(folder: Path) -> Prepared:

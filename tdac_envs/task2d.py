@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import lru_cache
+from numbers import Integral
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +21,14 @@ from tdac_envs.grid import (
     clearance,
     clearance_at,
 )
-from tdac_envs.kernels import pad, path_distance, sees
+from tdac_envs.kernels import first_contact, pad, path_distance, sees
 from tdac_envs.params import RobotParams
 from tdac_envs.plan import Path, descend, distance_field
 
 MAX_TOLERANCE = 20.0
 MIN_HORIZON = 2500
 JITTER_HEADING = 0.5
+MAX_DRAWS = 1000
 
 
 class Pose(NamedTuple):
@@ -37,7 +41,7 @@ class Pose(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
-    """A grid and what is computed from it once.
+    """A grid and what is computed from it once; 10 bytes a pixel, read-only.
 
     Attributes:
         grid: The map.
@@ -51,11 +55,21 @@ class Terrain:
     padded: BoolGrid
     padded_clear: FloatGrid
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Terrain.of, (self.grid,)
+
     @classmethod
     def of(cls, grid: OccupancyGrid) -> Terrain:
-        """Computes the clearance of a grid."""
-        clear = clearance(grid.cells)
-        return cls(grid, clear, *pad(grid.cells, clear))
+        """The terrain of a grid; equal grids share the one used last."""
+        return _terrain(grid)
+
+
+# A map is often loaded by several envs, or again and again in one process.
+@lru_cache(maxsize=4)
+def _terrain(grid: OccupancyGrid) -> Terrain:
+    padded, padded_clear = pad(grid.cells, clearance(grid.cells))
+    padded.flags.writeable = padded_clear.flags.writeable = False
+    return Terrain(grid, padded_clear[1:-1, 1:-1], padded, padded_clear)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,29 +99,43 @@ class Map2DTask:
     field: NDArray[np.float32]
     shortest: float
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        rest = (self.robot, self.goal_tolerance, self.dt, self.horizon)
+        return _restored, (self.terrain, self.start, self.goal, *rest)
+
     def path_from(self, start: Pose) -> Path:
-        """Shortest path for the body, shape (n, 2); starts at the given point."""
-        free = body_free(self.terrain.clear, self.robot.radius)
-        first = _entry(self.field, start.x, start.y)
+        """Shortest path for the body, shape (n, 2); starts at the given point.
+
+        Empty where there is none.
+        """
+        radius = self.robot.radius
+        first = _entry(self.terrain, self.field, start.x, start.y, radius)
         if first is None:
             return np.empty((0, 2))
+        free = body_free(self.terrain.clear, radius)
         path = descend(free, np.asarray(self.field, np.float64), first)
         return np.vstack([[start.x, start.y], path, self.goal])
 
     def moved(self, start: Pose, goal: tuple[float, float] | None = None) -> Map2DTask:
-        """The same task with another start (and goal); horizon and tolerance kept."""
-        if goal is not None and goal != self.goal:
-            field, shortest = _route(self.terrain, start, goal, self.robot.radius)
+        """The same task with another start (and goal); horizon and tolerance kept.
+
+        Raises:
+            TaskError: No path joins the new start and goal.
+        """
+        field, radius = self.field, self.robot.radius
+        if goal is None or goal == self.goal:
+            goal = self.goal
         else:
-            field, goal = self.field, self.goal
-            shortest = path_distance(field, start.x, start.y, math.inf)
+            field = _route(self.terrain, start, goal, radius)
+        start = start._replace(heading=_wrapped(start.heading))
+        shortest = _way(self.terrain, field, start)
         return replace(self, start=start, goal=goal, field=field, shortest=shortest)
 
 
 def make_task(
     terrain: Terrain,
-    start: Pose,
-    goal: tuple[float, float],
+    start: Sequence[float],
+    goal: Sequence[float],
     robot: RobotParams,
     *,
     dt: float = 0.05,
@@ -126,26 +154,83 @@ def make_task(
         horizon: Steps; by default max(2500, 6 * d0 / (v_max * dt)).
 
     Raises:
-        TaskError: Start or goal cannot hold the body, no path joins them, or the
-            start is already within the tolerance; the message says which and what
-            to do.
+        TaskError: A number is not usable, start or goal cannot hold the body, no path
+            joins them, or the start is already within the tolerance; the message says
+            which and what to do.
     """
-    _check_stands(terrain, "start", start.x, start.y, robot.radius)
-    _check_stands(terrain, "goal", *goal, robot.radius)
-    field, shortest = _route(terrain, start, goal, robot.radius)
-    tolerance = goal_tolerance
-    if tolerance is None:
+    begin = Pose(*finite_numbers("start", start, 3))
+    begin = begin._replace(heading=_wrapped(begin.heading))
+    end = finite_point("goal", goal)
+    dt = positive("dt", dt)
+    _check_stands(terrain, "start", begin.x, begin.y, robot.radius)
+    _check_stands(terrain, "goal", *end, robot.radius)
+    field = _route(terrain, begin, end, robot.radius)
+    shortest = _way(terrain, field, begin)
+    if goal_tolerance is None:
         tolerance = min(MAX_TOLERANCE, 0.25 * shortest)
-    if at_goal(terrain, goal, tolerance, start.x, start.y):
+    else:
+        tolerance = positive("goal_tolerance", goal_tolerance)
+    if at_goal(terrain, end, tolerance, begin.x, begin.y):
         raise TaskError(
-            f"the start is already at the goal: {math.dist(start[:2], goal):.1f} px "
+            f"the start is already at the goal: {math.dist(begin[:2], end):.1f} px "
             f"apart with a tolerance of {tolerance:.1f} px; move one of them"
         )
-    step = robot.max_wheel_speed * dt
-    steps = horizon or max(MIN_HORIZON, math.ceil(6.0 * shortest / step))
-    return Map2DTask(
-        terrain, start, goal, robot, tolerance, dt, steps, field, shortest
-    )
+    steps = default_horizon(shortest, robot, dt)
+    if horizon is not None:
+        steps = whole_number("horizon", horizon, 1)
+    return Map2DTask(terrain, begin, end, robot, tolerance, dt, steps, field, shortest)
+
+
+def default_horizon(shortest: float, robot: RobotParams, dt: float) -> int:
+    """Steps in which to drive `shortest` px: six times what it takes, or 2500."""
+    steps = 6.0 * shortest / (robot.max_wheel_speed * dt)
+    return max(MIN_HORIZON, math.ceil(min(steps, 2.0**62)))
+
+
+def finite_numbers(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
+    """The values as floats.
+
+    Raises:
+        TaskError: There are not `count` of them, or one is not a finite number.
+    """
+    try:
+        numbers = tuple(float(value) for value in values)
+    except (TypeError, ValueError, OverflowError):
+        numbers = ()
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise TaskError(f"expected {name} to be {count} finite numbers, got {values!r}")
+    return numbers
+
+
+def finite_point(name: str, values: Sequence[float]) -> tuple[float, float]:
+    """The values as a point (x, y); raises as `finite_numbers` does."""
+    x, y = finite_numbers(name, values, 2)
+    return x, y
+
+
+def positive(name: str, value: float) -> float:
+    """The value as a float.
+
+    Raises:
+        TaskError: It is not a finite number above 0.
+    """
+    (number,) = finite_numbers(name, (value,), 1)
+    if number <= 0.0:
+        raise TaskError(f"expected {name} above 0, got {value!r}")
+    return number
+
+
+def whole_number(name: str, value: int, least: int) -> int:
+    """The value as an int.
+
+    Raises:
+        TaskError: It is not a whole number, or below `least`.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise TaskError(
+            f"expected {name} to be a whole number from {least}, got {value!r}"
+        )
+    return int(value)
 
 
 def at_goal(
@@ -160,64 +245,105 @@ def at_goal(
 def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
     """A feasible start within one body radius of the nominal one, heading +- 0.5 rad.
 
-    The disc that is drawn from shrinks slowly, so that a start in a tight place
-    ends the search, too.
+    The disc that is drawn from shrinks slowly; where the body fits nowhere but at the
+    nominal start, only the heading changes.
     """
-    reach = task.robot.radius
-    while True:
+    nominal, reach = task.start, task.robot.radius
+    for _ in range(MAX_DRAWS):
         distance = reach * math.sqrt(random.random())
         bearing = random.uniform(-math.pi, math.pi)
-        heading = task.start.heading + random.uniform(-JITTER_HEADING, JITTER_HEADING)
+        turn = random.uniform(-JITTER_HEADING, JITTER_HEADING)
         pose = Pose(
-            task.start.x + distance * math.cos(bearing),
-            task.start.y + distance * math.sin(bearing),
-            math.remainder(heading, 2 * math.pi),
+            nominal.x + distance * math.cos(bearing),
+            nominal.y + distance * math.sin(bearing),
+            _wrapped(nominal.heading + turn),
         )
         if _may_start(task, pose):
             return pose
         reach *= 0.98
+    return nominal._replace(heading=pose.heading)
 
 
 def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
-    """The same map and robot with any feasible start and goal.
+    """The same map and robot with any feasible start and goal; horizon kept.
 
-    The goal is drawn from the free pixels connected to the nominal goal.
+    Both are drawn from the free pixels connected to the nominal goal. Where hardly
+    any two of them are farther apart than the tolerance, it is the nominal task.
     """
-    connected = np.argwhere(np.isfinite(task.field))
-    while True:
-        goal_y, goal_x = connected[random.integers(len(connected))]
-        start_y, start_x = connected[random.integers(len(connected))]
-        heading = random.uniform(-math.pi, math.pi)
-        start = Pose(float(start_x), float(start_y), heading)
-        drawn = task.moved(start, (float(goal_x), float(goal_y)))
-        if _may_start(drawn, start):
-            return drawn
+    width = task.field.shape[1]
+    connected = np.flatnonzero(np.isfinite(task.field))
+    for _ in range(MAX_DRAWS):
+        goal_y, goal_x = divmod(int(random.choice(connected)), width)
+        start_y, start_x = divmod(int(random.choice(connected)), width)
+        heading = _wrapped(random.uniform(-math.pi, math.pi))
+        start, goal = Pose(start_x, start_y, heading), (float(goal_x), float(goal_y))
+        if not at_goal(task.terrain, goal, task.goal_tolerance, start_x, start_y):
+            field = _field_to(task.terrain, (goal_x, goal_y), task.robot.radius)
+            shortest = float(field[start_y, start_x])
+            return replace(task, start=start, goal=goal, field=field, shortest=shortest)
+    return task
+
+
+def _wrapped(heading: float) -> float:
+    """The same direction in (-pi, pi], for a heading of any size."""
+    wrapped = math.remainder(heading, 2.0 * math.pi)
+    return math.pi if wrapped <= -math.pi else wrapped
 
 
 def _may_start(task: Map2DTask, pose: Pose) -> bool:
-    body = math.sqrt(task.robot.radius**2 + 0.5)
-    cells = task.terrain.grid.cells
+    radius, terrain = task.robot.radius, task.terrain
+    body = math.sqrt(radius**2 + 0.5)
     return (
-        clearance_at(cells, pose.x, pose.y, body) >= body
-        and _entry(task.field, pose.x, pose.y) is not None
-        and not at_goal(task.terrain, task.goal, task.goal_tolerance, pose.x, pose.y)
+        clearance_at(terrain.grid.cells, pose.x, pose.y, body) >= body
+        and _entry(terrain, task.field, pose.x, pose.y, radius) is not None
+        and not at_goal(terrain, task.goal, task.goal_tolerance, pose.x, pose.y)
     )
 
 
-def _entry(
-    field: NDArray[np.float32], x: float, y: float, reach: int = 2
-) -> tuple[int, int] | None:
-    """The pixel near (x, y) through which the shortest path goes, if any."""
-    height, width = field.shape
+def _near(x: float, y: float, shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
+    """The pixels (i, j) within 2 columns and rows of a point."""
     column, row = math.floor(x + 0.5), math.floor(y + 0.5)
-    best, entry = math.inf, None
-    for j in range(max(row - reach, 0), min(row + reach + 1, height)):
-        for i in range(max(column - reach, 0), min(column + reach + 1, width)):
-            # A nearer pixel is preferred: the straight hop there must be free.
-            through = float(field[j, i]) + 2.0 * math.hypot(x - i, y - j)
-            if through < best:
-                best, entry = through, (i, j)
-    return entry
+    for j in range(max(row - 2, 0), min(row + 3, shape[0])):
+        for i in range(max(column - 2, 0), min(column + 3, shape[1])):
+            yield i, j
+
+
+def _entry(
+    terrain: Terrain, field: NDArray[np.float32], x: float, y: float, radius: float
+) -> tuple[int, int] | None:
+    """The pixel near (x, y) through which the shortest path goes, if any.
+
+    The body gets there from (x, y) in a straight line.
+    """
+    found = [
+        (float(field[j, i]) + math.dist((x, y), (i, j)), i, j)
+        for i, j in _near(x, y, field.shape)
+        if field[j, i] < math.inf
+    ]
+    for _, i, j in sorted(found):
+        if _may_hop(terrain, (x, y), (i, j), radius):
+            return i, j
+    return None
+
+
+def _may_hop(
+    terrain: Terrain,
+    begin: tuple[float, float],
+    end: tuple[float, float],
+    radius: float,
+) -> bool:
+    """Whether the body touches nothing on the straight line between two points."""
+    touch = first_contact(
+        terrain.padded,
+        terrain.padded_clear,
+        float(begin[0]),
+        float(begin[1]),
+        math.atan2(end[1] - begin[1], end[0] - begin[0]),
+        math.dist(begin, end),
+        0.0,
+        radius,
+    )
+    return bool(touch > 1.0)
 
 
 def _check_stands(
@@ -241,29 +367,26 @@ def _check_stands(
 def _nearest_place(terrain: Terrain, x: float, y: float, radius: float) -> str:
     rows, columns = np.nonzero(body_free(terrain.clear, radius))
     if rows.size == 0:
-        return f"the body fits nowhere; the widest place is {terrain.clear.max():.1f} px"
+        return (
+            f"the body fits nowhere; the widest place is {terrain.clear.max():.1f} px"
+        )
     nearest = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
     return f"the nearest free pixel is ({columns[nearest]}, {rows[nearest]})"
 
 
 def _route(
     terrain: Terrain, start: Pose, goal: tuple[float, float], radius: float
-) -> tuple[NDArray[np.float32], float]:
+) -> NDArray[np.float32]:
+    """Way to the goal from each pixel; refused where the start has none."""
     free = body_free(terrain.clear, radius)
-    height, width = free.shape
-    column, row = math.floor(goal[0] + 0.5), math.floor(goal[1] + 0.5)
     # A goal that just holds the body may have no roomy pixel at its very centre.
-    near = [
-        (abs(i - goal[0]) + abs(j - goal[1]), i, j)
-        for j in range(max(row - 2, 0), min(row + 3, height))
-        for i in range(max(column - 2, 0), min(column + 3, width))
-        if free[j, i]
-    ]
-    if near:
-        _, i, j = min(near)
-        field = distance_field(free, (i, j)).astype(np.float32)
-        if _entry(field, start.x, start.y) is not None:
-            return field, float(path_distance(field, start.x, start.y, math.inf))
+    near = [(math.dist(goal, pixel), *pixel) for pixel in _near(*goal, free.shape)]
+    for _, i, j in sorted(near):
+        if free[j, i] and _may_hop(terrain, goal, (i, j), radius):
+            field = _shared_field(terrain, (i, j), radius)
+            if _entry(terrain, field, start.x, start.y, radius) is not None:
+                return field
+            break
     widest = widest_connected_radius(terrain.clear, (start.x, start.y), goal)
     reason = f"the widest body that gets through has a radius of {widest:.1f} px"
     if widest <= 0.0:
@@ -271,6 +394,35 @@ def _route(
     raise TaskError(
         f"no free path for a body of {radius:g} px from start ({start.x:g}, "
         f"{start.y:g}) to goal ({goal[0]:g}, {goal[1]:g}): {reason}"
+    )
+
+
+def _field_to(
+    terrain: Terrain, goal: tuple[int, int], radius: float
+) -> NDArray[np.float32]:
+    free = body_free(terrain.clear, radius)
+    field = distance_field(free, goal).astype(np.float32)
+    field.flags.writeable = False
+    return field
+
+
+_shared_field = lru_cache(maxsize=4)(_field_to)
+
+
+def _way(terrain: Terrain, field: NDArray[np.float32], start: Pose) -> float:
+    cells, clear = terrain.padded, terrain.padded_clear
+    return float(path_distance(cells, clear, field, start.x, start.y, math.inf))
+
+
+def _restored(
+    terrain: Terrain, start: Pose, goal: tuple[float, float], *rest: Any
+) -> Map2DTask:
+    """A task from its pickle, which leaves out what can be computed."""
+    robot, tolerance, dt, horizon = rest
+    field = _route(terrain, start, goal, robot.radius)
+    shortest = _way(terrain, field, start)
+    return Map2DTask(
+        terrain, start, goal, robot, tolerance, dt, horizon, field, shortest
     )
 
 
