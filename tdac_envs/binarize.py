@@ -45,17 +45,23 @@ def unknown_level(luminance: GreyImage) -> int | None:
     return None
 
 
-def unevenly_lit(luminance: GreyImage, light: BoolGrid) -> bool:
-    """Whether the light side is a photograph's: no level holds much of it."""
-    counts = np.bincount(luminance[light], minlength=256)
-    return bool(counts.max() < 0.1 * counts.sum())
+def unevenly_lit(luminance: GreyImage) -> bool:
+    """Whether it is a photograph: no level holds much of either side of Otsu's cut."""
+    counts = np.bincount(luminance.ravel(), minlength=256)
+    cut = int(otsu(luminance)) + 1
+    return all(side.max() < 0.1 * side.sum() for side in (counts[:cut], counts[cut:]))
 
 
-def outside(luminance: GreyImage, light_free: bool) -> BoolGrid:
+def outside(luminance: GreyImage, light_free: bool, ignored: BoolGrid) -> BoolGrid:
     """The paper around a plan: what joins the border without crossing any faint line.
 
     Half the contrast of Otsu's threshold makes a line here, so that a window drawn
     in grey counts.
+
+    Args:
+        luminance: Shape (height, width), uint8.
+        light_free: Whether the paper is light.
+        ignored: Shape (height, width), bool; pixels that are no lines, e.g. marks.
 
     Returns:
         Shape (height, width), bool; all False where no such piece holds half of the
@@ -64,8 +70,8 @@ def outside(luminance: GreyImage, light_free: bool) -> BoolGrid:
     grey = luminance if light_free else 255 - luminance
     cut = otsu(grey)
     paper = int(np.bincount(grey[grey > cut], minlength=256).argmax())
-    free = (grey > paper - 0.5 * (paper - cut)).astype(np.uint8)
-    labels = cv2.connectedComponents(free, connectivity=4)[1]
+    free = (grey > paper - 0.5 * (paper - cut)) | ignored
+    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
     rim = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
     held = np.bincount(rim)
     held[0] = 0
@@ -87,16 +93,13 @@ def saturated(colour: ColourImage) -> BoolGrid:
     return np.asarray(chroma(colour) >= MARK_CHROMA)
 
 
-def local_light(luminance: GreyImage, window: int) -> BoolGrid:
+def local_light(luminance: GreyImage) -> BoolGrid:
     """Pixels lighter than their surroundings say; for uneven lighting.
 
-    The paper's brightness is estimated as the closing (light paper) of the picture
-    and divided out.
-
-    Args:
-        luminance: Shape (height, width), uint8.
-        window: Side of the surroundings, px; wider than any wall.
+    The brightness of light paper is estimated as the closing of the picture, in a
+    window wider than any wall, and divided out.
     """
+    window = max(2 * (min(luminance.shape) // 16) + 1, 15)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (window, window))
     paper = cv2.morphologyEx(luminance, cv2.MORPH_CLOSE, kernel)
     paper = cv2.GaussianBlur(paper, (0, 0), window / 2).astype(np.float32)

@@ -24,10 +24,8 @@ def clean(cells: BoolGrid, strength: int) -> BoolGrid:
         return cells.copy()
     kept = _without_small(cells, strength, connectivity=8)
     filled = ~_without_small(~kept, strength, connectivity=4)
-    # Framed, since a closing at the edge of the picture must not erode from outside.
-    framed = np.pad(filled, 1).astype(np.uint8)
-    closed = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, _SQUARE)
-    return np.asarray(closed[1:-1, 1:-1] > 0)
+    closed = cv2.morphologyEx(filled.astype(np.uint8), cv2.MORPH_CLOSE, _SQUARE)
+    return np.asarray(closed > 0)
 
 
 def _without_small(mask: BoolGrid, smallest: int, connectivity: int) -> BoolGrid:

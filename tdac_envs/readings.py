@@ -26,15 +26,15 @@ from tdac_envs.binarize import (
 )
 from tdac_envs.cleanup import thick_share, without_lines, without_specks
 from tdac_envs.grid import BoolGrid
-from tdac_envs.image import GreyImage, MapImage, luminance
+from tdac_envs.image import GreyImage, luminance
 from tdac_envs.scene import Reading, Scene, decide_light_free, touches, unknown_of
 
 
 def readings(scene: Scene) -> Iterator[Reading]:
     """Readings of the likelier polarity, the plainest first.
 
-    Without start and goal there is only the plain one, marks ignored: nothing could
-    tell whether a bolder one is needed.
+    Without start and goal there is only one, marks ignored: nothing could tell
+    whether a bolder one is needed.
     """
     given = scene.image.occupied
     if given is not None:
@@ -42,11 +42,12 @@ def readings(scene: Scene) -> Iterator[Reading]:
         return
     light_free = decide_light_free(scene)
     plain = plain_reading(scene, light_free)
-    unmarked = _without_marks(scene.image, plain)
+    unmarked = _without_marks(scene, plain)
     if not scene.ends:
-        yield unmarked or plain
+        photographed = unevenly_lit(scene.luminance)
+        yield _local(scene, plain) if photographed else unmarked or plain
         return
-    beyond = _beyond_the_plan(scene, light_free)
+    beyond = _beyond_the_plan(scene, plain)
     for reading in _outwards(scene, plain, unmarked):
         yield _walled_in(reading, beyond)
 
@@ -58,26 +59,28 @@ def _outwards(
     if mixed is not None:
         yield mixed
         for extent in (4, 8, 16):
-            cells = without_specks(mixed.cells, extent)
-            yield _note(mixed, cells, f"specks up to {extent} px ignored", extent, 0)
+            yield _without(mixed, extent)
         return
     yield plain
     base = unmarked or plain
     if unmarked is not None:
         yield unmarked
     if unknown_of(scene) is not None:
-        # A mapping tool's output: every dark pixel was measured, none was drawn.
+        # A mapping tool's output: what is dark was measured, and none of it drawn.
+        yield _without(base, 4)
         return
     yield from _bolder(base)
-    if unevenly_lit(scene.luminance, ~plain.cells):
+    if unevenly_lit(scene.luminance):
         local = _local(scene, base)
         yield local
         yield from _bolder(local)
 
 
-def _beyond_the_plan(scene: Scene, light_free: bool) -> BoolGrid:
+def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
     """The outside, where start and goal are inside; empty otherwise."""
-    region = outside(scene.luminance, light_free)
+    strong = saturated(scene.image.colour)
+    ignored = strong if _are_marks(scene, strong, plain) else np.zeros_like(strong)
+    region = outside(scene.luminance, plain.polarity == "dark", ignored)
     if touches(region, scene.ends):
         return np.zeros_like(region)
     return region
@@ -131,15 +134,24 @@ def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Re
     return Reading(cells, "dark" if light_free else "light", method, threshold)
 
 
-def _without_marks(image: MapImage, reading: Reading) -> Reading | None:
-    """Saturated marks and lines dropped, where walls are of another colour."""
-    marks = saturated(image.colour) & reading.cells
-    few = marks.sum() <= min(0.02 * marks.size, 0.4 * reading.cells.sum())
-    if not few or not marks.any():
+def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
+    """Whether strong colours are marks: few, and most walls of another colour."""
+    on_walls = int((strong & plain.cells).sum())
+    allowed = 0.05 if touches(strong, scene.ends) else 0.02
+    few = float(strong.mean()) <= allowed
+    return few and on_walls <= 0.4 * float(plain.cells.sum())
+
+
+def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
+    """Saturated marks and lines dropped; None where there are none."""
+    colour = scene.image.colour
+    strong = saturated(colour)
+    marks = strong & plain.cells
+    if not marks.any() or not _are_marks(scene, strong, plain):
         return None
     near = cv2.dilate(marks.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    cells = reading.cells & ~(near & (chroma(image.colour) >= 30))
-    return replace(reading, cells=cells, method=f"{reading.method}, marks ignored")
+    cells = plain.cells & ~(near & (chroma(colour) >= 30))
+    return replace(plain, cells=cells, method=f"{plain.method}, marks ignored")
 
 
 def _mixed(scene: Scene) -> Reading | None:
@@ -171,8 +183,7 @@ def _bolder(base: Reading) -> Iterator[Reading]:
     shape = base.cells.shape
     for extent in (4, 8, 16, 32):
         if extent <= 0.04 * min(shape):
-            cells = without_specks(base.cells, extent)
-            yield _note(base, cells, f"specks up to {extent} px ignored", extent, 0)
+            yield _without(base, extent)
     for width in (3, 5) if min(shape) >= 1500 else (3,):
         if thick_share(base.cells, 2 * width) < 0.5:
             return
@@ -182,6 +193,11 @@ def _bolder(base: Reading) -> Iterator[Reading]:
                 cells = without_specks(opened, extent)
                 note = f"lines under {width} px and specks up to {extent} px ignored"
                 yield _note(base, cells, note, extent, width)
+
+
+def _without(base: Reading, extent: int) -> Reading:
+    cells = without_specks(base.cells, extent)
+    return _note(base, cells, f"specks up to {extent} px ignored", extent, 0)
 
 
 def _note(
@@ -199,6 +215,5 @@ def _note(
 def _local(scene: Scene, base: Reading) -> Reading:
     """A threshold that follows the lighting."""
     grey = scene.luminance if base.polarity == "dark" else 255 - scene.luminance
-    window = 2 * (min(grey.shape) // 16) + 1
-    light = local_light(grey, max(window, 15))
+    light = local_light(np.asarray(grey, np.uint8))
     return replace(base, cells=~light, method="local threshold", threshold=None)

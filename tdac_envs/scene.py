@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from tdac_envs.binarize import disc, otsu, saturated, unknown_level
+import numpy as np
+
+from tdac_envs.binarize import (
+    disc,
+    local_light,
+    otsu,
+    saturated,
+    unevenly_lit,
+    unknown_level,
+)
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage, MapImage, luminance
 from tdac_envs.polarity import light_free_evidence
@@ -64,14 +73,23 @@ class Scene:
 
 def decide_light_free(scene: Scene) -> bool:
     """Whether the light side is free, from the picture, start and goal."""
-    light = scene.luminance > otsu(scene.luminance)
-    evidence = light_free_evidence(scene.luminance, light)
+    grey = scene.luminance
+    if unevenly_lit(grey):
+        negative = np.asarray(255 - grey, np.uint8)
+        on_light, on_dark = local_light(grey), local_light(negative)
+        return _evidence(scene, grey, on_light) >= _evidence(scene, negative, on_dark)
+    return _evidence(scene, grey, grey > otsu(grey)) > 0
+
+
+def _evidence(scene: Scene, grey: GreyImage, light: BoolGrid) -> float:
+    """Log-odds that `light` is free, start and goal considered."""
+    evidence = light_free_evidence(grey, light)
     neutral = ~saturated(scene.image.colour)
     for x, y in scene.ends:
         around = disc(light.shape, x, y, scene.radius)
         judged = around & neutral if (around & neutral).any() else around
         evidence += _W_TASK * (2 * float(light[judged].mean()) - 1)
-    return evidence > 0
+    return evidence
 
 
 def unknown_of(scene: Scene) -> int | None:
