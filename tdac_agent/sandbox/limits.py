@@ -24,7 +24,7 @@ class Limits:
         open_files: Descriptors.
     """
 
-    start_seconds: float = 10.0
+    start_seconds: float = 30.0
     import_seconds: float = 10.0
     reset_seconds: float = 5.0
     call_seconds: float = 10.0

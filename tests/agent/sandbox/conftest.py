@@ -9,7 +9,7 @@ import pytest
 
 from tdac_agent.sandbox import TIERS, Limits, SandboxError, start
 
-QUICK = Limits(import_seconds=5, call_seconds=5, cpu_seconds=20)
+PATIENT = Limits(import_seconds=30, reset_seconds=30, call_seconds=30)
 
 
 @functools.cache
@@ -90,7 +90,7 @@ def launch(workdir, tmp_path, monkeypatch, wait_until_gone):
     monkeypatch.setattr("tempfile.tempdir", str(base))
     children = []
 
-    def launch(source, tier="auto", limits=QUICK):
+    def launch(source, tier="auto", limits=PATIENT):
         child = start(workdir, source, tier=tier, limits=limits)
         children.append(child)
         return child

@@ -2,7 +2,6 @@
 
 import os
 import textwrap
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +17,14 @@ from tdac_agent.sandbox import (
 )
 from tdac_agent.sandbox.inner import syscalls, wire
 
-SHORT = Limits(import_seconds=0.5, call_seconds=0.5, cpu_seconds=20)
+PATIENT = Limits(import_seconds=30, call_seconds=30)
+SHORT = Limits(import_seconds=0.5, call_seconds=0.5)
 OBS = {"pose": np.zeros(3, np.float32)}
 
 
-def loaded(launch, tier, source, limits=SHORT):
+def loaded(launch, tier, source, limits=PATIENT):
     child = launch(textwrap.dedent(source), tier, limits)
-    child.load(timeout=5)
+    child.load()
     return child
 
 
@@ -69,10 +69,9 @@ def test_an_import_that_fails(launch, name):
 
 def check_import(launch, tier, name):
     source, fault, match = IMPORTS[name]
-    start = time.monotonic()
+    limits = SHORT if fault is ControllerTimeout else PATIENT
     with pytest.raises(fault, match=match):
-        launch(source, tier, SHORT).load()
-    assert time.monotonic() - start < 8
+        launch(source, tier, limits).load()
 
 
 CALLS = {
@@ -120,10 +119,10 @@ def test_a_call_that_fails(launch, name):
 
 def check_call(launch, tier, name):
     body, fault, match = CALLS[name]
-    limits = Limits(call_seconds=0.5 if name == "endless" else 5)
-    child = loaded(launch, tier, f"def policy(obs):\n    {body}\n", limits)
+    limit = 0.5 if name == "endless" else 30
+    child = loaded(launch, tier, f"def policy(obs):\n    {body}\n")
     with pytest.raises(fault, match=match):
-        child.policy(OBS)
+        child.policy(OBS, timeout=limit)
 
 
 def test_cpu_time_is_limited(launch, tier):
@@ -131,7 +130,7 @@ def test_cpu_time_is_limited(launch, tier):
         launch,
         tier,
         "import signal\ndef policy(obs):\n    while True: pass\n",
-        Limits(cpu_seconds=1, call_seconds=10),
+        Limits(cpu_seconds=1, call_seconds=60),
     )
     with pytest.raises(ControllerDied, match="CPU time"):
         child.policy(OBS)
@@ -170,7 +169,7 @@ REFUSALS = {"PermissionError", "BlockingIOError", "RuntimeError", "ValueError"}
 
 
 def test_processes_and_signals_are_denied(launch, tier):
-    child = loaded(launch, tier, PROCESSES, Limits(call_seconds=5))
+    child = loaded(launch, tier, PROCESSES)
     for name in DENIED:
         arguments = (os.getpid(),) if name == "kill_judge" else ()
         with pytest.raises(ControllerError) as caught:
@@ -363,7 +362,7 @@ def test_scratch_is_bounded(launch, tier):
 
 
 def test_scratch_is_removed_however_deep(launch, tier):
-    loaded(launch, tier, SCRATCH, Limits(call_seconds=5)).call("bury")
+    loaded(launch, tier, SCRATCH).call("bury")
 
 
 def test_links_cannot_be_made_in_scratch(launch, tier):
@@ -381,7 +380,6 @@ def test_closing_the_channel_is_noticed(launch, tier):
         launch,
         tier,
         "import os\ndef policy(obs):\n    os.closerange(3, 64)\n    while True: pass\n",
-        Limits(call_seconds=9),
     )
     with pytest.raises(
         ControllerProtocolError, match=r"wrote to the judge's channel.*closed it"

@@ -170,7 +170,7 @@ def test_the_judge_steps_the_env_of_run_episode(child):
             actions.append(action)
             return OBS, 0.0, len(actions) == 3, False, {"steps": len(actions)}
 
-    result = child.run_episode(Env(), 10, 5.0)
+    result = child.run_episode(Env(), 10, 30.0)
     assert len(result["positions"]) == 4
     assert result["info"] == {"steps": 3}
     assert actions == [(0.5, np.float32(1))] * 3
@@ -184,7 +184,7 @@ def test_an_env_may_refuse_a_step(child):
             raise EnvRefusalError("call reset once")
 
     with pytest.raises(ControllerError, match=r"RuntimeError.*call reset once"):
-        child.run_episode(Env(), 10, 5.0)
+        child.run_episode(Env(), 10, 30.0)
 
 
 def test_a_failing_env_is_not_the_controllers_fault(child):
@@ -193,7 +193,7 @@ def test_a_failing_env_is_not_the_controllers_fault(child):
             raise KeyError("ours")
 
     with pytest.raises(KeyError, match="ours"):
-        child.run_episode(Env(), 10, 5.0)
+        child.run_episode(Env(), 10, 30.0)
     with pytest.raises(SandboxError, match="has ended"):
         child.policy(OBS)
 

@@ -63,12 +63,13 @@ def same(a, b):
     )
 
 
+@settings(deadline=None)
 @given(values)
 def test_a_value_comes_back_equal_and_of_the_same_types(value):
     assert same(decode(encode(value)), value)
 
 
-@settings(max_examples=400)
+@settings(deadline=None, max_examples=400)
 @given(st.binary(max_size=200))
 def test_any_bytes_are_a_value_or_a_wire_error(data):
     try:
@@ -78,7 +79,7 @@ def test_any_bytes_are_a_value_or_a_wire_error(data):
     assert same(decode(encode(value)), value)
 
 
-@settings(max_examples=300)
+@settings(deadline=None, max_examples=300)
 @given(values, st.data())
 def test_damaged_values_are_a_value_or_a_wire_error(value, data):
     raw = bytearray(encode(value))
@@ -91,7 +92,7 @@ def test_damaged_values_are_a_value_or_a_wire_error(value, data):
 
 
 @pytest.mark.slow
-@settings(max_examples=10_000)
+@settings(deadline=None, max_examples=10_000)
 @given(st.binary(max_size=300))
 def test_many_bytes_are_a_value_or_a_wire_error(data):
     with contextlib.suppress(WireError):
