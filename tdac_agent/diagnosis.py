@@ -33,7 +33,7 @@ _SIDES = (
     "left",
     "front left",
 )
-_TIME_OUT = re.compile(r"did not end within|ms a call|CPU time|timed out")
+_OUT_OF_CPU = re.compile(r"CPU time")
 _CONTRACT = re.compile(r"must return|reset\(\)|step\(\)|run_episode|has no ")
 
 
@@ -47,7 +47,7 @@ def diagnose(rollout: Rollout, task: Map2DTask) -> Diagnosis:
     Returns:
         For an episode that is held out: the cause `held out`, and no figures.
     """
-    if rollout.error is not None and rollout.error.startswith("not run"):
+    if rollout.outcome == "not run":
         return Diagnosis(cause="error", text=f"{rollout.name}: {rollout.error}.")
     if rollout.held_out:
         text = "A start that is held out failed; nothing more is told of it."
@@ -64,7 +64,7 @@ def diagnose(rollout: Rollout, task: Map2DTask) -> Diagnosis:
 def _error(rollout: Rollout) -> Diagnosis:
     message = rollout.error or ""
     cause: Cause = "error"
-    if _TIME_OUT.search(message):
+    if rollout.timed_out or _OUT_OF_CPU.search(message):
         cause = "time-out"
     elif _CONTRACT.search(message):
         cause = "contract"

@@ -144,8 +144,9 @@ def repair(
             wanted = remedy.apply(parameters, bounds)
             for change in _compare(parameters, wanted, tests[cause], cause):
                 changes.setdefault(change.name, change)
-    if not changes and tests:
-        cause, test = next(iter(tests.items()))
+    if not changes and report.failures:
+        unknown: dict[Cause, str] = {"error": report.failures[0].test}
+        cause, test = next(iter((tests or unknown).items()))
         wanted = _random_step(parameters, attempt)
         changes = {c.name: c for c in _compare(parameters, wanted, test, cause)}
     after = {name: change.after for name, change in changes.items()}
@@ -191,7 +192,9 @@ def write_rules(
 ) -> list[str]:
     """Rules that lead to these parameters, for a person and for `read_rules`.
 
-    All that is not neutral is said again, so that older rules may be forgotten.
+    They read `set LOOKAHEAD = 60 px (k = 1: collision in test_no_collisions)` and
+    `keep INFLATION_MARGIN > 2 px (k = 1: collision)`. All that is not neutral is said
+    again, so that older rules may be forgotten.
 
     Args:
         parameters: What the next controller shall have.

@@ -20,7 +20,7 @@ from tdac_agent.episode import Record
 from tdac_agent.extract import extract_source
 from tdac_agent.oracle import Oracle
 from tdac_agent.provider import Request
-from tdac_agent.report import Diagnosis, Failure, Provenance, Report, Verdict
+from tdac_agent.report import Diagnosis, Failure, Report
 from tdac_agent.rules import MAX_RULE_CHARS, add_rules, parse_rules
 from tdac_envs.map2d import Map2DEnv
 from tdac_envs.maps import bundled_maps
@@ -50,25 +50,8 @@ def report(*failures):
         )
         for test, cause in failures
     )
-    provenance = dict.fromkeys(Provenance.model_fields, "x")
-    return Report(
-        verdict=Verdict(
-            passed=False,
-            expected=9,
-            passed_tests=9 - len(records),
-            failed_tests=len(records),
-        ),
-        provenance=Provenance(
-            **provenance
-            | {"profile": "paper", "paper": False, "seed": 0}
-            | {"versions": {}, "warnings": ()}
-        ),
-        failures=records,
-        tests={},
-        episodes=(),
-        child_cpu_seconds=0.0,
-        seconds=0.0,
-    )
+    # What verified it, and with which seeds, is nothing to the repair.
+    return Report.model_construct(failures=records)
 
 
 @pytest.fixture(scope="module")
@@ -344,6 +327,18 @@ def test_late_progress_is_too_slow(builtin):
     assert read_parameters(source_of(reply)).cruise_speed > MIDDLE.cruise_speed
 
 
+def test_collision_is_laid_to_the_collision_test():
+    """Of the tests that one collision failed, the notes name the plainest."""
+    tests = (
+        f"{END}test_progress",
+        f"{END}test_no_collisions",
+        f"{END}test_reaches_goal",
+    )
+    failed = report(*((test, "collision") for test in tests))
+    _, changes = repair(MIDDLE, failed, Bounds(), 0)
+    assert {change.test for change in changes} == {tests[1]}
+
+
 def test_first_cause_wins():
     """Where two failures want the same parameter, the more telling one has it."""
     failed = report(("slow", "too slow"), ("hit", "collision"))
@@ -390,7 +385,7 @@ def test_a_persons_rule_counts(builtin):
 
 
 @pytest.mark.parametrize(
-    "cause", ["collision", "no motion", "too slow", "held out", "error"]
+    "cause", ["collision", "no motion", "too slow", "held out", "error", None]
 )
 def test_never_tries_the_same_twice(builtin, cause):
     """Ten iterations that all fail in the same way are twenty different candidates."""
