@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -24,6 +24,8 @@ Source = str | Path | NDArray[np.generic] | MapImage
 
 INFLATIONS = (0, 1, 2, 3)
 PAPER_CLEANUPS = (0, 4, 8, 12, 16)
+MAX_DETOUR = 0.1
+"""Most that the planner's margin may lengthen the path, as a share."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,9 +127,21 @@ def _staged_search(scene: Scene) -> Iterator[Candidate]:
     """Reading after reading, up to the first feasible one; its margins by score."""
     for reading in readings(scene):
         candidates = _with_margins(scene, reading, INFLATIONS)
-        yield from candidates
+        yield candidates[0]
+        yield from (_without_detour(c, candidates[0]) for c in candidates[1:])
         if candidates[0].failure is None:
             return
+
+
+def _without_detour(candidate: Candidate, plain: Candidate) -> Candidate:
+    """Refuses a margin that sends the robot another way: clearance is not all."""
+    if candidate.terms is None or plain.terms is None:
+        return candidate
+    longer = candidate.terms.path_length / max(plain.terms.path_length, 1.0) - 1
+    if longer <= MAX_DETOUR:
+        return candidate
+    why = f"the margin of {candidate.inflation} px makes the path {longer:.0%} longer"
+    return replace(candidate, failure=why, terms=None)
 
 
 def _paper_grid(scene: Scene) -> Iterator[Candidate]:

@@ -247,6 +247,16 @@ def test_candidates_are_ranked_by_score() -> None:
     assert score(params.score_terms) == pytest.approx(scores[0])
 
 
+def test_margin_does_not_send_the_robot_another_way() -> None:
+    """A door just wide enough beats a wide one far away."""
+    image = rooms()
+    image[26:54, 146:155] = 255
+    ranked = rank_candidates(image, START, GOAL, 12.0)
+    assert ranked[0].terms is not None
+    assert ranked[0].terms.path_length < 240
+    assert any("px makes the path" in (c.failure or "") for c in ranked)
+
+
 def test_world_is_not_inflated() -> None:
     grid, params = preprocess(rooms(), START, GOAL, 12.0)
     assert params.inflation > 0
@@ -317,35 +327,17 @@ class Oracle:
         grown = kept | {n for cell in kept for n in self.neighbours(*cell, True)}
         return {c for c in grown if all(n in grown for n in self.neighbours(*c, True))}
 
-    def clearance(self, occupied: set, y: int, x: int) -> float:
-        edge = min(x, y, self.width - 1 - x, self.height - 1 - y) + 0.5
-        if (y, x) in occupied:
-            return 0.0
-        gaps = (
-            math.hypot(max(abs(b - x) - 0.5, 0), max(abs(a - y) - 0.5, 0))
-            for a, b in occupied
-        )
-        return min(edge, *gaps)
-
-    def best(self) -> tuple[float, str, int, int]:
-        """Highest score with polarity, cleanup and inflation."""
-        found = []
-        threshold = self.otsu()
-        for polarity in ("dark", "light"):
-            dark = self.grey <= threshold
-            mask = dark if polarity == "dark" else ~dark
-            for strength in (0, 4, 8, 12, 16):
-                cells = self.cleaned(set(zip(*np.nonzero(mask), strict=True)), strength)
-                clear = {
-                    (y, x): self.clearance(cells, y, x)
-                    for y in range(self.height)
-                    for x in range(self.width)
-                }
-                for inflation in (0, 1, 2, 3):
-                    value = self.value(cells, clear, inflation)
-                    if value is not None:
-                        found.append((value, polarity, strength, inflation))
-        return max(found, key=lambda f: f[0])
+    def clearances(self, occupied: set) -> dict:
+        """Distance of every pixel centre to the nearest occupied square or border."""
+        rows, columns = np.array(sorted(occupied)).reshape(-1, 2).T
+        found = {}
+        for y, x in itertools.product(range(self.height), range(self.width)):
+            edge = min(x, y, self.width - 1 - x, self.height - 1 - y) + 0.5
+            dx = np.maximum(np.abs(columns - x) - 0.5, 0.0)
+            dy = np.maximum(np.abs(rows - y) - 0.5, 0.0)
+            gap = float(np.hypot(dx, dy).min(initial=edge))
+            found[y, x] = 0.0 if (y, x) in occupied else gap
+        return found
 
     def value(self, cells: set, clear: dict, inflation: int) -> float | None:
         need = math.sqrt((self.radius + inflation) ** 2 + 0.5)
@@ -397,19 +389,16 @@ def test_paper_preset_is_the_literal_grid() -> None:
     grey, start, goal = small_map(), (7, 7), (26, 7)
     oracle = Oracle(grey, start, goal, 1.5)
     ranked = rank_candidates(grey, start, goal, 1.5, preset="paper")
-    threshold = oracle.otsu()
-    tried = set()
+    dark = grey <= oracle.otsu()
+    grids, tried = {}, set()
+    for polarity, strength in itertools.product(("dark", "light"), (0, 4, 8, 12, 16)):
+        mask = dark if polarity == "dark" else ~dark
+        cells = oracle.cleaned(set(zip(*np.nonzero(mask), strict=True)), strength)
+        grids[polarity, strength] = cells, oracle.clearances(cells)
     for candidate in ranked:
         reading = candidate.reading
-        dark = grey <= threshold
-        mask = dark if reading.polarity == "dark" else ~dark
-        cells = oracle.cleaned(
-            set(zip(*np.nonzero(mask), strict=True)), reading.cleanup
-        )
+        cells, clear = grids[reading.polarity, reading.cleanup]
         assert set(zip(*np.nonzero(reading.cells), strict=True)) == cells
-        clear = {
-            (y, x): oracle.clearance(cells, y, x) for y in range(26) for x in range(34)
-        }
         value = oracle.value(cells, clear, candidate.inflation)
         assert (value is None) == (candidate.failure is not None)
         if value is not None and candidate.terms is not None:
