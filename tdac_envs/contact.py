@@ -8,8 +8,8 @@ from numba import njit
 
 from tdac_envs.grid import BoolGrid, FloatGrid
 
-# A contact is a disc that gets this much deeper, px, into a square than it was at the
-# start of the step: driving along a wall in touch with it is free.
+# A disc that starts in touch is stopped when it gets this much deeper, px: driving
+# along a wall in touch with it is free.
 SINK = 1e-8
 # No sequence of such steps gets deeper than this, px.
 DEEPEST = 1e-7
@@ -84,28 +84,67 @@ def first_contact(
     open_at_end = max(_room(clear, end_x, end_y) - radius, 0.0)
     if open_at_start + open_at_end > length:
         return 2.0
+    best, gap = _scan(cells, clear, x, y, heading, forward, turn, radius, 0.0)
+    if gap < SINK:
+        floor = max(gap - SINK, -DEEPEST)
+        best, _ = _scan(cells, clear, x, y, heading, forward, turn, radius, floor)
+    return best / length if best < length else 2.0
+
+
+@njit(cache=True, nogil=True)
+def _scan(
+    cells: BoolGrid,
+    clear: FloatGrid,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    radius: float,
+    floor: float,
+) -> tuple[float, float]:
+    """Way to the first square that the disc gets into by more than `-floor` px.
+
+    Returns:
+        The way along the arc, px, and the distance at its start between the disc and
+        the nearest of the squares that were looked at, px.
+    """
+    end_x, end_y, _ = move(x, y, heading, forward, turn)
+    best = abs(forward)
     # How far the arc swings out beyond the box of its two ends, at most.
-    swing = 0.5 * length * min(1.0, 0.25 * abs(turn))
+    swing = 0.5 * best * min(1.0, 0.25 * abs(turn))
     reach = radius + swing + _ROUNDING
     left, right = min(x, end_x), max(x, end_x)
     top, bottom = min(y, end_y), max(y, end_y)
-    best, height, width = length, cells.shape[0] - 2, cells.shape[1] - 2
     first_row = max(math.ceil(top - reach - 0.5), -1)
-    last_row = min(math.floor(bottom + reach + 0.5), height)
+    last_row = min(math.floor(bottom + reach + 0.5), cells.shape[0] - 2)
+    nearest = math.inf
     for j in range(first_row, last_row + 1):
-        gap = max(j - 0.5 - bottom, top - j - 0.5, 0.0)
-        span = math.sqrt(max(reach * reach - gap * gap, 0.0)) + 0.5
+        above = max(j - 0.5 - bottom, top - j - 0.5, 0.0)
+        span = math.sqrt(max(reach * reach - above * above, 0.0)) + 0.5
         i = max(math.ceil(left - span), -1)
-        last = min(math.floor(right + span), width)
+        last = min(math.floor(right + span), cells.shape[1] - 2)
         while i <= last:
-            if cells[j + 1, i + 1]:
-                if _is_edge(cells, i + 1, j + 1):
-                    best = _travel(x, y, heading, forward, turn, i, j, radius, best)
-                i += 1
-            else:
+            if not cells[j + 1, i + 1]:
                 # The nearest square is this far off, so it is in the row, too.
                 i += max(math.ceil(clear[j + 1, i + 1] + 0.5 - _ROUNDING), 1)
-    return best / length if best < length else 2.0
+                continue
+            if _is_edge(cells, i + 1, j + 1):
+                gap = math.sqrt(_square_distance2(x, y, i, j)) - radius
+                nearest = min(nearest, gap)
+                if gap < best:
+                    best = _travel(
+                        x, y, heading, forward, turn, i, j, radius, floor, best
+                    )
+            i += 1
+    return best, nearest
+
+
+@njit(cache=True, nogil=True)
+def _square_distance2(x: float, y: float, i: int, j: int) -> float:
+    dx = max(abs(x - i) - 0.5, 0.0)
+    dy = max(abs(y - j) - 0.5, 0.0)
+    return dx * dx + dy * dy
 
 
 @njit(cache=True, nogil=True)
@@ -141,34 +180,35 @@ def _travel(
     i: int,
     j: int,
     radius: float,
+    floor: float,
     limit: float,
 ) -> float:
-    """Way along the arc, px, until the disc touches square (i, j); at most `limit`.
+    """Way along the arc, px, until the disc's gap to square (i, j) falls to `floor`.
 
     The distance to a convex body is convex along a straight line, and an arc of
     curvature k is at most k h^2 / 2 away from its tangent after h px. So
     `d + d' h - k h^2 / 2` bounds the distance from below, and going from root to
     root of this bound never jumps over a contact and converges quadratically.
+
+    Returns:
+        At most `limit`, where there is no contact before it.
     """
     length = abs(forward)
     curvature = abs(turn) / length
-    way, floor = 0.0, 0.0
-    at_x, at_y, at_heading = x, y, heading
+    way, at_x, at_y, at_heading = 0.0, x, y, heading
     while True:
         off_x = at_x - max(i - 0.5, min(at_x, i + 0.5))
         off_y = at_y - max(j - 0.5, min(at_y, j + 0.5))
-        distance = math.hypot(off_x, off_y)
-        if distance > radius + (limit - way):
-            return limit
+        distance = math.sqrt(off_x * off_x + off_y * off_y)
+        rest = distance - radius - floor
         approach = -1.0
         if distance > 0.0:
             along = off_x * math.cos(at_heading) + off_y * math.sin(at_heading)
             approach = math.copysign(1.0, forward) * along / distance
-        if way == 0.0:
-            floor = min(distance - radius - SINK, 0.0)
-            if approach < 0.0:
-                floor = max(floor, -DEEPEST)
-        rest = distance - radius - floor
+        if way == 0.0 and approach >= 0.0 and rest < SINK:
+            # Even a disc that is too deep may leave.
+            floor -= SINK - rest
+            rest = SINK
         if rest <= _CLOSE:
             return way
         root = math.sqrt(approach * approach + 2.0 * curvature * rest)
