@@ -10,7 +10,7 @@ import signal
 import sys
 import traceback
 from pathlib import Path
-from typing import Annotated, Any, Literal, Optional
+from typing import Annotated, Any, Literal, NoReturn, Optional
 
 import typer
 
@@ -276,22 +276,33 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
-        app(prog_name="tdac")
-    except KeyboardInterrupt:
-        _fail("interrupted", 130)
+        code = app(prog_name="tdac", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        code = 130
     except Exception as error:
-        from tdac_agent.errors import Fault
-        from tdac_envs.errors import TdacError
-
-        if isinstance(error, TdacError):
-            _fail(f"error: {error}", 2)
-        if isinstance(error, Fault):
-            _fail(f"infrastructure fault: {error}", 3)
-        traceback.print_exc()
-        _fail("internal error: please report the lines above", 3)
+        _explain(error)
+    if code == 130:
+        _fail("interrupted", 130)
+    sys.exit(code or 0)
 
 
-def _fail(message: str, code: int) -> None:
+def _explain(error: Exception) -> NoReturn:
+    from tdac_agent.errors import Fault
+    from tdac_envs.errors import TdacError
+
+    if hasattr(error, "format_message"):  # usage, as typer found it
+        _fail(f"error: {error.format_message().rstrip('.')}; see tdac --help", 2)
+    if isinstance(error, TdacError):
+        _fail(f"error: {error}", 2)
+    if isinstance(error, Fault):
+        _fail(f"infrastructure fault: {error}", 3)
+    if isinstance(error, OSError) and error.filename:
+        _fail(f"error: {error.filename}: {error.strerror}", 3)
+    traceback.print_exception(error)
+    _fail("internal error: please report the lines above", 3)
+
+
+def _fail(message: str, code: int) -> NoReturn:
     sys.stdout.flush()
     print(" ".join(message.split()), file=sys.stderr)
     sys.exit(code)

@@ -22,11 +22,13 @@ def render_feedback(report: Report) -> str:
         if index >= MAX_GROUPS:
             parts.append(f"Also failed: {names}")
             continue
-        first = members[0]
-        lines = [f"{index + 1}. {names}", f"   {_cut(first.message)}"]
-        lines += [f"   also: {_cut(m.message)}" for m in members[1:4]]
-        if first.diagnosis is not None:
-            lines.append(f"   What happened: {_cut(first.diagnosis.text)}")
+        diagnosis = members[0].diagnosis
+        lines = [f"{index + 1}. {names}"]
+        if diagnosis is None or diagnosis.cause != "held out":
+            messages = dict.fromkeys(member.message for member in members)
+            lines += [f"   {_cut(message)}" for message in list(messages)[:4]]
+        if diagnosis is not None:
+            lines.append(f"   What happened: {_cut(diagnosis.text)}")
         parts.append("\n".join(lines))
     return "\n\n".join(parts)
 

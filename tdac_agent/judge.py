@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -196,8 +197,8 @@ class Judge:
         return name != "nominal" and int(name.split()[1]) > SHOWN_JITTERS
 
     def _start(self) -> Child:
-        left = int(self._limits.cpu_seconds - self.cpu_seconds)
-        if left < 1:
+        left = math.ceil(self._limits.cpu_seconds - self.cpu_seconds)
+        if left <= 0:
             used = f"used {self._limits.cpu_seconds} s of CPU time, all it may"
             raise ControllerFault(f"the controller {used}", "import")
         if time.monotonic() > self._deadline:

@@ -7,6 +7,7 @@ import unicodedata
 from dataclasses import dataclass
 
 BEGIN, END = "AUTO_REPAIR_RULES_BEGIN", "AUTO_REPAIR_RULES_END"
+_MARKER = re.compile(f"{BEGIN}|{END}")
 MAX_RULES = 24
 MAX_RULE_CHARS = 200
 
@@ -43,7 +44,7 @@ def add_rules(
     number = max((int(rule.id[1:]) for rule in rules), default=0)
     added = []
     for text in texts:
-        clean = " ".join(text.split())[:MAX_RULE_CHARS]
+        clean = " ".join(_MARKER.sub("…", text).split())[:MAX_RULE_CHARS]
         if clean and _key(clean) not in known:
             known.add(_key(clean))
             number += 1

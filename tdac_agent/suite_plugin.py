@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 from collections.abc import Callable
+from importlib.util import decode_source
 from typing import Any
 
 import pytest
@@ -40,8 +41,8 @@ class Controller:
             limit = f"at most {MAX_SOURCE_BYTES} are allowed"
             pytest.fail(f"the source has {size} bytes, {limit}", pytrace=False)
         try:
-            # The bytes, as Python itself reads them: they may declare an encoding.
-            return ast.parse(self._judge.source)
+            # As Python itself reads a file, which may declare an encoding.
+            return ast.parse(decode_source(self._judge.source))
         except SyntaxError as error:
             line = f" (line {error.lineno})" if error.lineno else ""
             reason = f"{error.msg}{line}"

@@ -34,6 +34,7 @@ def write_small_task(folder: Path, **changes) -> Path:
         "goal": [130, 30],
         "robot": {"radius": 6},
         "name": "small",
+        "horizon": 400,
     }
     (folder / "task.yaml").write_text(yaml.safe_dump(content | changes))
     return folder
@@ -64,7 +65,9 @@ def mentioning(text: str) -> list[int]:
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
-            about = (folder / "cmdline").read_bytes() + (folder / "environ").read_bytes()
+            about = (folder / "cmdline").read_bytes() + (
+                folder / "environ"
+            ).read_bytes()
             about += os.fsencode(os.readlink(folder / "cwd"))
         except OSError:
             continue

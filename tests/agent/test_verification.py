@@ -3,14 +3,21 @@
 import json
 import os
 import re
+import shutil
+import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
+import numpy as np
 import pytest
+from conftest import write_small_task
 
+from tdac_agent.episode import as_wheels, wrong_action
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.report import Report
+from tdac_agent.sandbox import Limits
 from tdac_agent.verification import load_trajectories, read_source, verify
 
 NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
@@ -114,7 +121,7 @@ HOSTILE = {
         "at import",
     ),
     "judge's channel": (
-        "import os\nfor fd in range(3, 20):\n    try:\n        os.write(fd, b'passed')\n"
+        "import os\nfor fd in range(3, 20):\n    try:\n        os.write(fd, b'x')\n"
         "    except OSError:\n        print(fd)\n" + NOTHING,
         "channel|progress|d_min|did not end within",
     ),
@@ -143,7 +150,7 @@ def test_hostile_controllers_fail(small_task, quick, no_traces, name):
         assert not re.search(r"0x[0-9a-f]{6}", text)
 
 
-SPY = '''
+SPY = """
 import os
 import sensors
 
@@ -152,7 +159,7 @@ FOUND = [v for v in os.environ if "KEY" in v or "SECRET" in v]
 
 def policy(obs):
     raise ValueError(f"found {len(FOUND)} and {list(os.environ)}")
-'''
+"""
 
 
 def test_the_environment_holds_no_key(small_task, monkeypatch, no_traces):
@@ -165,7 +172,7 @@ def test_the_environment_holds_no_key(small_task, monkeypatch, no_traces):
     assert "import of 'os'" in failed_with(report, "test_imports")
 
 
-FAKE = '''
+FAKE = """
 
 def run_episode(env, max_steps):
     points = [(30.0 + i, 30.0) for i in range(max_steps + 1)]
@@ -175,7 +182,7 @@ def run_episode(env, max_steps):
 
 def policy(obs):
     return 0.0, 0.0
-'''
+"""
 
 
 def test_a_fabricated_episode_fails(small_task, good_source, no_traces):
@@ -207,13 +214,8 @@ def test_a_fabricated_episode_fails(small_task, good_source, no_traces):
         "object()",
     ],
 )
-@pytest.mark.parametrize("when", [0])
-def test_wrong_actions_are_refused(answer, when):
+def test_wrong_actions_are_refused(answer):
     """An action that is not two finite numbers is none, whatever else it is."""
-    import numpy as np
-
-    from tdac_agent.episode import as_wheels, wrong_action
-
     value = eval(answer, {"np": np})
     assert as_wheels(value) is None
     assert len(wrong_action(value)) < 200
@@ -247,7 +249,7 @@ def test_numpy_actions_are_fine(small_task, good_source, answer):
     assert report.passed, report.failures
 
 
-FORGER = '''
+FORGER = """
 import gc
 import numpy as np
 import sensors
@@ -260,7 +262,7 @@ def policy(obs):
             thing["pose"] = np.array([130.0, 30.0, 0.0], np.float32)
     np.hypot = lambda *a: np.zeros(1)
     return 0.0, 0.0
-'''
+"""
 
 
 def test_state_cannot_be_forged(small_task):
@@ -311,24 +313,21 @@ def test_files_that_cannot_be_read(what):
         read_source(what)
 
 
-def test_the_cpu_budget_is_for_all_episodes(small_task, quick, no_traces):
+def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     """What all processes of a controller use together is bounded."""
-    from dataclasses import replace
-
-    source = "x = 0\nfor i in range(12_000_000):\n    x += i\n" + NOTHING
-    limits = replace(quick, cpu_seconds=2, import_seconds=20)
-    report = verify(source, small_task, limits=limits)
+    burn = "\nfor _ in range(12_000_000):\n    pass\n"
+    source = good_source + burn
+    limits = Limits(cpu_seconds=2)
+    report = verify(source, small_task, profile="policy", limits=limits)
     assert not report.passed
-    assert report.child_cpu_seconds < 6
-    assert "CPU time" in "\n".join(f.message for f in report.failures)
+    assert report.child_cpu_seconds < 5
+    assert "used 2 s of CPU time" in "\n".join(f.message for f in report.failures)
 
 
-def test_an_interrupt_leaves_nothing(tmp_path, small_task, no_traces):
-    """SIGINT in the middle of a verification ends the judge and its children."""
-    task = tmp_path / "task"
-    from conftest import write_small_task
-
-    write_small_task(task)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
+    """A signal in the middle of a verification ends the judge and its children."""
+    task = write_small_task(tmp_path / "task")
     path = tmp_path / "controller.py"
     path.write_text("while True:\n    pass\n")
     command = [sys.executable, "-m", "tdac_agent.cli", "verify", str(path)]
@@ -341,13 +340,11 @@ def test_an_interrupt_leaves_nothing(tmp_path, small_task, no_traces):
     deadline = time.monotonic() + 60
     while not list(no_traces.glob("tdac-child-*")) and time.monotonic() < deadline:
         time.sleep(0.02)
-    process.send_signal(2)
+    process.send_signal(number)
     _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130
     assert stderr.decode().strip().splitlines()[-1] == "interrupted"
     for folder in no_traces.glob("tdac-child-*"):
-        import shutil
-
         shutil.rmtree(folder)
 
 

@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from tdac_agent import contract
+from tdac_agent import contract, hygiene
 
 
 def test_source_parses(controller):
@@ -58,8 +58,8 @@ def test_main(controller):
     assert guarded, 'no `if __name__ == "__main__": main()`'
 
 
-@pytest.mark.parametrize("pattern", contract.HYGIENE)
+@pytest.mark.parametrize("pattern", hygiene.HYGIENE)
 def test_hygiene(controller, pattern):
     """No unstable pattern: each is named with its line."""
-    found = list(contract.HYGIENE[pattern](controller.tree))
+    found = list(hygiene.HYGIENE[pattern](controller.tree))
     assert not found, f"{pattern.replace('_', ' ')}: {'; '.join(found[:8])}"

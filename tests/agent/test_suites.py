@@ -1,0 +1,338 @@
+"""The integrity of verdicts: only the expected tests, each passed, count."""
+
+import json
+import os
+
+import pytest
+from conftest import QUICK, write_small_task
+
+from tdac_agent.builtin import Parameters, render_controller
+from tdac_agent.errors import ControllerFileError, Fault
+from tdac_agent.judge import Judge
+from tdac_agent.judging import Findings
+from tdac_agent.report import Report
+from tdac_agent.report_log import read_outcomes, verdict_of
+from tdac_agent.task import load_task, write_workdir
+from tdac_agent.verification import verify
+
+
+@pytest.fixture
+def check(small_task, good_source, tmp_path):
+    """Verifies the good controller with a suite of one more file."""
+
+    def check(text, conftest=None, **options) -> Report:
+        folder = tmp_path / "mine"
+        folder.mkdir(exist_ok=True)
+        (folder / "test_mine.py").write_text(text)
+        if conftest is not None:
+            (folder / "conftest.py").write_text(conftest)
+        given = {"profile": "policy", "paper": True, **options}
+        return verify(good_source, small_task, suite=folder, **given)
+
+    return check
+
+
+def outcome(report, test="test_it"):
+    return report.tests[f"own/test_mine.py::{test}"]
+
+
+def test_a_users_test_takes_part(check):
+    """It gets the documented fixtures, is expected, and is named as the user's."""
+    text = '''
+def test_it(controller, task, rollout, oracle):
+    """Every fixture of the contract."""
+    assert "def policy" in controller.source
+    assert controller.constant("N_RAYS") == task.params.robot.n_rays
+    assert controller.error_of("nearest_free") is not None
+    assert controller.call("_octile", (0, 0), (3, 0)) == 3
+    episode = rollout("nominal")
+    assert episode.reached and not episode.collisions
+    assert oracle.grid(1).shape == (30, 40)
+
+
+def test_fails(rollout):
+    assert rollout("nominal").trajectory.steps == 0, "the episode has steps"
+'''
+    report = check(text)
+    assert outcome(report) == "passed"
+    assert not report.passed
+    (failure,) = report.failures
+    assert failure.test == "own/test_mine.py::test_fails"
+    assert failure.group == "user"
+    assert failure.message == "the episode has steps"
+    assert report.provenance.suite == "map2d + mine"
+
+
+@pytest.mark.parametrize(
+    ("body", "found"),
+    [
+        ("pytest.skip('no')", "skipped"),
+        ("pytest.xfail('no')", "skipped"),
+        ("pytest.importorskip('nosuchmodule')", "skipped"),
+        ("assert False, 'no'", "failed"),
+        ("raise SystemExit(0)", "failed"),
+        ("pytest.exit('enough', 0)", "missing"),
+    ],
+)
+def test_anything_but_passed_is_a_failure(check, body, found):
+    """A skip, an xfail or an exit is not a pass, however the rest went."""
+    report = check(f"import pytest\n\ndef test_it():\n    {body}\n")
+    assert not report.passed
+    assert outcome(report) == found
+    assert report.failures[-1].test == "own/test_mine.py::test_it"
+    assert report.failures[-1].message
+
+
+def test_an_unexpected_pass_is_no_pass(check):
+    """A test that is marked to fail and passes is not counted as passed."""
+    text = "import pytest\n\n@pytest.mark.xfail\ndef test_it():\n    assert True\n"
+    assert not check(text).passed
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("import nosuchmodule\n\ndef test_it(): ...\n", "No module named 'nosuchmodul"),
+        ("def test_it(:\n", "SyntaxError"),
+        ("import os\n\ndef test_it():\n    os._exit(0)\n", "left no findings"),
+        ("import pytest\n@pytest.mark.nosuch\ndef test_it(): ...\n", "nosuch"),
+    ],
+)
+def test_a_broken_suite_is_a_fault(check, text, reason):
+    """It says nothing about the controller: neither pass nor fail."""
+    with pytest.raises(Fault, match=reason) as caught:
+        check(text)
+    assert "/tmp" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_conftest_of_the_suite_may_be_used(check):
+    """Fixtures beside the user's tests are found."""
+    conftest = "import pytest\n\n@pytest.fixture\ndef three():\n    return 3\n"
+    report = check("def test_it(three):\n    assert three == 3\n", conftest)
+    assert report.passed
+
+
+@pytest.mark.parametrize(
+    "hook",
+    [
+        "def pytest_collection_modifyitems(items):\n    items[:] = items[-1:]\n",
+        "def pytest_ignore_collect():\n    return True\n",
+    ],
+)
+def test_a_conftest_cannot_take_tests_away(check, hook):
+    """Tests that a hook leaves out are missing, and so have failed."""
+    try:
+        report = check("def test_it():\n    pass\n", hook)
+    except Fault:
+        return
+    assert not report.passed
+
+
+def test_no_suite_in_the_folder(small_task, good_source, tmp_path):
+    """A folder without test files is the user's error."""
+    with pytest.raises(ControllerFileError, match=r"expected test_\*\.py files"):
+        verify(good_source, small_task, suite=tmp_path)
+
+
+def test_markers_choose_the_tests(check):
+    """`paper` and `jitter` leave a test out of the verdicts it is not meant for."""
+    text = """
+import pytest
+
+@pytest.mark.paper
+def test_paper(): ...
+
+@pytest.mark.jitter
+def test_jitter(): ...
+
+def test_it(): ...
+"""
+    names = {
+        name.partition("::")[2] for name in check(text).tests if name.startswith("own/")
+    }
+    assert names == {"test_it"}
+
+
+def test_the_tasks_own_suite_is_found_beside_its_file(tmp_path, good_source):
+    """`suite` in task.yaml is relative to that file, and is part of the verdict."""
+    folder = write_small_task(tmp_path / "task", suite="mine")
+    (folder / "mine").mkdir()
+    (folder / "mine" / "test_mine.py").write_text("def test_it():\n    assert 0, 'a'\n")
+    task = load_task(folder)
+    report = verify(good_source, task, profile="policy", paper=True)
+    assert outcome(report) == "failed"
+
+
+PLUGIN = """
+import pytest
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    result = yield
+    result.get_result().outcome = "passed"
+"""
+
+
+def test_the_users_pytest_does_not_change_a_verdict(
+    small_task, tmp_path, monkeypatch, check
+):
+    """Configuration, plugins and variables for the user's own tests have no effect."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("conftest.py", "helpful.py"):
+        (tmp_path / name).write_text(PLUGIN)
+    options = "-p helpful --collect-only -k nothing --co"
+    (tmp_path / "pytest.ini").write_text(f"[pytest]\naddopts = {options}\n")
+    (tmp_path / "sitecustomize.py").write_text("")
+    monkeypatch.setenv("PYTEST_ADDOPTS", options)
+    monkeypatch.setenv("PYTEST_PLUGINS", "helpful")
+    monkeypatch.setenv("PYTHONOPTIMIZE", "2")
+    monkeypatch.setenv("PYTHONWARNINGS", "error")
+    report = check("def test_it():\n    assert False, 'no'\n")
+    assert [failure.message for failure in report.failures] == ["no"]
+    assert outcome(report) == "failed"
+    nothing = "def policy(obs):\n    return 0.0, 0.0\n"
+    assert not verify(nothing, small_task, profile="policy", paper=True).passed
+
+
+def test_a_call_that_takes_too_long_is_tried_once_more(check, tmp_path):
+    """The test that made it runs again; it fails only if it is too slow again."""
+    text = """
+import time
+from pathlib import Path
+
+COUNT = Path(__file__).with_name("count")
+
+
+def test_it(controller):
+    COUNT.open("a").write("x")
+    controller.call("nearest_free", "not a map", 0, 0, 1)
+
+
+def test_slow(controller):
+    COUNT.open("a").write("y")
+    controller.call("hang")
+
+
+def test_after(controller):
+    assert controller.call("_octile", (0, 0), (3, 0)) == 3
+"""
+    hang = "\n\ndef hang():\n    while True:\n        pass\n"
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "test_mine.py").write_text(text)
+    task = load_task(write_small_task(tmp_path / "task"))
+    source = render_controller(Parameters(), task.params.robot, 0.05) + hang
+    report = verify(
+        source, task, profile="policy", paper=True, suite=folder, limits=QUICK
+    )
+    assert (folder / "count").read_text() == "xyy"
+    assert outcome(report, "test_after") == "passed"
+    messages = {f.test.rpartition("::")[2]: f.message for f in report.failures}
+    assert messages["test_slow"] == "hang did not end within 1.5 s"
+    assert "AttributeError at nearest_free" in messages["test_it"]
+
+
+def test_an_episode_that_is_slow_once_is_run_again(small_task, tmp_path, quick):
+    """A time-out counts only if the controller is too slow a second time."""
+    write_workdir(tmp_path, small_task)
+    source = b"import time\n\n\ndef policy(obs):\n    time.sleep(9)\n"
+    judge = Judge(small_task, source, tmp_path, limits=quick)
+    began = os.times().elapsed
+    rollout = judge.rollout("nominal")
+    judge.close()
+    assert rollout.timed_out
+    assert rollout.error == "policy did not end within 1.5 s"
+    assert os.times().elapsed - began >= 3.0
+
+
+def test_provenance_names_everything(small_task, good_source, tmp_path, check):
+    """Another controller, task, map, parameter or suite gives other hashes."""
+
+    def hashes(report):
+        about = report.provenance.model_dump()
+        return {key: about[key] for key in about if key.endswith("_sha256")}
+
+    def other(**changes):
+        folder = write_small_task(tmp_path / "-".join(changes), **changes)
+        task = load_task(folder)
+        return hashes(verify("x = 1\n", task, profile="policy", paper=True))
+
+    first = hashes(verify("x = 1\n", small_task, profile="policy", paper=True))
+    again = other(name="small")
+    assert again == first
+
+    def changed(after):
+        return {
+            key.removesuffix("_sha256") for key in after if after[key] != first[key]
+        }
+
+    assert changed(hashes(verify("x = 2\n", small_task, paper=True))) == {"controller"}
+    assert changed(other(goal=[131, 30])) == {"task", "params"}
+    assert changed(other(progress={"fraction": 0.5})) == {"task"}
+    assert "suite" in changed(hashes(check("def test_it(): ...\n")))
+
+
+def record(**fields):
+    return json.dumps(
+        {"$report_type": "TestReport", "outcome": "passed", "when": "call", **fields}
+    )
+
+
+@pytest.mark.parametrize(
+    ("log", "passed"),
+    [
+        ([record(nodeid="t.py::a"), record(nodeid="t.py::b")], True),
+        ([record(nodeid="t.py::a")], False),
+        ([], False),
+        ([record(nodeid="t.py::a"), record(nodeid="t.py::b")[:-1]], False),
+        ([record(nodeid="t.py::a"), "garbage", record(nodeid="t.py::b")], False),
+        ([record(nodeid="t.py::a"), "[]", record(nodeid="t.py::b")], False),
+        ([record(nodeid="t.py::a"), record(nodeid="t.py::b", when="setup")], False),
+        ([record(nodeid="t.py::a"), record(nodeid="t.py::b", wasxfail="")], False),
+        (
+            [record(nodeid="t.py::a"), record(nodeid="t.py::b")]
+            + [record(nodeid="t.py::b", when="teardown", outcome="failed")],
+            False,
+        ),
+        (
+            [record(nodeid="t.py::b", outcome="failed"), record(nodeid="t.py::b")]
+            + [record(nodeid="t.py::a")],
+            False,
+        ),
+    ],
+)
+def test_a_torn_log_is_no_pass(tmp_path, log, passed):
+    """What is missing from the log, or not wholly in it, has not passed."""
+    path = tmp_path / "report.jsonl"
+    path.write_text("\n".join(log))
+    tests, failures = read_outcomes(path, findings("t.py::a", "t.py::b"))
+    assert verdict_of(tests).passed is passed
+    assert bool(failures) is not passed
+    assert set(tests) == {"t.py::a", "t.py::b"}
+
+
+def test_a_missing_log_is_no_pass(tmp_path):
+    """Without a log every test is missing."""
+    tests, failures = read_outcomes(tmp_path / "none", findings("t.py::a"))
+    assert tests == {"t.py::a": "missing"}
+    assert failures[0].message == "the test did not run to its end"
+
+
+def test_unexpected_tests_are_a_fault(tmp_path):
+    """A log of other tests than the expected ones is no verdict."""
+    path = tmp_path / "report.jsonl"
+    path.write_text(record(nodeid="t.py::other"))
+    with pytest.raises(Fault, match="not expected: t.py::other"):
+        read_outcomes(path, findings("t.py::a"))
+
+
+def findings(*expected):
+    return Findings(
+        expected=list(expected),
+        episodes=[],
+        diagnoses={},
+        tier="x",
+        child_cpu_seconds=0,
+        fault=None,
+    )
