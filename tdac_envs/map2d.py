@@ -24,7 +24,7 @@ from tdac_envs.task2d import (
     Pose,
     Terrain,
     default_horizon,
-    finite_numbers,
+    finite,
     jittered_start,
     make_task,
     positive,
@@ -439,7 +439,7 @@ def _override(robot: RobotParams, **given: float | None) -> RobotParams:
         if value is None:
             continue
         if name == "n_rays":
-            changes[name] = whole_number(name, int(value), 1)
+            changes[name] = whole_number(name, value, 1)
         else:
             field = "field_of_view_deg" if name == "field_of_view" else name
             changes[field] = positive(name, value)
@@ -458,7 +458,7 @@ def _choose(name: str, value: object, allowed: tuple[object, ...]) -> None:
 
 
 def _not_negative(name: str, value: float) -> float:
-    (number,) = finite_numbers(name, (value,), 1)
+    number = finite(name, value)
     if number < 0.0:
         raise TaskError(f"expected {name} of at least 0, got {value!r}")
     return number

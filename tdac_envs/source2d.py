@@ -22,7 +22,7 @@ from tdac_envs.metric import Point, resolution_of, to_pixels
 from tdac_envs.params import MapParams, RobotParams
 from tdac_envs.preprocess import preprocess
 from tdac_envs.score import nearest_free
-from tdac_envs.task2d import finite_numbers, finite_point, positive
+from tdac_envs.task2d import finite, finite_numbers, finite_point, positive
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
 
@@ -115,7 +115,7 @@ class _Given:
         if goal is not None:
             end = finite_point("goal", goal)
         if heading is not None:
-            (heading,) = finite_numbers("heading", (heading,), 1)
+            heading = finite("heading", heading)
         return cls(at, end, heading, robot_radius, snap)
 
     def or_else(self, bundled: BundledMap) -> _Given:

@@ -208,19 +208,34 @@ def finite_point(name: str, values: Sequence[float]) -> tuple[float, float]:
     return x, y
 
 
+def finite(name: str, value: float) -> float:
+    """The value as a float.
+
+    Raises:
+        TaskError: It is not a finite number.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise TaskError(f"expected {name} to be a finite number, got {value!r}")
+    return number
+
+
 def positive(name: str, value: float) -> float:
     """The value as a float.
 
     Raises:
         TaskError: It is not a finite number above 0.
     """
-    (number,) = finite_numbers(name, (value,), 1)
+    number = finite(name, value)
     if number <= 0.0:
         raise TaskError(f"expected {name} above 0, got {value!r}")
     return number
 
 
-def whole_number(name: str, value: int, least: int) -> int:
+def whole_number(name: str, value: float, least: int) -> int:
     """The value as an int.
 
     Raises:
@@ -315,12 +330,18 @@ def _entry(
 
     The body gets there from (x, y) in a straight line.
     """
+    # The pixels around the point come first, as in `path_distance`.
     found = [
-        (float(field[j, i]) + math.dist((x, y), (i, j)), i, j)
+        (
+            max(abs(i - x), abs(j - y)) >= 1,
+            field[j, i] + math.dist((x, y), (i, j)),
+            i,
+            j,
+        )
         for i, j in _near(x, y, field.shape)
         if field[j, i] < math.inf
     ]
-    for _, i, j in sorted(found):
+    for _, _, i, j in sorted(found):
         if _may_hop(terrain, (x, y), (i, j), radius):
             return i, j
     return None

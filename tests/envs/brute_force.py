@@ -1,4 +1,4 @@
-"""Slow and obvious answers to what the kernels compute: over all squares, one by one."""
+"""Slow and obvious answers to what the kernels compute: square by square."""
 
 import math
 

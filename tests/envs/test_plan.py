@@ -120,17 +120,21 @@ def scenarios(file, count):
         yield (x, y), (to_x, to_y), float(length)
 
 
-@pytest.mark.skipif(not SCENARIOS, reason="the public maps are not here")
-@pytest.mark.parametrize("file", SCENARIOS, ids=lambda file: file.name)
-def test_movingai_lengths(file, count=4):
+def assert_optimal(file, count):
     occupied = read_movingai(file.with_suffix("")).occupied
     for start, goal, length in scenarios(file, count):
         path = plan_path(~occupied, start, goal)
         assert path_length(path) == pytest.approx(length, abs=0.01)
 
 
+@pytest.mark.skipif(not SCENARIOS, reason="the public maps are not here")
+@pytest.mark.parametrize("file", SCENARIOS, ids=lambda file: file.name)
+def test_movingai_lengths(file):
+    assert_optimal(file, 4)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not SCENARIOS, reason="the public maps are not here")
 @pytest.mark.parametrize("file", SCENARIOS, ids=lambda file: file.name)
 def test_many_movingai_lengths(file):
-    test_movingai_lengths(file, count=200)
+    assert_optimal(file, 200)
