@@ -24,6 +24,14 @@ ALLOWED_IMPORTS = frozenset(
         "__future__",
     ]
 )
+# What allowed modules have imported themselves.
+_HIDDEN_MODULES = frozenset(
+    [
+        *("builtins", "codecs", "ctypes", "ctypeslib", "f2py", "gc", "importlib"),
+        *("inspect", "io", "os", "pathlib", "pickle", "posix", "shutil", "signal"),
+        *("socket", "subprocess", "sys", "threading"),
+    ]
+)
 CONSTANTS_2D = (
     "MAP_IMG",
     "PARAMS_JSON",
@@ -83,11 +91,35 @@ def import_problems(tree: ast.Module) -> list[str]:
         else:
             continue
         for module in modules:
-            allowed = module.split(".")[0] in ALLOWED_IMPORTS
-            problems += [] if allowed else [f"line {node.lineno}: import of {module!r}"]
+            first, *rest = module.split(".")
+            if first not in ALLOWED_IMPORTS or any(map(_is_hidden, rest)):
+                problems.append(f"line {node.lineno}: import of {module!r}")
+            elif isinstance(node, ast.ImportFrom):
+                names = [alias.name for alias in node.names if _is_hidden(alias.name)]
+                problems += [
+                    f"line {node.lineno}: import of {name!r} from {module!r}"
+                    for name in names
+                ]
         if node not in top:
             problems.append(f"line {node.lineno}: import not at the top level")
-    return problems
+    return [*problems, *_reached_modules(tree)]
+
+
+def _is_hidden(name: str) -> bool:
+    return name.lstrip("_") in _HIDDEN_MODULES
+
+
+def _reached_modules(tree: ast.Module) -> Iterator[str]:
+    """Modules that are reached through an imported one, such as `random._os`."""
+    imports = [n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
+    bound = {name for name, _ in _bindings([*imports])}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and _is_hidden(node.attr):
+            root: ast.expr = node
+            while isinstance(root, ast.Attribute):
+                root = root.value
+            if isinstance(root, ast.Name) and root.id in bound:
+                yield f"line {node.lineno}: use of {ast.unparse(node)}"
 
 
 def calls_in(*nodes: ast.AST) -> set[str]:

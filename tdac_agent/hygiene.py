@@ -14,7 +14,7 @@ SEEDED_CONSTRUCTORS = frozenset({"Random", "default_rng", "Generator", "SeedSequ
 SAVERS = frozenset(
     [
         *("save", "savez", "savez_compressed", "savetxt", "tofile", "memmap"),
-        *("write_text", "write_bytes"),
+        *("dump", "open_memmap", "write_text", "write_bytes"),
     ]
 )
 
@@ -50,10 +50,16 @@ def file_writes(tree: ast.Module) -> Iterator[str]:
             yield f"line {node.lineno}: open() for writing"
         if name in SAVERS:
             yield f"line {node.lineno}: {name}()"
+    called = {node.func for node in calls(tree)}
+    for other in ast.walk(tree):
+        if isinstance(other, ast.Name) and other.id == "open" and other not in called:
+            yield f"line {other.lineno}: open under another name"
 
 
 def _reads_only(call: ast.Call) -> bool:
-    mode: ast.expr | None = call.args[1] if len(call.args) > 1 else None
+    # `path.open(mode)` has no first argument for the file.
+    place = 1 if isinstance(call.func, ast.Name) else 0
+    mode: ast.expr | None = call.args[place] if len(call.args) > place else None
     for keyword in call.keywords:
         if keyword.arg in ("mode", None):
             mode = keyword.value

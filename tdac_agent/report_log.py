@@ -12,9 +12,7 @@ from pydantic import ValidationError
 from tdac_agent.errors import Fault
 from tdac_agent.judging import Findings
 from tdac_agent.report import Diagnosis, Failure, Verdict, group_of
-from tdac_agent.suite_plugin import test_id
-
-MAX_MESSAGE = 4000
+from tdac_agent.suite_plugin import MAX_MESSAGE, test_id
 
 
 def read_findings(results: Path, output: str) -> Findings:

@@ -20,6 +20,7 @@ from tdac_agent.task import Task
 from tdac_agent.trajectory import Rollout
 
 SHIPPED, OWN = "shipped", "own"
+MAX_MESSAGE = 4000
 
 
 class Controller:
@@ -136,6 +137,17 @@ class JudgePlugin:
         )
         self.expected = [test_id(item.nodeid) for item in items]
 
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
+        """Cuts what an error says, before a report takes it apart line by line.
+
+        A message may quote megabytes that a controller returned.
+        """
+        error = None if call.excinfo is None else call.excinfo.value
+        while error is not None:
+            _shorten(error)
+            error = error.__cause__ or error.__context__
+
     def pytest_runtest_protocol(
         self, item: pytest.Item, nextitem: pytest.Item | None
     ) -> bool:
@@ -149,6 +161,14 @@ class JudgePlugin:
             item.ihook.pytest_runtest_logreport(report=report)
         item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
         return True
+
+
+def _shorten(error: BaseException) -> None:
+    text = str(error)
+    if len(text) > MAX_MESSAGE:
+        error.args = (f"{text[:MAX_MESSAGE]} …",)
+        if isinstance(error, pytest.fail.Exception):
+            error.msg = error.args[0]
 
 
 def rollout_key(name: str, steps: int | None, drive: str) -> str:
