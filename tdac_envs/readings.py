@@ -157,8 +157,8 @@ def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
 def _mixed(scene: Scene) -> Reading | None:
     """What is unlike the floor at start and goal, where that is of a middle tone.
 
-    Only where both darker and lighter pixels border on the floor: then no threshold
-    separates it.
+    Only where much of the floor's rim is darker and much of it lighter: then no
+    threshold separates it.
     """
     shape, colour = scene.luminance.shape, scene.image.colour
     spots = [disc(shape, x, y, scene.radius / 2) for x, y in scene.ends]
@@ -169,9 +169,9 @@ def _mixed(scene: Scene) -> Reading | None:
     grey = int(luminance(np.rint(floor).astype(np.uint8)[None, None])[0, 0])
     gap = scene.luminance.astype(np.int16) - grey
     like = (np.abs(gap) < 8).astype(np.uint8)
-    beside = cv2.dilate(like, np.ones((5, 5), np.uint8)) > 0
-    shares = [float((beside & far).mean()) for far in (gap <= -20, gap >= 20)]
-    if like.mean() < 0.02 or min(shares) < 0.003 or (gap <= -20).mean() < 0.03:
+    rim = (cv2.dilate(like, np.ones((5, 5), np.uint8)) > 0) & (np.abs(gap) >= 20)
+    darker = float((gap[rim] < 0).mean()) if rim.any() else 0.0
+    if like.mean() < 0.02 or not 0.2 <= darker <= 0.8:
         return None
     distance = floor_distance(colour, floor)
     cells = np.asarray(distance > otsu(distance))

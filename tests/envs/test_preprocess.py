@@ -136,15 +136,19 @@ def test_uneven_light() -> None:
     assert agrees(grid.cells, rooms())
 
 
-def test_middle_tone_floor() -> None:
+@pytest.mark.parametrize("negative", [False, True])
+def test_middle_tone_floor(negative: bool) -> None:
     """Floor grey, walls white, outside black: no threshold tells the floor."""
     image = rooms()
     walls = (image == 0).all(axis=2)
     image[...], image[walls] = 110, 255
-    image[:5], image[-5:], image[:, :5], image[:, 285:] = 20, 20, 20, 20
+    image[:5], image[185:], image[:, :5], image[:, 285:] = 20, 20, 20, 20
+    image = 255 - image if negative else image
     grid, params = preprocess(image, START, GOAL, 12.0)
     assert params.polarity == "mixed"
-    assert agrees(grid.cells, rooms())
+    drawn = rooms()
+    drawn[185:], drawn[:, 285:] = 0, 0
+    assert agrees(grid.cells, drawn)
 
 
 @pytest.mark.parametrize("negative", [False, True])
