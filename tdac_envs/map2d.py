@@ -13,6 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from tdac_envs.arguments import finite, positive, whole_number
 from tdac_envs.errors import TaskError
 from tdac_envs.kernels import GOAL_X, GOAL_Y, drive, sense
 from tdac_envs.params import RobotParams
@@ -24,12 +25,9 @@ from tdac_envs.task2d import (
     Pose,
     Terrain,
     default_horizon,
-    finite,
     jittered_start,
     make_task,
-    positive,
     random_task,
-    whole_number,
 )
 
 if TYPE_CHECKING:

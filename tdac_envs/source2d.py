@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.arguments import finite, finite_numbers, finite_point, positive
 from tdac_envs.errors import MapError, TaskError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.image import load_image, read_bytes
@@ -22,7 +23,6 @@ from tdac_envs.metric import Point, resolution_of, to_pixels
 from tdac_envs.params import MapParams, RobotParams
 from tdac_envs.preprocess import preprocess
 from tdac_envs.score import nearest_free
-from tdac_envs.task2d import finite, finite_numbers, finite_point, positive
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
 
