@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import math
+import os
+import threading
 import time
-from dataclasses import replace
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
 from tdac_agent.episode import Record, run_own_loop, run_policy
 from tdac_agent.errors import Fault
+from tdac_agent.nursery import Nursery
 from tdac_agent.remote import Unit
 from tdac_agent.sandbox import (
     Child,
+    ChildUsage,
     ControllerFault,
     ControllerTimeout,
     Limits,
     SandboxError,
-    start,
 )
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Outcome, Rollout
@@ -27,6 +29,9 @@ from tdac_envs.task2d import Pose, jittered_start
 JITTERS = 5
 SHOWN_JITTERS = 2
 WALL_SECONDS = 600.0
+
+Key = tuple[str, int | None, str]
+NOMINAL: Key = ("nominal", None, "policy")
 
 
 class Judge:
@@ -39,11 +44,11 @@ class Judge:
         tier: Sandbox tier, or `auto`.
         seed: Of the jittered starts.
         limits: Of each child; `cpu_seconds` is for all of them together.
+        nursery: Where children are started ahead; one of its own by default.
 
     Attributes:
         tier: Name of the tier that was used.
         cpu_seconds: CPU time of all children so far.
-        rollouts: Episodes by (name, steps, drive).
         fault: Why the sandbox failed, where it did.
     """
 
@@ -56,18 +61,21 @@ class Judge:
         tier: str = "auto",
         seed: int = 0,
         limits: Limits | None = None,
+        nursery: Nursery | None = None,
     ) -> None:
         self.task = task
         self.source = source
-        self.tier = tier
+        self.tier = self._wanted_tier = tier
         self.cpu_seconds = 0.0
-        self.rollouts: dict[tuple[str, int | None, str], Rollout] = {}
         self.fault: str | None = None
         self._workdir = workdir
         self._seed = seed
         self._limits = limits or Limits()
         self._deadline = time.monotonic() + WALL_SECONDS
-        self._env = task.make_env()
+        self._nursery = nursery or Nursery(spares=0)
+        self._pool = ThreadPoolExecutor(max_workers=max(2, os.cpu_count() or 2))
+        self._lock = threading.Lock()
+        self._episodes: dict[Key, Future[Rollout]] = {}
         self._unit: Unit | None = None
         self._import_fault: ControllerFault | None = None
 
@@ -81,7 +89,7 @@ class Judge:
             ControllerFault: It cannot be imported.
         """
         if self._unit is not None and self._unit.fault is not None:
-            self.close()
+            self._end_unit()
         if self._unit is None:
             self._unit = Unit(self._load(), self._deadline)
         return self._unit
@@ -102,16 +110,49 @@ class Judge:
             steps: Stop after so many steps; the horizon by default.
             drive: `policy`, or `run_episode` for the controller's own loop.
         """
-        key = (name, steps, drive)
-        if key not in self.rollouts:
-            self.rollouts[key] = self._run(name, steps, drive)
-        return self.rollouts[key]
+        return self._submit((name, steps, drive)).result()
+
+    @property
+    def rollouts(self) -> dict[Key, Rollout]:
+        """The episodes that were run, by (name, steps, drive)."""
+        return {
+            key: future.result()
+            for key, future in self._episodes.items()
+            if not future.cancelled() and future.exception() is None
+        }
+
+    def begin(self, *, jitters: bool) -> None:
+        """Starts the episodes that every suite asks for, beside its other tests."""
+        self._submit(NOMINAL)
+        if jitters:
+            for number in range(1, JITTERS + 1):
+                self._submit((f"jitter {number}", None, "policy"))
 
     def close(self) -> None:
-        """Ends the child that `unit` calls."""
+        """Waits for the episodes under way and ends the children."""
+        self._pool.shutdown(cancel_futures=True)
+        self._end_unit()
+
+    def _end_unit(self) -> None:
         if self._unit is not None:
-            self.cpu_seconds += self._unit.close().cpu_seconds
+            self._account(self._unit.close())
             self._unit = None
+
+    def _account(self, usage: ChildUsage) -> None:
+        with self._lock:
+            self.cpu_seconds += usage.cpu_seconds
+
+    def _submit(self, key: Key) -> Future[Rollout]:
+        """The episode's future, from the queue.
+
+        The nominal episode comes first: the jittered ones wait for it, and in a
+        queue it could stand behind them.
+        """
+        if key[0] != "nominal" and NOMINAL not in self._episodes:
+            self._submit(NOMINAL)
+        if key not in self._episodes:
+            self._episodes[key] = self._pool.submit(self._run, *key)
+        return self._episodes[key]
 
     def start_pose(self, name: str) -> Pose:
         """Start of a named episode."""
@@ -136,7 +177,7 @@ class Judge:
     ) -> Rollout:
         """Runs an episode in a fresh child; arguments as for `rollout`."""
         limit = steps if steps is not None else self.task.nominal.horizon
-        record = Record(self._env, self.start_pose(name), limit)
+        record = Record(self.task.make_env(), self.start_pose(name), limit)
         try:
             child = self._load()
         except ControllerFault as fault:
@@ -150,7 +191,7 @@ class Judge:
                 child, record, name, held_out=held_out, deadline=self._deadline
             )
         finally:
-            self.cpu_seconds += child.close().cpu_seconds
+            self._account(child.close())
 
     def _load(self) -> Child:
         """A fresh child with the controller imported; a time-out is tried once more.
@@ -174,12 +215,12 @@ class Judge:
         try:
             child.load()
         except ControllerFault:
-            self.cpu_seconds += child.close().cpu_seconds
+            self._account(child.close())
             raise
         return child
 
     def _skipped(self, name: str, outcome: Outcome, reason: str) -> Rollout:
-        record = Record(self._env, self.start_pose(name), 1)
+        record = Record(self.task.make_env(), self.start_pose(name), 1)
         record.reset()
         task = self.task.nominal
         return Rollout(
@@ -197,19 +238,22 @@ class Judge:
         return name != "nominal" and int(name.split()[1]) > SHOWN_JITTERS
 
     def _start(self) -> Child:
-        left = math.ceil(self._limits.cpu_seconds - self.cpu_seconds)
-        if left <= 0:
+        if self.cpu_seconds >= self._limits.cpu_seconds:
             used = f"used {self._limits.cpu_seconds} s of CPU time, all it may"
             raise ControllerFault(f"the controller {used}", "import")
         if time.monotonic() > self._deadline:
             raise ControllerFault(
                 f"the verification took longer than {WALL_SECONDS:g} s", "import"
             )
-        limits = replace(self._limits, cpu_seconds=left)
         try:
-            child = start(self._workdir, self.source, tier=self.tier, limits=limits)
+            child = self._nursery.take(self._wanted_tier, self._limits)
         except SandboxError as error:
             self.fault = f"the sandbox failed: {error}"
             raise Fault(self.fault) from error
         self.tier = child.tier
+        try:
+            child.furnish(self._workdir, self.source)
+        except ControllerFault:
+            child.close()
+            raise
         return child

@@ -1,27 +1,37 @@
 """The judge's process: pytest over a suite, away from the caller and hermetic.
 
-Run as `python -m tdac_agent.judging REQUEST.json`; the controller's code never runs
-here, only in the sandboxed children that the judge starts.
+Run by `tdac_agent.warm` as `python -m tdac_agent.judging`; the controller's code never
+runs here, only in the sandboxed children that the judge starts.
 """
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
+import signal
 import sys
+import traceback
 from pathlib import Path
+from typing import NoReturn
 
+import cv2
+import numpy as np
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.diagnosis import diagnose
-from tdac_agent.errors import Fault
 from tdac_agent.files import write_atomic
 from tdac_agent.judge import Judge
+from tdac_agent.nursery import Nursery
 from tdac_agent.report import Episode
-from tdac_agent.sandbox import Limits
+from tdac_agent.sandbox import Limits, SandboxError, best_tier
 from tdac_agent.suite_plugin import JudgePlugin, rollout_key
 from tdac_agent.task import Profile, Task, load_task
 from tdac_agent.trajectory import Rollout
+from tdac_envs.map2d import Map2DEnv
+
+NO_JOB = 77
 
 
 class Job(BaseModel):
@@ -53,9 +63,82 @@ class Findings(BaseModel):
     fault: str | None
 
 
-def main() -> None:
-    """Runs a suite as its only argument asks, and writes the findings."""
-    job = Job.model_validate_json(Path(sys.argv[1]).read_text(encoding="utf-8"))
+def serve() -> None:
+    """Forks one worker after another until there is no further job.
+
+    For each worker, prints its process id and, when it has ended, its exit code.
+    """
+    # OpenCV's threads would not survive the fork.
+    cv2.setNumThreads(1)
+    _warm_up()
+    more = True
+    while more:
+        worker = os.fork()
+        if worker == 0:
+            work()
+        print(worker, flush=True)
+        code = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
+        more = code != NO_JOB
+        print(code, flush=True)
+
+
+def work() -> NoReturn:
+    """Starts children, waits for a job on standard input, does it and ends."""
+    os.setpgid(0, 0)
+    _end_with_parent()
+    nursery = Nursery()
+    request = _read_line(sys.stdin.fileno())
+    code = NO_JOB
+    try:
+        if request:
+            with (Path(request).parent / "output.txt").open("wb") as output:
+                os.dup2(output.fileno(), 1)
+                os.dup2(output.fileno(), 2)
+            code = 1
+            judge_job(Path(request), nursery)
+            code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        nursery.close()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _end_with_parent() -> None:
+    """Lets the kernel kill this process when the server ends (Linux)."""
+    if sys.platform == "linux":
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+
+
+def _read_line(descriptor: int) -> str:
+    """A line without its end, read without buffering: the next one is not ours."""
+    line = b""
+    while not line.endswith(b"\n"):
+        read = os.read(descriptor, 1)
+        if not read:
+            return ""
+        line += read
+    return line[:-1].decode()
+
+
+def _warm_up() -> None:
+    """Loads what is compiled, and finds the best sandbox tier."""
+    cells = np.zeros((40, 60), np.bool_)
+    env = Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
+    env.reset(seed=0)
+    env.step(np.zeros(2, np.float32))
+    env.nominal.path_from(env.nominal.start)
+    with contextlib.suppress(SandboxError):
+        best_tier()
+
+
+def judge_job(request: Path, nursery: Nursery) -> None:
+    """Runs a suite as asked, and writes the findings."""
+    job = Job.model_validate_json(request.read_text(encoding="utf-8"))
+    os.chdir(request.parent)
     task = load_task(job.task)
     judge = Judge(
         task,
@@ -64,8 +147,10 @@ def main() -> None:
         tier=job.tier,
         seed=job.seed,
         limits=job.limits,
+        nursery=nursery,
     )
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
+    judge.begin(jitters=not job.paper)
     try:
         pytest.main(_arguments(job), plugins=[plugin])
     finally:
@@ -145,7 +230,4 @@ def _episode(rollout: Rollout, task: Task) -> Episode:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except Fault as error:
-        sys.exit(f"fault: {error}")
+    serve()

@@ -15,6 +15,7 @@ from tdac_agent.records import Event, Recorder, Run
 from tdac_agent.report import Report
 from tdac_agent.task import Task
 from tdac_agent.verification import load_trajectories, verify
+from tdac_agent.warm import WarmJudge
 from tdac_envs.errors import TaskError
 
 
@@ -55,6 +56,7 @@ def synthesize(
     recorder = _recorder(task, out, first, second, iterations, patience, seed, on_event)
     dialogue = Dialogue(task, first, second, recorder)
     given = Candidate(start_from) if start_from is not None else None
+    judge = WarmJudge()
     try:
         for k in range(1, iterations + 1):
             candidate = given or dialogue.generate(k)
@@ -65,7 +67,9 @@ def synthesize(
                     recorder.judged(k, j, None, notes)
                     break
                 folder = recorder.candidate(k, j, source)
-                report = verify(folder / "controller.py", task, seed=seed, out=folder)
+                report = verify(
+                    folder / "controller.py", task, seed=seed, out=folder, judge=judge
+                )
                 recorder.judged(k, j, report, notes)
                 if report.passed:
                     return _deliver(recorder, task, k, source, report, folder)
@@ -80,6 +84,8 @@ def synthesize(
     except Exception as error:
         recorder.finish("fault", reason=str(error))
         raise
+    finally:
+        judge.close()
     return recorder.run
 
 

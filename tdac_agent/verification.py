@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.metadata
 import json
-import os
 import platform
-import signal
-import subprocess
-import sys
 import tempfile
 import time
 from dataclasses import asdict
 from pathlib import Path
 
-from tdac_agent.errors import ControllerFileError, Fault
+from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
 from tdac_agent.judging import Findings, Job
 from tdac_agent.report import Provenance, Report
@@ -24,15 +21,11 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.suite_plugin import OWN, SHIPPED
 from tdac_agent.task import Profile, Task, portable_task_file, write_workdir
 from tdac_agent.trajectory import Trajectory
+from tdac_agent.warm import WarmJudge
 
 SHIPPED_SUITE = Path(__file__).parent / "suites" / "map2d"
 DEADLINE_SECONDS = 900.0
 MAX_FILE_BYTES = 64 << 20
-# What of Python's own environment the judge's process keeps: where things are. The
-# rest can change a verdict; PYTHONOPTIMIZE, for one, takes away every assertion.
-KEPT_VARIABLES = frozenset(
-    ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
-)
 VERSIONED = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
 
 
@@ -47,6 +40,7 @@ def verify(
     seed: int = 0,
     limits: Limits | None = None,
     out: Path | None = None,
+    judge: WarmJudge | None = None,
 ) -> Report:
     """Tests a controller in the sandbox against everything the task asks for.
 
@@ -61,6 +55,7 @@ def verify(
         seed: Of the jittered starts.
         limits: Of the controller's processes; `cpu_seconds` is for all of them.
         out: Folder for `report.json` and `trajectories/`; none by default.
+        judge: A warm one, for several verifications; one of its own by default.
 
     Returns:
         The report; a failing controller is a report, never an exception.
@@ -89,7 +84,9 @@ def verify(
             out=folder / "results",
         )
         _prepare(job, task, source, suites)
-        output = _run_judge(job, folder)
+        with contextlib.ExitStack() as stack:
+            warm = judge or stack.enter_context(WarmJudge())
+            output = _run_judge(job, folder, warm)
         findings = read_findings(job.out, output)
         tests, failures = read_outcomes(job.out / "report.jsonl", findings)
         report = Report(
@@ -162,36 +159,13 @@ def _suite_folder(path: Path) -> Path:
     return path.resolve()
 
 
-def _run_judge(job: Job, folder: Path) -> str:
-    """Runs the judge's process to its end; returns what it printed."""
+def _run_judge(job: Job, folder: Path, judge: WarmJudge) -> str:
+    """Has the job done; returns what was printed meanwhile."""
     request = folder / "job.json"
     request.write_text(job.model_dump_json(), encoding="utf-8")
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if not name.startswith(("PYTHON", "PYTEST")) or name in KEPT_VARIABLES
-    }
-    environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    process = subprocess.Popen(
-        [sys.executable, "-P", "-m", "tdac_agent.judging", str(request)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        env=environment,
-        cwd=folder,
-        start_new_session=True,
-    )
-    try:
-        output, _ = process.communicate(timeout=DEADLINE_SECONDS)
-    except BaseException as error:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        if isinstance(error, subprocess.TimeoutExpired):
-            raise Fault(
-                f"the judge did not end within {DEADLINE_SECONDS:g} s"
-            ) from error
-        raise
-    return output.decode("utf-8", "replace").replace(f"{folder}/", "")
+    judge.run(request, DEADLINE_SECONDS)
+    output = (folder / "output.txt").read_bytes().decode("utf-8", "replace")
+    return output.replace(f"{folder}/", "")
 
 
 def _provenance(

@@ -15,6 +15,7 @@ from tdac_agent.files import write_atomic
 from tdac_agent.report import Report
 from tdac_agent.task import Profile, Task, load_task
 from tdac_agent.verification import verify
+from tdac_agent.warm import WarmJudge
 
 
 def run(
@@ -29,9 +30,11 @@ def run(
     as_json: bool,
 ) -> int:
     """Verifies and prints; returns the exit code."""
-    file, task = controller_and_task(controller, flags)
     console = Console(stderr=as_json)
-    with console.status(f"verifying {file.name} on {task.name} …"):
+    # The judge warms up while the map is preprocessed.
+    with WarmJudge() as judge, console.status("preparing the task …") as status:
+        file, task = controller_and_task(controller, flags)
+        status.update(f"verifying {file.name} on {task.name} …")
         report = verify(
             file,
             task,
@@ -40,6 +43,7 @@ def run(
             suite=suite,
             tier=tier,
             seed=seed,
+            judge=judge,
         )
     if junit is not None:
         write_junit(report, junit)

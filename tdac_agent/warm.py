@@ -1,0 +1,120 @@
+"""Judges that are warm before there is anything to judge.
+
+Importing what a judge needs takes about a second, and each sandboxed child a tenth. A
+server process does the importing once; for each verification it forks a worker, which
+starts its children and then waits for its job. A worker does one job and ends, so that
+nothing of a verification is left for the next one.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+
+from tdac_agent.errors import Fault
+
+# What of Python's own environment the judge's process keeps: where things are. The
+# rest can change a verdict; PYTHONOPTIMIZE, for one, takes away every assertion.
+KEPT_VARIABLES = frozenset(
+    ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
+)
+START_SECONDS = 120.0
+FAREWELL_SECONDS = 5.0
+
+
+class WarmJudge:
+    """Does jobs, each in a process of its own that was started ahead of it.
+
+    Making one returns at once: it warms up while the caller goes on. A context manager.
+    """
+
+    def __init__(self) -> None:
+        environment = {
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith(("PYTHON", "PYTEST")) or name in KEPT_VARIABLES
+        }
+        environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+        # A worker that is killed leaves the folders of its children here.
+        self._folder = tempfile.TemporaryDirectory(
+            prefix="tdac-judge-", ignore_cleanup_errors=True
+        )
+        environment["TMPDIR"] = self._folder.name
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
+        self._server = subprocess.Popen(
+            [sys.executable, "-P", "-m", "tdac_agent.judging"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            env=environment,
+            cwd=self._folder.name,
+            start_new_session=True,
+        )
+
+    def run(self, request: Path, seconds: float) -> None:
+        """Does one job; returns when its process has ended, however it ended.
+
+        Args:
+            request: File that holds the job.
+            seconds: Wall time it may take.
+
+        Raises:
+            Fault: The judge did not start, or the job took too long.
+        """
+        worker = int(self._line(START_SECONDS))
+        assert self._server.stdin is not None
+        self._server.stdin.write(f"{request}\n".encode())
+        self._server.stdin.flush()
+        try:
+            self._line(seconds)
+        except BaseException:
+            # A worker leads a process group; its children end with it.
+            os.killpg(worker, signal.SIGKILL)
+            self._line(FAREWELL_SECONDS)
+            raise
+
+    def close(self) -> None:
+        """Ends the server; its worker ends with it, and the children with that."""
+        self._server.kill()
+        self._server.communicate()
+        self._log.close()
+        self._folder.cleanup()
+
+    def __enter__(self) -> WarmJudge:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _line(self, seconds: float) -> bytes:
+        """The server's next line, without its end."""
+        assert self._server.stdout is not None
+        stream, deadline = self._server.stdout.fileno(), time.monotonic() + seconds
+        line = b""
+        while not line.endswith(b"\n"):
+            left = max(deadline - time.monotonic(), 0.0)
+            if not select.select([stream], [], [], left)[0]:
+                raise Fault(f"the judge did not answer within {seconds:g} s")
+            read = os.read(stream, 1)
+            if not read:
+                raise Fault(f"the judge ended: {self._last_words()}")
+            line += read
+        return line[:-1]
+
+    def _last_words(self) -> str:
+        self._log.seek(0)
+        text = self._log.read().decode("utf-8", "replace")
+        kept = [line.strip() for line in text.splitlines() if line.strip()][-4:]
+        return " | ".join(kept) or "no output"
