@@ -18,7 +18,15 @@ from tdac_envs.plan import (
 )
 
 MOVINGAI = Path(__file__).parents[3] / "shared/data/maps/movingai"
-SCENARIOS = sorted(MOVINGAI.glob("*.scen"))
+
+
+def has_one_ground(scenario):
+    """Water and swamp have rules of their own: water may be swum in, for one."""
+    rows = scenario.with_suffix("").read_text().splitlines()[4:]
+    return not set("WS") & set("".join(rows))
+
+
+SCENARIOS = sorted(filter(has_one_ground, MOVINGAI.glob("*.scen")))
 
 
 def random_free(seed, density, shape=(15, 18)):
