@@ -29,6 +29,9 @@ from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage, luminance
 from tdac_envs.scene import Reading, Scene, decide_light_free, touches, unknown_of
 
+SLIVER = 6.0
+"""Widest strip along the outside of a plan that belongs to it, px."""
+
 
 def readings(scene: Scene) -> Iterator[Reading]:
     """Readings of the likelier polarity, the plainest first.
@@ -94,7 +97,17 @@ def _walled_in(reading: Reading, beyond: BoolGrid) -> Reading:
     if reading.polarity == "mixed" or not (beyond & ~reading.cells).any():
         return reading
     note = f"{reading.method}, outside of the plan closed"
-    return replace(reading, cells=reading.cells | beyond, method=note)
+    cells = reading.cells | beyond
+    return replace(reading, cells=cells | _slivers(cells, beyond), method=note)
+
+
+def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
+    """Free pieces that cling to the outside: blurred edges, gaps within letters."""
+    count, labels = cv2.connectedComponents((~cells).astype(np.uint8), connectivity=4)
+    apart = cv2.distanceTransform((~beyond).astype(np.uint8), cv2.DIST_L2, 3) > SLIVER
+    deep = np.bincount(labels[apart], minlength=count) > 0
+    deep[0] = True
+    return np.asarray(~deep[labels])
 
 
 def plain_reading(scene: Scene, light_free: bool) -> Reading:
