@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import cv2
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -198,6 +199,8 @@ def _resolve(name: str, spec: TaskFile, base: Path) -> Task:
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
+    if not cv2.haveImageReader(str(robot_image)):
+        raise TaskError(f"the robot image {str(robot_image)!r} is not a PNG or JPEG")
     suite = None if spec.suite is None else base / spec.suite
     name = spec.name or name
     return Task(name, spec, params, nominal, prepared.image, robot_image, suite)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from tdac_agent.sandbox import TIERS
 from tdac_agent.task import RobotSpec, Task, TaskFile, load_task
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
@@ -42,6 +44,7 @@ class TaskFlags:
         Raises:
             TaskError: They contradict each other, or the task cannot be used.
         """
+        check_finite(start=self.start, goal=self.goal)
         if self.task is not None:
             self._refuse_with_task()
             return load_task(self.task)
@@ -81,6 +84,29 @@ class TaskFlags:
                 "instructions": _text(self.instructions),
             }
         )
+
+
+def check_tier(name: str) -> None:
+    """Refuses the name of a sandbox tier that does not exist.
+
+    Raises:
+        TaskError: It is none.
+    """
+    names = ("auto", *(tier.name for tier in TIERS))
+    if name not in names:
+        known = ", ".join(names)
+        raise TaskError(f"unknown sandbox tier {name!r}; expected one of {known}")
+
+
+def check_finite(**points: Point | None) -> None:
+    """Refuses `nan` and `inf`, which count as numbers on the command line.
+
+    Raises:
+        TaskError: A point has such a coordinate.
+    """
+    for name, point in points.items():
+        if point is not None and not all(map(math.isfinite, point)):
+            raise TaskError(f"expected --{name} as two finite numbers, got {point}")
 
 
 def in_pixels(

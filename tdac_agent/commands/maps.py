@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from tdac_agent.commands.flags import in_pixels
+from tdac_agent.commands.flags import check_finite, in_pixels
 from tdac_envs.errors import TaskError
 from tdac_envs.image import load_image
 from tdac_envs.map_folder import write_map
@@ -37,6 +37,7 @@ def run(
     """Preprocesses, writes the map folder and prints the best candidates."""
     if (start is None) != (goal is None):
         raise TaskError("give both --start X Y and --goal X Y, or neither")
+    check_finite(start=start, goal=goal)
     path = Path(image)
     if image in bundled_maps():
         bundled = bundled_map(image)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.commands.flags import TaskFlags
+from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.verify import controller_and_task
 from tdac_agent.judge import Judge
 from tdac_agent.task import Task, write_workdir
@@ -30,6 +30,7 @@ def run(
     controller: str, flags: TaskFlags, video: Path | None, seed: int, tier: str
 ) -> int:
     """Plays one episode; returns 0 if the goal was reached."""
+    check_tier(tier)
     if video is None and not has_display():
         raise TaskError("there is no display here: give --video FILE.mp4 (or .gif)")
     if video is not None and video.suffix not in SUFFIXES:

@@ -17,14 +17,21 @@ from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.records import Run
 from tdac_agent.synthesis import synthesize
+from tdac_agent.task import Task
 from tdac_agent.verification import read_source
 
 
 class Progress:
-    """Turns journal records into lines: what is going on, and what came of it."""
+    """Turns journal records into lines: what is going on, and what came of it.
 
-    def __init__(self, console: Console) -> None:
+    Args:
+        console: Where to.
+        heading: Line to print when the run begins.
+    """
+
+    def __init__(self, console: Console, heading: str) -> None:
         self._console = console
+        self._heading = heading
         self._spinner = Spinner("dots", text="preparing")
 
     def __enter__(self) -> Progress:
@@ -44,7 +51,9 @@ class Progress:
         """Shows one record."""
         kind = record["event"]
         at = f"k={record.get('k')} j={record.get('j')}"
-        if kind == "call.intent":
+        if kind == "run.start":
+            self._console.print(self._heading)
+        elif kind == "call.intent":
             verb = {"generate": "writing", "edit": "editing"}.get(
                 record["kind"], "writing rules from the failures of"
             )
@@ -88,14 +97,8 @@ def run(
     with console.status("preprocessing the map …"):
         task = flags.load()
     folder = out if out is not None else _next_folder(task.name)
-    nominal = task.nominal
-    console.print(
-        f"task [bold]{escape(task.name)}[/]: {nominal.shortest:.0f} px for a disc of "
-        f"{nominal.robot.radius:g} px, at most {nominal.horizon} steps; learner "
-        f"[bold]{escape(learner)}[/]" + _no_model(learner)
-    )
     try:
-        with Progress(console) as progress:
+        with Progress(console, _heading(task, learner)) as progress:
             result = synthesize(
                 task,
                 learner,
@@ -131,8 +134,14 @@ def read_text(path: Path) -> str:
         ) from error
 
 
-def _no_model(learner: str) -> str:
-    return " (a tuned template, no language model)" if learner == "builtin" else ""
+def _heading(task: Task, learner: str) -> str:
+    nominal = task.nominal
+    model = " (a tuned template, no language model)" if learner == "builtin" else ""
+    return (
+        f"task [bold]{escape(task.name)}[/]: {nominal.shortest:.0f} px for a disc of "
+        f"{nominal.robot.radius:g} px, at most {nominal.horizon} steps; learner "
+        f"[bold]{escape(learner)}[/]{model}"
+    )
 
 
 def _next_folder(name: str) -> Path:

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 from rich.console import Console
 
-from tdac_agent.commands.flags import TaskFlags
+from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.report_view import show_report
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
@@ -30,6 +30,7 @@ def run(
     as_json: bool,
 ) -> int:
     """Verifies and prints; returns the exit code."""
+    check_tier(tier)
     console = Console(stderr=as_json)
     # The judge warms up while the map is preprocessed.
     with WarmJudge() as judge, console.status("preparing the task …") as status:

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -319,8 +318,9 @@ def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     limits = Limits(cpu_seconds=2)
     report = verify(source, small_task, profile="policy", limits=limits)
     assert not report.passed
-    assert report.child_cpu_seconds < 5
-    assert "used 2 s of CPU time" in "\n".join(f.message for f in report.failures)
+    assert report.child_cpu_seconds < 8
+    errors = [episode.error or "" for episode in report.episodes]
+    assert any("used 2 s of CPU time" in error for error in errors), errors
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -337,14 +337,13 @@ def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
         env={**os.environ, "TMPDIR": str(no_traces)},
     )
     deadline = time.monotonic() + 60
-    while not list(no_traces.glob("tdac-child-*")) and time.monotonic() < deadline:
+    running = "*/tdac-child-*/work/controller.py"
+    while not list(no_traces.glob(running)) and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(number)
     _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130
     assert stderr.decode().strip().splitlines()[-1] == "interrupted"
-    for folder in no_traces.glob("tdac-child-*"):
-        shutil.rmtree(folder)
 
 
 def test_the_report_is_json(small_task):

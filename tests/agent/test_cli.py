@@ -1,0 +1,387 @@
+"""The command line: exit codes, one clear line for each mistake, clean JSON."""
+
+import json
+import re
+import signal
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import cv2
+import numpy as np
+import pytest
+from conftest import small_cells, write_small_task
+
+from tdac_agent.cli import main
+
+COMMANDS = ["map", "synth", "verify", "play", "doctor"]
+ENDS = ["--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6"]
+
+
+@pytest.fixture
+def tdac(monkeypatch, capsys, tmp_path):
+    """Runs a command in an empty folder; gives exit code, stdout and stderr."""
+    place = tmp_path / "here"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    monkeypatch.setenv("COLUMNS", "200")
+    handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
+
+    def run(*words):
+        monkeypatch.setattr("sys.argv", ["tdac", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return (ended.value.code, *capsys.readouterr())
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def image(tmp_path):
+    """The small map as an image file."""
+    path = tmp_path / "plan.png"
+    cv2.imwrite(str(path), np.where(small_cells(), 0, 255).astype(np.uint8))
+    return path
+
+
+@pytest.fixture
+def good(tmp_path, good_source):
+    """A folder with the small task and a controller that solves it."""
+    folder = write_small_task(tmp_path / "task")
+    (folder / "controller.py").write_text(good_source)
+    return folder
+
+
+def black_png(width, height):
+    """A 1-bit PNG, small as a file whatever its size."""
+
+    def chunk(kind, body):
+        tail = struct.pack(">I", zlib.crc32(kind + body))
+        return struct.pack(">I", len(body)) + kind + body + tail
+
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0))
+    rows = zlib.compress(bytes(height * (1 + (width + 7) // 8)))
+    return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_has_an_example(tdac, command):
+    """`--help` of each command shows how it is called."""
+    code, out, _ = tdac(command, "--help")
+    assert code == 0
+    assert re.search(rf"Examples?: .*tdac {command}", re.sub(r"\s+", " ", out))
+
+
+def test_help_and_version(tdac):
+    """Without a command the help; `--version` in one line."""
+    code, out, _ = tdac("--help")
+    assert code == 0
+    assert all(command in out for command in COMMANDS)
+    code, out, _ = tdac("--version")
+    assert code == 0
+    assert re.fullmatch(r"tdac \d+\.\d+\.\d+\n", out)
+
+
+def test_the_help_is_quick():
+    """It imports nothing that only the commands need."""
+    code = (
+        "import sys; sys.argv = ['tdac', '--help']\n"
+        "from tdac_agent.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'cv2', 'numba', 'scipy', 'gymnasium', 'pydantic', 'pytest',"
+        " 'pandas', 'matplotlib', 'anthropic', 'openai', 'torch', 'pygame', 'yaml'}\n"
+        "print('HEAVY', sorted(heavy & set(sys.modules)))\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert process.stdout.splitlines()[-1] == "HEAVY []"
+
+
+def is_one_clear_line(code, out, err, place):
+    """Exit 2, nothing on stdout, one line on stderr, nothing written."""
+    assert code == 2, err
+    assert out == ""
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    assert "/tmp/tdac" not in err
+    assert [path.name for path in Path(place).iterdir()] == []
+    return True
+
+
+# A file's content, made by a function of its path, and what the message says.
+IMAGES = {
+    "missing": (lambda path: None, "no such file"),
+    "not an image": (lambda path: path.write_text("hello"), "image"),
+    "a folder": (lambda path: path.mkdir(), ""),
+    "empty": (lambda path: path.write_bytes(b""), ""),
+    "1 x 1": (lambda path: cv2.imwrite(str(path), np.zeros((1, 1), np.uint8)), "1 x 1"),
+    "all black": (
+        lambda path: cv2.imwrite(str(path), np.zeros((120, 160), np.uint8)),
+        "",
+    ),
+    "100 megapixels": (
+        lambda path: path.write_bytes(black_png(10_000, 10_000)),
+        "10000 x 10000",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", IMAGES)
+@pytest.mark.parametrize("command", ["map", "synth"])
+def test_images_that_cannot_be_used(tdac, tmp_path, command, name):
+    """Each is refused with its reason."""
+    path = tmp_path / "bad.png"
+    make, reason = IMAGES[name]
+    make(path)
+    words = ["map", path] if command == "map" else ["synth", "--map", path]
+    code, out, err = tdac(*words, *ENDS)
+    assert is_one_clear_line(code, out, err, Path.cwd())
+    assert reason in err
+
+
+# Flags after `--map plan.png`, and what the message says.
+PLACES = {
+    "start outside": (["--start", 900, 30, "--goal", 130, 30], r"start \(900, 30\)"),
+    "start in a wall": (["--start", 73, 30, "--goal", 130, 30], r"start \(73, 30\)"),
+    "start near a wall": (["--start", 65, 30, "--goal", 130, 30], r"start \(65, 30\)"),
+    "goal in a wall": (["--start", 30, 30, "--goal", 73, 30], r"goal \(73, 30\)"),
+    "start at the goal": (
+        ["--start", 30, 30, "--goal", 30, 30],
+        "same pixel|already at the goal",
+    ),
+    "start without goal": (["--start", 30, 30], "--goal"),
+    "goal without start": (["--goal", 30, 30], "--start"),
+    "neither": ([], "--start X Y and --goal X Y"),
+    "not a number": (["--start", "nan", 30, "--goal", 130, 30], "start"),
+    "infinite": (["--start", 30, 30, "--goal", "inf", 30], "goal"),
+    "metres": (["--metres", *ENDS], "resolution"),
+    "word for a number": (["--start", "a", 30], "valid (number|float)"),
+    "huge body": (
+        ["--start", 30, 30, "--goal", 130, 30, "--robot-radius", 60],
+        "60 px",
+    ),
+    "too wide a body": (
+        ["--start", 30, 40, "--goal", 120, 40, "--robot-radius", 25],
+        "body of 25 px",
+    ),
+    "heading": ([*ENDS, "--heading", "nan"], "nan"),
+    "robot image": ([*ENDS, "--robot-image", "no.png"], "no robot image 'no.png'"),
+    "bad robot image": ([*ENDS, "--robot-image", __file__], "robot image"),
+    "unknown learner": ([*ENDS, "--learner", "gpt"], "unknown learner 'gpt'"),
+    "unknown optimizer": ([*ENDS, "--optimizer", "gpt"], "unknown learner 'gpt'"),
+    "from a missing file": ([*ENDS, "--from", "no.py"], "'no.py'"),
+    "no iterations": ([*ENDS, "-K", 0], "-K"),
+    "instructions": ([*ENDS, "--task", "maze"], "--task already says it all"),
+}
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_tasks_that_cannot_be_used(tdac, image, name):
+    """Each is refused with its reason and the values that are wrong."""
+    words, reason = PLACES[name]
+    if name == "too wide a body":
+        reason = "25 px"
+    radius = [] if "--robot-radius" in words else ["--robot-radius", 6]
+    code, out, err = tdac("synth", "--map", image, *radius, *words)
+    assert is_one_clear_line(code, out, err, Path.cwd())
+    assert re.search(reason, err), err
+
+
+def test_an_unreachable_goal(tdac, image):
+    """A closed wall is named as what it is."""
+    cells = small_cells()
+    cells[:, 70:76] = True
+    cv2.imwrite(str(image), np.where(cells, 0, 255).astype(np.uint8))
+    code, out, err = tdac("synth", "--map", image, *ENDS)
+    assert is_one_clear_line(code, out, err, Path.cwd())
+    assert re.search("path|room|connect|reach", err), err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["map", "IMAGE", "--start", "nan", "30", "--goal", "130", "30"],
+        ["map", "IMAGE", "--start", "30", "30"],
+        ["map", "IMAGE", "--metres", *ENDS],
+        ["map", "IMAGE", "--out", "FILE/x", *ENDS],
+        ["synth", "--map", "IMAGE", "--out", "FILE/x", *ENDS],
+        ["synth", "--map", "IMAGE", "--out", "FULL", *ENDS],
+        ["synth", "--task", "nosuch"],
+        ["synth", "--map", "nosuch"],
+        ["synth", "--task", "FILE"],
+        ["verify", "no.py"],
+        ["verify", "FULL"],
+        ["verify", "FILE", "--task", "nosuch"],
+        ["verify", "FILE", "--task", "maze", "--suite", "no"],
+        ["verify", "FILE", "--task", "maze", "--profile", "x"],
+        ["play", "FILE", "--task", "maze", "--video", "a.avi"],
+        ["play", "FILE", "--task", "maze", "--video", "a"],
+        ["play", "no.py", "--video", "a.mp4"],
+        ["play", "FILE", "--video", "a.mp4", "--tier", "nosuch"],
+        ["verify", "FILE", "--tier", "nosuch"],
+        ["play", "FILE", "--task", "maze"],
+        ["nosuch"],
+        ["verify"],
+        ["synth", "--nosuch"],
+    ],
+    ids=" ".join,
+)
+def test_wrong_words(tdac, image, tmp_path, monkeypatch, words):
+    """Files, folders, names and flags that cannot be used."""
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    file, full = tmp_path / "file.py", tmp_path / "full"
+    file.write_text("x = 1\n")
+    full.mkdir()
+    (full / "mine.txt").write_text("keep")
+    names = {"IMAGE": image, "FILE": file, "FILE/x": file / "x", "FULL": full}
+    code, out, err = tdac(*[names.get(word, word) for word in words])
+    assert is_one_clear_line(code, out, err, Path.cwd())
+    assert [path.name for path in full.iterdir()] == ["mine.txt"]
+    assert file.read_text() == "x = 1\n"
+
+
+YAML = {
+    "broken": "map: [",
+    "no mapping": "- 1\n- 2\n",
+    "unknown key": "map: map.npy\nspeed: 3\n",
+    "unknown key in robot": "map: map.npy\nrobot: {size: 3}\n",
+    "wrong type": "map: map.npy\nstart: here\n",
+    "one number": "map: map.npy\nstart: [1]\n",
+    "negative radius": "map: map.npy\nrobot: {radius: -1}\n",
+    "not a number": "map: map.npy\nstart: [.nan, 1]\n",
+    "another schema": "schema: 2\nmap: map.npy\n",
+    "another environment": "env: TDAC-Map3D-v0\n",
+    "no map": "map: other.png\nstart: [1, 1]\ngoal: [2, 2]\n",
+    "robot image": (
+        "map: map.npy\nstart: [30, 30]\ngoal: [130, 30]\n"
+        "robot: {radius: 6, image: no.png}\n"
+    ),
+    "binary": "\x00\x01",
+}
+
+
+@pytest.mark.parametrize("name", YAML)
+def test_task_files_that_cannot_be_used(tdac, good, name):
+    """The message names the file, and the key where there is one."""
+    (good / "task.yaml").write_text(YAML[name])
+    code, out, err = tdac("verify", good)
+    assert is_one_clear_line(code, out, err, Path.cwd())
+    if "unknown key" in name:
+        assert "speed" in err or "robot.size" in err
+        assert "not" in err
+
+
+def test_verify_says_yes_and_no(tdac, good):
+    """Exit 0 for a verified controller, 1 for another; a table for people."""
+    code, out, _ = tdac("verify", good, "--profile", "policy", "--paper")
+    assert code == 0
+    assert "verified: 16 of 16 tests passed" in out
+    (good / "controller.py").write_text("def policy(obs):\n    return 1, 1\n")
+    code, out, _ = tdac("verify", good / "controller.py", "--profile", "policy")
+    assert code == 1
+    assert "not verified" in out
+    assert "collision in step" in out
+
+
+def test_verify_as_json_and_junit(tdac, good, tmp_path):
+    """JSON is all that stdout holds; the JUnit file has a case for each test."""
+    (good / "controller.py").write_text("def policy(obs):\n    return '\\x00<&'\n")
+    junit = tmp_path / "junit.xml"
+    code, out, _ = tdac(
+        "verify", good, "--profile", "policy", "--paper", "--json", "--junit", junit
+    )
+    assert code == 1
+    report = json.loads(out)
+    assert report["verdict"]["passed"] is False
+    root = ElementTree.fromstring(junit.read_bytes())
+    assert root.tag == "testsuite"
+    assert int(root.get("tests")) == report["verdict"]["expected"] == len(root)
+    assert int(root.get("failures")) == len(root.findall("testcase/failure"))
+
+
+def test_a_junit_file_that_cannot_be_written(tdac, good):
+    """One clear line."""
+    bad = good / "controller.py" / "x.xml"
+    code, _, err = tdac("verify", good, "--profile", "policy", "--junit", bad)
+    assert code == 2
+    assert err.splitlines()[-1].startswith("error: cannot write")
+
+
+def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
+    """Neither yes nor no."""
+    (tmp_path / "test_mine.py").write_text("import nosuchmodule\n")
+    code, _, err = tdac("verify", good, "--profile", "policy", "--suite", tmp_path)
+    assert code == 3
+    assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
+
+
+def test_synth_writes_a_run(tdac, good):
+    """Exit 0, a run folder; with --json the record alone on stdout."""
+    (good / "controller.py").unlink()
+    code, out, _ = tdac("synth", "--task", good, "--out", "a", "--json")
+    assert code == 0
+    run = json.loads(out)
+    assert run["status"] == "verified"
+    assert Path("a/controller.py").is_file()
+
+
+def test_synth_says_no(tdac, tmp_path):
+    """Exit 1 where nothing was verified in K iterations."""
+    folder = write_small_task(tmp_path / "task", suite="mine", profile="policy")
+    (folder / "mine").mkdir()
+    (folder / "mine" / "test_no.py").write_text("def test_no():\n    assert 0, 'no'\n")
+    code, out, _ = tdac("synth", "--task", folder, "-K", 1, "-J", 0)
+    assert code == 1
+    assert "not verified after 1 iterations" in out
+    assert Path("runs/small-1/run.json").is_file()
+
+
+def test_map_prints_json(tdac, image):
+    """The parameters, all candidates and the files that were written."""
+    code, out, _ = tdac("map", image, *ENDS, "--json")
+    assert code == 0
+    record = json.loads(out)
+    assert record["params"]["start"] == [30, 30]
+    assert all(Path(file).is_file() for file in record["files"])
+
+
+def test_map_without_places(tdac, image):
+    """A preview with rulers, and what to do next."""
+    code, out, _ = tdac("map", image)
+    assert code == 0
+    assert "then give --start X Y --goal X Y" in out
+    assert Path("plan-map/preview.png").is_file()
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "gif"])
+def test_play_writes_a_film(tdac, good, suffix):
+    """Exit 0 where the goal was reached."""
+    code, out, _ = tdac("play", good, "--video", f"a.{suffix}")
+    assert code == 0
+    assert "reached after" in out
+    assert Path(f"a.{suffix}").stat().st_size > 1000
+
+
+def test_play_says_what_went_wrong(tdac, good):
+    """Exit 1 and the reason where the controller fails."""
+    (good / "controller.py").write_text("import nosuchmodule\n")
+    code, out, _ = tdac("play", good, "--video", "a.gif")
+    assert code == 1
+    assert "ModuleNotFoundError at import" in out
+
+
+def test_doctor(tdac):
+    """Exit 0 where controllers can be run; as JSON, too."""
+    code, out, _ = tdac("doctor", "--json")
+    assert code == 0
+    record = json.loads(out)
+    assert any(c["name"] == "sandbox in use" and c["works"] for c in record["checks"])
+    assert "numpy" in record["versions"]

@@ -1,0 +1,118 @@
+"""The record of a run: there before and after each call, readable at any time."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tdac_agent.errors import RunError
+from tdac_agent.files import append_line, write_atomic
+from tdac_agent.provider import Reply
+from tdac_agent.records import load_run
+from tdac_agent.synthesis import synthesize
+
+
+def journal(folder):
+    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
+
+
+def test_each_call_is_on_record_before_and_after(small_task, good_source, tmp_path):
+    """While a model thinks, the question is on the disk; then the answer is, too."""
+    out = tmp_path / "run"
+    seen = []
+
+    class Watcher:
+        name = "watcher"
+
+        def complete(self, request):
+            prompt = out / "iterations" / "k01" / "j0" / "generate.prompt.md"
+            assert prompt.read_text() == request.prompt
+            seen.append(journal(out)[-1]["event"])
+            assert load_run(out).status == "running"
+            return Reply(f"```python\n{good_source}```")
+
+    events = []
+    synthesize(small_task, Watcher(), out=out, on_event=events.append)
+    assert seen == ["call.intent"]
+    assert events == journal(out)
+    names = [event["event"] for event in events]
+    assert names == [
+        *("run.start", "call.intent", "call.reply"),
+        *("verify.start", "verify.end", "run.end"),
+    ]
+    seconds = [event["seconds"] for event in events]
+    assert seconds == sorted(seconds)
+
+
+def test_writing_is_atomic(tmp_path, monkeypatch):
+    """A file is replaced as a whole, and a failure leaves the old one and no other."""
+    path = tmp_path / "a.json"
+    write_atomic(path, "old")
+    with pytest.raises(TypeError):
+        write_atomic(path, 3)
+    full = os.fsync
+
+    def no_space(handle):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", no_space)
+    with pytest.raises(OSError, match="No space"):
+        write_atomic(path, "new")
+    monkeypatch.setattr("os.fsync", full)
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_lines_are_on_the_disk_at_once(tmp_path, monkeypatch):
+    """Every appended line is forced out before the program goes on."""
+    synced = []
+    full = os.fsync
+    monkeypatch.setattr("os.fsync", lambda handle: synced.append(full(handle)))
+    for n in range(3):
+        append_line(tmp_path / "j", {"n": n})
+    assert len(synced) == 3
+    lines = (tmp_path / "j").read_text().splitlines()
+    assert [json.loads(line)["n"] for line in lines] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    "content", [None, "", "{", "[]", "{}", '{"schema_version": 2}', '"text"']
+)
+def test_what_is_no_run(tmp_path, content):
+    """A missing, torn or foreign run.json is one clear line."""
+    if content is not None:
+        (tmp_path / "run.json").write_text(content)
+    with pytest.raises(RunError, match="is not a run folder") as caught:
+        load_run(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def under_way(path):
+    return path.exists() and '"verify.start"' in path.read_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_synth_leaves_a_readable_run(tmp_path, no_traces, number):
+    """Exit 130, status `interrupted`, nothing left running."""
+    out = tmp_path / "run"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tdac_agent.cli", "synth", "--out", str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "TMPDIR": str(no_traces)},
+    )
+    deadline = time.monotonic() + 60
+    while not under_way(out / "journal.jsonl") and time.monotonic() < deadline:
+        time.sleep(0.02)
+        assert process.poll() is None
+    process.send_signal(number)
+    stdout, stderr = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert b"Traceback" not in stdout + stderr
+    run = load_run(out)
+    assert run.status == "interrupted"
+    assert journal(out)[-1]["status"] == "interrupted"

@@ -1,0 +1,251 @@
+"""Algorithm 2 with scripted models: what is asked, what is kept, how it ends."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+from conftest import write_small_task
+
+from tdac_agent.errors import Fault, RunError
+from tdac_agent.provider import ProviderFault, Reply
+from tdac_agent.records import load_run
+from tdac_agent.synthesis import synthesize
+from tdac_agent.task import load_task
+from tdac_agent.verification import verify
+from tdac_envs.errors import TaskError
+
+NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
+
+
+def code(source):
+    return Reply(f"Here it is:\n```python\n{source}```\n", tokens_in=10, tokens_out=5)
+
+
+class Script:
+    """A provider that gives prepared answers and remembers what it was asked."""
+
+    name = "script"
+
+    def __init__(self, *answers):
+        self.answers = list(answers)
+        self.requests = []
+
+    def complete(self, request):
+        self.requests.append(request)
+        answer = self.answers.pop(0)
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer
+
+    def asked(self):
+        return [(r.kind, *r.sample[1:]) for r in self.requests]
+
+
+@pytest.fixture
+def policy_task(tmp_path):
+    """The small task in the profile `policy`."""
+    return load_task(write_small_task(tmp_path / "task", profile="policy"))
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "run"
+
+
+def journal(folder):
+    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
+
+
+RULES = Reply("- Drive towards the goal.\n- Do not stand still.\n", tokens_in=7)
+
+
+def test_it_passes_after_rules_and_an_edit(policy_task, good_source, out):
+    """Two failures, rules, a failure, an edit that passes: k = 2, j = 1."""
+    learner = Script(code(NOTHING), code(NOTHING + "\nX = 2\n"))
+    optimizer = Script(code(NOTHING + "\nX = 1\n"), RULES, code(good_source))
+    run = synthesize(policy_task, learner, optimizer, out=out)
+    assert run.verified
+    assert run.tau == 2
+    assert learner.asked() == [("generate", 1, 0), ("generate", 2, 0)]
+    assert optimizer.asked() == [("edit", 1, 1), ("summarise", 1, 1), ("edit", 2, 1)]
+    attempts = [(a.k, a.j, a.valid, a.passed) for a in run.attempts]
+    assert attempts == [
+        *[(1, 0, True, False), (1, 1, True, False)],
+        *[(2, 0, True, False), (2, 1, True, True)],
+    ]
+    assert "Drive towards" not in learner.requests[0].prompt
+    rules = ("Drive towards the goal.", "Do not stand still.")
+    for later in (learner.requests[1], optimizer.requests[2]):
+        assert later.rules == rules
+        assert all(f"- {rule}" in later.prompt for rule in rules)
+    assert optimizer.requests[0].controller == NOTHING
+    assert "no motion" in optimizer.requests[0].prompt
+    assert run.tokens_in == 10 * 4 + 7
+    check_folder(out, good_source)
+
+
+def check_folder(folder, source):
+    """The folder is complete: evidence, working files, and every step on record."""
+    assert (folder / "controller.py").read_text() == source
+    names = "task.yaml run.json journal.jsonl report.json trajectory.png params.json"
+    names += " occupancy.npy occupancy.png robot.png sensors.py"
+    for name in names.split():
+        assert (folder / name).stat().st_size > 0, name
+    assert len(list((folder / "trajectories").glob("*.npz"))) == 6
+    last = folder / "iterations" / "k02" / "j1"
+    for name in ("edit.prompt.md", "edit.reply.md", "controller.py", "report.json"):
+        assert (last / name).is_file(), name
+    assert "+X = 1" in (folder / "iterations/k01/j1/controller.diff").read_text()
+    assert load_run(folder).verified
+    events = [record["event"] for record in journal(folder)]
+    assert events[0] == "run.start"
+    assert events[-1] == "run.end"
+    rules = next(r for r in journal(folder) if r["event"] == "rules")["rules"]
+    assert rules[0]["id"] == "R1"
+    assert "test_end_to_end.py::test_progress" in rules[0]["evidence"]
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [
+        Reply("I cannot help with that.", stop="refusal"),
+        Reply(f"```python\n{NOTHING}```", stop="length"),
+        Reply("No code here."),
+        Reply("```python\ndef policy(:\n```"),
+    ],
+)
+def test_invalid_answers_are_asked_again_twice(policy_task, good_source, out, reply):
+    """Then the iteration is spent and marked invalid; each answer is kept."""
+    learner = Script(reply, reply, reply, code(good_source))
+    run = synthesize(policy_task, learner, out=out)
+    assert run.tau == 2
+    assert [(a.k, a.valid, a.passed) for a in run.attempts] == [
+        (1, False, False),
+        (2, True, True),
+    ]
+    first = out / "iterations" / "k01" / "j0"
+    replies = sorted(path.name for path in first.glob("generate.reply*"))
+    assert replies == [
+        *("generate.reply-2.md", "generate.reply-3.md", "generate.reply.md"),
+    ]
+
+
+def test_faults_use_up_no_iteration(policy_task, good_source, out):
+    """A provider that cannot be reached is asked again; the second answer counts."""
+    learner = Script(ProviderFault("503"), ProviderFault("503"), code(good_source))
+    run = synthesize(policy_task, learner, out=out, iterations=1)
+    assert run.tau == 1
+    faults = [r for r in journal(out) if r["event"] == "call.fault"]
+    assert [fault["attempt"] for fault in faults] == [1, 2]
+
+
+def test_three_faults_stop_the_run(policy_task, out):
+    """The run is neither verified nor failed, and its record says why."""
+    learner = Script(*[ProviderFault("no route to host")] * 3)
+    with pytest.raises(Fault, match="script failed 3 times: no route to host"):
+        synthesize(policy_task, learner, out=out)
+    run = load_run(out)
+    assert run.status == "fault"
+    assert run.attempts == []
+    assert "no route" in journal(out)[-1]["reason"]
+
+
+def test_it_gives_up_after_k_iterations(policy_task, out):
+    """Nothing verified: no controller.py, status `not verified`."""
+    learner = Script(code(NOTHING), RULES, code(NOTHING), RULES)
+    run = synthesize(policy_task, learner, out=out, iterations=2, patience=0)
+    assert run.status == "not verified"
+    assert run.tau is None
+    assert not run.controller.exists()
+    assert learner.asked()[-1] == ("summarise", 2, 0)
+    assert learner.requests[-1].report.verdict.failed_tests > 0
+
+
+def test_an_interrupt_leaves_a_readable_run(policy_task, out):
+    """Ctrl-C in the middle of a call."""
+    learner = Script(code(NOTHING), KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        synthesize(policy_task, learner, out=out)
+    run = load_run(out)
+    assert run.status == "interrupted"
+    assert [(a.k, a.j) for a in run.attempts] == [(1, 0)]
+    assert journal(out)[-1]["status"] == "interrupted"
+
+
+def test_a_given_controller_is_tried_first(policy_task, good_source, out):
+    """`start_from` replaces the first answer of the learner."""
+    learner = Script()
+    run = synthesize(policy_task, learner, out=out, start_from=good_source)
+    assert run.tau == 1
+    assert learner.requests == []
+
+
+@pytest.mark.parametrize("source", ["", "x = 1", "# no line end"])
+def test_a_given_controller_may_be_poor(policy_task, good_source, out, source):
+    """An empty file or one without a line end is a candidate like any other."""
+    learner = Script(code(good_source))
+    run = synthesize(policy_task, learner, out=out, start_from=source)
+    assert [a.passed for a in run.attempts] == [False, True]
+
+
+def test_builtin_needs_no_model(policy_task, out):
+    """The builtin learner verifies the small task by itself."""
+    run = synthesize(policy_task, out=out)
+    assert run.verified
+    assert run.learner == run.optimizer == "builtin"
+    assert run.tokens_in == 0
+
+
+def test_an_unknown_learner(policy_task, out):
+    """The name is refused before anything is written."""
+    with pytest.raises(TaskError, match="unknown learner 'gpt'"):
+        synthesize(policy_task, "gpt", out=out)
+    assert not out.exists()
+
+
+def test_a_folder_in_use(policy_task, out):
+    """A run never writes into a folder that holds something."""
+    out.mkdir()
+    (out / "mine.txt").write_text("keep")
+    with pytest.raises(RunError, match="is not empty"):
+        synthesize(policy_task, out=out)
+    assert [path.name for path in out.iterdir()] == ["mine.txt"]
+
+
+def test_a_run_folder_is_self_contained(tmp_path, good_source):
+    """Moved elsewhere it verifies with its own suite, and its controller runs alone."""
+    folder = write_small_task(tmp_path / "task", suite="mine")
+    (folder / "mine").mkdir()
+    test = "def test_own(rollout):\n    assert rollout('nominal').reached, 'no'\n"
+    (folder / "mine" / "test_mine.py").write_text(test)
+    out = tmp_path / "run"
+    learner = Script(code(good_source))
+    assert synthesize(load_task(folder), learner, out=out).verified
+    moved = tmp_path / "elsewhere" / "moved"
+    moved.parent.mkdir()
+    out.rename(moved)
+    shutil.rmtree(folder)
+    report = verify(moved / "controller.py", load_task(moved))
+    assert report.passed
+    assert report.tests["own/test_mine.py::test_own"] == "passed"
+    kept = json.loads((moved / "report.json").read_text())
+    assert report.provenance.model_dump() == {
+        **kept["provenance"],
+        "suite": "map2d + suite",
+        "warnings": tuple(kept["provenance"]["warnings"]),
+    }
+    hidden = {"DISPLAY", "WAYLAND_DISPLAY"}
+    process = subprocess.run(
+        [sys.executable, "controller.py"],
+        cwd=moved,
+        env={k: v for k, v in os.environ.items() if k not in hidden},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert process.returncode == 0, process.stderr
+    assert "goal reached" in process.stdout or "reached" in process.stdout
+    assert (moved / "controller.mp4").stat().st_size > 1000
