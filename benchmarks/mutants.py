@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from benchmarks.domain_mutations import DOMAIN, Source
-from tdac_agent.task import Profile
+from tdac_agent.task_file import Profile
 
 
 @dataclass(frozen=True, slots=True)

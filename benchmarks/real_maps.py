@@ -73,7 +73,7 @@ class Row:
 def verify_builtin(image: ColourImage, start: Point, goal: Point, radius: int) -> bool:
     """Whether the builtin learner's controller is verified on the map."""
     from tdac_agent import load_task, synthesize
-    from tdac_agent.task import RobotSpec, TaskFile
+    from tdac_agent.task_file import RobotSpec, TaskFile
 
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "map.png"

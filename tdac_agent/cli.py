@@ -14,6 +14,20 @@ from typing import Annotated, Any, Literal, NoReturn, Optional
 
 import typer
 
+from tdac_agent.commands.options import (
+    Goal,
+    Heading,
+    Json,
+    MapOption,
+    Metres,
+    Profile,
+    Radius,
+    Snap,
+    Start,
+    TaskOption,
+    Tier,
+)
+
 app = typer.Typer(
     name="tdac",
     no_args_is_help=True,
@@ -27,49 +41,6 @@ app = typer.Typer(
         "`controller.py`, with no key and no network."
     ),
 )
-
-Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
-TaskOption = Annotated[
-    Optional[str],  # noqa: UP045 - typer reads it at run time
-    typer.Option(
-        "--task", help="Bundled name, task.yaml, or run folder.  [default: maze]"
-    ),
-]
-MapOption = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--map", help="Map image, ROS map.yaml, MovingAI .map, or bundled."),
-]
-Start = Annotated[
-    Optional[tuple[float, float]],  # noqa: UP045
-    typer.Option("--start", metavar="X Y", help="Start, px."),
-]
-Goal = Annotated[
-    Optional[tuple[float, float]],  # noqa: UP045
-    typer.Option("--goal", metavar="X Y", help="Goal, px."),
-]
-Radius = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--robot-radius", min=0.5, help="Body radius, px.  [default: 15]"),
-]
-Heading = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--heading", help="Start heading, rad, from +x towards +y (down)."),
-]
-Snap = Annotated[
-    bool, typer.Option("--snap", help="Move start and goal to the nearest free place.")
-]
-Metres = Annotated[
-    bool,
-    typer.Option("--metres", help="Lengths are metres in the map's frame (map.yaml)."),
-]
-Tier = Annotated[
-    str,
-    typer.Option(help="Sandbox tier; see `tdac doctor`."),
-]
-Profile = Annotated[
-    Optional[Literal["policy", "paper"]],  # noqa: UP045
-    typer.Option(help="What the file must define.  [default: the task's own]"),
-]
 
 
 @app.callback(invoke_without_command=True)

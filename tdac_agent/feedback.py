@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from tdac_agent.report import Failure, Report
 
 MAX_GROUPS = 3
@@ -9,28 +11,37 @@ MAX_CHARS = 1500
 
 
 def render_feedback(report: Report) -> str:
-    """The failures, grouped by what happened; three groups in full, the rest by name.
+    """The failures, grouped by what happened.
 
-    Episodes that are held out appear with pass or fail only.
+    Three groups of each part of the suite are told in full, the rest by name. Episodes
+    that are held out appear with pass or fail only.
     """
-    groups: dict[str, list[Failure]] = {}
+    groups: dict[tuple[str, str], list[Failure]] = {}
     for failure in report.failures:
-        groups.setdefault(_cause(failure), []).append(failure)
+        groups.setdefault((failure.group, _cause(failure)), []).append(failure)
     parts = [f"{len(report.failures)} of {report.verdict.expected} tests failed."]
-    for index, members in enumerate(groups.values()):
-        names = ", ".join(failure.test for failure in members)
-        if index >= MAX_GROUPS:
-            parts.append(f"Also failed: {names}")
-            continue
-        diagnosis = members[0].diagnosis
-        lines = [f"{index + 1}. {names}"]
-        if diagnosis is None or diagnosis.cause != "held out":
-            messages = dict.fromkeys(member.message for member in members)
-            lines += [f"   {_cut(message)}" for message in list(messages)[:4]]
-        if diagnosis is not None:
-            lines.append(f"   What happened: {_cut(diagnosis.text)}")
-        parts.append("\n".join(lines))
+    told, named = Counter[str](), list[str]()
+    for (part, _), members in groups.items():
+        if told[part] < MAX_GROUPS:
+            told[part] += 1
+            parts.append(f"{told.total()}. {_tell(members)}")
+        else:
+            named += [member.test for member in members]
+    if named:
+        parts.append(f"Also failed: {', '.join(named)}")
     return "\n\n".join(parts)
+
+
+def _tell(members: list[Failure]) -> str:
+    """Failures with one cause: names, messages, and what happened."""
+    lines = [", ".join(member.test for member in members)]
+    diagnosis = members[0].diagnosis
+    if diagnosis is None or diagnosis.cause != "held out":
+        messages = dict.fromkeys(member.message for member in members)
+        lines += [_cut(message) for message in list(messages)[:4]]
+    if diagnosis is not None:
+        lines.append(f"What happened: {_cut(diagnosis.text)}")
+    return "\n   ".join(lines)
 
 
 def _cause(failure: Failure) -> str:

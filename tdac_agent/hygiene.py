@@ -10,6 +10,12 @@ from tdac_agent.contract import call_name, calls, last_name
 FORBIDDEN_CALLS = frozenset(
     ["eval", "exec", "compile", "__import__", "breakpoint", "input", "globals", "vars"]
 )
+FORBIDDEN_ATTRIBUTES = frozenset(
+    [
+        *("__globals__", "__builtins__", "__subclasses__", "__code__", "__bases__"),
+        *("__mro__", "__loader__", "__spec__", "__import__"),
+    ]
+)
 SEEDED_CONSTRUCTORS = frozenset({"Random", "default_rng", "Generator", "SeedSequence"})
 SAVERS = frozenset(
     [
@@ -22,24 +28,13 @@ SAVERS = frozenset(
 def forbidden_calls(tree: ast.Module) -> Iterator[str]:
     """Calls and names that run or reach code a reader cannot see."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node.id in FORBIDDEN_CALLS | {"__builtins__"}:
+        if (
+            isinstance(node, ast.Name)
+            and node.id in FORBIDDEN_CALLS | FORBIDDEN_ATTRIBUTES
+        ):
             yield f"line {node.lineno}: {node.id}"
-        elif isinstance(node, ast.Attribute) and _is_private_dunder(node.attr):
+        elif isinstance(node, ast.Attribute) and node.attr in FORBIDDEN_ATTRIBUTES:
             yield f"line {node.lineno}: .{node.attr}"
-
-
-def _is_private_dunder(name: str) -> bool:
-    return name in {
-        "__globals__",
-        "__builtins__",
-        "__subclasses__",
-        "__code__",
-        "__bases__",
-        "__mro__",
-        "__loader__",
-        "__spec__",
-        "__import__",
-    }
 
 
 def file_writes(tree: ast.Module) -> Iterator[str]:

@@ -27,7 +27,8 @@ from tdac_agent.nursery import Nursery
 from tdac_agent.report import Episode
 from tdac_agent.sandbox import Limits, SandboxError, best_tier
 from tdac_agent.suite_plugin import JudgePlugin, rollout_key
-from tdac_agent.task import Profile, Task, load_task
+from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Rollout
 from tdac_envs.map2d import Map2DEnv
 

@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from tdac_agent.contract import ALLOWED_IMPORTS
 from tdac_agent.feedback import render_feedback
+from tdac_agent.hygiene import FORBIDDEN_ATTRIBUTES, FORBIDDEN_CALLS
 from tdac_agent.report import Report
 from tdac_agent.rules import RepairRule, render_block
 from tdac_agent.task import SENSORS_FILE, Task
@@ -36,6 +37,8 @@ def generate_prompt(task: Task, rules: tuple[RepairRule, ...]) -> str:
         "observation_table": sections["Observation Space"],
         "action_text": sections["Action Space"],
         "allowed_imports": " ".join(sorted(ALLOWED_IMPORTS - {"__future__"})),
+        "forbidden_calls": ", ".join(sorted(FORBIDDEN_CALLS)),
+        "forbidden_attributes": ", ".join(sorted(FORBIDDEN_ATTRIBUTES)),
         "dt": f"{nominal.dt:g}",
         "dt_ms": f"{1000 * nominal.dt:g}",
         "profile": task.spec.profile,

@@ -1,4 +1,4 @@
-"""`task.yaml`: what is asked for, and the feasible task it stands for."""
+"""The feasible task that a `task.yaml` stands for, and the files it comes with."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from tdac_agent.task_file import RobotSpec, TaskFile, read_task_file
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.map2d import Map2DEnv
@@ -23,56 +23,8 @@ from tdac_envs.render import ROBOT_IMAGE
 from tdac_envs.source2d import prepare
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
 
-Profile = Literal["policy", "paper"]
 SENSORS_FILE = Path(__file__).parent.parent / "tdac_envs" / "sensors.py"
 MIN_PROGRESS_STEPS = 400
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class RobotSpec(_Strict):
-    """The robot's body, where it differs from the default."""
-
-    radius: float | None = Field(None, gt=0, description="px")
-    axle: float | None = Field(None, gt=0, description="px; default 2 x radius")
-    max_wheel_speed: float | None = Field(None, gt=0, description="px/s")
-    n_rays: int | None = Field(None, ge=1)
-    field_of_view: float | None = Field(None, gt=0, le=360, description="degrees")
-    range_max: float | None = Field(None, gt=0, description="px")
-    image: Path | None = Field(None, description="Picture of the robot, nose to +x.")
-
-
-class ProgressSpec(_Strict):
-    """The progress test: d_min <= fraction * d0 within so many steps."""
-
-    fraction: float = Field(0.7, gt=0, lt=1)
-    steps: int | None = Field(None, gt=0, description="Default max(400, 0.16 horizon).")
-    distance: Literal["geodesic", "euclidean"] = "geodesic"
-
-
-class TaskFile(_Strict):
-    """Contents of `task.yaml`, schema 1."""
-
-    schema_version: Literal[1] = Field(1, alias="schema")
-    name: str | None = Field(None, description="For people.")
-    env: Literal["TDAC-Map2D-v0"] = "TDAC-Map2D-v0"
-    map: str = Field("maze", description="Bundled name, or a path beside this file.")
-    robot: RobotSpec = RobotSpec()
-    start: tuple[float, float] | tuple[float, float, float] | None = None
-    goal: tuple[float, float] | None = None
-    snap: bool = Field(False, description="Move start and goal to a free place.")
-    tolerance: float | None = Field(None, gt=0, description="px")
-    dt: float = Field(0.05, gt=0, description="s")
-    horizon: int | None = Field(None, gt=0, description="steps")
-    progress: ProgressSpec = ProgressSpec()
-    variation: Literal["nominal", "jitter", "random"] = "jitter"
-    suite: Path | None = Field(None, description="Folder with further test files.")
-    profile: Profile = "paper"
-    instructions: str = Field("", description="The user's own text to the model.")
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,30 +107,9 @@ def load_task(source: str | Path | TaskFile, *, base: Path | None = None) -> Tas
     else:
         path = Path(source)
         path = path / "task.yaml" if path.is_dir() else path
-        spec, base = _read(path, source), base or path.parent
+        spec, base = read_task_file(path, source), base or path.parent
         name = path.parent.resolve().name if path.name == "task.yaml" else path.stem
     return _resolve(name, spec, base or Path())
-
-
-def _read(path: Path, asked: object) -> TaskFile:
-    try:
-        data = yaml.safe_load(path.read_text())
-    except OSError as error:
-        names = ", ".join(bundled_maps())
-        raise TaskError(
-            f"no task {str(asked)!r}: {error.strerror}; bundled tasks: {names}"
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise TaskError(f"{path} is not a task file: {reason}") from error
-    if not isinstance(data, dict):
-        raise TaskError(f"{path} is not a task file: expected `key: value` lines")
-    try:
-        return TaskFile.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise TaskError(f"{path}: {where}: {first['msg']}") from error
 
 
 def _resolve(name: str, spec: TaskFile, base: Path) -> Task:

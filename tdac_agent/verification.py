@@ -19,7 +19,8 @@ from tdac_agent.report import Provenance, Report
 from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
 from tdac_agent.sandbox import Limits
 from tdac_agent.suite_plugin import OWN, SHIPPED
-from tdac_agent.task import Profile, Task, portable_task_file, write_workdir
+from tdac_agent.task import Task, portable_task_file, write_workdir
+from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Trajectory
 from tdac_agent.warm import WarmJudge
 

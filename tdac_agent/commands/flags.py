@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from tdac_agent.sandbox import TIERS
-from tdac_agent.task import RobotSpec, Task, TaskFile, load_task
+from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import TaskFile, checked
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.image import load_image
@@ -44,7 +45,8 @@ class TaskFlags:
         Raises:
             TaskError: They contradict each other, or the task cannot be used.
         """
-        check_finite(start=self.start, goal=self.goal)
+        heading = None if self.heading is None else (self.heading,)
+        check_finite(start=self.start, goal=self.goal, heading=heading)
         if self.task is not None:
             self._refuse_with_task()
             return load_task(self.task)
@@ -74,16 +76,15 @@ class TaskFlags:
             start = bundled_map(source).start
         if start is not None and self.heading is not None:
             start = (*start, self.heading)
-        return TaskFile.model_validate(
-            {
-                "map": source,
-                "start": start,
-                "goal": goal,
-                "snap": self.snap,
-                "robot": RobotSpec(radius=radius, image=self.robot_image),
-                "instructions": _text(self.instructions),
-            }
-        )
+        given = {
+            "map": source,
+            "start": start,
+            "goal": goal,
+            "snap": self.snap,
+            "robot": {"radius": radius, "image": self.robot_image},
+            "instructions": _text(self.instructions),
+        }
+        return checked(given, "the flags")
 
 
 def check_tier(name: str) -> None:
@@ -98,7 +99,7 @@ def check_tier(name: str) -> None:
         raise TaskError(f"unknown sandbox tier {name!r}; expected one of {known}")
 
 
-def check_finite(**points: Point | None) -> None:
+def check_finite(**points: tuple[float, ...] | None) -> None:
     """Refuses `nan` and `inf`, which count as numbers on the command line.
 
     Raises:
@@ -106,7 +107,8 @@ def check_finite(**points: Point | None) -> None:
     """
     for name, point in points.items():
         if point is not None and not all(map(math.isfinite, point)):
-            raise TaskError(f"expected --{name} as two finite numbers, got {point}")
+            given = " ".join(map(str, point))
+            raise TaskError(f"expected --{name} to be finite, got {given}")
 
 
 def in_pixels(

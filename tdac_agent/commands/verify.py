@@ -13,7 +13,8 @@ from tdac_agent.commands.report_view import show_report
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
 from tdac_agent.report import Report
-from tdac_agent.task import Profile, Task, load_task
+from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import Profile
 from tdac_agent.verification import verify
 from tdac_agent.warm import WarmJudge
 

@@ -172,6 +172,7 @@ PLACES = {
         "body of 25 px",
     ),
     "heading": ([*ENDS, "--heading", "nan"], "nan"),
+    "radius": ([*ENDS[:6], "--robot-radius", "nan"], "radius"),
     "robot image": ([*ENDS, "--robot-image", "no.png"], "no robot image 'no.png'"),
     "bad robot image": ([*ENDS, "--robot-image", __file__], "robot image"),
     "unknown learner": ([*ENDS, "--learner", "gpt"], "unknown learner 'gpt'"),

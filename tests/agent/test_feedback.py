@@ -49,15 +49,17 @@ def test_long_messages_are_cut(small_task):
 
 
 def test_three_kinds_of_failure_in_full(small_task):
-    """What shares a message shares a paragraph; a fourth kind is named only."""
+    """What shares a message shares a paragraph; a fourth of a part is named only."""
     report = verify(WALL, small_task, profile="policy", paper=True)
     failures = [
         Failure(test=f"a::t{n}", group="unit", message=f"reason {n // 2}.")
         for n in range(10)
     ]
+    driving = Failure(test="e::drive", group="end to end", message="it hit a wall")
+    assert "it hit a wall" in render_feedback(report_with(report, *failures, driving))
     text = render_feedback(report_with(report, *failures))
     assert "a::t0, a::t1" in text
     assert text.count("reason 0.") == 1
     assert "reason 2." in text
     assert "reason 3." not in text
-    assert "Also failed: a::t6, a::t7" in text
+    assert text.endswith("Also failed: a::t6, a::t7, a::t8, a::t9")

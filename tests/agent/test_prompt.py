@@ -28,7 +28,7 @@ def test_every_name_of_the_contract_is_in_the_prompt(prompt):
     """No test needs what the prompt does not say."""
     for name in (*CONTRACT, *contract.ALLOWED_IMPORTS - {"__future__"}):
         assert re.search(rf"\b{re.escape(name)}\b", prompt), name
-    for call in hygiene.FORBIDDEN_CALLS - {"breakpoint"}:
+    for call in hygiene.FORBIDDEN_CALLS | hygiene.FORBIDDEN_ATTRIBUTES:
         assert re.search(rf"\b{call}\b", prompt), call
 
 
