@@ -32,7 +32,7 @@ class Tier:
 
 ALL_PROMISES = ("hides_files", "denies_network", "denies_processes")
 TIERS = (
-    Tier("bubblewrap", ("rlimits", "seccomp"), ALL_PROMISES),
+    Tier("bubblewrap", ("end with parent", "rlimits", "seccomp"), ALL_PROMISES),
     Tier("namespaces", ("namespaces", "rlimits", "seccomp"), ALL_PROMISES),
     Tier("landlock", ("rlimits", "landlock", "seccomp"), ALL_PROMISES),
     Tier("rlimits", ("rlimits", "seccomp if offered"), ()),

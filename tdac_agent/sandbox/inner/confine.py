@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import resource
+import signal
 from typing import Any
 
 from . import kernel, landlock, namespaces, seccomp
@@ -27,6 +28,12 @@ def confine(setup: dict[str, Any]) -> dict[str, bool]:
         "denies_network": not kernel.can_open_socket(),
         "denies_processes": not _can_fork(),
     }
+
+
+def _end_with_parent(setup: dict[str, Any]) -> None:
+    """Die with bubblewrap: the lifeline's signal does not reach a first process."""
+    del setup
+    kernel.prctl(kernel.PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _limit_resources(setup: dict[str, Any]) -> None:
@@ -97,6 +104,7 @@ def _can_fork() -> bool:
 
 _STEPS = {
     "namespaces": namespaces.enter,
+    "end with parent": _end_with_parent,
     "rlimits": _limit_resources,
     "landlock": _limit_files,
     "seccomp": _limit_system_calls,

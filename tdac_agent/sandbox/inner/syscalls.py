@@ -1,7 +1,8 @@
 """System calls that a controller may make, by number and processor.
 
 Left out on purpose: whatever makes processes, threads, sockets, links, devices, new
-rights or shared memory, looks into another process, or leaves the process group.
+rights or shared memory, locks files that other children see, looks into another
+process, or leaves the process group.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ fchdir 81 50, getdents 78 -, getdents64 217 61, statfs 137 43, fstatfs 138 44,
 mkdir 83 -, mkdirat 258 34, rmdir 84 -, unlink 87 -, unlinkat 263 35, rename 82 -,
 renameat 264 38, renameat2 316 276, ftruncate 77 46, truncate 76 45,
 fallocate 285 47, fsync 74 82, fdatasync 75 83, fadvise64 221 223, sendfile 40 71,
-copy_file_range 326 285, flock 73 32, umask 95 166, dup 32 23, pipe 22 -,
+copy_file_range 326 285, umask 95 166, dup 32 23, pipe 22 -,
 pipe2 293 59, poll 7 -, ppoll 271 73, select 23 -, pselect6 270 72, mmap 9 222,
 munmap 11 215, mprotect 10 226, mremap 25 216, madvise 28 233, msync 26 227,
 brk 12 214, rt_sigaction 13 134, rt_sigprocmask 14 135, rt_sigreturn 15 139,

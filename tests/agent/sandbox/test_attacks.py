@@ -136,6 +136,19 @@ def test_cpu_time_is_limited(launch, tier):
         child.policy(OBS)
 
 
+def test_cpu_time_counts_though_the_child_has_ended_itself(launch, tier):
+    source = """
+        import os, time
+        def policy(obs):
+            while time.process_time() < 0.5: pass
+            os._exit(0)
+    """
+    child = loaded(launch, tier, source, Limits(call_seconds=30))
+    with pytest.raises(ControllerDied, match="exit code 0"):
+        child.policy(OBS)
+    assert child.close().cpu_seconds >= 0.4
+
+
 PROCESSES = """
     import os, subprocess, sys, threading
 

@@ -102,7 +102,7 @@ def test_no_process_socket_or_rights_call_is_in_the_table(machine):
         "clone clone3 fork vfork execve execveat socket socketpair connect bind ptrace "
         "unshare setns mount symlink symlinkat link linkat chmod fchmod chown setsid "
         "setpgid setrlimit prctl seccomp io_uring_setup memfd_create bpf kcmp tkill "
-        "process_vm_readv process_vm_writev pidfd_open pidfd_send_signal "
+        "process_vm_readv process_vm_writev pidfd_open pidfd_send_signal flock "
         "rt_sigqueueinfo rt_tgsigqueueinfo close_range shmget mknod "
         "mknodat open_by_handle_at"
     )
