@@ -9,6 +9,7 @@ nothing of a verification is left for the next one.
 from __future__ import annotations
 
 import os
+import re
 import select
 import signal
 import subprocess
@@ -25,6 +26,9 @@ from tdac_agent.errors import Fault
 KEPT_VARIABLES = frozenset(
     ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
 )
+# The judge starts the controllers, so it holds no keys: on the weakest tier they may
+# read its environment.
+SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
 START_SECONDS = 120.0
 FAREWELL_SECONDS = 5.0
 
@@ -39,7 +43,8 @@ class WarmJudge:
         environment = {
             name: value
             for name, value in os.environ.items()
-            if not name.startswith(("PYTHON", "PYTEST")) or name in KEPT_VARIABLES
+            if (not name.startswith(("PYTHON", "PYTEST")) or name in KEPT_VARIABLES)
+            and not SECRET.search(name)
         }
         environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
         # A worker that is killed leaves the folders of its children here.
