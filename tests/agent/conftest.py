@@ -4,40 +4,11 @@ import os
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
-import yaml
+from small import QUICK, write_small_task
 
 from tdac_agent.builtin import Parameters, render_controller
-from tdac_agent.sandbox import Limits
 from tdac_agent.task import load_task
-
-QUICK = Limits(import_seconds=1.5, reset_seconds=1.5, call_seconds=1.5, cpu_seconds=30)
-
-
-def small_cells():
-    """A room of 160 x 120 px with a wall that ends 40 px above the lower side."""
-    cells = np.zeros((120, 160), np.bool_)
-    cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = True
-    cells[:80, 70:76] = True
-    return cells
-
-
-def write_small_task(folder: Path, **changes) -> Path:
-    """A folder with the small map and a task.yaml; `changes` go into the file."""
-    folder.mkdir(parents=True, exist_ok=True)
-    np.save(folder / "map.npy", small_cells())
-    content = {
-        "schema": 1,
-        "map": "map.npy",
-        "start": [30, 30],
-        "goal": [130, 30],
-        "robot": {"radius": 6},
-        "name": "small",
-        "horizon": 400,
-    }
-    (folder / "task.yaml").write_text(yaml.safe_dump(content | changes))
-    return folder
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 import pytest
-from conftest import small_cells, write_small_task
+from small import small_cells, write_small_task
 
 from tdac_agent.cli import main
 

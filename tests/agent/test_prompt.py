@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from conftest import write_small_task
+from small import write_small_task
 
 from tdac_agent import contract, hygiene
 from tdac_agent.prompt import generate_prompt, repair_prompt

@@ -4,7 +4,7 @@ import json
 import os
 
 import pytest
-from conftest import QUICK, write_small_task
+from small import QUICK, write_small_task
 
 from tdac_agent.builtin import Parameters, render_controller
 from tdac_agent.errors import ControllerFileError, Fault

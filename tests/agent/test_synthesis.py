@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import write_small_task
+from small import write_small_task
 
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.provider import ProviderFault, Reply

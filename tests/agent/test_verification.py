@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import write_small_task
+from small import write_small_task
 
 from tdac_agent.episode import as_wheels, wrong_action
 from tdac_agent.errors import ControllerFileError
