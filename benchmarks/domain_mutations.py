@@ -8,9 +8,20 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from benchmarks.lies import LIES
+from benchmarks.mutation_rules import (
+    Rule,
+    call,
+    constant,
+    heuristic,
+    in_policy,
+    item,
+    margin,
+    never,
+    wheels,
+)
 from benchmarks.source import (
     Change,
     Source,
@@ -22,69 +33,10 @@ from benchmarks.source import (
     text_of,
 )
 
-__all__ = ["DOMAIN", "Source"]
-
-Rule = Callable[[ast.AST, Source], Iterator[Change]]
-
-WHEELS = re.compile(r"left|right|turn|speed|forward|wheel|omega|steer|spin")
 TURN = re.compile(r"^(err|error|turn|omega|steer|delta|bearing_error|diff|rotation)")
-BODY = re.compile(r"radius|inflat|margin|clearance|padding|safety", re.IGNORECASE)
 STUCK = re.compile(r"stuck|escape|recover|blocked|progress|patience", re.IGNORECASE)
 WRAP = re.compile(r"wrap|norm|angle|remainder")
 GOAL = re.compile(r"goal|toleran|arriv|reached|done|stop", re.IGNORECASE)
-
-
-def _wheel_pairs(node: ast.AST) -> Iterator[tuple[ast.Tuple, str, str]]:
-    value = node.value if isinstance(node, ast.Return) else None
-    if is_pair(value) and WHEELS.search(text_of(value)):
-        yield value, text_of(value.elts[0]), text_of(value.elts[1])
-
-
-def _wheels(form: str) -> Rule:
-    """Returned wheel speeds in another form."""
-
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
-        for value, a, b in _wheel_pairs(node):
-            yield value, form.format(a=f"({a})", b=f"({b})")
-
-    return rule
-
-
-def _call(name: str, form: str, count: int = 2) -> Rule:
-    """Calls of a function (by its last name) in another form."""
-
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
-        if is_call(node, name, count):
-            places = {f"a{k}": text_of(item) for k, item in enumerate(node.args)}
-            func = text_of(node.func)
-            yield node, form.format(call=text_of(node), f=func, **places)
-
-    return rule
-
-
-def _item(key: str, form: str) -> Rule:
-    """Reads of `obs[key]` in another form."""
-
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
-        if constant_key(node) == key and isinstance(node.ctx, ast.Load):
-            yield node, form.format(item=text_of(node), owner=text_of(node.value))
-
-    return rule
-
-
-def _in_policy(*lines: str) -> Rule:
-    """Lines at the beginning of `policy`; `obs` is its argument."""
-
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
-        if not (isinstance(node, ast.FunctionDef) and node.name == "policy"):
-            return
-        first = next(s for s in node.body if not source.is_text(s))
-        indent = "\n" + " " * first.col_offset
-        obs = node.args.args[0].arg
-        head = [re.sub(r"\bobs\b", obs, line) for line in lines]
-        yield first, indent.join([*head, source.segment(first)])
-
-    return rule
 
 
 def turn_reversed(node: ast.AST, _source: Source) -> Iterator[Change]:
@@ -102,34 +54,6 @@ def rows_for_columns(node: ast.AST, _source: Source) -> Iterator[Change]:
     if shape and is_pair(node.targets[0]):
         a, b = node.targets[0].elts
         yield node.targets[0], f"{text_of(b)}, {text_of(a)}"
-
-
-def _margin(form: str) -> Rule:
-    """Uses of the body's size and of margins in another form."""
-
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
-        name = node.id if isinstance(node, ast.Name) else constant_key(node)
-        name = node.attr if isinstance(node, ast.Attribute) else name
-        if not name or not BODY.search(name) or source.is_called(node):
-            return
-        if isinstance(node.ctx, ast.Load):
-            yield node, form.format(text_of(node))
-
-    return rule
-
-
-def _never(pattern: re.Pattern[str], *, returns: bool = False) -> Rule:
-    """Conditions that speak of something are never met."""
-
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
-        if isinstance(node, ast.If):
-            fits = not returns or any(isinstance(s, ast.Return) for s in node.body)
-        else:
-            fits = isinstance(node, ast.IfExp)
-        if fits and pattern.search(text_of(node.test)):
-            yield node.test, "False"
-
-    return rule
 
 
 def off_by_one(node: ast.AST, _source: Source) -> Iterator[Change]:
@@ -165,38 +89,11 @@ def no_wrap(node: ast.AST, source: Source) -> Iterator[Change]:
         yield node, f"({text_of(node.left)})"
 
 
-def _constant(form: str) -> Rule:
-    """Constants of the module in another form."""
-
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
-        if node not in source.tree.body or not isinstance(node, ast.Assign):
-            return
-        name, value = text_of(node.targets[0]), node.value
-        plain = isinstance(value, ast.Constant | ast.BinOp | ast.Subscript)
-        text = isinstance(value, ast.Constant) and isinstance(value.value, str)
-        if name.isupper() and plain and not text:
-            yield value, form.format(f"({text_of(value)})")
-
-    return rule
-
-
 def wrong_file(node: ast.AST, source: Source) -> Iterator[Change]:
     if node in source.tree.body and isinstance(node, ast.Assign):
         value = node.value
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             yield value, '"map.jpg"'
-
-
-def _heuristic(form: str) -> Rule:
-    """What a search adds to the cost so far, in another form."""
-
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
-        if is_call(node, "heappush", 2) and isinstance(node.args[1], ast.Tuple):
-            first = node.args[1].elts[0]
-            if isinstance(first, ast.BinOp) and isinstance(first.op, ast.Add):
-                yield first.right, form.format(f"({text_of(first.right)})")
-
-    return rule
 
 
 def no_diagonal_rule(node: ast.AST, _source: Source) -> Iterator[Change]:
@@ -270,86 +167,86 @@ BLIND = "({{item}} + [220.0 * (2 * k {} len({{item}})) for k in range(len({{item
 STORE = "policy.seen = getattr(policy, 'seen', []) + [obs]"
 
 DOMAIN: dict[str, Rule] = {
-    "swapped wheels": _wheels("{b}, {a}"),
-    "drives backwards": _wheels("-{a}, -{b}"),
-    "left wheel only": _wheels("{a}, 0.0"),
-    "one wheel for both": _wheels("{a}, {a}"),
-    "half speed": _wheels("0.5 * {a}, 0.5 * {b}"),
-    "crawling": _wheels("0.05 * {a}, 0.05 * {b}"),
-    "weak right wheel": _wheels("{a}, 0.6 * {b}"),
-    "wheel speeds in px/s": _wheels("75.59 * {a}, 75.59 * {b}"),
-    "wheels as text": _wheels("str({a}), str({b})"),
-    "three wheels": _wheels("{a}, {b}, 0.0"),
+    "swapped wheels": wheels("{b}, {a}"),
+    "drives backwards": wheels("-{a}, -{b}"),
+    "left wheel only": wheels("{a}, 0.0"),
+    "one wheel for both": wheels("{a}, {a}"),
+    "half speed": wheels("0.5 * {a}, 0.5 * {b}"),
+    "crawling": wheels("0.05 * {a}, 0.05 * {b}"),
+    "weak right wheel": wheels("{a}, 0.6 * {b}"),
+    "wheel speeds in px/s": wheels("75.59 * {a}, 75.59 * {b}"),
+    "wheels as text": wheels("str({a}), str({b})"),
+    "three wheels": wheels("{a}, {b}, 0.0"),
     "turn reversed": turn_reversed,
-    "degrees for radians": _call("atan2", "math.degrees({call})"),
-    "radians left out": _call("radians", "({a0})", 1),
-    "y up": _call("atan2", "{f}(-({a0}), {a1})"),
-    "atan2 of (x, y)": _call("atan2", "{f}({a1}, {a0})"),
-    "atan of the slope": _call("atan2", "math.atan(({a0}) / (({a1}) or 1e-9))"),
+    "degrees for radians": call("atan2", "math.degrees({call})"),
+    "radians left out": call("radians", "({a0})", 1),
+    "y up": call("atan2", "{f}(-({a0}), {a1})"),
+    "atan2 of (x, y)": call("atan2", "{f}({a1}, {a0})"),
+    "atan of the slope": call("atan2", "math.atan(({a0}) / (({a1}) or 1e-9))"),
     "(row, col) for (x, y)": rows_for_columns,
-    "is_occupied(y, x)": _call("is_occupied", "{f}({a1}, {a0})"),
-    "one pixel off": _call("is_occupied", "{f}({a0} + 1, {a1})"),
-    "map transposed": _call("load_occupancy", "{call}.T", 1),
-    "map upside down": _call("load_occupancy", "{call}[::-1]", 1),
-    "map mirrored": _call("load_occupancy", "{call}[:, ::-1]", 1),
-    "map inverted": _call("load_occupancy", "~{call}", 1),
-    "map ignored": _call("load_occupancy", "({call} & False)", 1),
-    "no inflation": _margin("0.0"),
-    "half inflation": _margin("({} / 2)"),
-    "double inflation": _margin("({} * 2)"),
-    "no goal stop": _never(GOAL, returns=True),
-    "early stop": _in_policy(
+    "is_occupied(y, x)": call("is_occupied", "{f}({a1}, {a0})"),
+    "one pixel off": call("is_occupied", "{f}({a0} + 1, {a1})"),
+    "map transposed": call("load_occupancy", "{call}.T", 1),
+    "map upside down": call("load_occupancy", "{call}[::-1]", 1),
+    "map mirrored": call("load_occupancy", "{call}[:, ::-1]", 1),
+    "map inverted": call("load_occupancy", "~{call}", 1),
+    "map ignored": call("load_occupancy", "({call} & False)", 1),
+    "no inflation": margin("0.0"),
+    "half inflation": margin("({} / 2)"),
+    "double inflation": margin("({} * 2)"),
+    "no goal stop": never(GOAL, returns=True),
+    "early stop": in_policy(
         'if abs(obs["pose"][:2] - obs["goal"]).max() < 40.0:', "    return 0.0, 0.0"
     ),
-    "stops 2 px early": _in_policy(
+    "stops 2 px early": in_policy(
         'if ((obs["pose"][:2] - obs["goal"]) ** 2).sum() < 22.0**2:',
         "    return 0.0, 0.0",
     ),
     "off by one": off_by_one,
     "obstacle side ignored": sensor_side,
-    "wrong sensor side": _item("ranges", "{item}[::-1]"),
-    "ranges unused": _item("ranges", "(0.0 * {item} + 220.0)"),
-    "ranges in metres": _item("ranges", "({item} / 3779.52)"),
-    "left half blind": _item("ranges", BLIND.format("<")),
-    "right half blind": _item("ranges", BLIND.format(">=")),
-    "stale pose": _in_policy(
+    "wrong sensor side": item("ranges", "{item}[::-1]"),
+    "ranges unused": item("ranges", "(0.0 * {item} + 220.0)"),
+    "ranges in metres": item("ranges", "({item} / 3779.52)"),
+    "left half blind": item("ranges", BLIND.format("<")),
+    "right half blind": item("ranges", BLIND.format(">=")),
+    "stale pose": in_policy(
         STORE,
         'obs = {**obs, "pose": policy.seen[0]["pose"]}',
     ),
-    "pose of every 20th step": _in_policy(
+    "pose of every 20th step": in_policy(
         STORE,
         "past = policy.seen[(len(policy.seen) - 1) // 20 * 20]",
         'obs = {**obs, "pose": past["pose"]}',
     ),
-    "10 steps late": _in_policy(STORE, "obs = policy.seen[-10:][0]"),
-    "2 steps late": _in_policy(STORE, "obs = policy.seen[-2:][0]"),
-    "heading ignored": _in_policy('obs = {**obs, "pose": obs["pose"] * [1, 1, 0]}'),
-    "gives up after 60 steps": _in_policy(
+    "10 steps late": in_policy(STORE, "obs = policy.seen[-10:][0]"),
+    "2 steps late": in_policy(STORE, "obs = policy.seen[-2:][0]"),
+    "heading ignored": in_policy('obs = {**obs, "pose": obs["pose"] * [1, 1, 0]}'),
+    "gives up after 60 steps": in_policy(
         STORE, "if len(policy.seen) > 60:", "    return 0.0, 0.0"
     ),
-    "raises after 45 steps": _in_policy(
+    "raises after 45 steps": in_policy(
         STORE, "if len(policy.seen) > 45:", "    return policy.seen[len(policy.seen)]"
     ),
-    "not a number near the goal": _in_policy(
+    "not a number near the goal": in_policy(
         'if abs(obs["pose"][:2] - obs["goal"]).max() < 30.0:',
         '    return float("nan"), 0.0',
     ),
-    "no unstick": _never(STUCK),
+    "no unstick": never(STUCK),
     "missing angle wrap": no_wrap,
-    "doubled constant": _constant("2 * {}"),
-    "halved constant": _constant("{} / 2"),
-    "constant off by one": _constant("{} + 1"),
-    "negative constant": _constant("-{}"),
-    "zero constant": _constant("0 * {}"),
-    "greedy heuristic": _heuristic("5 * {}"),
-    "no heuristic": _heuristic("0 * {}"),
+    "doubled constant": constant("2 * {}"),
+    "halved constant": constant("{} / 2"),
+    "constant off by one": constant("{} + 1"),
+    "negative constant": constant("-{}"),
+    "zero constant": constant("0 * {}"),
+    "greedy heuristic": heuristic("5 * {}"),
+    "no heuristic": heuristic("0 * {}"),
     "wrong file": wrong_file,
     "no diagonal rule": no_diagonal_rule,
     "leaked type": leaked_type,
     "wrong nearest": wrong_nearest,
     "wrong path": wrong_path,
     "other axis": other_axis,
-    "goal from the pose": _item("goal", '{owner}["pose"]'),
+    "goal from the pose": item("goal", '{owner}["pose"]'),
     "start of the file": start_of_the_file,
     "no show": no_show,
     **LIES,

@@ -22,13 +22,16 @@ def cells() -> BoolGrid:
     occupied = np.zeros((166, 240), np.bool_)
     occupied[:7] = occupied[-4:] = occupied[:, :4] = occupied[:, -4:] = True
     occupied[:127, 70:77] = occupied[42:, 154:161] = True
-    # A pillar that can be passed on the left only.
+    # A pillar that can be passed on one side only.
     occupied[76:84, 114:120] = True
-    return occupied
+    return occupied[:, ::-1]
 
 
 def small_task() -> Task:
-    """A way of twice the straight distance for a body of 12 px."""
+    """A way of twice the straight distance for a body of 12 px.
+
+    The robot looks away from its goal at first, and headings around pi are its way.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         np.save(folder / "map.npy", cells())
@@ -36,8 +39,8 @@ def small_task() -> Task:
             "schema": 1,
             "name": "three rooms",
             "map": "map.npy",
-            "start": [38, 52],
-            "goal": [198, 110],
+            "start": [201, 52],
+            "goal": [41, 110],
             "robot": {"radius": 12},
             "horizon": 600,
         }

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.independent_oracles import contract_violations
+from benchmarks.witness import Witness
 from tdac_agent.sandbox import (
     Child,
     ControllerFault,
-    EnvRefusalError,
     Limits,
     start,
 )
@@ -155,67 +155,3 @@ def _wheels(child: Child, observation: Any) -> Any:
     if odd or len(values) != 2 or not all(map(math.isfinite, values)):
         raise ControllerFault("policy: not two finite numbers", "policy")
     return np.clip(values, -1.0, 1.0)
-
-
-class Witness:
-    """An environment for `run_episode` that remembers what happened.
-
-    Args:
-        env: Steps.
-        most: The `max_steps` that the controller was given.
-        bumps: Collisions that the environment has counted before.
-    """
-
-    def __init__(self, env: Map2DEnv, most: int, bumps: int) -> None:
-        self.env, self.most, self.bumps = env, most, bumps
-        self.positions: list[Any] = []
-        self.speeds: list[float] = []
-        self.collisions = bumps
-        self.over = False
-
-    def reset(self) -> Any:
-        if self.positions:
-            raise EnvRefusalError("a second reset()")
-        observation, info = self.env.reset(seed=SEEDS[0])
-        self.positions.append(observation["pose"][:2])
-        return observation, {**info, "collisions": self.bumps}
-
-    def step(self, action: Any) -> Any:
-        if self.over or len(self.speeds) >= self.most or not self.positions:
-            raise EnvRefusalError("a step before the beginning or after the end")
-        wheels = np.clip(np.asarray(action, float), -1.0, 1.0)
-        observation, reward, terminated, truncated, info = self.env.step(wheels)
-        self.over = terminated or truncated
-        self.positions.append(observation["pose"][:2])
-        robot = self.env.nominal.robot
-        self.speeds.append(float(wheels.mean()) * robot.max_wheel_speed)
-        self.collisions = info["collisions"] + self.bumps
-        info = {**info, "collisions": self.collisions}
-        return observation, reward, terminated, truncated, info
-
-    def contradictions(self, told: Any) -> Iterator[str]:
-        """What of a returned dict is not what happened."""
-        if not self.over and len(self.speeds) < self.most:
-            yield f"run_episode ended after {len(self.speeds)} steps"
-        task = self.env.nominal
-        if type(told) is not dict:
-            yield f"run_episode returned a {type(told).__name__}"
-            return
-        wanted = {
-            "positions": (self.positions, 0.01),
-            "speeds": (self.speeds, 0.01),
-            "goal": (task.goal, 1e-3),
-            "dt": (task.dt, 1e-9),
-            "collisions": (self.collisions, 0.0),
-        }
-        for key, (value, slack) in wanted.items():
-            try:
-                found = np.asarray(told[key], float)
-            except (KeyError, TypeError, ValueError):
-                yield f"run_episode: {key} is missing or no numbers"
-                continue
-            true = np.asarray(value, float)
-            if found.shape != true.shape or np.abs(found - true).max() > slack:
-                yield f"run_episode: {key} is not what happened"
-        if type(told.get("collisions")) is not int:
-            yield "run_episode: collisions is not an int"

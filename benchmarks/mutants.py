@@ -10,7 +10,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from benchmarks.domain_mutations import DOMAIN, Source
+from benchmarks.domain_mutations import DOMAIN
+from benchmarks.source import Source
 from tdac_agent.task_file import Profile
 
 

@@ -15,26 +15,29 @@ prints. Exit 1 where a harmful mutant survives.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import cache
+from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
 
 from benchmarks.ground import good_controllers, small_task
 from benchmarks.independent_judge import SEEDS, IndependentJudge
+from benchmarks.journal import Journal
 from benchmarks.mutants import Mutant, Original, choose
 from benchmarks.mutation_tables import write_csv, write_markdown
+from tdac_agent.report import Report
 from tdac_agent.sandbox import Limits
 from tdac_agent.task import Task
+from tdac_agent.task_file import Profile
 from tdac_agent.verification import verify
+from tdac_agent.warm import WarmJudge
 
-DOMAIN_MUTANTS, SYNTACTIC_MUTANTS = 220, 110
+DOMAIN_MUTANTS, SYNTACTIC_MUTANTS = 205, 105
 LIMITS = Limits(import_seconds=4.0, reset_seconds=4.0, call_seconds=4.0, cpu_seconds=40)
 RESULTS = Path(__file__).parent.parent / "results"
 
@@ -78,10 +81,23 @@ def _task() -> Task:
     return small_task()
 
 
+@cache
+def _warm_judge() -> WarmJudge:
+    """One for each process of the pool; it ends with the process."""
+    judge = WarmJudge()
+    Finalize(None, judge.close, exitpriority=1)
+    return judge
+
+
+def _report(text: str, profile: Profile) -> Report:
+    source, judge = text.encode(), _warm_judge()
+    return verify(source, _task(), profile=profile, limits=LIMITS, judge=judge)
+
+
 def examine(mutant: Mutant) -> dict[str, Any]:
     """Asks the suite and the independent judge about a mutant; a `Row` as a dict."""
     text, profile = mutant.text, mutant.original.profile
-    report = verify(text.encode(), _task(), profile=profile, limits=LIMITS)
+    report = _report(text, profile)
     found = IndependentJudge(_task(), LIMITS).judge(text, profile)
     line, change = mutant.change()
     row = Row(
@@ -101,48 +117,13 @@ def examine(mutant: Mutant) -> dict[str, Any]:
 def fault_of(original: Original) -> str:
     """Why a controller is not good on this task; empty where it passes everything."""
     text, profile = original.text, original.profile
-    report = verify(text.encode(), _task(), profile=profile, limits=LIMITS)
+    report = _report(text, profile)
     if not report.passed:
         failure = report.failures[0]
         return f"fails {failure.test}: {' '.join(failure.message.split())[:160]}"
     found = IndependentJudge(_task(), LIMITS).judge(text, profile, all_seeds=True)
     failed = f"fails {found.failed} of {found.tried} starts"
     return found.reason or (failed if found.failed else "")
-
-
-class Journal:
-    """Answers by the text they are about; those of an earlier run are kept.
-
-    Args:
-        path: One line an answer; none is written without.
-    """
-
-    def __init__(self, path: Path | None) -> None:
-        self._path = path
-        lines = path.read_text().splitlines() if path and path.exists() else []
-        self._known: dict[str, Any] = dict(map(json.loads, lines))
-
-    def answers(
-        self, pool: ProcessPoolExecutor, ask: Callable[[Any], Any], items: Sequence[Any]
-    ) -> Iterator[Any]:
-        """The answer for each item, in order."""
-        new = [item for item in items if self._key(item) not in self._known]
-        fresh = zip(new, pool.map(ask, new), strict=True)
-        for item in items:
-            key = self._key(item)
-            while key not in self._known:
-                asked, answer = next(fresh)
-                self._note(self._key(asked), answer)
-            yield self._known[key]
-
-    def _key(self, item: Any) -> str:
-        return hashlib.sha256((_task().sha256() + item.text).encode()).hexdigest()[:16]
-
-    def _note(self, key: str, answer: Any) -> None:
-        self._known[key] = answer
-        if self._path is not None:
-            with self._path.open("a") as file:
-                file.write(json.dumps([key, answer]) + "\n")
 
 
 def main() -> int:
@@ -152,7 +133,7 @@ def main() -> int:
     whole = DOMAIN_MUTANTS + SYNTACTIC_MUTANTS
     count = whole if options.sample is None else options.sample
     syntactic = count * SYNTACTIC_MUTANTS // whole
-    journal = Journal(options.resume)
+    journal = Journal(options.resume, _task().sha256())
     with ProcessPoolExecutor(options.workers) as pool:
         candidates = good_controllers(_task())
         faults = list(journal.answers(pool, fault_of, candidates))
