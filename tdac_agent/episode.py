@@ -33,11 +33,16 @@ class Record:
         env: The judge's environment.
         start: Start pose.
         max_steps: Steps after which the episode is stopped.
+        truncates: Whether the last step says `truncated`; else the controller has to
+            know its `max_steps`.
+        collisions_before: Collisions that are counted when the episode begins.
     """
 
     env: Map2DEnv
     start: Pose
     max_steps: int
+    truncates: bool = False
+    collisions_before: int = 0
     outcome: Outcome | None = None
     _poses: list[NDArray[np.float64]] = field(default_factory=list)
     _actions: list[NDArray[np.float32]] = field(default_factory=list)
@@ -54,8 +59,7 @@ class Record:
         if self._poses:
             raise EnvRefusalError("reset() is allowed once, at the beginning")
         observation, info = self.env.reset(options={"start": self.start})
-        self._note(observation, info)
-        return observation, info
+        return observation, self._note(observation, info)
 
     def step(
         self, action: Any
@@ -74,7 +78,7 @@ class Record:
             raise EnvRefusalError(wrong_action(action))
         observation, reward, terminated, truncated, info = self.env.step(wheels)
         self._actions.append(np.clip(wheels, -1.0, 1.0))
-        self._note(observation, info)
+        info = self._note(observation, info)
         if info["collision"]:
             self.outcome = "collision"
         elif info["is_success"]:
@@ -83,7 +87,7 @@ class Record:
             self.outcome = "out of time"
         elif len(self._actions) >= self.max_steps:
             self.outcome = "stopped"
-            truncated = True
+            truncated = self.truncates
         return observation, reward, terminated, truncated, info
 
     def trajectory(self) -> Trajectory:
@@ -97,11 +101,13 @@ class Record:
             self.env.task.dt,
         )
 
-    def _note(self, observation: Observation, info: dict[str, Any]) -> None:
+    def _note(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
+        """Writes a moment down; returns what the controller may know of it."""
         self._poses.append(self.env.pose())
         self._distances.append(info["path_distance"])
         self._ranges.append(observation["ranges"])
-        self._collisions = info["collisions"]
+        self._collisions = self.collisions_before + info["collisions"]
+        return {**info, "collisions": self._collisions}
 
 
 def as_wheels(action: Any) -> NDArray[np.float32] | None:
@@ -163,23 +169,27 @@ def run_policy(
 
 
 def run_own_loop(child: Child, record: Record, name: str, *, timeout: float) -> Rollout:
-    """Lets the controller's `run_episode` step the judge's environment."""
+    """Lets the controller's `run_episode` step the judge's environment.
+
+    Its `max_steps` is out of reach where the environment itself truncates.
+    """
+    max_steps = 2 * record.max_steps if record.truncates else record.max_steps
     error: str | ControllerFault | None = None
     returned = None
     try:
-        returned = child.run_episode(record, record.max_steps, timeout)
+        returned = child.run_episode(record, max_steps, timeout)
     except ControllerFault as fault:
         error = fault
     if error is None and record.outcome is None:
-        error = _ended_early(record)
+        error = _ended_early(record, max_steps)
     return _rollout(record, name, False, error, [], returned)
 
 
-def _ended_early(record: Record) -> str:
+def _ended_early(record: Record, max_steps: int) -> str:
     done = record.trajectory().steps
     return (
         f"run_episode returned after {done} steps, before the episode ended "
-        f"and before max_steps = {record.max_steps}"
+        f"and before max_steps = {max_steps}"
     )
 
 

@@ -108,7 +108,9 @@ class Judge:
         Args:
             name: `nominal`, or `jitter 1` … `jitter 5`.
             steps: Stop after so many steps; the horizon by default.
-            drive: `policy`, or `run_episode` for the controller's own loop.
+            drive: `policy`; `run_episode` for the controller's own loop;
+                `truncated run_episode`, where the environment ends that loop after
+                `steps`, and has counted collisions before it.
         """
         return self._submit((name, steps, drive)).result()
 
@@ -178,12 +180,14 @@ class Judge:
         """Runs an episode in a fresh child; arguments as for `rollout`."""
         limit = steps if steps is not None else self.task.nominal.horizon
         record = Record(self.task.make_env(), self.start_pose(name), limit)
+        if drive == "truncated run_episode":
+            record.truncates, record.collisions_before = True, 2
         try:
             child = self._load()
         except ControllerFault as fault:
             return self._skipped(name, "error", str(fault))
         try:
-            if drive == "run_episode":
+            if drive != "policy":
                 seconds = child.limits.reset_seconds + 2 * limit * self.task.nominal.dt
                 return run_own_loop(child, record, name, timeout=seconds)
             held_out = self._held_out(name)

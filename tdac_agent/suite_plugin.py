@@ -108,7 +108,8 @@ class JudgePlugin:
         """`rollout(name, steps=None, drive="policy")`: a judged episode, run once.
 
         Names are `nominal` and `jitter 1` … `jitter 5`; `drive="run_episode"` lets
-        the controller's own loop step an environment that the judge holds.
+        the controller's own loop step an environment that the judge holds;
+        `drive="truncated run_episode"` ends that loop by `truncated`.
         """
 
         def run(

@@ -1,6 +1,7 @@
 """Unit API (Table I): the controller's own map, utility and planner functions."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -93,17 +94,18 @@ def test_nearest_free_of_a_free_pixel(controller, small_map):
 
 
 def test_nearest_free_is_nearest(controller, oracle):
-    """From an occupied pixel: free, and as near as any."""
+    """From an occupied pixel: free, and as near as any, up to max_rad itself."""
     occ = oracle.grid(seed=11, width=40, height=30, density=0.85)
     own = controller.call("OccMap2D", occ)
     for y, x in np.argwhere(occ)[::60].tolist():
-        found = controller.call("nearest_free", own, x, y, 40)
+        best = oracle.nearest_free_distance(occ, x, y)
+        found = controller.call("nearest_free", own, x, y, math.ceil(best))
         assert is_int_pair(found), f"nearest_free returned {found!r}, not (int, int)"
         fx, fy = found
         inside = 0 <= fx < 40 and 0 <= fy < 30
         assert inside, f"nearest_free({x}, {y}) is {found}: outside the map"
         assert not occ[fy, fx], f"nearest_free({x}, {y}) is {found}: occupied"
-        best, got = oracle.nearest_free_distance(occ, x, y), math.dist((x, y), found)
+        got = math.dist((x, y), found)
         assert got <= best + 1e-9, (
             f"nearest_free({x}, {y}) is {found}, {got:.2f} px away, not {best:.2f}"
         )
@@ -115,13 +117,15 @@ def test_nearest_free_raises(controller):
     occ[2, 2] = False
     own = controller.call("OccMap2D", occ)
     message = "nearest_free without a free pixel in reach"
-    error = controller.error_of("nearest_free", own, 25, 15, 5)
-    assert error is not None, f"{message} returned instead of raising ValueError"
-    assert error.type_name == "ValueError", f"{message} raised {error.type_name}"
+    # The second is 5 px away, though no more than 4 px in x and in y.
+    for x, y, max_rad in ((25, 15, 5), (5, 6, 4)):
+        error = controller.error_of("nearest_free", own, x, y, max_rad)
+        assert error is not None, f"{message} returned instead of raising ValueError"
+        assert error.type_name == "ValueError", f"{message} raised {error.type_name}"
 
 
 def test_plan_path(controller, oracle):
-    """Cell 1: int pixels, both ends, free, connected, <= 1.1 x optimum, or []."""
+    """Int pixels, both ends, free, connected; cell 1: <= 1.1 x optimum, or []."""
     for case in oracle.plan_cases():
         own = controller.call("OccMap2D", case.occ)
         path = controller.call("plan_path", own, case.start, case.goal, 1)
@@ -141,3 +145,27 @@ def test_plan_path(controller, oracle):
         assert length <= 1.1 * case.length + 1e-6, (
             f"{case.name}: {length:.1f} px long, the shortest is {case.length:.1f} px"
         )
+    for cell in (2, 3):
+        check_larger_steps(controller, oracle, cell)
+
+
+def check_larger_steps(controller, oracle, cell):
+    """Steps of `cell` px to a goal that is a whole number of them away."""
+    occ = np.zeros((40, 60), np.bool_)
+    occ[12:, 28:32] = True
+    occ[6:9, 20] = occ[13, 40:44] = True
+    own, start, goal = controller.call("OccMap2D", occ), (4, 17), (52, 23)
+    path = controller.call("plan_path", own, start, goal, cell)
+    assert isinstance(path, list), f"cell {cell}: a {type(path).__name__}, not a list"
+    assert path, f"cell {cell}: [], but there is a path"
+    assert all(map(is_int_pair, path)), f"cell {cell}: points must be (int, int)"
+    ends = (path[0], path[-1])
+    assert ends == (start, goal), f"cell {cell}: runs {ends}"
+    for (x0, y0), (x1, y1) in pairwise(path):
+        step = f"cell {cell}: ({x0}, {y0}) -> ({x1}, {y1})"
+        sizes = {abs(x1 - x0), abs(y1 - y0)}
+        assert sizes in ({cell}, {0, cell}), f"{step} has another length"
+        dx, dy = (x1 - x0) // cell, (y1 - y0) // cell
+        passed = [(x0 + k * dx, y0 + k * dy) for k in range(cell + 1)]
+        error = oracle.path_error(occ, passed)
+        assert error is None, f"{step}: {error}"
