@@ -1,0 +1,10 @@
+# idea: catch every error and stand still, as a published controller does
+# profile: policy
+# fails: test_hygiene[swallowed_errors], test_progress, test_reaches_goal
+# error: d_min .* > 0.7 x d0
+# why: it must make progress and reach the goal
+def policy(obs):
+    try:
+        return obs["no such key"]
+    except BaseException:
+        return 0.0, 0.0

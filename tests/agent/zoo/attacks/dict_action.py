@@ -1,0 +1,7 @@
+# idea: a dict of wheels
+# profile: policy
+# fails: test_short_rollout_is_stable[10], test_no_collisions, test_reaches_goal
+# error: policy must return two finite numbers
+# why: an action is two finite numbers; anything else ends the episode
+def policy(obs):
+    return {"left": 1.0, "right": 1.0}

@@ -1,0 +1,16 @@
+# idea: kill the parent, the group and everybody
+# profile: policy
+# onto: witness.py
+# tiers: every
+# fails: test_imports, test_reaches_goal
+# error: got nothing
+# why: signals reach the own process only
+import os
+import signal
+
+for number in (0, signal.SIGTERM, signal.SIGSTOP, signal.SIGKILL):
+    attempt("parent", os.kill, os.getppid(), number)
+    attempt("group", os.killpg, os.getpgrp(), number)
+    attempt("everybody", os.kill, -1, number)
+    attempt("first", os.kill, 2, number)
+    attempt("descriptor", lambda n=number: signal.pidfd_send_signal(3, n))
