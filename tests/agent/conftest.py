@@ -9,6 +9,7 @@ from small import QUICK, write_small_task
 
 from tdac_agent.builtin import Parameters, render_controller
 from tdac_agent.task import load_task
+from tdac_agent.warm import WarmJudge
 
 
 @pytest.fixture(scope="session")
@@ -22,6 +23,13 @@ def good_source(small_task):
     """A controller that is verified on the small task."""
     task = small_task
     return render_controller(Parameters(), task.params.robot, task.nominal.dt)
+
+
+@pytest.fixture(scope="session")
+def warm():
+    """A judge that is ready, for tests that need nothing special of it."""
+    with WarmJudge() as judge:
+        yield judge
 
 
 @pytest.fixture

@@ -83,10 +83,10 @@ def test_rules_are_in_the_block(small_task):
 
 
 @pytest.mark.parametrize("kind", ["edit", "summarise"])
-def test_repair_prompts_hide_the_held_out_starts(small_task, prompt, kind):
+def test_repair_prompts_hide_the_held_out_starts(small_task, prompt, kind, warm):
     """They hold the source and the failures, and no figure of a held-out start."""
     source = "X = '{{ 1 }}'\n\n\ndef policy(obs):\n    return 0.6, 0.5\n"
-    report = verify(source, small_task, profile="policy")
+    report = verify(source, small_task, profile="policy", judge=warm)
     text = repair_prompt(kind, prompt, source, report)
     assert source.strip() in text
     assert text.startswith(prompt)

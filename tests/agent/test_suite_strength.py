@@ -163,7 +163,7 @@ BROAD = {
     ),
     "slow policy": (
         COMMAND,
-        f"    sum(range(10_000_000))\n{COMMAND}",
+        f"    __import__('time').sleep(0.06)\n{COMMAND}",
         [END + "test_policy_is_fast_enough"],
     ),
 }
@@ -196,9 +196,15 @@ screen[0]
 '''
 
 
-def check(source, task):
-    report = verify(source, task, paper=True)
-    return {failure.test for failure in report.failures}
+@pytest.fixture
+def failed(small_task, warm):
+    """Verifies a source; gives the tests that failed."""
+
+    def failed(source):
+        report = verify(source, small_task, paper=True, judge=warm)
+        return {failure.test for failure in report.failures}
+
+    return failed
 
 
 def spoiled(source, old, new):
@@ -207,35 +213,35 @@ def spoiled(source, old, new):
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_controller_fails_its_test(small_task, good_source, name):
+def test_a_wrong_controller_fails_its_test(failed, good_source, name):
     """Exactly the tests meant for it fail."""
     old, new, expected = WRONG[name]
-    assert check(spoiled(good_source, old, new), small_task) == set(expected)
+    assert failed(spoiled(good_source, old, new)) == set(expected)
 
 
 @pytest.mark.parametrize("name", BROAD)
-def test_a_broadly_wrong_controller_fails(small_task, good_source, name):
+def test_a_broadly_wrong_controller_fails(failed, good_source, name):
     """Its own test fails, whatever else does."""
     old, new, expected = BROAD[name]
-    assert check(spoiled(good_source, old, new), small_task) >= set(expected)
+    assert failed(spoiled(good_source, old, new)) >= set(expected)
 
 
-def test_each_unstable_pattern_fails_its_test(small_task, good_source):
+def test_each_unstable_pattern_fails_its_test(failed, good_source):
     """Import in a function, SciPy, eval, writing, sleeping, swallowing, randomness."""
     source = spoiled(good_source, "import heapq\n", "import heapq\nimport random\n")
     expected = {f"{STATIC}test_hygiene[{pattern}]" for pattern in HYGIENE}
-    assert check(source + PATTERNS, small_task) == {*expected, STATIC + "test_imports"}
+    assert failed(source + PATTERNS) == {*expected, STATIC + "test_imports"}
 
 
-def test_words_in_strings_and_comments_are_harmless(small_task, good_source):
+def test_words_in_strings_and_comments_are_harmless(failed, good_source):
     """What merely mentions a forbidden pattern passes."""
-    assert check(good_source + WORDS, small_task) == set()
+    assert failed(good_source + WORDS) == set()
 
 
-def test_a_controller_for_the_nominal_start_only_fails(small_task, good_source):
+def test_a_controller_for_the_nominal_start_only_fails(small_task, good_source, warm):
     """The jittered starts catch what the nominal one does not."""
     source = spoiled(good_source, RESET, RESET + GIVE_UP)
-    report = verify(source, small_task, profile="policy")
+    report = verify(source, small_task, profile="policy", judge=warm)
     failed = {failure.test for failure in report.failures}
     assert failed == {f"{END}test_jittered_start[{n}]" for n in range(1, 6)}
     held_out = [f for f in report.failures if f.test[-2] in "345"]

@@ -17,7 +17,7 @@ from tdac_agent.verification import verify
 
 
 @pytest.fixture
-def check(small_task, good_source, tmp_path):
+def check(small_task, good_source, tmp_path, warm):
     """Verifies the good controller with a suite of one more file."""
 
     def check(text, conftest=None, **options) -> Report:
@@ -26,7 +26,7 @@ def check(small_task, good_source, tmp_path):
         (folder / "test_mine.py").write_text(text)
         if conftest is not None:
             (folder / "conftest.py").write_text(conftest)
-        given = {"profile": "policy", "paper": True, **options}
+        given = {"profile": "policy", "paper": True, "judge": warm, **options}
         return verify(good_source, small_task, suite=folder, **given)
 
     return check
@@ -180,7 +180,7 @@ def test_the_users_pytest_does_not_change_a_verdict(
     monkeypatch.setenv("PYTEST_PLUGINS", "helpful")
     monkeypatch.setenv("PYTHONOPTIMIZE", "2")
     monkeypatch.setenv("PYTHONWARNINGS", "error")
-    report = check("def test_it():\n    assert False, 'no'\n")
+    report = check("def test_it():\n    assert False, 'no'\n", judge=None)
     assert [failure.message for failure in report.failures] == ["no"]
     assert outcome(report) == "failed"
     nothing = "def policy(obs):\n    return 0.0, 0.0\n"

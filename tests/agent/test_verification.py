@@ -40,9 +40,9 @@ def test_a_good_controller_passes(small_task, good_source, profile, tests, no_tr
     assert report.provenance.profile == profile
 
 
-def test_doing_nothing_fails(small_task, no_traces):
+def test_doing_nothing_fails(small_task, warm):
     """A controller that stands still is not verified, and the diagnosis says so."""
-    report = verify(NOTHING, small_task, profile="policy")
+    report = verify(NOTHING, small_task, profile="policy", judge=warm)
     assert not report.passed
     assert report.tests["test_end_to_end.py::test_progress"] == "failed"
     assert report.tests["test_end_to_end.py::test_no_collisions"] == "passed"
@@ -50,9 +50,9 @@ def test_doing_nothing_fails(small_task, no_traces):
     assert causes == {"no motion"}
 
 
-def test_evidence_is_kept(small_task, good_source, tmp_path):
+def test_evidence_is_kept(small_task, good_source, tmp_path, warm):
     """`out` gets a report.json that reads back as it was, and each trajectory."""
-    report = verify(good_source, small_task, profile="policy", out=tmp_path)
+    report = verify(good_source, small_task, profile="policy", out=tmp_path, judge=warm)
     text = (tmp_path / "report.json").read_text()
     assert Report.model_validate_json(text) == report
     trajectories = load_trajectories(tmp_path / "trajectories")
@@ -62,9 +62,9 @@ def test_evidence_is_kept(small_task, good_source, tmp_path):
         assert len(trajectories[episode.name].poses) == episode.steps + 1
 
 
-def test_paper_runs_the_nominal_start_only(small_task, good_source):
+def test_paper_runs_the_nominal_start_only(small_task, good_source, warm):
     """With `paper` no jittered start is run, and the verdict says so."""
-    report = verify(good_source, small_task, profile="policy", paper=True)
+    report = verify(good_source, small_task, profile="policy", paper=True, judge=warm)
     assert report.passed
     assert report.provenance.paper
     assert [episode.name for episode in report.episodes] == ["nominal"]
@@ -220,10 +220,10 @@ def test_wrong_actions_are_refused(answer):
 
 
 @pytest.mark.parametrize("answer", ["(float('nan'), 0.5)", "None"])
-def test_wrong_actions_fail(small_task, answer):
+def test_wrong_actions_fail(small_task, answer, warm):
     """A policy with such an answer fails in its first step, and is told why."""
     source = f"def policy(obs):\n    return {answer}\n"
-    report = verify(source, small_task, profile="policy", paper=True)
+    report = verify(source, small_task, profile="policy", paper=True, judge=warm)
     assert not report.passed
     assert "policy must return two finite numbers" in report.episodes[0].error
     assert report.episodes[0].steps == 0
@@ -238,12 +238,12 @@ def test_wrong_actions_fail(small_task, answer):
         "np.array([left, right], dtype=np.float16).astype(np.float32)",
     ],
 )
-def test_numpy_actions_are_fine(small_task, good_source, answer):
+def test_numpy_actions_are_fine(small_task, good_source, answer, warm):
     """Arrays, lists and NumPy numbers are as good as floats."""
     old = "return min(max(left, -1.0), 1.0), min(max(right, -1.0), 1.0)"
     assert old in good_source
     source = good_source.replace(old, f"return {answer}")
-    report = verify(source, small_task, profile="policy", paper=True)
+    report = verify(source, small_task, profile="policy", paper=True, judge=warm)
     assert report.passed, report.failures
 
 
@@ -263,9 +263,9 @@ def policy(obs):
 """
 
 
-def test_state_cannot_be_forged(small_task):
+def test_state_cannot_be_forged(small_task, warm):
     """Writing into observations or patching NumPy changes nothing at the judge's."""
-    report = verify(FORGER, small_task, profile="policy", paper=True)
+    report = verify(FORGER, small_task, profile="policy", paper=True, judge=warm)
     assert not report.passed
     nominal = report.episodes[0]
     assert nominal.d_min == pytest.approx(nominal.d0, abs=0.1)
@@ -284,12 +284,12 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_broken_files_fail(small_task, tmp_path, name):
+def test_broken_files_fail(small_task, tmp_path, name, warm):
     """A file that is no controller fails with one clear line."""
     raw, reason = BROKEN[name]
     path = tmp_path / "controller.py"
     path.write_bytes(raw)
-    report = verify(path, small_task, profile="policy", paper=True)
+    report = verify(path, small_task, profile="policy", paper=True, judge=warm)
     assert not report.passed
     messages = [f.message for f in report.failures]
     assert any(re.search(reason, m) for m in messages), messages
@@ -297,10 +297,10 @@ def test_broken_files_fail(small_task, tmp_path, name):
     assert report.episodes[0].steps == 0
 
 
-def test_the_declared_encoding_is_what_is_checked(small_task):
+def test_the_declared_encoding_is_what_is_checked(small_task, warm):
     """Code that a declared encoding hides from a reader does not escape the checks."""
     hidden = b"# coding: utf-7\n# +AAo-import os\n" + NOTHING.encode()
-    report = verify(hidden, small_task, profile="policy", paper=True)
+    report = verify(hidden, small_task, profile="policy", paper=True, judge=warm)
     assert "import of 'os'" in failed_with(report, "test_imports")
 
 
@@ -346,8 +346,10 @@ def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
     assert stderr.decode().strip().splitlines()[-1] == "interrupted"
 
 
-def test_the_report_is_json(small_task):
+def test_the_report_is_json(small_task, warm):
     """Every figure of a report survives JSON, also of a controller that fails."""
-    report = verify("policy = 3\n", small_task, profile="policy", paper=True)
+    report = verify(
+        "policy = 3\n", small_task, profile="policy", paper=True, judge=warm
+    )
     again = Report.model_validate(json.loads(report.model_dump_json()))
     assert again == report
