@@ -262,7 +262,11 @@ def _explain(error: Exception) -> NoReturn:
     from tdac_envs.errors import TdacError
 
     if hasattr(error, "format_message"):  # usage, as typer found it
-        _fail(f"error: {error.format_message().rstrip('.')}; see tdac --help", 2)
+        # Without any word there is help, and nothing more to say.
+        reason = error.format_message().rstrip(".")
+        if not reason:
+            sys.exit(2)
+        _fail(f"error: {reason}; see tdac --help", 2)
     if isinstance(error, TdacError):
         _fail(f"error: {error}", 2)
     if isinstance(error, Fault):

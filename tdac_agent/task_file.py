@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 from typing import Any, Literal
 
@@ -75,8 +76,10 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
         data = yaml.safe_load(path.read_text())
     except OSError as error:
         names = ", ".join(bundled_maps())
+        close = difflib.get_close_matches(str(asked), bundled_maps(), n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
         raise TaskError(
-            f"no task {str(asked)!r}: {error.strerror}; bundled tasks: {names}"
+            f"no task {str(asked)!r}: {error.strerror}{hint}; bundled tasks: {names}"
         ) from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         reason = " ".join(str(error).split())

@@ -190,7 +190,7 @@ def _provenance(
         seed=job.seed,
         sandbox=findings.tier,
         limits=asdict(job.limits),
-        warnings=(warning,) if weak else (),
+        warnings=(*((warning,) if weak else ()), *task.params.notes),
         versions={"python": platform.python_version(), **versions},
     )
 

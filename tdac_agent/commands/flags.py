@@ -70,6 +70,8 @@ class TaskFlags:
     def _spec(self, source: str) -> TaskFile:
         start: tuple[float, ...] | None = self.start
         goal, radius = self.goal, self.robot_radius
+        if self.metres and source in bundled_maps():
+            raise TaskError("--metres needs --map with a map.yaml that has a scale")
         if self.metres:
             start, goal, radius = in_pixels(Path(source), self.start, goal, radius)
         if source in bundled_maps() and start is None:

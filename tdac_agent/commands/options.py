@@ -27,7 +27,7 @@ Goal = Annotated[
 ]
 Radius = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--robot-radius", min=0.5, help="Body radius, px.  [default: 15]"),
+    typer.Option("--robot-radius", help="Body radius, px.  [default: 15]"),
 ]
 Heading = Annotated[
     Optional[float],  # noqa: UP045

