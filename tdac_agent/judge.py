@@ -8,8 +8,6 @@ import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
-
 from tdac_agent.episode import Record, run_own_loop, run_policy
 from tdac_agent.errors import Fault
 from tdac_agent.nursery import Nursery
@@ -22,9 +20,10 @@ from tdac_agent.sandbox import (
     Limits,
     SandboxError,
 )
+from tdac_agent.starts import spread_starts
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Outcome, Rollout
-from tdac_envs.task2d import Pose, jittered_start
+from tdac_envs.task2d import Pose
 
 JITTERS = 5
 SHOWN_JITTERS = 2
@@ -69,7 +68,8 @@ class Judge:
         self.cpu_seconds = 0.0
         self.fault: str | None = None
         self._workdir = workdir
-        self._seed = seed
+        starts = spread_starts(task.nominal, seed, JITTERS)
+        self._starts = {f"jitter {n}": pose for n, pose in enumerate(starts, 1)}
         self._limits = limits or Limits()
         self._deadline = time.monotonic() + WALL_SECONDS
         self._nursery = nursery or Nursery(spares=0)
@@ -160,11 +160,11 @@ class Judge:
         """Start of a named episode."""
         if name == "nominal":
             return self.task.nominal.start
-        kind, _, number = name.partition(" ")
-        if kind != "jitter" or not number.isdigit():
-            raise ValueError(f"expected 'nominal' or 'jitter N', got {name!r}")
-        random = np.random.default_rng([self._seed, int(number)])
-        return jittered_start(self.task.nominal, random)
+        if name not in self._starts:
+            raise ValueError(
+                f"expected 'nominal' or 'jitter N', N = 1 to {JITTERS}, got {name!r}"
+            )
+        return self._starts[name]
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
         if name != "nominal" and not self.rollout("nominal").reached:
