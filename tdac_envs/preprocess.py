@@ -212,6 +212,16 @@ def _snapped(
     return moved
 
 
+def _ignored(reading: Reading) -> list[str]:
+    """What of the picture's obstacles the reading takes for free space."""
+    if not (reading.opening or reading.cleanup):
+        return []
+    what = f"specks up to {reading.cleanup} px"
+    if reading.opening:
+        what = f"lines under {reading.opening} px and {what}"
+    return [f"taken for free space in the picture: {what}; look at the preview"]
+
+
 def _params(
     scene: Scene, best: Candidate, heading: float, notes: list[str]
 ) -> MapParams:
@@ -236,5 +246,5 @@ def _params(
         score_terms=best.terms,
         resolution=image.resolution,
         origin=image.origin,
-        notes=tuple(notes),
+        notes=(*notes, *_ignored(reading)),
     )
