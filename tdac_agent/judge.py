@@ -189,13 +189,21 @@ class Judge:
         try:
             if drive != "policy":
                 seconds = child.limits.reset_seconds + 2 * limit * self.task.nominal.dt
-                return run_own_loop(child, record, name, timeout=seconds)
-            held_out = self._held_out(name)
-            return run_policy(
-                child, record, name, held_out=held_out, deadline=self._deadline
-            )
+                rollout = run_own_loop(child, record, name, timeout=seconds)
+            else:
+                held_out = self._held_out(name)
+                rollout = run_policy(
+                    child, record, name, held_out=held_out, deadline=self._deadline
+                )
         finally:
             self._account(child.close())
+        # Children side by side may together use more than each may by itself.
+        if self.cpu_seconds > self._limits.cpu_seconds:
+            return self._skipped(name, "error", f"the controller {self._overspent()}")
+        return rollout
+
+    def _overspent(self) -> str:
+        return f"used {self._limits.cpu_seconds} s of CPU time, all it may"
 
     def _load(self) -> Child:
         """A fresh child with the controller imported; a time-out is tried once more.
@@ -243,8 +251,7 @@ class Judge:
 
     def _start(self) -> Child:
         if self.cpu_seconds >= self._limits.cpu_seconds:
-            used = f"used {self._limits.cpu_seconds} s of CPU time, all it may"
-            raise ControllerFault(f"the controller {used}", "import")
+            raise ControllerFault(f"the controller {self._overspent()}", "import")
         if time.monotonic() > self._deadline:
             raise ControllerFault(
                 f"the verification took longer than {WALL_SECONDS:g} s", "import"

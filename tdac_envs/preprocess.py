@@ -190,6 +190,8 @@ def as_image(image: Source) -> MapImage:
 def _to_pixel(image: MapImage, name: str, point: tuple[float, float]) -> Point:
     """The pixel that holds the point; refused outside the map."""
     height, width = image.colour.shape[:2]
+    if not np.isfinite(point).all():
+        raise TaskError(f"expected {name} to be two finite numbers, got {point}")
     x, y = int(np.floor(point[0] + 0.5)), int(np.floor(point[1] + 0.5))
     if not (0 <= x < width and 0 <= y < height):
         raise TaskError(
