@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import select
@@ -131,7 +132,9 @@ class Channel:
         except BlockingIOError:
             return True
         if not part:
-            self._poll.unregister(self._output)
+            # The end is read again when the child is ended.
+            with contextlib.suppress(KeyError):
+                self._poll.unregister(self._output)
             return False
         self.output_count += len(part)
         room = KEPT_OUTPUT - len(self.output_head)

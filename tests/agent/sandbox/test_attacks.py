@@ -400,6 +400,15 @@ def test_closing_the_channel_is_noticed(launch, tier):
         child.policy(OBS)
 
 
+def test_closing_the_output_changes_nothing(launch, tier):
+    source = "import os\nos.close(1); os.close(2)\ndef policy(obs): return 1.0, 1.0\n"
+    child = launch(source, tier)
+    child.load()
+    for _ in range(3):
+        assert child.policy(OBS) == (1.0, 1.0)
+    assert child.close().cpu_seconds > 0
+
+
 def test_patched_builtins_harm_only_the_child(launch, tier):
     source = """
         import builtins, json, os, sys
