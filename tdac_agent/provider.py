@@ -51,9 +51,16 @@ class Reply:
 
 
 class Provider(Protocol):
-    """Answers requests; both Learner and Optimizer are providers."""
+    """Answers requests; both Learner and Optimizer are providers.
+
+    Attributes:
+        name: For people and records.
+        paid: Whether an answer costs money (or much else); before the first such
+            call of a run the suite has to prove itself.
+    """
 
     name: str
+    paid: bool
 
     def complete(self, request: Request) -> Reply:
         """Answers one request.

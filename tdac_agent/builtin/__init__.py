@@ -32,6 +32,7 @@ class Builtin:
     """
 
     name = "builtin"
+    paid = False
 
     def __init__(self, task: Map2DTask, params: MapParams) -> None:
         self.dt = task.dt

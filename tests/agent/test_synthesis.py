@@ -28,6 +28,7 @@ class Script:
     """A provider that gives prepared answers and remembers what it was asked."""
 
     name = "script"
+    paid = False
 
     def __init__(self, *answers):
         self.answers = list(answers)
