@@ -31,18 +31,20 @@ class Record:
 
     Attributes:
         env: The judge's environment.
-        start: Start pose.
+        start: Start pose; None for the one that the environment draws.
         max_steps: Steps after which the episode is stopped.
         truncates: Whether the last step says `truncated`; else the controller has to
             know its `max_steps`.
         collisions_before: Collisions that are counted when the episode begins.
+        seed: Of the environment's random numbers.
     """
 
     env: Map2DEnv
-    start: Pose
+    start: Pose | None
     max_steps: int
     truncates: bool = False
     collisions_before: int = 0
+    seed: int | None = None
     outcome: Outcome | None = None
     _poses: list[NDArray[np.float64]] = field(default_factory=list)
     _actions: list[NDArray[np.float32]] = field(default_factory=list)
@@ -58,7 +60,8 @@ class Record:
         """
         if self._poses:
             raise EnvRefusalError("reset() is allowed once, at the beginning")
-        observation, info = self.env.reset(options={"start": self.start})
+        options = None if self.start is None else {"start": self.start}
+        observation, info = self.env.reset(seed=self.seed, options=options)
         return observation, self._note(observation, info)
 
     def step(
@@ -183,6 +186,12 @@ def run_own_loop(child: Child, record: Record, name: str, *, timeout: float) -> 
     if error is None and record.outcome is None:
         error = _ended_early(record, max_steps)
     return _rollout(record, name, False, error, [], returned)
+
+
+def not_driven(record: Record, name: str, fault: ControllerFault) -> Rollout:
+    """The episode of a controller that cannot be imported."""
+    record.reset()
+    return _rollout(record, name, False, fault, [])
 
 
 def _ended_early(record: Record, max_steps: int) -> str:
