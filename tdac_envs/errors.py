@@ -11,3 +11,7 @@ class MapError(TdacError):
 
 class TaskError(TdacError):
     """A start, goal or robot does not make a feasible task on its map."""
+
+
+class WorldError(TdacError):
+    """A Webots world cannot be used."""
