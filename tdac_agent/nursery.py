@@ -31,9 +31,12 @@ class Nursery:
         Raises:
             SandboxError: The tier does not work here.
         """
-        if tier != "auto" or limits != Limits() or not self._ready:
+        if tier != "auto" or limits != Limits():
             return start(tier=tier, limits=limits)
-        future = self._ready.pop(0)
+        try:
+            future = self._ready.pop(0)
+        except IndexError:  # None is kept, or other threads took them all.
+            return start()
         self._grow()
         return future.result()
 

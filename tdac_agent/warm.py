@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
@@ -31,6 +32,7 @@ KEPT_VARIABLES = frozenset(
 SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
 START_SECONDS = 120.0
 FAREWELL_SECONDS = 5.0
+POLL_SECONDS = 0.2
 
 
 class WarmJudge:
@@ -63,12 +65,18 @@ class WarmJudge:
             start_new_session=True,
         )
 
-    def run(self, request: Path, seconds: float) -> None:
+    def run(
+        self,
+        request: Path,
+        seconds: float,
+        meanwhile: Callable[[], None] | None = None,
+    ) -> None:
         """Does one job; returns when its process has ended, however it ended.
 
         Args:
             request: File that holds the job.
             seconds: Wall time it may take.
+            meanwhile: Called now and then until it has ended.
 
         Raises:
             Fault: The judge did not start, or the job took too long.
@@ -78,7 +86,7 @@ class WarmJudge:
         self._server.stdin.write(f"{request}\n".encode())
         self._server.stdin.flush()
         try:
-            self._line(seconds)
+            self._line(seconds, meanwhile)
         except BaseException:
             # A worker leads a process group; its children end with it.
             os.killpg(worker, signal.SIGKILL)
@@ -103,15 +111,21 @@ class WarmJudge:
     ) -> None:
         self.close()
 
-    def _line(self, seconds: float) -> bytes:
+    def _line(
+        self, seconds: float, meanwhile: Callable[[], None] | None = None
+    ) -> bytes:
         """The server's next line, without its end."""
         assert self._server.stdout is not None
         stream, deadline = self._server.stdout.fileno(), time.monotonic() + seconds
         line = b""
         while not line.endswith(b"\n"):
             left = max(deadline - time.monotonic(), 0.0)
-            if not select.select([stream], [], [], left)[0]:
-                raise Fault(f"the judge did not answer within {seconds:g} s")
+            if not select.select([stream], [], [], min(left, POLL_SECONDS))[0]:
+                if left == 0.0:
+                    raise Fault(f"the judge did not answer within {seconds:g} s")
+                if meanwhile is not None:
+                    meanwhile()
+                continue
             read = os.read(stream, 1)
             if not read:
                 raise Fault(f"the judge ended: {self._last_words()}")
