@@ -18,7 +18,7 @@ from typing import NoReturn
 import cv2
 import numpy as np
 import pytest
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.files import write_atomic
@@ -26,6 +26,7 @@ from tdac_agent.judge import Judge
 from tdac_agent.nursery import Nursery
 from tdac_agent.report import Episode
 from tdac_agent.sandbox import Limits, SandboxError, best_tier
+from tdac_agent.seeded import SeededJob, judge_seeds
 from tdac_agent.suite_plugin import JudgePlugin, rollout_key
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import Profile
@@ -96,7 +97,7 @@ def work() -> NoReturn:
                 os.dup2(output.fileno(), 1)
                 os.dup2(output.fileno(), 2)
             code = 1
-            judge_job(Path(request), nursery)
+            do_job(Path(request), nursery)
             code = 0
     except BaseException:
         traceback.print_exc()
@@ -136,10 +137,19 @@ def _warm_up() -> None:
         best_tier()
 
 
-def judge_job(request: Path, nursery: Nursery) -> None:
-    """Runs a suite as asked, and writes the findings."""
-    job = Job.model_validate_json(request.read_text(encoding="utf-8"))
+def do_job(request: Path, nursery: Nursery) -> None:
+    """Does a job of either kind, in its folder."""
+    jobs = TypeAdapter[Job | SeededJob](Job | SeededJob)
+    job = jobs.validate_json(request.read_text(encoding="utf-8"))
     os.chdir(request.parent)
+    if isinstance(job, Job):
+        judge_suite(job, nursery)
+    else:
+        judge_seeds(job, nursery)
+
+
+def judge_suite(job: Job, nursery: Nursery) -> None:
+    """Runs a suite as asked, and writes the findings."""
     task = load_task(job.task)
     judge = Judge(
         task,
