@@ -72,7 +72,8 @@ class Judge:
         self._starts = {f"jitter {n}": pose for n, pose in enumerate(starts, 1)}
         self._limits = limits or Limits()
         self._deadline = time.monotonic() + WALL_SECONDS
-        self._nursery = nursery or Nursery(spares=0)
+        self._nursery = nursery or Nursery(ahead=False)
+        self._owns_nursery = nursery is None
         self._pool = ThreadPoolExecutor(max_workers=max(2, os.cpu_count() or 2))
         self._lock = threading.Lock()
         self._episodes: dict[Key, Future[Rollout]] = {}
@@ -134,6 +135,8 @@ class Judge:
         """Waits for the episodes under way and ends the children."""
         self._pool.shutdown(cancel_futures=True)
         self._end_unit()
+        if self._owns_nursery:
+            self._nursery.close()
 
     def _end_unit(self) -> None:
         if self._unit is not None:

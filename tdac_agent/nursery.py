@@ -1,29 +1,40 @@
-"""Sandboxed children that are started before they are needed."""
+"""Sandboxed children that are ready before they are needed."""
 
 from __future__ import annotations
 
+import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from tdac_agent.sandbox import Child, Limits, start
+from tdac_agent.sandbox import (
+    Child,
+    Limits,
+    Tier,
+    Zygote,
+    best_tier,
+    find_tier,
+    fork_child,
+    start_zygote,
+)
 
-SPARES = 2
+Kind = tuple[str, int]
 
 
 class Nursery:
-    """Keeps a few children started, each for one use.
-
-    Only the best tier with the usual limits is started ahead; others are started when
-    they are asked for.
+    """Keeps a zygote ready that forks children, each for one use.
 
     Args:
-        spares: How many to keep ready.
+        ahead: Whether to start one for the best tier at once, and the next one when
+            that can have no further child.
     """
 
-    def __init__(self, spares: int = SPARES) -> None:
+    def __init__(self, *, ahead: bool = True) -> None:
+        self._ahead = ahead
+        self._lock = threading.Lock()
         self._pool = ThreadPoolExecutor(max_workers=1)
-        self._ready: list[Future[Child]] = []
-        for _ in range(spares):
-            self._grow()
+        self._zygotes: list[Zygote] = []
+        self._next: Future[Zygote] | None = None
+        if ahead:
+            self._next = self._pool.submit(_zygote_of_best_tier)
 
     def take(self, tier: str, limits: Limits) -> Child:
         """A child that has no controller yet.
@@ -31,22 +42,40 @@ class Nursery:
         Raises:
             SandboxError: The tier does not work here.
         """
-        if tier != "auto" or limits != Limits():
-            return start(tier=tier, limits=limits)
-        try:
-            future = self._ready.pop(0)
-        except IndexError:  # None is kept, or other threads took them all.
-            return start()
-        self._grow()
-        return future.result()
+        wanted = find_tier(tier)
+        with self._lock:
+            zygote = self._zygote(wanted, limits)
+            child = fork_child(zygote, wanted, limits)
+            if not zygote.slots:
+                self._zygotes.remove(zygote)
+                if self._ahead and self._next is None:
+                    self._next = self._pool.submit(start_zygote, wanted, limits)
+        return child
 
     def close(self) -> None:
-        """Ends the children that were not used."""
-        for future in self._ready:
-            if not future.cancel() and future.exception() is None:
-                future.result().close()
-        self._ready = []
+        """Has no further children; ends the zygotes that have none."""
         self._pool.shutdown()
+        if self._next is not None and self._next.exception() is None:
+            self._next.result().close()
+        for zygote in self._zygotes:
+            zygote.close()
 
-    def _grow(self) -> None:
-        self._ready.append(self._pool.submit(start))
+    def _zygote(self, tier: Tier, limits: Limits) -> Zygote:
+        """One with room for a further child."""
+        if not any(_suits(zygote, tier, limits) for zygote in self._zygotes):
+            ready, self._next = self._next, None
+            if ready is not None:
+                self._zygotes.append(ready.result())
+        for zygote in self._zygotes:
+            if _suits(zygote, tier, limits):
+                return zygote
+        self._zygotes.append(start_zygote(tier, limits))
+        return self._zygotes[-1]
+
+
+def _suits(zygote: Zygote, tier: Tier, limits: Limits) -> bool:
+    return zygote.tier == tier.name and zygote.scratch_bytes == limits.scratch_bytes
+
+
+def _zygote_of_best_tier() -> Zygote:
+    return start_zygote(best_tier(), Limits())

@@ -16,10 +16,18 @@ from tdac_agent.sandbox.errors import (
     SandboxError,
 )
 from tdac_agent.sandbox.inner.wire import Handle
-from tdac_agent.sandbox.launch import available_tiers, best_tier, start
+from tdac_agent.sandbox.launch import (
+    available_tiers,
+    best_tier,
+    find_tier,
+    fork_child,
+    start,
+    start_zygote,
+)
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
 from tdac_agent.sandbox.process import Child, EpisodeEnv
 from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
+from tdac_agent.sandbox.zygote import Zygote
 
 __all__ = [
     "MAX_SOURCE_BYTES",
@@ -39,7 +47,11 @@ __all__ = [
     "SandboxError",
     "Tier",
     "TierStatus",
+    "Zygote",
     "available_tiers",
     "best_tier",
+    "find_tier",
+    "fork_child",
     "start",
+    "start_zygote",
 ]

@@ -1,24 +1,25 @@
-"""The command line of bubblewrap for one child."""
+"""The command line of bubblewrap for one zygote."""
 
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 from tdac_agent.sandbox.errors import SandboxError
 from tdac_agent.sandbox.exposure import exposure
-from tdac_agent.sandbox.folder import PrivateFolder
 
 
 def bubblewrap_command(
-    folder: PrivateFolder, lifeline: int, scratch_bytes: int
+    parent: Path, scratch: list[str], lifeline: int, scratch_bytes: int
 ) -> list[str]:
-    """Return the words that come before the child's own command.
+    """Return the words that come before the zygote's own command.
 
     Args:
-        folder: The private folder.
+        parent: Folder that holds the private ones.
+        scratch: The scratch folders in them.
         lifeline: Descriptor that bubblewrap's first process keeps open, out of the
-            controller's reach.
-        scratch_bytes: Size of the scratch folder.
+            controllers' reach.
+        scratch_bytes: Size of a scratch folder.
 
     Raises:
         SandboxError: bubblewrap is not installed.
@@ -40,11 +41,12 @@ def bubblewrap_command(
     for path in seen.hidden:
         words += ["--tmpfs", path]
     # numpy may lie in a hidden folder, so that this can be closed only afterwards.
-    words += _each("--ro-bind", (*seen.packages, str(folder.root)))
+    words += _each("--ro-bind", (*seen.packages, str(parent)))
     for path in seen.hidden:
         words += ["--remount-ro", path]
     words += _each("--dev-bind", seen.devices)
-    words += ["--size", str(scratch_bytes), "--tmpfs", str(folder.scratch)]
+    for path in scratch:
+        words += ["--size", str(scratch_bytes), "--tmpfs", path]
     return [*words, "--remount-ro", "/", "--chdir", "/", "--"]
 
 

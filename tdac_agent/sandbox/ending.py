@@ -11,8 +11,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_agent.sandbox.folder import PrivateFolder
-from tdac_agent.sandbox.spawn import Spawned
+from tdac_agent.sandbox.zygote import Forked
 
 GRACE_SECONDS = 5.0
 
@@ -42,13 +41,11 @@ class Ending:
     """Ends one child, once; every call returns what it used.
 
     Args:
-        spawned: The child.
-        folder: Its private folder, deleted too.
+        forked: The child; its private folder is deleted, too.
     """
 
-    def __init__(self, spawned: Spawned, folder: PrivateFolder) -> None:
-        self._spawned = spawned
-        self._folder = folder
+    def __init__(self, forked: Forked) -> None:
+        self._forked = forked
         self._usage: ChildUsage | None = None
 
     def __call__(self) -> ChildUsage:
@@ -56,63 +53,49 @@ class Ending:
         if self._usage is None:
             # Stands if the next line is interrupted: nothing is closed twice.
             self._usage = ChildUsage(0.0, 0, 0, "", "", -signal.SIGKILL)
-            self._usage = _end(self._spawned, self._folder)
+            self._usage = _end(self._forked)
         return self._usage
 
 
-def _end(spawned: Spawned, folder: PrivateFolder) -> ChildUsage:
-    process, channel = spawned.process, spawned.channel
+def _end(forked: Forked) -> ChildUsage:
+    channel = forked.channel
     try:
-        cpu, rss = _usage_of_tree(process.pid)
+        cpu, rss = _usage_of_tree(forked.pid)
         # The leader is not reaped yet, so that the number is still its own.
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.returncode, own_cpu, own_rss = _reap(process.pid)
+            os.killpg(forked.pid, signal.SIGKILL)
+        status, own_cpu, own_rss = forked.reap()
         channel.drain_until_end(time.monotonic() + GRACE_SECONDS)
     finally:
         channel.close()
-        os.close(spawned.lifeline)
+        os.close(forked.lifeline)
         # A folder that cannot be removed is no reason to lose a verdict.
         with contextlib.suppress(OSError):
-            folder.remove()
+            forked.folder.remove()
     return ChildUsage(
         cpu_seconds=max(cpu, own_cpu),
         max_rss_bytes=max(rss, own_rss),
         output_bytes=channel.output_count,
         output_head=channel.output_head.decode("utf-8", "replace"),
         output_tail=channel.output_tail.decode("utf-8", "replace"),
-        status=_signal_of_wrapper(process.returncode),
+        status=_signal_of_wrapper(status),
     )
 
 
-def _reap(pid: int) -> tuple[int, float, int]:
-    """Return exit code, CPU seconds and largest resident bytes of a process."""
-    try:
-        _, status, used = os.wait4(pid, 0)
-    except ChildProcessError:  # Somebody else has waited for it.
-        return -signal.SIGKILL, 0.0, 0
-    scale = 1 if sys.platform == "darwin" else 1024
-    code = os.waitstatus_to_exitcode(status)
-    return code, used.ru_utime + used.ru_stime, used.ru_maxrss * scale
-
-
 def has_ended(pid: int, seconds: float) -> bool:
-    """Wait for the end of a process without reaping it."""
-    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
-    if sys.platform == "linux":
+    """Wait for the end of a process without reaping it; where one cannot, assume it."""
+    if sys.platform != "linux":
+        return True
+    try:
         descriptor = os.pidfd_open(pid)
-        try:
-            poll = select.poll()
-            poll.register(descriptor, select.POLLIN)
-            return bool(poll.poll(seconds * 1000))
-        finally:
-            os.close(descriptor)
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if os.waitid(os.P_PID, pid, options) is not None:
-            return True
-        select.select([], [], [], 0.01)
-    return False
+    except ProcessLookupError:
+        return True
+    try:
+        poll = select.poll()
+        poll.register(descriptor, select.POLLIN)
+        return bool(poll.poll(seconds * 1000))
+    finally:
+        os.close(descriptor)
 
 
 def _signal_of_wrapper(status: int) -> int:

@@ -1,37 +1,37 @@
-"""The private folder of one child: working folder, scratch folder, numpy."""
+"""The private folder of one child: working folder and scratch folder."""
 
 from __future__ import annotations
 
 import os
+import secrets
 import shutil
-import tempfile
 from pathlib import Path
 
 from tdac_agent.sandbox.errors import SandboxError
-from tdac_agent.sandbox.exposure import numpy_folders
 
 MAX_FOLDER_BYTES = 256 << 20
 
 
 class PrivateFolder:
-    """A new folder with `work`, `scratch` and `site`, made for one child.
+    """A new folder with `work` and `scratch`, made for one child.
+
+    Its name cannot be guessed by a child that has another one.
+
+    Args:
+        parent: Where it is made.
 
     Attributes:
         root: The folder.
         work: What the controller sees as its working folder.
         scratch: Where the controller may write.
-        site: Links to numpy and to nothing else.
     """
 
-    def __init__(self) -> None:
-        self.root = Path(tempfile.mkdtemp(prefix="tdac-child-")).resolve()
+    def __init__(self, parent: Path) -> None:
+        self.root = parent / secrets.token_hex(16)
         self.work = self.root / "work"
         self.scratch = self.root / "scratch"
-        self.site = self.root / "site"
-        for folder in (self.work, self.scratch, self.site):
-            folder.mkdir()
-        for target in numpy_folders():
-            (self.site / os.path.basename(target)).symlink_to(target)
+        for folder in (self.root, self.work, self.scratch):
+            folder.mkdir(mode=0o700)
 
     def furnish(self, workdir: Path | None, source: bytes) -> None:
         """Copy the files of `workdir` in and write the controller.

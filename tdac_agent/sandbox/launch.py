@@ -12,8 +12,8 @@ from tdac_agent.sandbox.exposure import entries_but_hidden, exposure
 from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
 from tdac_agent.sandbox.process import Child
-from tdac_agent.sandbox.spawn import spawn
 from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
+from tdac_agent.sandbox.zygote import SLOTS, Zygote
 
 # Files that exist nearly everywhere and that no controller may read.
 WITNESSES = ("/etc/passwd", "/etc/hostname", "/proc/1/status", "/proc/self/environ")
@@ -40,7 +40,7 @@ def start(
         SandboxError: The tier does not work here or the child did not start.
     """
     limits = limits or Limits()
-    child = start_blank(_find(tier), limits)
+    child = start_blank(find_tier(tier), limits)
     try:
         if controller_source is not None:
             child.furnish(workdir, controller_source)
@@ -51,14 +51,44 @@ def start(
 
 
 def start_blank(tier: Tier, limits: Limits) -> Child:
-    """Start a child without files.
+    """Start a child without files, from a zygote of its own.
 
     Raises:
         SandboxError: It did not start, or the tier's promise does not hold.
     """
-    child = _spawn_child(tier, limits)
+    zygote = start_zygote(tier, limits, 1)
     try:
-        facts = child.set_up(_setup(tier, limits, child.folder))
+        return fork_child(zygote, tier, limits)
+    finally:
+        zygote.close()
+
+
+def start_zygote(tier: Tier, limits: Limits, slots: int = SLOTS) -> Zygote:
+    """Start a zygote, which loads numpy while the caller goes on.
+
+    Args:
+        tier: Of its children.
+        limits: Of its children's scratch folders.
+        slots: Most children that it has.
+
+    Raises:
+        SandboxError: It cannot be started.
+    """
+    try:
+        return Zygote(tier.name, limits, slots)
+    except OSError as error:
+        raise SandboxError(f"{tier.name}: cannot start a child: {error}") from error
+
+
+def fork_child(zygote: Zygote, tier: Tier, limits: Limits) -> Child:
+    """Have a zygote fork a child, and confine it.
+
+    Raises:
+        SandboxError: It did not start, or the tier's promise does not hold.
+    """
+    child = Child(tier.name, limits, zygote.fork(limits))
+    try:
+        facts = child.set_up(_setup(tier, limits, zygote, child.folder))
     except ControllerFault as fault:
         printed = child.close().output_head.strip()
         raise SandboxError(f"{tier.name}: {printed or fault}") from None
@@ -70,18 +100,6 @@ def start_blank(tier: Tier, limits: Limits) -> Child:
         child.close()
         raise SandboxError(f"{tier.name}: does not hold here: {', '.join(broken)}")
     return child
-
-
-def _spawn_child(tier: Tier, limits: Limits) -> Child:
-    try:
-        folder = PrivateFolder()
-        try:
-            return Child(tier.name, limits, folder, spawn(tier.name, folder, limits))
-        except BaseException:
-            folder.remove()
-            raise
-    except OSError as error:
-        raise SandboxError(f"{tier.name}: cannot start a child: {error}") from error
 
 
 def available_tiers() -> list[TierStatus]:
@@ -113,7 +131,12 @@ def _status(tier: Tier) -> TierStatus:
     return TierStatus(tier, True, "")
 
 
-def _find(name: str) -> Tier:
+def find_tier(name: str) -> Tier:
+    """Return the tier of that name, or the best one for "auto".
+
+    Raises:
+        SandboxError: There is none, or none works here.
+    """
     if name == "auto":
         return best_tier()
     for tier in TIERS:
@@ -123,11 +146,13 @@ def _find(name: str) -> Tier:
     raise SandboxError(f"expected a sandbox tier (auto, {names}), got {name!r}")
 
 
-def _setup(tier: Tier, limits: Limits, folder: PrivateFolder) -> dict[str, Any]:
+def _setup(
+    tier: Tier, limits: Limits, zygote: Zygote, folder: PrivateFolder
+) -> dict[str, Any]:
     seen = exposure()
-    readable, listable = (
-        entries_but_hidden(seen) if "landlock" in tier.steps else ([], [])
-    )
+    # Where mounts hide them, these folders need no care.
+    masked = "hides_names" in tier.promises
+    readable, listable = (list(seen.system), []) if masked else entries_but_hidden(seen)
     return {
         "steps": list(tier.steps),
         "links": list(seen.links),
@@ -138,10 +163,11 @@ def _setup(tier: Tier, limits: Limits, folder: PrivateFolder) -> dict[str, Any]:
         "readable": readable,
         "listable": listable,
         "root": str(folder.root),
-        "site": str(folder.site),
+        "site": str(zygote.site),
         "work": str(folder.work),
         "scratch": str(folder.scratch),
         "witnesses": [path for path in WITNESSES if os.access(path, os.R_OK)],
+        "foreign": [str(zygote.witness)],
         "cpu_seconds": limits.cpu_seconds,
         "memory_bytes": limits.memory_bytes,
         "frame_bytes": limits.frame_bytes,

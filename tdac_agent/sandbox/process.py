@@ -11,10 +11,9 @@ from typing import Any, Protocol
 from tdac_agent.sandbox.conversation import Conversation
 from tdac_agent.sandbox.ending import ChildUsage, Ending
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
-from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.inner.wire import Handle, Kind
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
-from tdac_agent.sandbox.spawn import Spawned
+from tdac_agent.sandbox.zygote import Forked
 
 
 class EpisodeEnv(Protocol):
@@ -45,21 +44,18 @@ class Child:
         pid: The leader of its process group.
 
     Args:
-        tier: See above, as for the next two.
+        tier: See above, as for the next one.
         limits: What it may use.
-        folder: Its private folder.
-        spawned: Its process and channel.
+        forked: Its process, folder and channel.
     """
 
-    def __init__(
-        self, tier: str, limits: Limits, folder: PrivateFolder, spawned: Spawned
-    ) -> None:
+    def __init__(self, tier: str, limits: Limits, forked: Forked) -> None:
         self.tier = tier
         self.limits = limits
-        self.folder = folder
-        self.pid = spawned.process.pid
-        end = Ending(spawned, folder)
-        self._talk = Conversation(spawned.channel, self.pid, limits, folder.root, end)
+        self.folder = forked.folder
+        self.pid = forked.pid
+        end, root = Ending(forked), forked.folder.root
+        self._talk = Conversation(forked.channel, self.pid, limits, root, end)
         weakref.finalize(self, end)
 
     def __enter__(self) -> Child:

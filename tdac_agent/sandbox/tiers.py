@@ -21,8 +21,9 @@ class Tier:
     Attributes:
         name: As named in a verdict.
         steps: What the child applies to itself after it has imported numpy.
-        promises: Of `hides_files` (only what it needs can be read), `denies_network`
-            and `denies_processes` (no fork, no program, no thread).
+        promises: Of `hides_files` (only what it needs can be read), `hides_names`
+            (nor can it be asked whether others exist), `denies_network` and
+            `denies_processes` (no fork, no program, no thread).
     """
 
     name: str
@@ -30,11 +31,14 @@ class Tier:
     promises: tuple[str, ...]
 
 
-ALL_PROMISES = ("hides_files", "denies_network", "denies_processes")
+ALL_PROMISES = ("hides_files", "hides_names", "denies_network", "denies_processes")
+BUT_NAMES = ("hides_files", "denies_network", "denies_processes")
+# Landlock inside of bubblewrap keeps the children of one zygote from one another.
+INSIDE = ("end with parent", "rlimits", "landlock if offered", "seccomp")
 TIERS = (
-    Tier("bubblewrap", ("end with parent", "rlimits", "seccomp"), ALL_PROMISES),
+    Tier("bubblewrap", INSIDE, ALL_PROMISES),
     Tier("namespaces", ("namespaces", "rlimits", "seccomp"), ALL_PROMISES),
-    Tier("landlock", ("rlimits", "landlock", "seccomp"), ALL_PROMISES),
+    Tier("landlock", ("rlimits", "landlock", "seccomp"), BUT_NAMES),
     Tier("rlimits", ("rlimits", "seccomp if offered"), ()),
 )
 

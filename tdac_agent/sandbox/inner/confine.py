@@ -24,7 +24,8 @@ def confine(setup: dict[str, Any]) -> dict[str, bool]:
         _STEPS[step](setup)
     os.chdir(setup["work"])
     return {
-        "hides_files": _files_hidden(setup["witnesses"]),
+        "hides_files": _files_hidden([*setup["witnesses"], *setup["foreign"]]),
+        "hides_names": not any(map(os.path.lexists, setup["witnesses"])),
         "denies_network": not kernel.can_open_socket(),
         "denies_processes": not _can_fork(),
     }
@@ -71,6 +72,11 @@ def _limit_files(setup: dict[str, Any]) -> None:
     )
 
 
+def _limit_files_if_offered(setup: dict[str, Any]) -> None:
+    if landlock.is_offered():
+        _limit_files(setup)
+
+
 def _limit_system_calls(setup: dict[str, Any]) -> None:
     seccomp.apply(setup["lifeline"])
 
@@ -107,6 +113,7 @@ _STEPS = {
     "end with parent": _end_with_parent,
     "rlimits": _limit_resources,
     "landlock": _limit_files,
+    "landlock if offered": _limit_files_if_offered,
     "seccomp": _limit_system_calls,
     "seccomp if offered": _limit_system_calls_if_offered,
 }

@@ -7,6 +7,7 @@ import ctypes
 import os
 import stat
 import struct
+import sys
 
 from . import kernel
 
@@ -22,6 +23,18 @@ SCRATCH = (
 _FILE_RIGHTS = _WRITE_FILE | _READ_FILE | _TRUNCATE
 
 
+def is_offered() -> bool:
+    """Return whether this kernel has it."""
+    try:
+        return sys.platform == "linux" and _version() > 0
+    except OSError:
+        return False
+
+
+def _version() -> int:
+    return kernel.syscall("landlock_create_ruleset", None, 0, 1)
+
+
 def apply(rights: list[tuple[str, int]]) -> None:
     """Deny all files but those below the given paths.
 
@@ -31,7 +44,7 @@ def apply(rights: list[tuple[str, int]]) -> None:
     Raises:
         OSError: The kernel does not offer it.
     """
-    abi = kernel.syscall("landlock_create_ruleset", None, 0, 1)
+    abi = _version()
     ruleset = kernel.syscall("landlock_create_ruleset", *_ruleset(abi), 0)
     try:
         for path, granted in rights:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from .confine import confine
@@ -26,6 +27,7 @@ def main(requests: int, answers: int, lifeline: int, site: str) -> None:
     setup = decode(payload)
     ours = {"descriptors": [requests, answers], "lifeline": lifeline}
     sys.argv = ["controller.py"]
+    os.environ.update(HOME=setup["scratch"], TMPDIR=setup["scratch"])
     sys.path[:] = [setup["work"], *sys.path[1:-1], site]
     try:
         facts = confine({**setup, **ours})

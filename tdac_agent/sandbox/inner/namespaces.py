@@ -72,7 +72,7 @@ def _build_root(setup: dict[str, Any]) -> None:
         kernel.mount("tmpfs", scratch + path, "tmpfs", _NOSUID | _NODEV, "mode=755")
     for path in setup["packages"]:
         _show(path, scratch, _RECURSIVE)
-    for path in (*setup["devices"], setup["root"]):
+    for path in (*setup["devices"], setup["root"], setup["site"]):
         _show(path, scratch, 0)
     _make_read_only(scratch)
     options = f"mode=700,size={setup['scratch_bytes']}"

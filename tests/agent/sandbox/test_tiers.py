@@ -34,6 +34,7 @@ def test_every_tier_is_reported_with_a_reason_where_it_does_not_work():
         assert status.works == (status.reason == "")
     assert statuses[-1].withdrawn == (
         "hides_files",
+        "hides_names",
         "denies_network",
         "denies_processes",
     )
@@ -91,7 +92,7 @@ def test_a_tier_that_does_not_confine_is_refused(monkeypatch, tmp_path):
     )
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
-    with pytest.raises(SandboxError, match="does not hold here: hides_files"):
+    with pytest.raises(SandboxError, match="does not hold here: hides_names"):
         start(tier="bubblewrap")
 
 

@@ -1,0 +1,86 @@
+"""A process with numpy loaded that forks one child after another.
+
+No controller's code runs here: a child reads its first request only after the fork.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import socket
+import struct
+import sys
+import traceback
+from typing import NoReturn
+
+from . import kernel
+from .main import main as serve
+
+# What is wanted, and of which child.
+REQUEST = struct.Struct("<cI")
+FORK, REAP = b"F", b"R"
+# To FORK, from the child itself: its process id in this namespace, or -1 and an error
+# number. To REAP: exit code or minus the signal, CPU seconds, largest resident kB.
+REPLY = struct.Struct("<qdq")
+DESCRIPTORS = 4
+
+
+def main(control: int, lifeline: int, site: str) -> None:
+    """Serve the judge on a socket until it closes it.
+
+    Args:
+        control: Descriptor of the socket.
+        lifeline: Descriptor that is of no use to a child.
+        site: Folder from which numpy is imported.
+    """
+    if os.getpid() == 1:
+        # Die with bubblewrap: the lifeline's signal does not reach a first process.
+        kernel.prctl(kernel.PR_SET_PDEATHSIG, signal.SIGKILL)
+    # What is alive now stays shared with the children.
+    gc.freeze()
+    link = socket.socket(fileno=control)
+    while True:
+        data, descriptors, _, _ = socket.recv_fds(link, REQUEST.size, DESCRIPTORS)
+        if not data:
+            os._exit(0)
+        wanted, pid = REQUEST.unpack(data)
+        if wanted == REAP:
+            link.send(_reap(pid))
+            continue
+        try:
+            forked = os.fork()
+        except OSError as error:
+            link.send(REPLY.pack(-1, 0.0, error.errno or 0))
+        else:
+            if forked == 0:
+                os.close(lifeline)
+                _be_child(link, descriptors, site)
+        for descriptor in descriptors:
+            os.close(descriptor)
+
+
+def _reap(pid: int) -> bytes:
+    """Waits for a child that is ending."""
+    _, status, used = os.wait4(pid, 0)
+    cpu = used.ru_utime + used.ru_stime
+    return REPLY.pack(os.waitstatus_to_exitcode(status), cpu, used.ru_maxrss)
+
+
+def _be_child(link: socket.socket, descriptors: list[int], site: str) -> NoReturn:
+    """Leads a process group of its own, and serves on descriptors of its own."""
+    try:
+        requests, answers, output, lifeline = descriptors
+        os.setsid()
+        os.dup2(output, 1)
+        os.dup2(output, 2)
+        os.close(output)
+        link.send(REPLY.pack(os.getpid(), 0.0, 0))
+        link.close()
+        serve(requests, answers, lifeline, site)
+    except SystemExit as error:
+        print(error, file=sys.stderr)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(1)

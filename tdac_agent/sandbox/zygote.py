@@ -1,0 +1,285 @@
+"""Zygotes: processes with numpy loaded that fork children, each for one use.
+
+Starting an interpreter and loading numpy costs a tenth of a second, a fork a few
+thousandths. No controller's code runs in a zygote, so its children share nothing that
+one of them could have written.
+"""
+
+from __future__ import annotations
+
+import array
+import contextlib
+import errno
+import fcntl
+import os
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.sandbox.bubblewrap import bubblewrap_command
+from tdac_agent.sandbox.channel import Channel
+from tdac_agent.sandbox.errors import SandboxError
+from tdac_agent.sandbox.exposure import INNER, exposure, numpy_folders
+from tdac_agent.sandbox.folder import PrivateFolder
+from tdac_agent.sandbox.inner import landlock
+from tdac_agent.sandbox.inner.zygote import FORK, REAP, REPLY, REQUEST
+from tdac_agent.sandbox.limits import Limits
+
+BOOT = (
+    "import sys; *fds, code, site = sys.argv[1:]; "
+    "sys.path[:] = [code, *sys.path, site]; from inner.zygote import main; "
+    "main(*map(int, fds), site)"
+)
+# No `-I`: it would ignore PYTHONHASHSEED. The environment below is all there is.
+OPTIONS = ("-s", "-S", "-P", "-B", "-u", "-X", "utf8")
+SLOTS = 12
+KEPT_OUTPUT = 4000
+REAP_SECONDS = 10.0
+
+Reaped = tuple[int, float, int]
+
+
+@dataclass(slots=True)
+class Forked:
+    """A child as it was forked.
+
+    Attributes:
+        pid: Its process id here, and that of a process group of its own.
+        folder: Its private folder.
+        channel: The way to talk with it.
+        lifeline: When this descriptor closes, the kernel kills the process group.
+        reap: Waits for its end; exit code or minus the signal, CPU s, resident bytes.
+    """
+
+    pid: int
+    folder: PrivateFolder
+    channel: Channel
+    lifeline: int
+    reap: Callable[[], Reaped]
+
+
+class Zygote:
+    """Forks as many children as it has folders for; ends with the last of them.
+
+    Where the kernel cannot keep the files of its children from one another, it has
+    one child only.
+
+    Args:
+        tier: Name of the tier.
+        limits: The scratch folders are bounded by these.
+        slots: Number of children.
+
+    Raises:
+        SandboxError: The tier cannot be used.
+        OSError: The program cannot be started.
+    """
+
+    def __init__(self, tier: str, limits: Limits, slots: int = SLOTS) -> None:
+        self.tier = tier
+        self.scratch_bytes = limits.scratch_bytes
+        separate = tier == "namespaces" or landlock.is_offered()
+        slots = slots if separate and tier != "rlimits" else 1
+        self._lock = threading.Lock()
+        self._alive = 0
+        self.parent = Path(tempfile.mkdtemp(prefix="tdac-child-")).resolve()
+        self.site = self.parent / "site"
+        # A file of the zygote's that no child may read.
+        self.witness = self.parent / "witness"
+        try:
+            self._furnish()
+            self._free = [PrivateFolder(self.parent) for _ in range(slots)]
+            self._process, self._link, self._output, lifeline = self._start()
+        except BaseException:
+            shutil.rmtree(self.parent, ignore_errors=True)
+            raise
+        ends = (self._process, self._link, self._output, lifeline, self.parent)
+        self._end = weakref.finalize(self, _end, *ends)
+
+    @property
+    def slots(self) -> int:
+        """How many further children it can have."""
+        return len(self._free)
+
+    def fork(self, limits: Limits) -> Forked:
+        """A new child that waits for its setup frame.
+
+        Raises:
+            SandboxError: The zygote did not start, or has ended.
+        """
+        with self._lock, contextlib.ExitStack() as theirs, contextlib.ExitStack() as us:
+            inner, outer = _pipes(theirs, us)
+            message = [REQUEST.pack(FORK, 0)]
+            self._link.settimeout(limits.start_seconds)
+            try:
+                socket.send_fds(self._link, message, inner)
+                (number, _, reason), pid = self._answer()
+            except OSError as error:
+                raise SandboxError(f"{self.tier}: {self._last_words(error)}") from None
+            if number < 0:
+                text = os.strerror(reason)
+                raise SandboxError(f"{self.tier}: cannot fork a child: {text}")
+            _tie(inner[3], pid)
+            us.pop_all()
+            folder = self._free.pop()
+            self._alive += 1
+        write, read, printed, lifeline = outer
+        frame, most = limits.frame_bytes, limits.output_bytes
+        channel = Channel(write, read, printed, frame, most)
+        return Forked(pid, folder, channel, lifeline, lambda: self._reap(number))
+
+    def close(self) -> None:
+        """Have no further children; end now or with the last one."""
+        with self._lock:
+            self._free = []
+            if not self._alive:
+                self._end()
+
+    def _reap(self, number: int) -> Reaped:
+        """Waits for a child that was killed; its id is nobody else's until then."""
+        lost = -signal.SIGKILL, 0.0, 0
+        with self._lock:
+            try:
+                self._link.settimeout(REAP_SECONDS)
+                self._link.send(REQUEST.pack(REAP, number))
+                (status, cpu, peak), _ = self._answer()
+                reaped = status, cpu, peak * (1 if sys.platform == "darwin" else 1024)
+            except OSError:
+                reaped = lost
+            self._alive -= 1
+            if not self._alive and not self._free:
+                self._end()
+        return reaped
+
+    def _answer(self) -> tuple[tuple[int, float, int], int]:
+        """A reply, and the process id of its sender in our namespace."""
+        size = socket.CMSG_SPACE(struct.calcsize("3i"))
+        data, ancillary, _, _ = self._link.recvmsg(REPLY.size, size)
+        if len(data) < REPLY.size:
+            raise OSError(errno.EPIPE, "the sandbox ended")
+        reply = REPLY.unpack(data)
+        for _, _, credentials in ancillary:
+            return reply, struct.unpack("3i", credentials)[0]
+        return reply, reply[0]
+
+    def _last_words(self, error: OSError) -> str:
+        """What the zygote printed, else the error."""
+        self._process.kill()
+        self._process.wait()
+        with contextlib.suppress(BlockingIOError):
+            printed = os.read(self._output, KEPT_OUTPUT).decode("utf-8", "replace")
+            if printed.strip():
+                return printed.strip()
+        return str(error)
+
+    def _furnish(self) -> None:
+        self.site.mkdir()
+        for target in numpy_folders():
+            (self.site / os.path.basename(target)).symlink_to(target)
+        self.witness.write_text("not for children\n")
+
+    def _start(self) -> tuple[subprocess.Popen[bytes], socket.socket, int, int]:
+        """The process, our end of its socket, its output, and its lifeline."""
+        with contextlib.ExitStack() as theirs, contextlib.ExitStack() as ours:
+            link, control = socket.socketpair()
+            ours.callback(link.close)
+            theirs.callback(control.close)
+            (printed, output), (line, lifeline) = os.pipe(), os.pipe()[::-1]
+            for descriptor in (printed, line):
+                ours.callback(os.close, descriptor)
+            for descriptor in (output, lifeline):
+                theirs.callback(os.close, descriptor)
+            command = [exposure().interpreter, *OPTIONS, "-c", BOOT]
+            command += [str(control.fileno()), str(lifeline)]
+            command += [str(INNER.parent), str(self.site)]
+            if self.tier == "bubblewrap":
+                scratch = [str(folder.scratch) for folder in self._free]
+                wrapper = bubblewrap_command(
+                    self.parent, scratch, lifeline, self.scratch_bytes
+                )
+                command = wrapper + command
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                pass_fds=(control.fileno(), lifeline),
+                start_new_session=True,
+                cwd="/",
+                env=_environment(self.parent),
+            )
+            _tie(lifeline, process.pid)
+            if sys.platform == "linux":
+                # A child's id as the kernel says it, seen from our namespace.
+                link.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+            os.set_blocking(printed, False)
+            ours.pop_all()
+        return process, link, printed, line
+
+
+def _pipes(
+    theirs: contextlib.ExitStack, ours: contextlib.ExitStack
+) -> tuple[list[int], list[int]]:
+    """Ends for the child and for us: requests, answers, output, lifeline."""
+    inner, outer = array.array("i"), []
+    for we_write in (True, False, False, True):
+        ends = os.pipe()
+        mine, other = ends[::-1] if we_write else ends
+        ours.callback(os.close, mine)
+        theirs.callback(os.close, other)
+        outer.append(mine)
+        inner.append(other)
+    return list(inner), outer
+
+
+def _end(
+    process: subprocess.Popen[bytes],
+    link: socket.socket,
+    output: int,
+    lifeline: int,
+    parent: Path,
+) -> None:
+    """Kills a zygote, and with it what is left of its children."""
+    link.close()
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    os.close(output)
+    os.close(lifeline)
+    shutil.rmtree(parent, ignore_errors=True)
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    """Return the whole environment of a zygote: nothing of ours but library paths."""
+    environment = {
+        "HOME": str(folder),
+        "TMPDIR": str(folder),
+        "LANG": "C.UTF-8",
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        "PYTHONHASHSEED": "0",
+    }
+    if "LD_LIBRARY_PATH" in os.environ:
+        environment["LD_LIBRARY_PATH"] = os.environ["LD_LIBRARY_PATH"]
+    return environment
+
+
+def _tie(lifeline: int, group: int) -> None:
+    """Have the kernel kill `group` when our end of the lifeline closes.
+
+    Unlike the parent-death signal this holds for the process and not for the thread
+    that started the child.
+    """
+    if sys.platform == "linux":
+        fcntl.fcntl(lifeline, fcntl.F_SETOWN, -group)
+        fcntl.fcntl(lifeline, fcntl.F_SETSIG, signal.SIGKILL)
+        flags = fcntl.fcntl(lifeline, fcntl.F_GETFL)
+        fcntl.fcntl(lifeline, fcntl.F_SETFL, flags | os.O_ASYNC)
