@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from tdac_envs.errors import WorldError
 
 DIGITS = 9
+THINNEST = 1e-4
+"""Thickness of what has none in the file, m."""
 Points = NDArray[np.float64]
 Point = tuple[float, float]
 
@@ -79,8 +81,8 @@ class Rectangle:
     Attributes:
         x: Of its centre.
         y: Of its centre.
-        yaw: Direction of its length, in [-pi/2, pi/2).
-        length: Along `yaw`, above 0.
+        yaw: Direction of its length, in [-pi/2, pi/2); of a square in [-pi/4, pi/4).
+        length: Along `yaw`; the longer side, whatever the order in which they came.
         width: Across, above 0.
     """
 
@@ -93,9 +95,14 @@ class Rectangle:
     def __post_init__(self) -> None:
         _keep_digits(self, "x", "y", "length", "width")
         _above_zero(length=self.length, width=self.width)
-        yaw = metres("yaw", math.remainder(self.yaw, math.pi))
-        half = metres("yaw", math.pi / 2)
-        object.__setattr__(self, "yaw", -half if yaw == half else yaw)
+        length, width, yaw = self.length, self.width, self.yaw
+        if length < width:
+            object.__setattr__(self, "length", width)
+            object.__setattr__(self, "width", length)
+            yaw += math.pi / 2
+        turn = math.pi / 2 if length == width else math.pi
+        yaw, half = metres("yaw", math.remainder(yaw, turn)), metres("yaw", turn / 2)
+        object.__setattr__(self, "yaw", -half if yaw >= half else yaw)
 
     @property
     def turn(self) -> Points:

@@ -18,6 +18,7 @@ from typing import Literal
 
 from tdac_envs.errors import WorldError
 from tdac_envs.footprint import (
+    THINNEST,
     Disc,
     Footprint,
     Rectangle,
@@ -37,7 +38,7 @@ _STEP_DOWN = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A prism.
+    """A prism, at least 0.1 mm high (a flat one grows downwards).
 
     Attributes:
         shape: Its footprint.
@@ -56,6 +57,8 @@ class Part:
             raise WorldError(
                 f"expected a bottom below the top, got {self.bottom} and {self.top}"
             )
+        if self.top - self.bottom < THINNEST:
+            object.__setattr__(self, "bottom", metres("bottom", self.top - THINNEST))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""Webots world files: text → nodes → frames → prisms → `tdac_envs.world.World`."""
