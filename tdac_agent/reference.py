@@ -80,24 +80,29 @@ def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
     return ends
 
 
-def pull(task: Map2DTask, path: Path) -> list[tuple[float, float]]:
+def pull(task: Map2DTask, path: Path, safe: float = _SAFE) -> list[tuple[float, float]]:
     """Corners of the path after every shortcut that keeps the disc clear.
 
     A shortcut is looked for by doubling and halving the number of path points that
     it skips, so a long path costs n log n contact tests.
+
+    Args:
+        task: Gives the map and the body.
+        path: Shape (n, 2), px.
+        safe: Room that a shortcut keeps beyond the body, px.
     """
     points = [(float(x), float(y)) for x, y in path]
     corners, at = points[:1], 0
     while at < len(points) - 1:
         reach = 1
         while at + 2 * reach < len(points) and _free(
-            task, points[at], points[at + 2 * reach], _SAFE
+            task, points[at], points[at + 2 * reach], safe
         ):
             reach *= 2
         stride = reach
         while stride >= 1:
             beyond = at + reach + stride
-            if beyond < len(points) and _free(task, points[at], points[beyond], _SAFE):
+            if beyond < len(points) and _free(task, points[at], points[beyond], safe):
                 reach += stride
             stride //= 2
         at += reach

@@ -1,0 +1,97 @@
+"""The source of the privileged controllers of a task."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from tdac_agent.judge import JITTERS
+from tdac_agent.reference import oracle_path, pull
+from tdac_agent.starts import spread_starts
+from tdac_envs.task2d import Map2DTask
+
+Point = tuple[float, float]
+
+REFERENCE, DO_NOTHING, SLOW = "reference", "do-nothing", "slow"
+POLICIES = {
+    REFERENCE: '''\
+def policy(obs):
+    """Follows the way."""
+    return steer(obs)''',
+    DO_NOTHING: '''\
+def policy(obs):
+    """Stands still."""
+    return 0.0, 0.0''',
+    "constant": '''\
+def policy(obs):
+    """Drives straight on, whatever comes."""
+    return 1.0, 1.0''',
+    "random": '''\
+DICE = random.Random(0)
+
+
+def policy(obs):
+    """Rolls the dice."""
+    return DICE.uniform(-1.0, 1.0), DICE.uniform(-1.0, 1.0)''',
+    "raising": '''\
+def policy(obs):
+    """Gives up."""
+    raise ValueError("this controller always raises")''',
+    SLOW: '''\
+def policy(obs):
+    """Follows the way, but takes longer than a call may."""
+    end = time.perf_counter() + 2.2 * DT
+    while time.perf_counter() < end:
+        math.sqrt(end)
+    return steer(obs)''',
+}
+"""Definition of `policy` in each controller, by the controller's name."""
+BAD = tuple(name for name in POLICIES if name != REFERENCE)
+# Room kept beyond the body on a shortcut, px: many times what float32 rounds away.
+SAFE = 0.02
+
+
+def privileged_controller(task: Map2DTask, seed: int, name: str = REFERENCE) -> str:
+    """Source of a controller that knows the oracle's path from each start of a test.
+
+    Args:
+        task: What it must do, or fail to do.
+        seed: Of the jittered starts.
+        name: One of `POLICIES`.
+    """
+    starts = (task.start, *spread_starts(task, seed, JITTERS))
+    size = max(task.terrain.grid.cells.shape)
+    environment = Environment(
+        loader=PackageLoader("tdac_agent", "privileged"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    return environment.get_template("controller_map2d.py.j2").render(
+        robot=task.robot,
+        dt=task.dt,
+        spacing=float(np.spacing(np.float32(size))),
+        ways=[reference_way(task, start.x, start.y) for start in starts],
+        policy=POLICIES[name],
+    )
+
+
+def reference_way(task: Map2DTask, x: float, y: float) -> list[Point]:
+    """The oracle's path from (x, y) to the goal, pulled taut, px; ends included."""
+    return without_flat_points(pull(task, oracle_path(task, x, y), SAFE))
+
+
+def without_flat_points(points: Sequence[Point]) -> list[Point]:
+    """A polyline without the points at which it goes straight on."""
+    kept = list(points[:1])
+    for here, after in pairwise(points[1:]):
+        (x0, y0), (x1, y1), (x2, y2) = kept[-1], here, after
+        ax, ay, bx, by = x1 - x0, y1 - y0, x2 - x1, y2 - y1
+        if ax * by != ay * bx or ax * bx + ay * by <= 0.0:
+            kept.append(here)
+    return [*kept, *points[1:][-1:]]
