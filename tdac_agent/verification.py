@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import importlib.metadata
 import json
-import platform
 import tempfile
 import time
-from dataclasses import asdict
 from pathlib import Path
 
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
 from tdac_agent.judging import Findings, Job
+from tdac_agent.provenance import origin, sha256_of
 from tdac_agent.report import Provenance, Report
 from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
 from tdac_agent.sandbox import Limits
@@ -27,7 +24,6 @@ from tdac_agent.warm import WarmJudge
 SHIPPED_SUITE = Path(__file__).parent / "suites" / "map2d"
 DEADLINE_SECONDS = 900.0
 MAX_FILE_BYTES = 64 << 20
-VERSIONED = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
 
 
 def verify(
@@ -172,38 +168,22 @@ def _run_judge(job: Job, folder: Path, judge: WarmJudge) -> str:
 def _provenance(
     task: Task, source: bytes, job: Job, suites: dict[str, Path], findings: Findings
 ) -> Provenance:
-    weak = findings.tier == "rlimits"
-    warning = "this sandbox tier cannot withhold the network and other files"
     hashes = {name: _suite_hash(folder) for name, folder in suites.items()}
-    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
     return Provenance(
-        task=task.name,
-        task_sha256=task.sha256(),
-        map_sha256=task.nominal.terrain.grid.sha256(),
-        params_sha256=_sha(task.params.model_dump_json().encode()),
-        sensors_sha256=_sha((job.task / "sensors.py").read_bytes()),
-        controller_sha256=_sha(source),
+        **origin(task, source, job.task, findings.tier, job.limits),
         suite=" + ".join(folder.name for folder in suites.values()),
-        suite_sha256=_sha(json.dumps(hashes, sort_keys=True).encode()),
+        suite_sha256=sha256_of(json.dumps(hashes, sort_keys=True).encode()),
         profile=job.profile,
         paper=job.paper,
         seed=job.seed,
-        sandbox=findings.tier,
-        limits=asdict(job.limits),
-        warnings=(*((warning,) if weak else ()), *task.params.notes),
-        versions={"python": platform.python_version(), **versions},
     )
 
 
 def _suite_hash(folder: Path) -> dict[str, str]:
     return {
-        str(path.relative_to(folder)): _sha(path.read_bytes())
+        str(path.relative_to(folder)): sha256_of(path.read_bytes())
         for path in sorted(folder.rglob("*.py"))
     }
-
-
-def _sha(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
 
 
 def _keep(report: Report, results: Path, out: Path) -> None:
