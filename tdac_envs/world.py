@@ -13,7 +13,7 @@ engine takes it, between two heights; it is the projection of one convex piece o
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from tdac_envs.errors import WorldError
@@ -34,6 +34,8 @@ MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
 
 _STEP_DOWN = 0.01
 """How far above the robot's origin the ground under it may be, m."""
+_NEAR = 0.005
+"""Gap up to which a thing stands on what is below it, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ class Obstacle:
         visible: What infra-red rays hit.
         mass: kg, of what can be pushed; None is fixed.
         reflectance: Factor by which Webots divides the distance that a sensor
-            measures, in (0, 1]; 1 where it is not known.
+            measures, in [0.2, 1]; 1 where it is not known, or nothing is seen.
         is_goal: It marks the goal.
     """
 
@@ -96,8 +98,10 @@ class Obstacle:
             object.__setattr__(self, "mass", metres("mass", self.mass))
             if self.mass <= 0.0:
                 raise WorldError(f"expected a mass above 0, got {self.mass}")
-        if not 0.0 < self.reflectance <= 1.0:
-            raise WorldError(f"expected 0 < f <= 1, got {self.reflectance}")
+        if not 0.2 <= self.reflectance <= 1.0:
+            raise WorldError(f"expected 0.2 <= f <= 1, got {self.reflectance}")
+        if not self.visible:
+            object.__setattr__(self, "reflectance", 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,15 +149,13 @@ class Arena:
     """A floor, most often with a wall around it.
 
     Attributes:
-        kind: PROTO type.
-        inside: The floor: a disc or a rectangle.
+        inside: The floor. A disc has a wall; a rectangle may have none.
         wall_thickness: Of the wall, which stands outside the floor; 0 without one.
         wall_height: Above the floor; 0 without a wall.
         z: Of the floor.
-        facets: Flat pieces of a round wall.
+        facets: Flat pieces of a round wall; each touches the disc.
     """
 
-    kind: str
     inside: Disc | Rectangle
     wall_thickness: float = 0.0
     wall_height: float = 0.0
@@ -163,16 +165,25 @@ class Arena:
     def __post_init__(self) -> None:
         for key in ("wall_thickness", "wall_height", "z"):
             object.__setattr__(self, key, metres(key, getattr(self, key)))
-        if min(self.wall_thickness, self.wall_height) < 0.0 or self.facets < 3:
-            raise WorldError(
-                "expected a wall with thickness and height from 0 and at least 3 "
-                f"facets, got {self.wall_thickness}, {self.wall_height}, {self.facets}"
-            )
+        wall = (self.wall_thickness, self.wall_height)
+        if min(wall) < 0.0 or (min(wall) == 0.0) != (max(wall) == 0.0):
+            raise WorldError(f"expected a wall with thickness and height, got {wall}")
+        if isinstance(self.inside, Disc) and (not self.has_wall or self.facets < 8):
+            raise WorldError("expected a round arena with a wall of 8 facets or more")
+        if isinstance(self.inside, Rectangle):
+            object.__setattr__(self, "facets", 48)
+
+    @property
+    def kind(self) -> str:
+        """PROTO type."""
+        if isinstance(self.inside, Disc):
+            return "CircleArena"
+        return "RectangleArena" if self.has_wall else "Floor"
 
     @property
     def has_wall(self) -> bool:
         """Whether there is a wall around the floor."""
-        return min(self.wall_thickness, self.wall_height) > 0.0
+        return self.wall_height > 0.0
 
     def wall(self) -> Obstacle:
         """The wall, in convex pieces; without pieces where there is none."""
@@ -248,6 +259,8 @@ class World:
         if self.goal is not None:
             point = (metres("x", self.goal[0]), metres("y", self.goal[1]))
             object.__setattr__(self, "goal", point)
+        elif any(obstacle.is_goal for obstacle in self.obstacles):
+            raise WorldError("a world with a mark of the goal needs a goal")
 
     @property
     def robot(self) -> EPuck:
@@ -271,29 +284,64 @@ class World:
 
     @property
     def bodies(self) -> tuple[Obstacle, ...]:
-        """Obstacles, walls of the arenas, and the e-pucks that stand in the way."""
+        """What stands in the way: obstacles, walls of the arenas, other e-pucks.
+
+        First the obstacles, in their order; those with a mass that hang in the air
+        have fallen.
+        """
         walls = [arena.wall() for arena in self.arenas if arena.has_wall]
-        return (*self.obstacles, *walls, *map(standing_robot, self.robots[1:]))
+        fallen = [
+            _fallen(thing, self.obstacles, self.floor) for thing in self.obstacles
+        ]
+        return (*fallen, *walls, *map(standing_robot, self.robots[1:]))
 
     @property
     def floor(self) -> float:
         """Height of the ground under the driven robot.
 
-        It may stand on an obstacle (a table, a plank); otherwise on the arena or
+        It may stand on an obstacle (a table, a plank); otherwise on an arena, or
         at 0.
         """
-        robot = self.robot
-        reach = robot.z + _STEP_DOWN
+        if not self.robots:
+            return 0.0
+        x, y, reach = self.robot.x, self.robot.y, self.robot.z + _STEP_DOWN
         under = [part for thing in self.obstacles for part in thing.solid]
-        tops = [p.top for p in under if p.shape.contains(robot.x, robot.y)]
-        tops += [a.z for a in self.arenas if a.inside.contains(robot.x, robot.y)]
-        return max((top for top in tops if top <= reach), default=min(0.0, reach))
+        tops = [part.top for part in under if part.shape.contains(x, y)]
+        tops += [arena.z for arena in self.arenas if arena.inside.contains(x, y)]
+        return max((top for top in tops if top <= reach), default=0.0)
 
 
 def at_body_height(parts: Iterable[Part], floor: float) -> tuple[Part, ...]:
     """The parts that an e-puck which stands on `floor` can hit."""
     low, high = floor + BODY_BOTTOM, floor + BODY_TOP
     return tuple(part for part in parts if part.top > low and part.bottom < high)
+
+
+def _fallen(thing: Obstacle, others: Iterable[Obstacle], floor: float) -> Obstacle:
+    """An obstacle with a mass, let down onto the floor or what is below it."""
+    if thing.mass is None or not thing.solid:
+        return thing
+    bottom = min(part.bottom for part in thing.solid)
+    below = [
+        p.top for o in others if o is not thing for p in o.solid if _above(thing, p)
+    ]
+    drop = bottom - max([floor, *(top for top in below if top <= bottom + _NEAR)])
+    if drop <= _NEAR:
+        return thing
+    solid, visible = (
+        tuple(replace(p, bottom=p.bottom - drop, top=p.top - drop) for p in parts)
+        for parts in (thing.solid, thing.visible)
+    )
+    return replace(thing, solid=solid, visible=visible)
+
+
+def _above(thing: Obstacle, part: Part) -> bool:
+    """Whether some of a thing is over a part, as far as their bounds say."""
+    left, low, right, high = part.shape.bounds
+    return any(
+        a <= right and left <= c and b <= high and low <= d
+        for a, b, c, d in (own.shape.bounds for own in thing.solid)
+    )
 
 
 def standing_robot(robot: EPuck) -> Obstacle:

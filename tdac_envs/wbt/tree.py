@@ -11,6 +11,8 @@ from tdac_envs.wbt.tokens import Kind, Source, Token, tokens
 
 DEEPEST = 100
 """Nodes within nodes at most, so that no file exhausts the stack."""
+MOST_NODES = 20_000
+"""Nodes at most, each USE counted as what it stands for."""
 
 _HEADER = re.compile(r"#VRML(?:_\w+)? +(\S+)(?: +utf8)?[^\S\n]*(?:\n|$)")
 _VERSION = re.compile(r"[RV]?(\d{1,6})(?:\.(\d{1,6})|([a-z]))?")
@@ -42,6 +44,7 @@ class Node:
         fields: By name.
         source: The text.
         offset: Where it begins in the text.
+        size: Number of nodes in it, itself included.
     """
 
     kind: str
@@ -49,6 +52,7 @@ class Node:
     fields: dict[str, Field]
     source: Source
     offset: int
+    size: int
 
     def error(self, message: str, field: str = "") -> WorldError:
         """An error at one of its fields, or at the node."""
@@ -69,13 +73,11 @@ class Document:
         nodes: Those at the top.
         version: As in the header, e.g. "R2025a".
         release: Its numbers, which can be compared: (2025, 1), (8, 6).
-        externs: Names of the PROTOs that it declares.
     """
 
     nodes: tuple[Node, ...]
     version: str
     release: tuple[int, int]
-    externs: tuple[str, ...]
 
 
 def parse(text: str, name: str) -> Document:
@@ -97,10 +99,8 @@ def parse(text: str, name: str) -> Document:
             0, "expected a header such as '#VRML_SIM R2025a utf8' on the first line"
         )
     minor = int(found[2] or 0) if not found[3] else ord(found[3]) - ord("a") + 1
-    parser = _Parser(source, tokens(source, header.end()))
-    nodes = parser.world()
-    release = (int(found[1]), minor)
-    return Document(nodes, header[1], release, tuple(parser.externs))
+    nodes = _Parser(source, tokens(source, header.end())).world()
+    return Document(nodes, header[1], (int(found[1]), minor))
 
 
 Item = float | str | bool | Node | None
@@ -113,10 +113,9 @@ class _Parser:
         self._source, self._stream = source, stream
         self._next = next(stream)
         self._defined: dict[str, Node] = {}
-        self.externs: list[str] = []
 
     def world(self) -> tuple[Node, ...]:
-        nodes = []
+        nodes, size = list[Node](), 0
         while self._next.kind != "end":
             if self._next.text in {"EXTERNPROTO", "IMPORTABLE"}:
                 self._extern()
@@ -124,6 +123,8 @@ class _Parser:
             node = self._node(0)
             if node is not None:
                 nodes.append(node)
+                size += node.size
+                self._bounded(size, node)
         return tuple(nodes)
 
     def _extern(self) -> None:
@@ -133,8 +134,7 @@ class _Parser:
             self._take()
         if self._next.kind != "string":
             raise self._unexpected("the URL of a PROTO in quotes")
-        url = self._take().text
-        self.externs.append(url.replace("\\", "/").rsplit("/", 1)[-1].split(".")[0])
+        self._take()
 
     def _node(self, depth: int) -> Node | None:
         """A node, a USE of one, or NULL."""
@@ -150,11 +150,23 @@ class _Parser:
             define = self._name("a name after DEF").text
         kind = self._name("a node").text
         before = self._defined.get(define)
-        node = Node(kind, define, self._body(kind, depth), self._source, begin.offset)
+        fields = self._body(kind, depth)
+        size = 1 + sum(
+            item.size
+            for field in fields.values()
+            for item in field.items
+            if isinstance(item, Node)
+        )
+        node = Node(kind, define, fields, self._source, begin.offset, size)
+        self._bounded(size, node)
         # A node within, of the same name, comes later than the beginning of this one.
         if define and self._defined.get(define) is before:
             self._defined[define] = node
         return node
+
+    def _bounded(self, size: int, node: Node) -> None:
+        if size > MOST_NODES:
+            raise node.error(f"expected at most {MOST_NODES} nodes, got {size}")
 
     def _used(self, name: Token) -> Node:
         if name.text not in self._defined:

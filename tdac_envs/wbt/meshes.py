@@ -1,0 +1,107 @@
+"""IndexedFaceSets as prisms."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.footprint import THINNEST
+from tdac_envs.wbt.fields import child, number_list
+from tdac_envs.wbt.frames import Frame
+from tdac_envs.wbt.prisms import hull
+from tdac_envs.wbt.tree import Node
+from tdac_envs.world import Part
+
+MOST_FACES = 1000
+"""Faces of a mesh that is not convex, at most."""
+
+Points = NDArray[np.float64]
+Face = NDArray[np.int64]
+
+
+def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
+    """The prisms of an IndexedFaceSet.
+
+    A convex mesh is one prism. Any other is a prism over each of its faces, as high
+    as the whole mesh: what is below an overhang counts as filled.
+
+    Args:
+        node: The IndexedFaceSet.
+        frame: Its frame, in the file's own axes.
+
+    Returns:
+        The parts, or why it has none.
+
+    Raises:
+        WorldError: Its points or indices are broken.
+    """
+    points = frame.at(_points(node))
+    faces = _faces(node, len(points))
+    if not faces:
+        return ()
+    used = points[np.unique(np.concatenate(faces))]
+    if len(faces) * len(used) > MOST_FACES**2:
+        return f"a mesh with {len(faces)} faces"
+    if _is_convex(points, faces, used):
+        return hull(used)
+    if len(faces) > MOST_FACES:
+        return f"a mesh with {len(faces)} faces that is not convex"
+    if not all(_is_flat_convex(points[face]) for face in faces):
+        return "a mesh with a face that is not convex"
+    low, high = float(used[:, 2].min()), float(used[:, 2].max())
+    shapes = [hull(points[face])[0].shape for face in faces if _casts(points[face])]
+    return tuple(Part(shape, low, high) for shape in dict.fromkeys(shapes)) or hull(
+        used
+    )
+
+
+def _points(node: Node) -> Points:
+    coordinate = child(node, "coord")
+    flat = () if coordinate is None else number_list(coordinate, "point")
+    if coordinate is not None and len(flat) % 3:
+        raise coordinate.error("expected x, y and z of each point", "point")
+    return np.array(flat, np.float64).reshape(-1, 3)
+
+
+def _faces(node: Node, count: int) -> list[Face]:
+    """Indices of the points of each face, without those of less than three."""
+    flat = np.array(number_list(node, "coordIndex"), np.float64)
+    index = flat.astype(np.int64)
+    if (index != flat).any() or (index < -1).any() or (index >= count).any():
+        raise node.error(
+            f"expected whole numbers below {count}, or -1, in coordIndex", "coordIndex"
+        )
+    pieces = np.split(index, np.flatnonzero(index == -1))
+    faces = [piece[piece >= 0] for piece in pieces]
+    return [face for face in faces if len(face) >= 3]
+
+
+def _is_convex(points: Points, faces: list[Face], used: Points) -> bool:
+    """Whether no point stands out of the plane of a face, on either side of it."""
+    for face in faces:
+        normal = _normal(points[face])
+        length = float(np.linalg.norm(normal))
+        if length > 0.0:
+            height = (used - points[face[0]]) @ (normal / length)
+            if height.max() > THINNEST and height.min() < -THINNEST:
+                return False
+    return True
+
+
+def _normal(corners: Points) -> Points:
+    """Newell's normal; its length is twice the area."""
+    at = corners - corners[0]
+    return np.asarray(np.cross(at, np.roll(at, -1, axis=0)).sum(axis=0))
+
+
+def _is_flat_convex(corners: Points) -> bool:
+    """Whether all turns along a face go the same way."""
+    normal = _normal(corners)
+    edge = np.roll(corners, -1, axis=0) - corners
+    turns = np.cross(edge, np.roll(edge, -1, axis=0)) @ normal
+    return bool((turns >= -1e-9 * float(normal @ normal)).all())
+
+
+def _casts(corners: Points) -> bool:
+    """Whether a face has an area as seen from above."""
+    return bool(abs(_normal(corners)[2]) > 2.0 * THINNEST**2)
