@@ -1,4 +1,4 @@
-"""The command line: `tdac map | synth | verify | play | doctor`.
+"""The command line: `tdac map | synth | verify | play | check-suite | doctor`.
 
 Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastructure,
 4 budget, 130 interrupted.
@@ -204,6 +204,40 @@ def play(
         task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
     )
     raise typer.Exit(command.run(controller, spec, video, seed, tier))
+
+
+@app.command(
+    "check-suite",
+    epilog="Example: `tdac check-suite --task office --suite my_tests`",
+)
+def check_suite(
+    task: TaskOption = None,
+    map_image: MapOption = None,
+    start: Start = None,
+    goal: Goal = None,
+    heading: Heading = None,
+    robot_radius: Radius = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    suite: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Folder with your own test_*.py files, run as well."),
+    ] = None,
+    profile: Profile = None,
+    tier: Tier = "auto",
+    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
+    repeats: Annotated[
+        int, typer.Option(min=1, help="Verifications of each, which must agree.")
+    ] = 5,
+    as_json: Json = False,
+) -> None:
+    """Let a suite prove itself: a reference must pass it, bad controllers must not."""
+    from tdac_agent.commands import check_suite as command
+
+    spec = _flags(
+        task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
+    )
+    raise typer.Exit(command.run(spec, profile, suite, tier, seed, repeats, as_json))
 
 
 @app.command(epilog="Example: `tdac doctor`")

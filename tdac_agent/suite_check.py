@@ -1,0 +1,122 @@
+"""A suite proves itself: the reference passes it, and bad controllers do not."""
+
+from __future__ import annotations
+
+import contextlib
+import textwrap
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from tdac_agent.errors import Fault
+from tdac_agent.privileged import (
+    BAD,
+    DO_NOTHING,
+    REFERENCE,
+    SLOW,
+    privileged_controller,
+)
+from tdac_agent.report import Report
+from tdac_agent.sandbox import Limits
+from tdac_agent.suite_proof import SuiteCheck, row_of, verdict_on_suite
+from tdac_agent.task import Task
+from tdac_agent.task_file import Profile
+from tdac_agent.verification import verify
+from tdac_agent.warm import WarmJudge
+
+REPEATS = 5
+# A slow controller is cut off for its speed; where steps are long, by this.
+SLOW_LIMITS = Limits(cpu_seconds=30)
+FAULT_WIDTH = 300
+
+
+def check_suite(
+    task: Task,
+    *,
+    profile: Profile | None = None,
+    suite: Path | None = None,
+    tier: str = "auto",
+    seed: int = 0,
+    repeats: int = REPEATS,
+    bad: Sequence[str] = BAD,
+    judge: WarmJudge | None = None,
+    on_progress: Callable[[str], None] = lambda _: None,
+) -> SuiteCheck:
+    """Verifies the reference and bad controllers, repeatedly.
+
+    Args:
+        task: What the controllers must do.
+        profile: `policy` or `paper`; the task's own by default.
+        suite: Folder with further tests; the task's own by default.
+        tier: Sandbox tier, `auto` for the best one here.
+        seed: Of the jittered starts.
+        repeats: Verifications of each controller, which must agree. Of the slow one
+            the clock decides: it has one, of the nominal episode alone.
+        bad: Names of the bad controllers.
+        judge: A warm one; one of its own by default.
+        on_progress: Called with what is being done, in a few words.
+
+    Raises:
+        ControllerFileError: The suite's folder holds no tests.
+        Fault: Sandbox or suite broken.
+    """
+    if repeats < 1:
+        raise ValueError(f"expected at least 1 repeat, got {repeats}")
+    began = time.monotonic()
+    with contextlib.ExitStack() as stack:
+        warm = judge or stack.enter_context(WarmJudge())
+        ask = partial(verify, task=task, suite=suite, tier=tier, seed=seed, judge=warm)
+
+        def reports_on(name: str) -> list[Report]:
+            source = privileged_controller(task.nominal, seed, name)
+            full = partial(ask, source, profile=profile)
+            short = partial(
+                ask, source, profile="policy", paper=True, limits=SLOW_LIMITS
+            )
+            times, verified = (1, short) if name == SLOW else (repeats, full)
+            reports = []
+            for number in range(1, times + 1):
+                on_progress(f"{name}, {number} of {times}")
+                reports.append(verified())
+            return reports
+
+        good = reports_on(REFERENCE)
+        rows = [row_of(REFERENCE, good)]
+        rows += [row_of(name, reports_on(name)) for name in bad]
+    about, tests = good[0].provenance, tuple(good[0].tests)
+    return verdict_on_suite(about, rows, tests, time.monotonic() - began)
+
+
+def prove_suite(
+    task: Task,
+    *,
+    profile: Profile | None = None,
+    suite: Path | None = None,
+    tier: str = "auto",
+    seed: int = 0,
+    judge: WarmJudge | None = None,
+) -> SuiteCheck:
+    """The short form, for the beginning of a run; arguments as for `check_suite`.
+
+    The reference must pass once, and a controller that does nothing must fail once.
+
+    Raises:
+        Fault: One of them does not, or sandbox or suite are broken.
+    """
+    check = check_suite(
+        task,
+        profile=profile,
+        suite=suite,
+        tier=tier,
+        seed=seed,
+        repeats=1,
+        bad=(DO_NOTHING,),
+        judge=judge,
+    )
+    if not check.proven:
+        first, *more = check.problems
+        others = f" ({len(more)} more: tdac check-suite)" if more else ""
+        told = textwrap.shorten(first, FAULT_WIDTH, placeholder=" …")
+        raise Fault(f"the suite did not prove itself: {told}{others}")
+    return check
