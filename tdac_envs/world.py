@@ -13,7 +13,7 @@ engine takes it, between two heights; it is the projection of one convex piece o
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 from tdac_envs.errors import WorldError
@@ -28,14 +28,7 @@ from tdac_envs.footprint import (
     wrapped,
 )
 
-BODY_RADIUS = 0.037
-BODY_BOTTOM, BODY_TOP = 0.0025, 0.0475
 MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
-
-_STEP_DOWN = 0.01
-"""How far above the robot's origin the ground under it may be, m."""
-_NEAR = 0.005
-"""Gap up to which a thing stands on what is below it, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,74 +274,6 @@ class World:
             if self.robots and arena.inside.contains(self.robot.x, self.robot.y):
                 return arena
         return walled[0] if walled else None
-
-    @property
-    def bodies(self) -> tuple[Obstacle, ...]:
-        """What stands in the way: obstacles, walls of the arenas, other e-pucks.
-
-        First the obstacles, in their order; those with a mass that hang in the air
-        have fallen.
-        """
-        walls = [arena.wall() for arena in self.arenas if arena.has_wall]
-        fallen = [
-            _fallen(thing, self.obstacles, self.floor) for thing in self.obstacles
-        ]
-        return (*fallen, *walls, *map(standing_robot, self.robots[1:]))
-
-    @property
-    def floor(self) -> float:
-        """Height of the ground under the driven robot.
-
-        It may stand on an obstacle (a table, a plank); otherwise on an arena, or
-        at 0.
-        """
-        if not self.robots:
-            return 0.0
-        x, y, reach = self.robot.x, self.robot.y, self.robot.z + _STEP_DOWN
-        under = [part for thing in self.obstacles for part in thing.solid]
-        tops = [part.top for part in under if part.shape.contains(x, y)]
-        tops += [arena.z for arena in self.arenas if arena.inside.contains(x, y)]
-        return max((top for top in tops if top <= reach), default=0.0)
-
-
-def at_body_height(parts: Iterable[Part], floor: float) -> tuple[Part, ...]:
-    """The parts that an e-puck which stands on `floor` can hit."""
-    low, high = floor + BODY_BOTTOM, floor + BODY_TOP
-    return tuple(part for part in parts if part.top > low and part.bottom < high)
-
-
-def _fallen(thing: Obstacle, others: Iterable[Obstacle], floor: float) -> Obstacle:
-    """An obstacle with a mass, let down onto the floor or what is below it."""
-    if thing.mass is None or not thing.solid:
-        return thing
-    bottom = min(part.bottom for part in thing.solid)
-    below = [
-        p.top for o in others if o is not thing for p in o.solid if _above(thing, p)
-    ]
-    drop = bottom - max([floor, *(top for top in below if top <= bottom + _NEAR)])
-    if drop <= _NEAR:
-        return thing
-    solid, visible = (
-        tuple(replace(p, bottom=p.bottom - drop, top=p.top - drop) for p in parts)
-        for parts in (thing.solid, thing.visible)
-    )
-    return replace(thing, solid=solid, visible=visible)
-
-
-def _above(thing: Obstacle, part: Part) -> bool:
-    """Whether some of a thing is over a part, as far as their bounds say."""
-    left, low, right, high = part.shape.bounds
-    return any(
-        a <= right and left <= c and b <= high and low <= d
-        for a, b, c, d in (own.shape.bounds for own in thing.solid)
-    )
-
-
-def standing_robot(robot: EPuck) -> Obstacle:
-    """An e-puck that is not driven, as an obstacle."""
-    disc = Disc(robot.x, robot.y, BODY_RADIUS)
-    part = Part(disc, robot.z + BODY_BOTTOM, robot.z + BODY_TOP)
-    return Obstacle(robot.name, "E-puck", robot.x, robot.y, (part,), (part,))
 
 
 def check_modelled(world: World, ignore: Iterable[str] = ()) -> tuple[Unmodelled, ...]:

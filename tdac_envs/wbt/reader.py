@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tdac_envs.arguments import finite_point
+from tdac_envs.bodies import bodies, floor_under
 from tdac_envs.errors import WorldError
 from tdac_envs.wbt.fields import number, numbers, text
 from tdac_envs.wbt.found import Found
@@ -150,12 +151,13 @@ def _notes(world: World, found: Found) -> list[str]:
         notes.append(f"{world.robot.name!r} is driven; {names} stand still")
     if len(set(found.goals)) > 1:
         notes.append(f"{len(found.goals)} nodes are named GOAL; the first is taken")
-    if world.robots and abs(world.floor) > _RAISED:
+    floor = floor_under(world)
+    if abs(floor) > _RAISED:
         notes.append(
-            f"the robot stands {world.floor:.3g} m above the ground; falling off is "
-            "not modelled"
+            f"the robot stands {floor:.3g} m above the ground; falling off is not "
+            "modelled"
         )
-    for thing, fallen in zip(world.obstacles, world.bodies, strict=False):
+    for thing, fallen in zip(world.obstacles, bodies(world), strict=False):
         if fallen != thing:
             drop = thing.solid[0].top - fallen.solid[0].top
             name = thing.name or thing.kind
