@@ -3,16 +3,90 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import ValidationError
+from pydantic import BaseModel, BeforeValidator, Field, StrictInt, ValidationError
 
 from tdac_agent.errors import Fault
 from tdac_agent.judging import Findings
 from tdac_agent.report import Diagnosis, Failure, Verdict, group_of
 from tdac_agent.suite_plugin import MAX_MESSAGE, test_id
+
+PHASES = frozenset({"setup", "call", "teardown"})
+NOT_RUN = "the test did not run to its end"
+TORN = "the report log is torn or unfinished, so that nothing in it counts as passed"
+
+
+def _without_surrogates(value: Any) -> Any:
+    """What a test says may quote half a character, which no report can hold."""
+    return value.encode("utf-8", "replace").decode() if type(value) is str else value
+
+
+Text = Annotated[str, BeforeValidator(_without_surrogates)]
+
+
+class _Crash(BaseModel):
+    message: Text
+
+
+class _Details(BaseModel):
+    reprcrash: _Crash | None = None
+
+
+class _Collected(BaseModel):
+    """pytest's word about a file; it has more fields than are read here."""
+
+    nodeid: Text
+    outcome: Literal["passed", "failed", "skipped"]
+    longrepr: _Details | tuple[str, int | None, Text] | Text | None = None
+
+
+class _Tested(_Collected):
+    """pytest's word about one phase of one test."""
+
+    when: Literal["setup", "call", "teardown"]
+    wasxfail: Any = None
+    user_properties: list[tuple[str, Any]] = []
+
+    @property
+    def passed(self) -> bool:
+        return self.outcome == "passed" and "wasxfail" not in self.model_fields_set
+
+
+class _Finished(BaseModel):
+    """pytest's last word."""
+
+    exitstatus: StrictInt
+
+
+class _Other(BaseModel):
+    """A record of something else, such as a warning."""
+
+    kind: str = Field(alias="$report_type")
+
+
+_KINDS: dict[str, type[BaseModel]] = {
+    "CollectReport": _Collected,
+    "TestReport": _Tested,
+    "SessionFinish": _Finished,
+}
+
+
+class _Log(NamedTuple):
+    """Records of a report log; None for a line that is not one."""
+
+    records: list[BaseModel | None]
+
+    def is_whole(self, failed: bool) -> bool:
+        """Whether it was written to its end, and knows of as many failures as it tells.
+
+        Args:
+            failed: Whether it tells of any.
+        """
+        last = self.records[-1] if self.records else None
+        ended = isinstance(last, _Finished) and last.exitstatus in (0, int(failed))
+        return ended and None not in self.records
 
 
 def read_findings(results: Path, output: str) -> Findings:
@@ -25,9 +99,11 @@ def read_findings(results: Path, output: str) -> Findings:
     Raises:
         Fault: There are none, or they say that the sandbox failed.
     """
-    path = results / "findings.json"
     try:
-        findings = Findings.model_validate_json(path.read_text(encoding="utf-8"))
+        raw = (results / "findings.json").read_bytes()
+        findings = Findings.model_validate_json(raw)
+        for text in findings.diagnoses.values():
+            Diagnosis.model_validate_json(text)
     except (OSError, ValidationError) as error:
         raise Fault(f"the judge left no findings: {_tail(output)}") from error
     if findings.fault is not None:
@@ -42,61 +118,74 @@ def read_outcomes(
 ) -> tuple[dict[str, str], list[Failure]]:
     """Outcome of each expected test; what is missing from the log has failed.
 
+    A test has passed if each phase of it is on record, each as passed, in a log that
+    is whole.
+
     Raises:
         Fault: The suite cannot be collected, or ran what was not expected.
     """
-    tests = dict.fromkeys(findings.expected, "missing")
+    log = _read(path)
+    phases: dict[str, set[str]] = {name: set() for name in findings.expected}
+    tests: dict[str, str] = dict.fromkeys(findings.expected, "missing")
     failures: dict[str, Failure] = {}
-    for record in _lines(path):
-        kind = record.get("$report_type")
-        if kind == "CollectReport" and record["outcome"] != "passed":
-            raise Fault(f"the suite is broken: {_collect_error(record)}")
-        if kind != "TestReport":
+    for record in log.records:
+        if not isinstance(record, _Collected):
             continue
-        name = test_id(record["nodeid"])
-        if name not in tests:
+        name = test_id(record.nodeid)
+        if not isinstance(record, _Tested):
+            if record.outcome != "passed":
+                raise Fault(f"the suite is broken: {_collect_error(name, record)}")
+        elif name not in tests:
             raise Fault(f"the suite ran a test that was not expected: {name}")
-        if record["outcome"] != "passed" or "wasxfail" in record:
-            tests[name] = "failed" if record["outcome"] == "failed" else "skipped"
-            failures.setdefault(name, _failure(name, record, findings))
-        elif record["when"] == "call" and tests[name] == "missing":
+        elif record.passed:
+            phases[name].add(record.when)
+        elif name not in failures:
+            tests[name] = "failed" if record.outcome == "failed" else "skipped"
+            failures[name] = _failure(name, record, findings)
+    whole = log.is_whole(failed=bool(failures))
+    for name in tests.keys() - failures.keys():
+        if phases[name] == PHASES and whole:
             tests[name] = "passed"
-    for name, outcome in tests.items():
-        if outcome == "missing":
-            message = "the test did not run to its end"
+        else:
+            message = TORN if phases[name] == PHASES else NOT_RUN
             failures[name] = Failure(test=name, group="judge", message=message)
     return tests, [failures[name] for name in tests if name in failures]
 
 
 def verdict_of(tests: dict[str, str]) -> Verdict:
-    """Passed if every expected test passed."""
+    """Passed if there are tests and each of them passed."""
     passed = sum(outcome == "passed" for outcome in tests.values())
     return Verdict(
-        passed=passed == len(tests),
+        passed=0 < passed == len(tests),
         expected=len(tests),
         passed_tests=passed,
         failed_tests=len(tests) - passed,
     )
 
 
-def _lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The records of a report log; a torn line ends it."""
-    if not path.exists():
-        return
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        try:
-            record = json.loads(line)
-        except json.JSONDecodeError:
-            return
-        if not isinstance(record, dict):
-            return
-        yield record
+def _read(path: Path) -> _Log:
+    """A report log; one that cannot be read is empty."""
+    try:
+        lines = path.read_bytes().split(b"\n")
+    except OSError:
+        return _Log([])
+    return _Log([_record(line) for line in lines[: -1 if not lines[-1] else None]])
 
 
-def _failure(name: str, record: dict[str, Any], findings: Findings) -> Failure:
+def _record(line: bytes) -> BaseModel | None:
+    """The record in one line, None where it is damaged."""
+    try:
+        value = json.loads(line.decode("utf-8"))
+        kind = _Other.model_validate(value).kind
+        return _KINDS.get(kind, _Other).model_validate(value)
+    except (ValueError, RecursionError):  # ValidationError is a ValueError
+        return None
+
+
+def _failure(name: str, record: _Tested, findings: Findings) -> Failure:
     diagnosis = None
-    for key, value in record.get("user_properties", []):
-        if key == "rollout" and value in findings.diagnoses:
+    for key, value in record.user_properties:
+        if key == "rollout" and type(value) is str and value in findings.diagnoses:
             diagnosis = Diagnosis.model_validate_json(findings.diagnoses[value])
     message = _message(record)
     return Failure(
@@ -104,15 +193,15 @@ def _failure(name: str, record: dict[str, Any], findings: Findings) -> Failure:
     )
 
 
-def _message(record: dict[str, Any]) -> str:
+def _message(record: _Collected) -> str:
     """Why a test failed, without the assertion's source; printable and bounded."""
-    details = record.get("longrepr")
-    if isinstance(details, dict):
-        text = str((details.get("reprcrash") or {}).get("message", ""))
-    elif isinstance(details, list | tuple) and details:
-        text = str(details[-1])  # of a skip: file, line, reason
+    details = record.longrepr
+    if isinstance(details, _Details):
+        text = details.reprcrash.message if details.reprcrash else ""
+    elif isinstance(details, tuple):
+        text = details[-1]  # of a skip: file, line, reason
     else:
-        text = str(details)
+        text = details or ""
     for prefix in ("AssertionError: ", "Failed: "):
         text = text.removeprefix(prefix)
     # Exceptions are shown with their module; the class says enough.
@@ -123,11 +212,11 @@ def _message(record: dict[str, Any]) -> str:
     return shown if len(shown) <= MAX_MESSAGE else f"{shown[:MAX_MESSAGE]} …"
 
 
-def _collect_error(record: dict[str, Any]) -> str:
+def _collect_error(name: str, record: _Collected) -> str:
     """Why a test file cannot be imported: pytest's own last line about it."""
     text = _message(record)
     marked = [line[1:].strip() for line in text.splitlines() if line.startswith("E ")]
-    return f"{test_id(record['nodeid'])}: {marked[-1] if marked else text}"
+    return f"{name}: {marked[-1] if marked else text}"
 
 
 def _tail(output: str) -> str:
