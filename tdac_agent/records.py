@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.errors import RunError
 from tdac_agent.files import append_line, write_atomic
@@ -79,9 +79,12 @@ def load_run(folder: Path) -> Run:
     """
     path = folder / "run.json"
     try:
-        return Run(folder=folder, **json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, json.JSONDecodeError, ValidationError, TypeError) as error:
-        reason = str(error).splitlines()[0]
+        content = json.loads(path.read_bytes().decode("utf-8"))
+        return Run.model_validate({**content, "folder": folder})
+    # Not all of a damaged file is a JSONDecodeError: wrong encodings, endless numbers
+    # and deep nesting are not. A ValidationError is a ValueError.
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
         raise RunError(f"{folder} is not a run folder: {reason}") from error
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
 GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
@@ -55,6 +55,9 @@ class Failure(_Record):
 
 class Episode(_Record):
     """Figures of one judged episode; distances in px."""
+
+    # JSON has no word for infinity: a report with one would not read back.
+    model_config = ConfigDict(allow_inf_nan=False)
 
     name: str
     held_out: bool
@@ -112,6 +115,20 @@ class Report(_Record):
     episodes: tuple[Episode, ...]
     child_cpu_seconds: float
     seconds: float
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """A verdict that its own tests do not bear out is none."""
+        passed = sum(outcome == "passed" for outcome in self.tests.values())
+        counts = (len(self.tests), passed, len(self.tests) - passed)
+        verdict = self.verdict
+        told = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
+        failed = {name for name, outcome in self.tests.items() if outcome != "passed"}
+        if told != counts or {failure.test for failure in self.failures} != failed:
+            raise ValueError(f"expected counts {counts} and their failures, got {told}")
+        if verdict.passed != (0 < passed == len(self.tests)):
+            raise ValueError(f"expected not passed={verdict.passed} with {counts}")
+        return self
 
     @property
     def passed(self) -> bool:

@@ -9,6 +9,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_agent.errors import RunError
+
+SCHEMA_VERSION = 1
 Outcome = Literal["reached", "collision", "out of time", "stopped", "not run", "error"]
 
 
@@ -41,7 +44,7 @@ class Trajectory:
         """Writes an `.npz` with one array per attribute."""
         np.savez_compressed(
             path,
-            schema_version=1,
+            schema_version=SCHEMA_VERSION,
             poses=self.poses,
             actions=self.actions,
             path_distances=self.path_distances,
@@ -52,16 +55,45 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: Path) -> Trajectory:
-        """Reads what `save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
-            return cls(
-                data["poses"],
-                data["actions"],
-                data["path_distances"],
-                data["ranges"],
-                int(data["collisions"]),
-                float(data["dt"]),
-            )
+        """Reads what `save` wrote.
+
+        Raises:
+            RunError: The file is missing, damaged or something else.
+        """
+        try:
+            # np.load itself leaves a damaged file open.
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+                if data["schema_version"] != SCHEMA_VERSION:
+                    raise ValueError(f"schema version {data['schema_version']}")
+                loaded = cls(
+                    data["poses"],
+                    data["actions"],
+                    data["path_distances"],
+                    data["ranges"],
+                    int(data["collisions"]),
+                    float(data["dt"]),
+                )
+            _check_shapes(loaded)
+        # zipfile, zlib and numpy have dozens of errors for a damaged file.
+        except Exception as error:
+            reason = str(error).partition("\n")[0] or type(error).__name__
+            raise RunError(f"{path} is no trajectory: {reason}") from error
+        return loaded
+
+
+def _check_shapes(trajectory: Trajectory) -> None:
+    """Refuses arrays that do not belong together."""
+    length = len(trajectory.poses)
+    for name, shape in (
+        ("poses", (length, 3)),
+        ("actions", (length - 1, 2)),
+        ("path_distances", (length,)),
+        ("ranges", (length, trajectory.ranges.shape[-1])),
+    ):
+        array = getattr(trajectory, name)
+        if array.shape != shape or array.dtype.kind != "f":
+            got = f"{array.dtype} {array.shape}"
+            raise ValueError(f"expected {name} as floats {shape}, got {got}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

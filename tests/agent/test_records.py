@@ -6,13 +6,17 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from damage import altered_json, torn
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tdac_agent.errors import RunError
 from tdac_agent.files import append_line, write_atomic
 from tdac_agent.provider import Reply
-from tdac_agent.records import load_run
+from tdac_agent.records import Attempt, Run, load_run
 from tdac_agent.synthesis import synthesize
 
 
@@ -80,15 +84,53 @@ def test_lines_are_on_the_disk_at_once(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "content", [None, "", "{", "[]", "{}", '{"schema_version": 2}', '"text"']
+    "content",
+    [
+        *(None, b"", b"{", b"[]", b"{}", b'"text"', b'{"schema_version": 2}'),
+        *(b"\xff", b"\0", b"[" * 10**5, b"9" * 5000, b'{"folder": "/"}', b"null"),
+    ],
 )
 def test_what_is_no_run(tmp_path, content):
     """A missing, torn or foreign run.json is one clear line."""
     if content is not None:
-        (tmp_path / "run.json").write_text(content)
+        (tmp_path / "run.json").write_bytes(content)
     with pytest.raises(RunError, match="is not a run folder") as caught:
         load_run(tmp_path)
     assert "\n" not in str(caught.value)
+
+
+RUN = Run(
+    folder=Path("run"),
+    task="maze",
+    task_sha256="0" * 64,
+    learner="builtin",
+    optimizer="builtin",
+    iterations=3,
+    patience=2,
+    seed=0,
+    status="not verified",
+    attempts=[Attempt(k=1, j=0, valid=True, passed=False, failed_tests=("t.py::a",))],
+    started="2026-01-01T00:00:00",
+)
+
+
+@settings(deadline=None, max_examples=400)
+@given(st.data())
+def test_a_damaged_run(tmp_path_factory, data):
+    """Whatever happened to a run.json: one clear line, or a run of that folder."""
+    folder, whole = tmp_path_factory.getbasetemp(), RUN.model_dump_json().encode()
+    damaged = altered_json(whole) if data.draw(st.booleans()) else torn(whole)
+    (folder / "run.json").write_bytes(data.draw(damaged))
+    try:
+        run = load_run(folder)
+    except RunError as error:
+        reason = str(error)
+    else:
+        assert run.folder == folder
+        assert not run.verified
+        return
+    assert reason.startswith(f"{folder} is not a run folder: ")
+    assert "\n" not in reason
 
 
 def under_way(path):
