@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
-from tdac_envs.errors import MapError, TaskError, TdacError
+from tdac_envs.errors import MapError, TaskError, TdacError, WorldError
 
 if TYPE_CHECKING:
     from tdac_envs.grid import OccupancyGrid
     from tdac_envs.maps import bundled_map, bundled_maps
     from tdac_envs.params import MapParams, RobotParams
     from tdac_envs.preprocess import preprocess
+    from tdac_envs.wbt.reader import load_world, read_world
+    from tdac_envs.wbt.writer import write_world
+    from tdac_envs.world import World
 
 __all__ = [
     "MapError",
@@ -22,18 +25,27 @@ __all__ = [
     "RobotParams",
     "TaskError",
     "TdacError",
+    "World",
+    "WorldError",
     "bundled_map",
     "bundled_maps",
+    "load_world",
     "preprocess",
+    "read_world",
+    "write_world",
 ]
 
 _HOME = {
     "MapParams": "tdac_envs.params",
     "OccupancyGrid": "tdac_envs.grid",
     "RobotParams": "tdac_envs.params",
+    "World": "tdac_envs.world",
     "bundled_map": "tdac_envs.maps",
     "bundled_maps": "tdac_envs.maps",
+    "load_world": "tdac_envs.wbt.reader",
     "preprocess": "tdac_envs.preprocess",
+    "read_world": "tdac_envs.wbt.reader",
+    "write_world": "tdac_envs.wbt.writer",
 }
 
 
