@@ -22,7 +22,7 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.suite_proof import SuiteCheck, row_of, verdict_on_suite
 from tdac_agent.task import Task
 from tdac_agent.task_file import Profile
-from tdac_agent.verification import verify
+from tdac_agent.verification import SHIPPED_SUITE, verify
 from tdac_agent.warm import WarmJudge
 
 REPEATS = 5
@@ -36,6 +36,7 @@ def check_suite(
     *,
     profile: Profile | None = None,
     suite: Path | None = None,
+    shipped: Path = SHIPPED_SUITE,
     tier: str = "auto",
     seed: int = 0,
     repeats: int = REPEATS,
@@ -49,6 +50,7 @@ def check_suite(
         task: What the controllers must do.
         profile: `policy` or `paper`; the task's own by default.
         suite: Folder with further tests; the task's own by default.
+        shipped: Folder of the shipped tests, or of others in their place.
         tier: Sandbox tier, `auto` for the best one here.
         seed: Of the jittered starts.
         repeats: Verifications of each controller, which must agree. Of the slow one
@@ -66,7 +68,15 @@ def check_suite(
     began = time.monotonic()
     with contextlib.ExitStack() as stack:
         warm = judge or stack.enter_context(WarmJudge())
-        ask = partial(verify, task=task, suite=suite, tier=tier, seed=seed, judge=warm)
+        ask = partial(
+            verify,
+            task=task,
+            suite=suite,
+            shipped=shipped,
+            tier=tier,
+            seed=seed,
+            judge=warm,
+        )
 
         def reports_on(name: str) -> list[Report]:
             source = privileged_controller(task.nominal, seed, name)

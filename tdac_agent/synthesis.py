@@ -13,6 +13,7 @@ from tdac_agent.files import write_atomic
 from tdac_agent.provider import Provider
 from tdac_agent.records import Event, Recorder, Run
 from tdac_agent.report import Report
+from tdac_agent.suite_check import prove_suite
 from tdac_agent.task import Task
 from tdac_agent.verification import load_trajectories, verify
 from tdac_agent.warm import WarmJudge
@@ -58,6 +59,8 @@ def synthesize(
     given = Candidate(start_from) if start_from is not None else None
     judge = WarmJudge()
     try:
+        if first.paid or second.paid:
+            _prove(task, seed, recorder, judge)
         for k in range(1, iterations + 1):
             candidate = given or dialogue.generate(k)
             given = None
@@ -87,6 +90,18 @@ def synthesize(
     finally:
         judge.close()
     return recorder.run
+
+
+def _prove(task: Task, seed: int, recorder: Recorder, judge: WarmJudge) -> None:
+    """Has the suite prove itself before an answer is paid for.
+
+    Raises:
+        Fault: It does not: no controller can pass it, or one that does nothing can.
+    """
+    recorder.event("prove.start")
+    proof = prove_suite(task, seed=seed, judge=judge)
+    facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
+    recorder.event("prove.end", **facts)
 
 
 def _deliver(

@@ -33,6 +33,7 @@ def verify(
     profile: Profile | None = None,
     paper: bool = False,
     suite: Path | None = None,
+    shipped: Path = SHIPPED_SUITE,
     tier: str = "auto",
     seed: int = 0,
     limits: Limits | None = None,
@@ -48,6 +49,7 @@ def verify(
         paper: Nominal start only, as in the paper.
         suite: Folder with further tests beside the shipped ones; the task's own by
             default.
+        shipped: Folder of the shipped tests, or of others in their place.
         tier: Sandbox tier, `auto` for the best one here.
         seed: Of the jittered starts.
         limits: Of the controller's processes; `cpu_seconds` is for all of them.
@@ -63,7 +65,7 @@ def verify(
     """
     began = time.monotonic()
     source = read_source(controller)
-    suites = {SHIPPED: SHIPPED_SUITE}
+    suites = {SHIPPED: _suite_folder(shipped)}
     extra = suite or task.suite
     if extra is not None:
         suites[OWN] = _suite_folder(extra)

@@ -53,6 +53,8 @@ class Progress:
         at = f"k={record.get('k')} j={record.get('j')}"
         if kind == "run.start":
             self._console.print(self._heading)
+        elif kind == "prove.start":
+            self._spinner.update(text="the suite proves itself")
         elif kind == "call.intent":
             verb = {"generate": "writing", "edit": "editing"}.get(
                 record["kind"], "writing rules from the failures of"
