@@ -17,7 +17,7 @@ from small import small_cells, write_small_task
 
 from tdac_agent.cli import main
 
-COMMANDS = ["map", "synth", "verify", "play", "doctor"]
+COMMANDS = ["map", "synth", "verify", "play", "check-suite", "doctor"]
 ENDS = ["--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6"]
 
 
@@ -227,6 +227,10 @@ def test_an_unreachable_goal(tdac, image):
         ["play", "no.py", "--video", "a.mp4"],
         ["play", "FILE", "--video", "a.mp4", "--tier", "nosuch"],
         ["verify", "FILE", "--tier", "nosuch"],
+        ["check-suite", "--tier", "nosuch"],
+        ["check-suite", "--task", "nosuch"],
+        ["check-suite", "--suite", "no"],
+        ["check-suite", "--repeats", "0"],
         ["play", "FILE", "--task", "maze"],
         ["nosuch"],
         ["verify"],
@@ -320,6 +324,38 @@ def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
     """Neither yes nor no."""
     (tmp_path / "test_mine.py").write_text("import nosuchmodule\n")
     code, _, err = tdac("verify", good, "--profile", "policy", "--suite", tmp_path)
+    assert code == 3
+    assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
+
+
+def test_check_suite_says_yes(tdac, tmp_path):
+    """Exit 0 and a table of the controllers."""
+    folder = write_small_task(tmp_path / "short", dt=0.02, profile="policy")
+    code, out, _ = tdac("check-suite", "--task", folder, "--repeats", 1)
+    assert code == 0
+    for name in ("reference", "do-nothing", "constant", "random", "raising", "slow"):
+        assert name in out
+    assert "proven: map2d on small, profile policy, seed 0" in out
+
+
+def test_check_suite_says_no(tdac, tmp_path):
+    """Exit 1; with --json the record alone on stdout."""
+    folder = write_small_task(tmp_path / "short", dt=0.02, profile="policy")
+    (tmp_path / "test_mine.py").write_text("def test_no():\n    assert 0, 'never'\n")
+    words = ["check-suite", "--task", folder, "--suite", tmp_path, "--repeats", 1]
+    code, out, _ = tdac(*words, "--json")
+    assert code == 1
+    record = json.loads(out)
+    assert record["proven"] is False
+    told = "the reference fails own/test_mine.py::test_no: never"
+    assert record["problems"] == [told]
+    assert record["rows"][0]["controller"] == "reference"
+
+
+def test_check_suite_of_a_broken_suite(tdac, good, tmp_path):
+    """Exit 3: neither yes nor no."""
+    (tmp_path / "test_mine.py").write_text("import nosuchmodule\n")
+    code, _, err = tdac("check-suite", "--task", good, "--suite", tmp_path)
     assert code == 3
     assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
 
