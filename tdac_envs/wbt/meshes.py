@@ -14,6 +14,8 @@ from tdac_envs.world import Part
 
 MOST_FACES = 1000
 """Faces of a mesh that is not convex, at most."""
+MOST_CORNERS = 100
+"""Corners of a face, at most."""
 
 Points = NDArray[np.float64]
 Face = NDArray[np.int64]
@@ -44,15 +46,14 @@ def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
         return f"a mesh with {len(faces)} faces"
     if _is_convex(points, faces, used):
         return hull(used)
-    if len(faces) > MOST_FACES:
+    if len(faces) > MOST_FACES or max(map(len, faces)) > MOST_CORNERS:
         return f"a mesh with {len(faces)} faces that is not convex"
-    if not all(_is_flat_convex(points[face]) for face in faces):
-        return "a mesh with a face that is not convex"
     low, high = float(used[:, 2].min()), float(used[:, 2].max())
-    shapes = [hull(points[face])[0].shape for face in faces if _casts(points[face])]
-    return tuple(Part(shape, low, high) for shape in dict.fromkeys(shapes)) or hull(
-        used
-    )
+    pieces = [piece for face in faces for piece in _convex_pieces(points[face])]
+    shapes = [hull(piece)[0].shape for piece in pieces if _casts(piece)]
+    if not shapes:
+        return hull(used)
+    return tuple(Part(shape, low, high) for shape in dict.fromkeys(shapes))
 
 
 def _points(node: Node) -> Points:
@@ -94,12 +95,42 @@ def _normal(corners: Points) -> Points:
     return np.asarray(np.cross(at, np.roll(at, -1, axis=0)).sum(axis=0))
 
 
-def _is_flat_convex(corners: Points) -> bool:
-    """Whether all turns along a face go the same way."""
+def _convex_pieces(corners: Points) -> list[Points]:
+    """A flat face as it is where it is convex, or cut into triangles."""
     normal = _normal(corners)
     edge = np.roll(corners, -1, axis=0) - corners
     turns = np.cross(edge, np.roll(edge, -1, axis=0)) @ normal
-    return bool((turns >= -1e-9 * float(normal @ normal)).all())
+    if (turns >= -1e-9 * float(normal @ normal)).all():
+        return [corners]
+    flat = np.delete(corners, int(np.abs(normal).argmax()), axis=1)
+    return [corners[list(triangle)] for triangle in _ears(flat)]
+
+
+def _ears(outline: Points) -> list[tuple[int, int, int]]:
+    """Triangles of a polygon, shape (n, 2), by cutting off ears."""
+    (x, y), (u, v) = outline.T, np.roll(outline, -1, axis=0).T
+    left = list(range(len(outline)))
+    if (x * v - u * y).sum() < 0.0:
+        left.reverse()
+    triangles = []
+    while len(left) >= 3:
+        ear = next((k for k in range(len(left)) if _is_ear(outline, left, k)), 0)
+        before, after = left[ear - 1], left[(ear + 1) % len(left)]
+        triangles.append((before, left.pop(ear), after))
+    return triangles
+
+
+def _is_ear(outline: Points, left: list[int], k: int) -> bool:
+    """Whether a corner can be cut off: it turns left, and no other corner is in it."""
+    a, b, c = outline[[left[k - 1], left[k], left[(k + 1) % len(left)]]]
+    others = outline[left]
+    sides = [
+        (q[0] - p[0]) * (others[:, 1] - p[1]) - (q[1] - p[1]) * (others[:, 0] - p[0])
+        for p, q in ((a, b), (b, c), (c, a))
+    ]
+    turn = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+    inside = (np.array(sides) > 0.0).all(axis=0)
+    return bool(turn >= 0.0 and not inside.any())
 
 
 def _casts(corners: Points) -> bool:

@@ -67,14 +67,14 @@ def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
     A robot that is written out keeps the axes of the version that it was made with,
     whatever the file's version.
     """
-    front = [
-        numbers(part, "translation", (0.0, 0.0, 0.0))
+    front = {
+        text(part, "name"): numbers(part, "translation", (0.0, 0.0, 0.0))
         for part in inside(node)
-        if part.kind == "DistanceSensor" and text(part, "name") in {"ps0", "ps7"}
-    ]
+        if "translation" in part.fields and text(part, "name") in {"ps0", "ps7"}
+    }
     if len(front) != 2:
         return None
-    away = frame.matrix @ (np.array(front).sum(axis=0))
+    away = frame.matrix @ np.array(list(front.values())).sum(axis=0)
     x, y = away[:2].tolist()
     return (x, y) if math.hypot(x, y) > 1e-6 else None
 

@@ -105,8 +105,8 @@ def _solid(node: Node, own: Frame, found: Found) -> None:
         found.left_out(node, own, f"its boundingObject is {missing}")
     visible = sum((pieces for pieces, _ in looks), Pieces())
     if visible.missing:
-        _unseen(node, visible, found)
-        # What can be hit stands for what cannot be drawn.
+        seen = "what bounds it" if body.parts else "nothing of it"
+        _unseen(node, visible, seen, found)
         visible += Pieces(body.parts)
     if node.kind != "Solid" and not body.parts and not visible.parts:
         return
@@ -126,10 +126,10 @@ def _kind(node: Node) -> str:
     return model.items[0] or node.kind
 
 
-def _unseen(node: Node, looks: Pieces, found: Found) -> None:
-    kinds = ", ".join(dict.fromkeys(looks.missing))
+def _unseen(node: Node, looks: Pieces, instead: str, found: Found) -> None:
+    what = ", ".join(dict.fromkeys(looks.missing))
     name = name_of(node) or node.kind
-    found.notes.append(f"{name} (line {node.line}): sensors do not see its {kinds}")
+    found.notes.append(f"line {node.line}: {name} is {what}; sensors see {instead}")
 
 
 def _look(
@@ -172,7 +172,7 @@ def _shape(node: Node, frame: Frame, found: Found, named: Node) -> None:
         return
     looks = geometry(shape, frame)
     if looks.missing:
-        _unseen(node, looks, found)
+        _unseen(node, looks, "nothing of it", found)
     x, y, _ = frame.origin.tolist()
     name = name_of(node) or name_of(named)
     mark = is_goal(node) or is_goal(named)
