@@ -16,6 +16,7 @@ from tdac_agent.privileged import (
     REFERENCE,
     SLOW,
     privileged_controller,
+    reference_ways,
 )
 from tdac_agent.report import Report
 from tdac_agent.sandbox import Limits
@@ -77,25 +78,21 @@ def check_suite(
             seed=seed,
             judge=warm,
         )
-
-        def reports_on(name: str) -> list[Report]:
-            source = privileged_controller(task.nominal, seed, name)
+        ways = reference_ways(task.nominal, seed)
+        reports: dict[str, list[Report]] = {}
+        for name in (REFERENCE, *bad):
+            source = privileged_controller(task.nominal, ways, name)
             full = partial(ask, source, profile=profile)
             short = partial(
                 ask, source, profile="policy", paper=True, limits=SLOW_LIMITS
             )
             times, verified = (1, short) if name == SLOW else (repeats, full)
-            reports = []
+            reports[name] = []
             for number in range(1, times + 1):
                 on_progress(f"{name}, {number} of {times}")
-                reports.append(verified())
-            return reports
-
-        good = reports_on(REFERENCE)
-        rows = [row_of(REFERENCE, good)]
-        rows += [row_of(name, reports_on(name)) for name in bad]
-    about, tests = good[0].provenance, tuple(good[0].tests)
-    return verdict_on_suite(about, rows, tests, time.monotonic() - began)
+                reports[name].append(verified())
+    rows = [row_of(name, about_it) for name, about_it in reports.items()]
+    return verdict_on_suite(reports[REFERENCE][0], rows, time.monotonic() - began)
 
 
 def prove_suite(

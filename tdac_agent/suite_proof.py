@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.privileged import REFERENCE
-from tdac_agent.report import Provenance, Report
+from tdac_agent.report import Report
 from tdac_agent.suite_plugin import OWN
 from tdac_agent.task_file import Profile
 
@@ -101,21 +101,21 @@ def problems_of(row: Row) -> Iterator[str]:
 
 
 def verdict_on_suite(
-    about: Provenance, rows: Sequence[Row], tests: Iterable[str], seconds: float
+    reference: Report, rows: Sequence[Row], seconds: float
 ) -> SuiteCheck:
     """Reads the rows.
 
     Args:
-        about: What was checked.
+        reference: A report on the reference: what was checked, and its tests.
         rows: One of each controller.
-        tests: All that the reference had to pass.
         seconds: How long it took.
     """
+    about = reference.provenance
     problems = [problem for row in rows for problem in problems_of(row)]
     failed = {test for row in rows for test in row.failures}
     notes = [
         f"every bad controller passes {test}"
-        for test in tests
+        for test in reference.tests
         if test.startswith(f"{OWN}/") and test not in failed
     ]
     return SuiteCheck(

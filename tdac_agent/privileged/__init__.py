@@ -13,6 +13,7 @@ from tdac_agent.privileged.controllers import (
     REFERENCE,
     SLOW,
     privileged_controller,
+    reference_ways,
 )
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     "REFERENCE",
     "SLOW",
     "privileged_controller",
+    "reference_ways",
 ]

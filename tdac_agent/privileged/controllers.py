@@ -54,15 +54,16 @@ BAD = tuple(name for name in POLICIES if name != REFERENCE)
 SAFE = 0.02
 
 
-def privileged_controller(task: Map2DTask, seed: int, name: str = REFERENCE) -> str:
+def privileged_controller(
+    task: Map2DTask, ways: Sequence[Sequence[Point]], name: str = REFERENCE
+) -> str:
     """Source of a controller that knows the oracle's path from each start of a test.
 
     Args:
         task: What it must do, or fail to do.
-        seed: Of the jittered starts.
+        ways: From `reference_ways`.
         name: One of `POLICIES`.
     """
-    starts = (task.start, *spread_starts(task, seed, JITTERS))
     size = max(task.terrain.grid.cells.shape)
     environment = Environment(
         loader=PackageLoader("tdac_agent", "privileged"),
@@ -76,9 +77,15 @@ def privileged_controller(task: Map2DTask, seed: int, name: str = REFERENCE) -> 
         robot=task.robot,
         dt=task.dt,
         spacing=float(np.spacing(np.float32(size))),
-        ways=[reference_way(task, start.x, start.y) for start in starts],
+        ways=ways,
         policy=POLICIES[name],
     )
+
+
+def reference_ways(task: Map2DTask, seed: int) -> list[list[Point]]:
+    """The points to drive to from each start of a verification with this seed, px."""
+    starts = (task.start, *spread_starts(task, seed, JITTERS))
+    return [reference_way(task, start.x, start.y) for start in starts]
 
 
 def reference_way(task: Map2DTask, x: float, y: float) -> list[Point]:

@@ -6,7 +6,13 @@ import pytest
 from small import write_small_task
 
 from tdac_agent.errors import ControllerFileError, Fault
-from tdac_agent.privileged import BAD, REFERENCE, SLOW, privileged_controller
+from tdac_agent.privileged import (
+    BAD,
+    REFERENCE,
+    SLOW,
+    privileged_controller,
+    reference_ways,
+)
 from tdac_agent.provider import Reply
 from tdac_agent.records import load_run
 from tdac_agent.suite_check import check_suite, prove_suite
@@ -100,7 +106,8 @@ def test_every_bundled_task(name, profile, warm):
 def test_the_nominal_start_alone(name, warm):
     """The reference passes with `paper`, too."""
     task = load_task(name)
-    source = privileged_controller(task.nominal, 0)
+    ways = reference_ways(task.nominal, 0)
+    source = privileged_controller(task.nominal, ways)
     assert verify(source, task, paper=True, judge=warm).failures == ()
 
 

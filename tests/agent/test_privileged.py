@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 from driving import drive, import_controller, random_env
 
-from tdac_agent.privileged import BAD, POLICIES, privileged_controller
+from tdac_agent.privileged import (
+    BAD,
+    POLICIES,
+    privileged_controller,
+    reference_ways,
+)
 from tdac_agent.privileged.controllers import reference_way, without_flat_points
 from tdac_agent.starts import spread_starts
 from tdac_envs.map2d import Map2DEnv
@@ -18,7 +23,8 @@ from tdac_envs.plan import distance_field
 
 def episodes(env, seed, folder, monkeypatch, name="reference"):
     """The six episodes of a verification, each in a fresh module."""
-    source = privileged_controller(env.nominal, seed, name)
+    ways = reference_ways(env.nominal, seed)
+    source = privileged_controller(env.nominal, ways, name)
     for start in (env.nominal.start, *spread_starts(env.nominal, seed, 5)):
         module = import_controller(source, env, folder, monkeypatch)
         yield drive(env, module.policy, start)
@@ -63,8 +69,9 @@ def test_the_reference_passes_where_the_body_just_fits(gap, tmp_path, monkeypatc
 def test_only_the_policy_differs():
     """Each bad controller is the reference but for `policy` and what that one needs."""
     env = Map2DEnv(np.zeros((60, 90), bool), (15, 15, 0), (70, 40), robot_radius=5)
+    ways = reference_ways(env.nominal, 3)
     trees = {
-        name: ast.parse(privileged_controller(env.nominal, 3, name))
+        name: ast.parse(privileged_controller(env.nominal, ways, name))
         for name in POLICIES
     }
     others = {
@@ -89,8 +96,9 @@ def test_only_the_policy_differs():
 def test_it_says_that_it_is_privileged():
     """The first words of the file: no one shall take it for an example."""
     env = Map2DEnv(np.zeros((60, 90), bool), (15, 15, 0), (70, 40), robot_radius=5)
+    ways = reference_ways(env.nominal, 0)
     for name in POLICIES:
-        source = privileged_controller(env.nominal, 0, name)
+        source = privileged_controller(env.nominal, ways, name)
         assert source.startswith('"""PRIVILEGED: ')
 
 
