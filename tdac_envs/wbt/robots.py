@@ -62,7 +62,7 @@ def inside(node: Node) -> Iterator[Node]:
 
 
 def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
-    """Direction from the middle to between the two front sensors, ps0 and ps7.
+    """Direction of the axis that its two front sensors, ps0 and ps7, lie on.
 
     A robot that is written out keeps the axes of the version that it was made with,
     whatever the file's version.
@@ -74,9 +74,10 @@ def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
     }
     if len(front) != 2:
         return None
-    away = frame.matrix @ np.array(list(front.values())).sum(axis=0)
-    x, y = away[:2].tolist()
-    return (x, y) if math.hypot(x, y) > 1e-6 else None
+    local = np.array(list(front.values())).sum(axis=0)
+    longest = int(np.abs(local).argmax())
+    x, y = (frame.matrix[:2, longest] * np.sign(local[longest])).tolist()
+    return (x, y) if math.hypot(x, y) > 0.5 else None
 
 
 def has_body(node: Node) -> bool:
