@@ -1,4 +1,4 @@
-"""The command line: `tdac map | synth | verify | play | check-suite | doctor`.
+"""The command line: `tdac map | world | synth | verify | play | check-suite | doctor`.
 
 Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastructure,
 4 budget, 130 interrupted.
@@ -81,6 +81,21 @@ def map_command(
     from tdac_agent.commands import maps
 
     maps.run(image, start, goal, robot_radius, snap, metres, preset, out, as_json)
+
+
+@app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")
+def world_command(
+    file: Annotated[Path, typer.Argument(help="Webots world, V6 to R2025a.")],
+    png: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--png", metavar="OUT", help="Draw it from above."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Show what is in a Webots world: e-pucks, goal, arena, obstacles."""
+    from tdac_agent.commands import world
+
+    world.run(file, png, as_json)
 
 
 @app.command(
