@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from tdac_envs.compiled import kernel
 from tdac_envs.grid import BoolGrid, FloatGrid
 
 # A disc that starts in touch is stopped when it gets this much deeper, px: driving
@@ -20,14 +19,14 @@ _ROUNDING = 1e-3
 _TWO_PI = 2.0 * math.pi
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def wrap_angle(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
     return math.pi if wrapped <= -math.pi else wrapped
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def move(
     x: float, y: float, heading: float, forward: float, turn: float
 ) -> tuple[float, float, float]:
@@ -46,7 +45,7 @@ def move(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f8 f8 f8 f8 f8 f8 -> f8")
 def first_contact(
     cells: BoolGrid,
     clear: FloatGrid,
@@ -91,7 +90,7 @@ def first_contact(
     return best / length if best < length else 2.0
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _scan(
     cells: BoolGrid,
     clear: FloatGrid,
@@ -140,14 +139,14 @@ def _scan(
     return best, nearest
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _square_distance2(x: float, y: float, i: int, j: int) -> float:
     dx = max(abs(x - i) - 0.5, 0.0)
     dy = max(abs(y - j) - 0.5, 0.0)
     return dx * dx + dy * dy
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _room(clear: FloatGrid, x: float, y: float) -> float:
     """Lower bound of the distance from a point to the nearest occupied square."""
     i, j = math.floor(x + 0.5), math.floor(y + 0.5)
@@ -156,7 +155,7 @@ def _room(clear: FloatGrid, x: float, y: float) -> float:
     return float(clear[j + 1, i + 1]) - math.hypot(x - i, y - j) - _ROUNDING
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _is_edge(cells: BoolGrid, i: int, j: int) -> bool:
     """Whether a free pixel is beside (i, j) of the padded map.
 
@@ -170,7 +169,7 @@ def _is_edge(cells: BoolGrid, i: int, j: int) -> bool:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _travel(
     x: float,
     y: float,

@@ -9,9 +9,9 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tdac_envs.compiled import kernel
 from tdac_envs.errors import MapError
 
 BoolGrid = NDArray[np.bool_]
@@ -93,12 +93,23 @@ def clearance(cells: BoolGrid) -> FloatGrid:
     Returns:
         Shape (height, width), float32; 0 inside obstacles.
     """
-    clear: FloatGrid = _clearance(np.ascontiguousarray(cells, np.bool_))
+    height, width = cells.shape
+    clear = np.empty((height, width), np.float32)
+    rows = np.empty((height, width), np.int32)
+    _clearance(
+        cells, rows, np.empty(width + 2, np.int64), np.empty((2, width + 3)), clear
+    )
     return clear
 
 
-@njit(cache=True, nogil=True)
-def _clearance(cells: BoolGrid) -> FloatGrid:
+@kernel("b1[:,:] i4[:,:] i8[:] f8[:,:] f4[:,:] ->")
+def _clearance(
+    cells: BoolGrid,
+    up: NDArray[np.int32],
+    site: NDArray[np.int64],
+    scratch: NDArray[np.float64],
+    clear: FloatGrid,
+) -> None:
     """Distance transform after Felzenszwalb and Huttenlocher (2012), for squares.
 
     From x, the square in another column x' is as far as its centre line is from
@@ -107,11 +118,8 @@ def _clearance(cells: BoolGrid) -> FloatGrid:
     the vertical distance.
     """
     height, width = cells.shape
-    clear = np.empty((height, width), np.float32)
-    up = _rows_to_obstacle(cells)
-    site = np.empty(width + 2, np.int64)
-    square = np.empty(width + 2)
-    begin = np.empty(width + 3)
+    _rows_to_obstacle(cells, up)
+    square, begin = scratch[0], scratch[1]
     for y in range(height):
         last = -1
         for x in range(-1, width + 1):
@@ -137,14 +145,12 @@ def _clearance(cells: BoolGrid) -> FloatGrid:
                 here = (rows - 0.5) ** 2 if rows else 0.0
                 clear[y, x - 1] = math.sqrt(min(here, before, after))
             before = after
-    return clear
 
 
-@njit(cache=True, nogil=True)
-def _rows_to_obstacle(cells: BoolGrid) -> NDArray[np.int32]:
+@kernel()
+def _rows_to_obstacle(cells: BoolGrid, rows: NDArray[np.int32]) -> None:
     """Rows from each pixel to the nearest occupied one of its column."""
     height, width = cells.shape
-    rows = np.empty((height, width), np.int32)
     for x in range(width):
         rows[0, x] = 0 if cells[0, x] else 1
     for y in range(1, height):
@@ -155,7 +161,6 @@ def _rows_to_obstacle(cells: BoolGrid) -> NDArray[np.int32]:
     for y in range(height - 2, -1, -1):
         for x in range(width):
             rows[y, x] = min(rows[y, x], rows[y + 1, x] + 1)
-    return rows
 
 
 def clearance_at(cells: BoolGrid, x: float, y: float, limit: float) -> float:

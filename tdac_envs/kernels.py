@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tdac_envs.compiled import kernel
 from tdac_envs.contact import first_contact, move, wrap_angle
 from tdac_envs.grid import BoolGrid, FloatGrid
 from tdac_envs.rays import cast_ray, cast_rays, pad, sees
@@ -38,7 +38,7 @@ AXLE, MAX_SPEED, DT, RADIUS, FAN, RANGE_MAX, GOAL_X, GOAL_Y, TOLERANCE, LAG = ra
 X, Y, HEADING, REMAINING = range(4)
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f8[:] f8 f8 f8 f8 f8 -> b1")
 def advance(
     cells: BoolGrid,
     clear: FloatGrid,
@@ -78,7 +78,7 @@ def advance(
     return bool(touch <= 1.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f4[:,:] f8 f8 f8 -> f8")
 def path_distance(
     cells: BoolGrid,
     clear: FloatGrid,
@@ -116,7 +116,7 @@ def path_distance(
     return previous
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f8[:] f8[:] f4[:] f4[:] ->")
 def sense(
     cells: BoolGrid,
     clear: FloatGrid,
@@ -131,21 +131,19 @@ def sense(
     cast_rays(cells, clear, x, y, heading, constants[FAN], constants[RANGE_MAX], ranges)
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f4[:,:] f8[:] f8[:] f8[:] f4[:] f4[:] f4[:] f8[:] ->")
 def drive(
     cells: BoolGrid,
     clear: FloatGrid,
     field: FloatGrid,
     constants: NDArray[np.float64],
+    command: NDArray[np.float64],
     state: NDArray[np.float64],
     pose: NDArray[np.float32],
     wheel_speeds: NDArray[np.float32],
     ranges: NDArray[np.float32],
-    left: float,
-    right: float,
-    slip_left: float,
-    slip_right: float,
-) -> tuple[bool, bool, float, float, float]:
+    outcome: NDArray[np.float64],
+) -> None:
     """One step of the environment, all of it but the random numbers.
 
     Args:
@@ -156,21 +154,19 @@ def drive(
             body radius (px), field of view (rad), range limit (px), goal x and y
             (px), goal tolerance (px), and the share of its speed that a wheel keeps
             from one step to the next.
+        command: Shape (4,), float64: wanted speed of the left and of the right wheel,
+            in [-1, 1]; for each the factor between its speed and what it does on the
+            ground.
         state: Shape (4,), float64: x, y (px), heading (rad) and the way left to the
             goal (px); overwritten.
         pose: Shape (3,), float32, overwritten with what the robot observes.
         wheel_speeds: Shape (2,), float32, fractions as last applied; overwritten.
         ranges: Shape (n_rays,), float32, overwritten.
-        left: Wanted speed of the left wheel, in [-1, 1].
-        right: Wanted speed of the right wheel, in [-1, 1].
-        slip_left: Factor between the left wheel's speed and what it does on the ground.
-        slip_right: The same of the right wheel.
-
-    Returns:
-        Whether the body touched an obstacle; whether the goal is reached; the way
-        left to the goal, the straight distance to it, and the clearance of the pixel
-        under the robot, px.
+        outcome: Shape (5,), float64, overwritten: whether the body touched an obstacle
+            (0 or 1); whether the goal is reached; the way left to the goal, the
+            straight distance to it, and the clearance of the pixel under the robot, px.
     """
+    left, right, slip_left, slip_right = command[0], command[1], command[2], command[3]
     lag, limit = constants[LAG], constants[MAX_SPEED]
     wheel_speeds[0] = left + lag * (wheel_speeds[0] - left)
     wheel_speeds[1] = right + lag * (wheel_speeds[1] - right)
@@ -190,4 +186,5 @@ def drive(
     gap = math.hypot(goal_x - x, goal_y - y)
     reached = gap <= constants[TOLERANCE] and sees(cells, clear, x, y, goal_x, goal_y)
     room = clear[math.floor(y + 1.5), math.floor(x + 1.5)]
-    return touched, reached, state[REMAINING], gap, room
+    outcome[0], outcome[1], outcome[2] = touched, reached, state[REMAINING]
+    outcome[3], outcome[4] = gap, room

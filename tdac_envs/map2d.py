@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -188,6 +189,9 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._pose = np.zeros(3, np.float32)
         self._wheel_speeds = np.zeros(2, np.float32)
         self._ranges = np.zeros(robot.n_rays, np.float32)
+        self._command = np.array([0.0, 0.0, 1.0, 1.0])
+        self._outcome = np.zeros(5)
+        self._drive: Callable[[], None] | None = None
         self._scene: Scene | None = None
         self._window: Window | None = None
 
@@ -203,6 +207,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         self.task = task = self._draw_task(options or {})
         self._constants[GOAL_X : GOAL_Y + 1] = task.goal
+        self._drive = None
         self._state[:] = *task.start, task.shortest
         self._goal = np.array(task.goal, np.float32)
         self._wheel_speeds[:] = 0.0
@@ -236,26 +241,15 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         Raises:
             ValueError: The action is not two finite numbers.
         """
-        left, right = self._wanted(action)
-        slip_left = slip_right = 1.0
+        self._command[0], self._command[1] = self._wanted(action)
         if self.wheel_slip:
-            slip_left, slip_right = self.np_random.normal(1.0, self.wheel_slip, 2)
+            self._command[2:] = self.np_random.normal(1.0, self.wheel_slip, 2)
+        if self._drive is None:
+            self._drive = self._bound()
+        self._drive()
+        touched, arrived, remaining, gap, room = self._outcome.tolist()
+        collided, reached = touched == 1.0, arrived == 1.0
         task = self.task
-        terrain = task.terrain
-        collided, reached, remaining, gap, room = drive(
-            terrain.padded,
-            terrain.padded_clear,
-            task.field,
-            self._constants,
-            self._state,
-            self._pose,
-            self._wheel_speeds,
-            self._ranges,
-            left,
-            right,
-            slip_left,
-            slip_right,
-        )
         self._steps += 1
         self._collisions += collided
         progress = (self._remaining - remaining) / self._full_step
@@ -292,6 +286,25 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         if self._window is not None:
             self._window.close()
             self._window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_drive": None}
+
+    def _bound(self) -> Callable[[], None]:
+        """`drive` on this environment's own arrays."""
+        terrain = self.task.terrain
+        return drive.bind(
+            terrain.padded,
+            terrain.padded_clear,
+            self.task.field,
+            self._constants,
+            self._command,
+            self._state,
+            self._pose,
+            self._wheel_speeds,
+            self._ranges,
+            self._outcome,
+        )
 
     def _draw_task(self, options: dict[str, Any]) -> Map2DTask:
         unknown = sorted(map(str, options.keys() - {"start", "goal"}))

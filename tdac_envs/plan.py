@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tdac_envs.compiled import kernel
 from tdac_envs.grid import BoolGrid
 
 Path = NDArray[np.float64]
@@ -16,39 +16,37 @@ _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _SQRT2 = 2.0**0.5
 
 
-@njit(cache=True, nogil=True)
-def _push(bucket: NDArray[np.int64], count: int, cell: int) -> NDArray[np.int64]:
-    if count == bucket.size:
-        grown = np.empty(2 * bucket.size, np.int64)
-        grown[:count] = bucket
-        bucket = grown
-    bucket[count] = cell
-    return bucket
-
-
-@njit(cache=True, nogil=True)
-def _spread(free: BoolGrid, goal_x: int, goal_y: int, stop: int) -> Field:
-    """Dijkstra in buckets of width 1.
+@kernel("b1[:,:] i8 i8 i8 f8[:,:] b1[:] i8[:,:] -> b1")
+def _spread(
+    free: BoolGrid,
+    goal_x: int,
+    goal_y: int,
+    stop: int,
+    field: Field,
+    settled: NDArray[np.bool_],
+    buckets: NDArray[np.int64],
+) -> bool:
+    """Dijkstra in buckets of width 1; False where these have no room.
 
     No step is shorter than 1, so a bucket never receives a cell while it is
     worked off, and three buckets in rotation suffice.
     """
     height, width = free.shape
-    distance = np.full(height * width, np.inf)
-    settled = np.zeros(height * width, np.bool_)
-    one = np.empty(256, np.int64)
-    two, three = np.empty(256, np.int64), np.empty(256, np.int64)
+    room = buckets.shape[1]
+    one, two, three = 0, 1, 2
     n_one, n_two, n_three = 1, 0, 0
-    one[0] = goal_y * width + goal_x
-    distance[one[0]] = 0.0
+    buckets[one, 0] = goal_y * width + goal_x
+    field[goal_y, goal_x] = 0.0
     level = 0
     while n_one + n_two + n_three > 0:
         for index in range(n_one):
-            cell = one[index]
+            cell = buckets[one, index]
             if settled[cell]:
                 continue
             settled[cell] = True
             y, x = cell // width, cell % width
+            if n_two + 8 > room or n_three + 8 > room:
+                return False
             for k in range(8):
                 nx, ny = x + _DX[k], y + _DY[k]
                 if nx < 0 or ny < 0 or nx >= width or ny >= height:
@@ -57,22 +55,21 @@ def _spread(free: BoolGrid, goal_x: int, goal_y: int, stop: int) -> Field:
                     continue
                 if k >= 4 and not (free[y, nx] and free[ny, x]):
                     continue
-                candidate = distance[cell] + (1.0 if k < 4 else _SQRT2)
-                neighbour = ny * width + nx
-                if candidate < distance[neighbour] - 1e-12:
-                    distance[neighbour] = candidate
+                candidate = field[y, x] + (1.0 if k < 4 else _SQRT2)
+                if candidate < field[ny, nx] - 1e-12:
+                    field[ny, nx] = candidate
                     if int(candidate) == level + 1:
-                        two = _push(two, n_two, neighbour)
+                        buckets[two, n_two] = ny * width + nx
                         n_two += 1
                     else:
-                        three = _push(three, n_three, neighbour)
+                        buckets[three, n_three] = ny * width + nx
                         n_three += 1
         if stop >= 0 and settled[stop]:
-            break
+            return True
         one, two, three = two, three, one
         n_one, n_two, n_three = n_two, n_three, 0
         level += 1
-    return distance.reshape(height, width)
+    return True
 
 
 def distance_field(
@@ -92,22 +89,27 @@ def distance_field(
     if not (0 <= goal[0] < width and 0 <= goal[1] < height) or not free[goal[::-1]]:
         return np.full(free.shape, np.inf)
     stop = -1 if until is None else until[1] * width + until[0]
-    field: Field = _spread(np.ascontiguousarray(free), goal[0], goal[1], stop)
-    return field
+    room = 4 * (height + width) + 1024
+    while True:
+        field: Field = np.full(free.shape, np.inf)
+        settled, buckets = np.zeros(free.size, np.bool_), np.empty((3, room), np.int64)
+        if _spread(free, goal[0], goal[1], stop, field, settled, buckets):
+            return field
+        room *= 4
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f8[:,:] i8 i8 i8[:,:] -> i8")
 def _descend(
-    free: BoolGrid, field: Field, start_x: int, start_y: int
-) -> NDArray[np.int64]:
+    free: BoolGrid, field: Field, start_x: int, start_y: int, path: NDArray[np.int64]
+) -> int:
+    """Writes the pixels of the path; returns how many."""
     height, width = field.shape
-    path = np.empty((int(field[start_y, start_x]) + 2, 2), np.int64)
     x, y, count = start_x, start_y, 0
     while True:
         path[count, 0], path[count, 1] = x, y
         count += 1
         if field[y, x] == 0.0:
-            return path[:count]
+            return count
         best, best_x, best_y = np.inf, x, y
         for k in range(8):
             nx, ny = x + _DX[k], y + _DY[k]
@@ -134,7 +136,9 @@ def descend(free: BoolGrid, field: Field, start: tuple[int, int]) -> Path:
     inside = 0 <= start[0] < width and 0 <= start[1] < height
     if not inside or not np.isfinite(field[start[1], start[0]]):
         return np.empty((0, 2))
-    return np.asarray(_descend(free, field, start[0], start[1]), np.float64)
+    pixels = np.empty((int(field[start[1], start[0]]) + 2, 2), np.int64)
+    count = _descend(free, field, start[0], start[1], pixels)
+    return pixels[:count].astype(np.float64)
 
 
 def plan_path(free: BoolGrid, start: tuple[int, int], goal: tuple[int, int]) -> Path:

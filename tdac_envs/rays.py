@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tdac_envs.compiled import kernel
 from tdac_envs.grid import BoolGrid, FloatGrid
 
 # From a point anywhere in a pixel, an obstacle is at most half a diagonal nearer
@@ -32,7 +32,7 @@ def pad(cells: BoolGrid, clear: FloatGrid) -> tuple[BoolGrid, FloatGrid]:
     return np.pad(cells, 1, constant_values=True), np.pad(clear, 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f8 f8 f8 f8 -> f8")
 def cast_ray(
     cells: BoolGrid,
     clear: FloatGrid,
@@ -91,7 +91,7 @@ def cast_ray(
                 break
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f8 f8 f8 f8 f8 f4[:] ->")
 def cast_rays(
     cells: BoolGrid,
     clear: FloatGrid,
@@ -124,7 +124,7 @@ def cast_rays(
         out[k] = cast_ray(cells, clear, x, y, first + k * step, range_max)
 
 
-@njit(cache=True, nogil=True)
+@kernel("b1[:,:] f4[:,:] f8 f8 f8 f8 -> b1")
 def sees(
     cells: BoolGrid, clear: FloatGrid, x: float, y: float, to_x: float, to_y: float
 ) -> bool:

@@ -1,0 +1,349 @@
+"""Compiled functions that start without their compiler.
+
+numba compiles a function when it is first called on a machine; the machine code is
+kept on disk, and every later process loads it with llvmlite alone. To import numba and
+set it up costs over half a second a process, to load the code a few thousandths.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import hashlib
+import os
+import struct
+import sys
+import tempfile
+import threading
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from types import FunctionType
+from typing import Any, Generic, ParamSpec, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# Names as numpy and numba have them, and what they are in LLVM as an argument.
+_SCALARS = {"f8": "double", "i8": "i64"}
+_DTYPES = {"b1": np.bool_, "f4": np.float32, "f8": np.float64, "i4": np.int32}
+_DTYPES["i8"] = np.int64
+# numba's helpers that only a failing function calls, and no kernel's caller needs.
+_HELPERS = (
+    "NRT_Allocate",
+    "NRT_Free",
+    "NRT_MemInfo_call_dtor",
+    "NRT_adapt_ndarray_from_python",
+    "numba_unpickle",
+    "numba_do_raise",
+    "numba_gil_ensure",
+    "numba_gil_release",
+    "numba_runtime_build_excinfo_struct",
+)
+_RESULT, _ERROR, _FIRST = 0, 1, 2
+_LOCK = threading.RLock()
+
+
+class Kernel(Generic[P, R]):
+    """A function of numbers and C-contiguous arrays that is compiled when called.
+
+    Kernels may call kernels. They allocate nothing and raise nothing.
+
+    Args:
+        function: Plain Python, as numba can compile it.
+        signature: Types of the arguments and of the result, such as
+            `"b1[:,:] f8[:] f8 -> b1"`; None for one that only kernels call, which
+            runs as plain Python where anything else calls it.
+    """
+
+    def __init__(self, function: Callable[P, R], signature: str | None) -> None:
+        functools.update_wrapper(self, function)
+        self.function = function
+        self.signature = signature
+        self.name = function.__name__
+        arguments, _, result = (signature or "").partition("->")
+        self._types = [_Type(text) for text in arguments.split()]
+        self._result = result.strip()
+        self._entry: Callable[[int], int] | None = None
+        self._engine: Any = None
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Calls the function; arrays are converted where they have to be.
+
+        Raises:
+            TypeError: An array has another type and is to be written to.
+        """
+        if self.signature is None:
+            return self.function(*args, **kwargs)
+        slots, kept = self._pack(args)
+        self._run(slots.ctypes.data)
+        del kept
+        return cast(R, self._result_in(slots))
+
+    def bind(self, *args: Any) -> Callable[[], None]:
+        """The call with these arrays, ready to be made again and again.
+
+        Numbers are passed in arrays; so is the result.
+        """
+        slots, kept = self._pack(args)
+        entry, address = self._load(), slots.ctypes.data
+
+        def call(_kept: object = (slots, kept)) -> None:
+            if entry(address):
+                raise ArithmeticError(f"{self.name} failed")
+
+        return call
+
+    def __reduce__(self) -> str:
+        return self.name
+
+    def _run(self, address: int) -> None:
+        if self._load()(address):
+            raise ArithmeticError(f"{self.name} failed")
+
+    def _result_in(self, slots: NDArray[np.int64]) -> Any:
+        word = slots[_RESULT : _RESULT + 1]
+        if self._result == "b1":
+            return bool(word.view(np.uint8)[0])
+        if self._result in ("f4", "f8"):
+            return float(word.view(_DTYPES[self._result])[0])
+        return int(word[0]) if self._result == "i8" else None
+
+    def _pack(self, args: Any) -> tuple[NDArray[np.int64], list[Any]]:
+        """The arguments as the compiled entry reads them, and what they point to."""
+        words: list[int] = [0, 0]
+        kept: list[Any] = []
+        if len(args) != len(self._types):
+            wanted, given = len(self._types), len(args)
+            raise TypeError(f"{self.name}: expected {wanted} arguments, got {given}")
+        for value, kind in zip(args, self._types, strict=True):
+            words += kind.words(value, kept)
+        slots = np.array(words, np.int64)
+        return slots, kept
+
+    def _load(self) -> Callable[[int], int]:
+        """The compiled entry; compiles it where that has not been done."""
+        if self._entry is None:
+            with _LOCK:
+                if self._entry is None:
+                    objects = _read(self._file()) or self._compile()
+                    self._engine, address = _link(objects, self._symbol())
+                    kind = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
+                    self._entry = kind(address)
+        return self._entry
+
+    def _symbol(self) -> str:
+        return f"tdac_{self.name}"
+
+    def _file(self) -> Path:
+        module = self.__module__.rpartition(".")[2]
+        return _cache_folder() / f"{module}.{self.name}-{self._key()}.obj"
+
+    def _key(self) -> str:
+        import llvmlite.binding as llvm
+
+        features = ",".join(
+            f"{k}{v}" for k, v in sorted(llvm.get_host_cpu_features().items())
+        )
+        facts = [
+            *_facts(self, set()),
+            *(str(kind) for kind in self._types),
+            self._result,
+            sys.version,
+            version("numba"),
+            llvm.get_host_cpu_name(),
+            repr(features),
+        ]
+        return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:20]
+
+    def _compile(self) -> list[bytes]:
+        """Objects with the compiled function and with the entry to it; kept on disk."""
+        dispatcher = _jitted(self)
+        signature = tuple(kind.numba() for kind in self._types)
+        dispatcher.compile(signature)
+        result = dispatcher.overloads[signature]
+        code = result.library._get_compiled_object()
+        name = result.fndesc.llvm_func_name
+        objects = [code, _entry_object(self._symbol(), name, self._types)]
+        _write(self._file(), objects)
+        return objects
+
+
+def kernel(signature: str | None = None) -> Callable[[Callable[P, R]], Kernel[P, R]]:
+    """Makes a function a `Kernel`; a decorator."""
+    return lambda function: Kernel(function, signature)
+
+
+class _Type:
+    """A type of a signature: `f8`, or `f4[:,:]`."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.item, _, rest = text.partition("[")
+        self.dimensions = rest.count(":")
+        self.dtype = np.dtype(_DTYPES[self.item])
+
+    def __str__(self) -> str:
+        return self.text
+
+    def words(self, value: Any, kept: list[Any]) -> list[int]:
+        """The value as 64-bit words, in the order in which numba passes it."""
+        if not self.dimensions:
+            form = "<d" if self.item == "f8" else "<q"
+            return [int(struct.unpack("<q", struct.pack(form, value))[0])]
+        array = value
+        if not (
+            isinstance(array, np.ndarray)
+            and array.dtype == self.dtype
+            and array.flags.c_contiguous
+        ):
+            array = np.ascontiguousarray(value, self.dtype)
+        if array.ndim != self.dimensions:
+            raise TypeError(f"expected {self.dimensions} dimensions, got {array.ndim}")
+        kept.append(array)
+        pointer = array.__array_interface__["data"][0]
+        return [0, 0, array.size, array.itemsize, pointer, *array.shape, *array.strides]
+
+    def llvm(self) -> list[str]:
+        """LLVM's types of these words."""
+        if not self.dimensions:
+            return [_SCALARS[self.item]]
+        return ["ptr", "ptr", "i64", "i64", "ptr", *["i64"] * (2 * self.dimensions)]
+
+    def numba(self) -> Any:
+        """Numba's type."""
+        from numba import from_dtype, types
+
+        item = from_dtype(self.dtype)
+        return types.Array(item, self.dimensions, "C") if self.dimensions else item
+
+
+def _facts(kernel: Kernel[Any, Any], seen: set[int]) -> list[str]:
+    """Everything that a kernel's machine code follows from, but the machine."""
+    seen.add(id(kernel))
+    code, scope = kernel.function.__code__, kernel.function.__globals__
+    constants = code.co_consts[1:] if kernel.function.__doc__ else code.co_consts
+    facts = [kernel.name, code.co_code.hex(), repr(code.co_varnames), repr(constants)]
+    for name in code.co_names:
+        value = scope.get(name)
+        facts.append(name)
+        if isinstance(value, Kernel) and id(value) not in seen:
+            facts += _facts(value, seen)
+        elif isinstance(value, int | float):
+            facts.append(repr(value))
+        elif isinstance(value, np.ndarray):
+            facts.append(repr(value.tolist()))
+    return facts
+
+
+@functools.cache
+def _jitted(kernel: Kernel[Any, Any]) -> Any:
+    """Numba's dispatcher of a kernel, with those of the kernels that it calls."""
+    from numba import njit
+
+    function = kernel.function
+    scope = dict(function.__globals__)
+    for name in function.__code__.co_names:
+        if isinstance(scope.get(name), Kernel):
+            scope[name] = _jitted(scope[name])
+    copy = FunctionType(function.__code__, scope, function.__name__)
+    copy.__defaults__ = function.__defaults__
+    return njit(copy, nogil=True)
+
+
+def _entry_object(symbol: str, target: str, types: list[_Type]) -> bytes:
+    """An object with a function that reads all arguments of `target` from memory."""
+    import llvmlite.binding as llvm
+
+    lines, given = [], []
+    kinds = [kind for each in types for kind in each.llvm()]
+    for number, kind in enumerate(kinds):
+        offset = 8 * (_FIRST + number)
+        lines.append(f"%p{number} = getelementptr i8, ptr %slots, i64 {offset}")
+        lines.append(f"%a{number} = load {kind}, ptr %p{number}")
+        given.append(f"{kind} %a{number}")
+    passed = ", ".join(["ptr %slots", "ptr %error", *given])
+    declared = ", ".join(["ptr", "ptr", *kinds])
+    body = "\n".join(lines)
+    text = f"""
+declare i32 @"{target}"({declared})
+define i32 @{symbol}(ptr %slots) {{
+%error = getelementptr i8, ptr %slots, i64 {8 * _ERROR}
+{body}
+%status = call i32 @"{target}"({passed})
+ret i32 %status
+}}
+"""
+    return bytes(_machine().emit_object(llvm.parse_assembly(text)))
+
+
+def _machine() -> Any:
+    """The processor that this process runs on; an engine takes it for its own."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), opt=3, reloc="default", codemodel="jitdefault"
+    )
+
+
+def _link(objects: list[bytes], symbol: str) -> tuple[Any, int]:
+    """An engine that holds the code, which must outlive it, and the entry's address."""
+    import llvmlite.binding as llvm
+
+    machine = _machine()
+    stub = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value
+    for name in _HELPERS:
+        if not llvm.address_of_symbol(name):
+            llvm.add_symbol(name, stub)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    for data in objects:
+        engine.add_object_file(llvm.ObjectFileRef.from_data(data))
+    engine.finalize_object()
+    return (engine, objects), int(engine.get_function_address(symbol))
+
+
+@functools.cache
+def _cache_folder() -> Path:
+    """Where machine code is kept: beside the byte code, else in the user's cache."""
+    beside = Path(__file__).parent / "__pycache__"
+    own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tdac"
+    for folder in (beside, own):
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+    return Path(tempfile.mkdtemp(prefix="tdac-cache-"))
+
+
+def _write(path: Path, objects: list[bytes]) -> None:
+    """Keeps objects, whole or not at all; a full disk is no reason to stop."""
+    data = b"".join(struct.pack("<Q", len(each)) + each for each in objects)
+    digest = hashlib.sha256(data).digest()
+    with contextlib.suppress(OSError):
+        handle, name = tempfile.mkstemp(dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(digest + data)
+        os.replace(name, path)
+
+
+def _read(path: Path) -> list[bytes] | None:
+    """What `_write` kept, or None."""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    digest, data = data[:32], data[32:]
+    if hashlib.sha256(data).digest() != digest:
+        return None
+    objects = []
+    while data:
+        (size,) = struct.unpack_from("<Q", data)
+        objects.append(data[8 : 8 + size])
+        data = data[8 + size :]
+    return objects
