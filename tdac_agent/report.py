@@ -14,8 +14,10 @@ Cause = Literal[
     "stuck",
     "spinning",
     "oscillating",
+    "looping",
     "too slow",
     "missed goal",
+    "wrong goal",
     "error",
     "time-out",
     "contract",
@@ -30,18 +32,28 @@ class _Record(BaseModel):
 class Diagnosis(_Record):
     """What happened in an episode, computed from its trajectory.
 
-    Attributes are figures where they apply: `step`, `x`, `y` of the event, `side`
-    of the body that was hit, path distances `d0` and `d_min` in px.
+    Figures are there where they apply; distances and places in px.
     """
 
     cause: Cause
     text: str = Field(description="One paragraph, deterministic, no paths.")
-    step: int | None = None
-    x: float | None = None
+    episode: str | None = Field(None, description="`nominal`, `jitter 1` ….")
+    step: int | None = Field(None, description="Of the event.")
+    x: float | None = Field(None, description="Of the robot at that step.")
     y: float | None = None
-    side: str | None = None
-    d0: float | None = None
-    d_min: float | None = None
+    side: str | None = Field(None, description="Of the body that was hit.")
+    wall: tuple[float, float] | None = Field(None, description="What was touched.")
+    corner: tuple[float, float] | None = Field(
+        None, description="Corner of the wall within a body radius of that."
+    )
+    heading_error: float | None = Field(
+        None, description="To the shortest path at the end, rad, right positive."
+    )
+    saturated: float | None = Field(
+        None, description="Share of steps with a wheel at its limit."
+    )
+    d0: float | None = Field(None, description="Path left at the start.")
+    d_min: float | None = Field(None, description="Path left at best.")
 
 
 class Failure(_Record):

@@ -83,6 +83,9 @@ def _narrower(margin: float, bounds: Bounds) -> float:
     return margin - 0.5 * gap if gap > _MARGIN_RESOLUTION else margin
 
 
+_HELD_UP = Remedy(
+    scale={"unstick_after": 0.5, "lookahead": 0.5}, switch_on={"unstick_after": 100.0}
+)
 _RESTLESS = Remedy(scale={"turn_gain": 0.6, "turn_in_place": 1.5})
 
 REMEDIES: Mapping[Cause, Remedy] = MappingProxyType(
@@ -93,10 +96,8 @@ REMEDIES: Mapping[Cause, Remedy] = MappingProxyType(
             scale={"lookahead": 0.5, "turn_in_place": 0.5},
         ),
         "no motion": Remedy(margin="narrower", scale={"stop_dist": 0.5}),
-        "stuck": Remedy(
-            scale={"unstick_after": 0.5, "lookahead": 0.5},
-            switch_on={"unstick_after": 100.0},
-        ),
+        "stuck": _HELD_UP,
+        "looping": _HELD_UP,
         "spinning": _RESTLESS,
         "oscillating": _RESTLESS,
         "missed goal": Remedy(scale={"lookahead": 0.5, "turn_in_place": 0.5}),

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from driving import drive
 
-from tdac_agent.diagnosis import diagnose, side_of
+from tdac_agent.diagnosis import diagnose
+from tdac_agent.touch import nearest_corner, nearest_touch, side_of, where_on_the_wall
 from tdac_envs.map2d import Map2DEnv
 from tdac_envs.task2d import Pose
 
@@ -77,7 +78,10 @@ def test_collision_with_the_border():
     _, found = judged(room((60, 60, -math.pi / 2)), always(1, 1))
     assert (found.cause, found.side) == ("collision", "front")
     assert found.y == pytest.approx(7.5, abs=0.1)
-    assert re.search(r"path lay (1\.9|2\.0)\d rad to the right", found.text)
+    assert found.wall == (60.0, -0.5)
+    assert "touched the border of the map" in found.text
+    assert re.search(r"Heading error 11\d° right to the shortest path", found.text)
+    assert found.heading_error == pytest.approx(math.radians(115), abs=0.1)
     assert "limit in 100 % of the steps" in found.text
 
 
@@ -187,13 +191,88 @@ def test_text_is_bounded_and_repeatable():
     """The same episode gives the same words, few enough for a prompt."""
     texts = {judged(room(horizon=600), always(0.3, 0.6))[1].text for _ in range(2)}
     assert len(texts) == 1
-    assert len(texts.pop()) < 900
+    assert len(texts.pop()) < 700
 
 
-@pytest.mark.parametrize("heading", [0.0, 1.0, -2.5, math.pi])
-def test_sides_turn_with_the_robot(heading):
-    """Right is clockwise of the heading on the screen, as y points down."""
-    pose = Pose(10.0, 20.0, heading)
-    x, y = 10 - 5 * math.sin(heading), 20 + 5 * math.cos(heading)
-    assert side_of(pose, x, y) == "right"
-    assert side_of(pose, 20 - x, 40 - y) == "left"
+@pytest.mark.parametrize(
+    ("degrees", "side"),
+    [
+        (0, "front"),
+        (22, "front"),
+        (23, "front right"),
+        (90, "right"),
+        (112, "right"),
+        (113, "rear right"),
+        (180, "rear"),
+        (-180, "rear"),
+        (-90, "left"),
+        (-23, "front left"),
+        (-158, "rear"),
+        (-157, "rear left"),
+    ],
+)
+def test_sides(degrees, side):
+    """Eight sides of 45° each; positive is clockwise on the screen, to the right."""
+    assert side_of(math.radians(degrees)) == side
+
+
+@pytest.mark.parametrize(
+    ("at", "corner"),
+    [
+        ((50, 42), (49.5, 39.5)),
+        ((69, 59), (69.5, 59.5)),
+        ((60, 40), None),
+        ((103, 90), (99.5, 89.5)),
+        ((148, 91), (149.5, 91.5)),
+        ((125, 90), None),
+        ((175, 42), None),
+        ((189.5, 40), None),
+    ],
+)
+def test_corners(at, corner):
+    """Outer corners of walls and the ends of thin ones; no inner corner, no post."""
+    cells = np.zeros((120, 200), bool)
+    cells[40:60, 50:70] = True
+    cells[90:92, 100:150] = True
+    cells[20:60, 160:200] = True
+    cells[24:56, 164:196] = False
+    rows, columns = np.ogrid[:120, :200]
+    cells |= (columns - 180) ** 2 + (rows - 40) ** 2 < 9.5**2
+    env = Map2DEnv(cells, (20, 20), (20, 100), robot_radius=8)
+    assert nearest_corner(env.nominal, at, 8.0) == corner
+
+
+@pytest.mark.parametrize(
+    ("pose", "words"),
+    [
+        (Pose(55.0, 31.5, 0.0), "5.5 px past the corner at (49.5, 39.5)"),
+        (Pose(55.0, 31.5, math.pi), "5.5 px before the corner at (49.5, 39.5)"),
+        (Pose(41.5, 45.0, 0.0), "5.5 px beside the corner at (49.5, 39.5)"),
+        (Pose(44.0, 33.7, 0.5), "at the corner at (49.5, 39.5)"),
+        (Pose(60.0, 31.5, 0.0), ""),
+    ],
+)
+def test_where_on_the_wall(pose, words):
+    """Past and before are meant along the motion, whatever side the wall is on."""
+    cells = np.zeros((120, 200), bool)
+    cells[40:60, 50:71] = True
+    env = Map2DEnv(cells, (20, 20), (20, 100), robot_radius=8)
+    touch = nearest_touch(env.nominal, pose, 12.0)
+    assert touch.gap == pytest.approx(0.0, abs=0.1)
+    assert where_on_the_wall(touch, pose.heading) == words
+
+
+def test_nothing_within_reach():
+    """Far from all walls there is nothing to touch."""
+    task = room().nominal
+    assert nearest_touch(task, Pose(100.0, 60.0, 0.0), 20.0) is None
+    assert nearest_touch(task, Pose(100.0, 10.0, 0.0), 20.0).border
+
+
+def test_turning_away_from_the_path_is_told():
+    """A robot that turns to the wrong side is told to look at the sign of its turn."""
+    start = (60, 60, 0.6)
+    _, wrong = judged(room(start), always(0.25, 0.2))
+    assert "look at the sign of the turn" in wrong.text
+    _, right = judged(room(start, horizon=60), always(0.2, 0.25))
+    assert "sign of the turn" not in right.text

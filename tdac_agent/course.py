@@ -1,0 +1,95 @@
+"""Where the shortest path lies, as seen from the robot while it drove."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from tdac_agent.reference import pull
+from tdac_agent.trajectory import Trajectory
+from tdac_envs.grid import body_free
+from tdac_envs.plan import descend
+from tdac_envs.task2d import Map2DTask, Pose
+from tdac_envs.terrain import entry
+
+_PATH_AHEAD = 400
+_LAST_POSES = 20
+_SAMPLES = 40
+# Wheels that differ by less than this do not mean to turn.
+_TURNING = 0.04
+# Nearer to the path's direction than this there is nothing to turn to, rad.
+_ALIGNED = 0.2
+# Within this of the opposite direction either way will do, rad.
+_OPPOSITE = 0.5
+# How far ahead on the path its direction is taken, radii of the body.
+_RADII = 3.0
+
+
+def heading_error(task: Map2DTask, trajectory: Trajectory, step: int) -> float | None:
+    """Direction of the shortest path seen from the heading, rad, right positive.
+
+    At the wall itself there may be no path for the body; an earlier pose has one.
+    """
+    first = max(step - _LAST_POSES + 1, 0)
+    for x, y, heading in trajectory.poses[first : step + 1][::-1].tolist():
+        path = task.path_from(Pose(x, y, heading))
+        if len(path) > 1:
+            # A shortest path on a grid has many forms; a pulled one has a direction.
+            _, (to_x, to_y), *_ = pull(task, path[:_PATH_AHEAD])
+            bearing = math.atan2(to_y - y, to_x - x)
+            return math.remainder(bearing - heading, 2.0 * math.pi)
+    return None
+
+
+def goal_bearing(
+    trajectory: Trajectory, goal: tuple[float, float], step: int = -1
+) -> float:
+    """Direction of the goal seen from the heading, rad, right positive."""
+    x, y, heading = trajectory.poses[step].tolist()
+    bearing = math.atan2(goal[1] - y, goal[0] - x)
+    return math.remainder(bearing - heading, 2.0 * math.pi)
+
+
+def turned_away(task: Map2DTask, trajectory: Trajectory) -> tuple[float, int]:
+    """Share of steps that turned away from the shortest path and from the goal itself.
+
+    Returns:
+        The share, and the number of steps that it was taken from: the first ones with
+        a turn, up to where the robot faces away from the path.
+    """
+    difference = trajectory.actions[:, 0] - trajectory.actions[:, 1]
+    turning = np.flatnonzero(np.abs(difference) > _TURNING)
+    steps = turning[:_SAMPLES].tolist()
+    clear = []
+    for step, error in zip(steps, _path_bearings(task, trajectory, steps), strict=True):
+        if error is not None and abs(error) > math.pi - _OPPOSITE:
+            break
+        if error is not None and abs(error) > _ALIGNED:
+            clear.append((step, error))
+    away = sum(
+        error * difference[step] < 0.0
+        and goal_bearing(trajectory, task.goal, step) * difference[step] < 0.0
+        for step, error in clear
+    )
+    return (away / len(clear) if clear else 0.0), len(clear)
+
+
+def _path_bearings(
+    task: Map2DTask, trajectory: Trajectory, steps: Sequence[int]
+) -> Iterator[float | None]:
+    """Like `heading_error` for many steps, from the nearest part of the path."""
+    free = body_free(task.terrain.clear, task.robot.radius)
+    field = np.asarray(task.field, np.float64)
+    for step in steps:
+        x, y, heading = trajectory.poses[step].tolist()
+        first = entry(task.terrain, task.field, x, y, task.robot.radius)
+        if first is None:
+            yield None
+            continue
+        path = descend(free, field, first)
+        far = np.hypot(path[:, 0] - x, path[:, 1] - y) >= _RADII * task.robot.radius
+        to_x, to_y = path[int(np.argmax(far)) if far.any() else -1]
+        bearing = math.atan2(to_y - y, to_x - x)
+        yield math.remainder(bearing - heading, 2.0 * math.pi)
