@@ -15,17 +15,21 @@ from typing import Annotated, Any, Literal, NoReturn, Optional
 import typer
 
 from tdac_agent.commands.options import (
+    Delay,
     Goal,
     Heading,
     Json,
     MapOption,
     Metres,
+    MotorLag,
     Profile,
     Radius,
+    RangeNoise,
     Snap,
     Start,
     TaskOption,
     Tier,
+    WheelSlip,
 )
 
 app = typer.Typer(
@@ -153,7 +157,7 @@ def synth(
 
 @app.command(
     epilog="Examples: `tdac verify controller.py --task maze`; "
-    "`tdac verify runs/maze-1`"
+    "`tdac verify runs/maze-1`; `tdac verify runs/maze-1 --robust 200`"
 )
 def verify(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
@@ -180,19 +184,63 @@ def verify(
         typer.Option(help="Write a JUnit XML report."),
     ] = None,
     as_json: Json = False,
+    robust: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Once verified, run N disturbed episodes and give the success rate.",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    first_seed: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            min=0,
+            help="Seed of the first disturbed episode.  [default: 0]",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    accept_at: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            metavar="RATE",
+            help="Stop as soon as a sequential test tells this success rate from one "
+            "that is --margin lower; exit 0 only if accepted.",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    margin: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            help="See --accept-at.  [default: 0.05]", rich_help_panel="Robustness"
+        ),
+    ] = None,
+    range_noise: RangeNoise = None,
+    wheel_slip: WheelSlip = None,
+    motor_lag: MotorLag = None,
+    delay: Delay = None,
 ) -> None:
     """Test a controller in the sandbox; exit 0 only if every test passed."""
     from tdac_agent.commands import verify as command
+    from tdac_agent.commands.robust_flags import DisturbanceFlags, RobustFlags
 
     spec = _flags(
         task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
     )
+    disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+    wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
     raise typer.Exit(
-        command.run(controller, spec, profile, paper, suite, tier, seed, junit, as_json)
+        command.run(
+            controller, spec, profile, paper, suite, tier, seed, junit, as_json, wanted
+        )
     )
 
 
-@app.command(epilog="Example: `tdac play runs/maze-1 --video maze.mp4`")
+@app.command(
+    epilog="Examples: `tdac play runs/maze-1 --video maze.mp4`; "
+    "`tdac play runs/maze-1 --seed 17`"
+)
 def play(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
     task: TaskOption = None,
@@ -207,18 +255,36 @@ def play(
         Optional[Path],  # noqa: UP045
         typer.Option(help="Write .mp4 or .gif instead of opening a window."),
     ] = None,
+    episode: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            help="Episode of the suite: `nominal`, `jitter 1` …  [default: nominal]"
+        ),
+    ] = None,
     seed: Annotated[
-        int, typer.Option(min=0, help="0: nominal start; N: jittered start N.")
-    ] = 0,
+        Optional[int],  # noqa: UP045
+        typer.Option(min=0, help="The disturbed episode of this seed instead."),
+    ] = None,
     tier: Tier = "auto",
+    range_noise: RangeNoise = None,
+    wheel_slip: WheelSlip = None,
+    motor_lag: MotorLag = None,
+    delay: Delay = None,
 ) -> None:
-    """Show one episode of a controller, run in the sandbox."""
+    """Show one episode of a controller, run in the sandbox.
+
+    It is one of those of `tdac verify`: of the suite, or with --seed of --robust.
+    """
     from tdac_agent.commands import play as command
+    from tdac_agent.commands.robust_flags import DisturbanceFlags
 
     spec = _flags(
         task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
     )
-    raise typer.Exit(command.run(controller, spec, video, seed, tier))
+    disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+    raise typer.Exit(
+        command.run(controller, spec, video, episode, seed, disturbed, tier)
+    )
 
 
 @app.command(

@@ -48,12 +48,13 @@ class Disturbance:
         return {"variation": "jitter", **asdict(self)}
 
     def __str__(self) -> str:
-        late = f"{self.delay} step{'' if self.delay == 1 else 's'}"
-        return (
-            f"jittered starts, range noise {100 * self.range_noise:g} %, "
-            f"wheel slip {100 * self.wheel_slip:g} %, "
-            f"motor lag {self.motor_lag:g} s, delay {late}"
-        )
+        parts = {
+            f"range noise {100 * self.range_noise:g} %": self.range_noise,
+            f"wheel slip {100 * self.wheel_slip:g} %": self.wheel_slip,
+            f"motor lag {self.motor_lag:g} s": self.motor_lag,
+            f"delay {self.delay} step{'' if self.delay == 1 else 's'}": self.delay,
+        }
+        return ", ".join(["jittered starts", *(p for p, size in parts.items() if size)])
 
 
 def _within(name: str, value: float, most: float) -> None:

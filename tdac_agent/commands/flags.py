@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,18 @@ class TaskFlags:
         """Whether any flag names or changes a task."""
         return self != TaskFlags()
 
+    def words(self) -> list[str]:
+        """The part of a command line that gives the same flags again."""
+        words = []
+        for name in (f.name for f in fields(self)):
+            value = getattr(self, name)
+            if value is None or value is False:
+                continue
+            values = value if isinstance(value, tuple) else (value,)
+            given = [] if value is True else map(as_word, values)
+            words += [flag("map" if name == "map_image" else name), *given]
+        return words
+
     def load(self, default: str = "maze") -> Task:
         """The task that the flags ask for.
 
@@ -63,8 +75,7 @@ class TaskFlags:
         names = ("map_image", "start", "goal", "heading", "robot_radius")
         given = [name for name in names if getattr(self, name) is not None]
         if given:
-            words = [n.replace("_image", "").replace("_", "-") for n in given]
-            flags = ", ".join(f"--{word}" for word in words)
+            flags = ", ".join(flag(name.replace("_image", "")) for name in given)
             raise TaskError(f"--task already says it all: leave out {flags}")
 
     def _spec(self, source: str) -> TaskFile:
@@ -87,6 +98,16 @@ class TaskFlags:
             "instructions": _text(self.instructions),
         }
         return checked(given, "the flags")
+
+
+def flag(field: str) -> str:
+    """The flag of a field: `--robot-radius`."""
+    return f"--{field.replace('_', '-')}"
+
+
+def as_word(value: object) -> str:
+    """A flag's value as it may be typed; a number keeps all of its digits."""
+    return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
 def check_tier(name: str) -> None:

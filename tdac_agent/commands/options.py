@@ -48,3 +48,32 @@ Profile = Annotated[
     Optional[Literal["policy", "paper"]],  # noqa: UP045
     typer.Option(help="What the file must define.  [default: the task's own]"),
 ]
+DISTURBED = "Disturbance of --robust, and of play --seed"
+RangeNoise = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        help="Noise of each range, relative.  [default: 0.025]",
+        rich_help_panel=DISTURBED,
+    ),
+]
+WheelSlip = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        help="Noise of each wheel's speed in each step, relative.  [default: 0.03]",
+        rich_help_panel=DISTURBED,
+    ),
+]
+MotorLag = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        help="Time constant of the wheel speeds, s.  [default: 0]",
+        rich_help_panel=DISTURBED,
+    ),
+]
+Delay = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        help="Steps by which an action is late.  [default: 1]",
+        rich_help_panel=DISTURBED,
+    ),
+]

@@ -12,8 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.commands.flags import TaskFlags, check_tier
+from tdac_agent.commands.robust_flags import DisturbanceFlags, refuse_without
 from tdac_agent.commands.verify import controller_and_task
-from tdac_agent.judge import Judge
+from tdac_agent.disturbance import Disturbance
+from tdac_agent.errors import Fault
+from tdac_agent.judge import JITTERS, Judge
+from tdac_agent.nursery import Nursery
+from tdac_agent.sandbox import Limits, SandboxError
+from tdac_agent.seeded import Stage, drive_seed
 from tdac_agent.task import Task, write_workdir
 from tdac_agent.trajectory import Rollout
 from tdac_agent.verification import read_source
@@ -27,16 +33,30 @@ STRIDE = 2
 
 
 def run(
-    controller: str, flags: TaskFlags, video: Path | None, seed: int, tier: str
+    controller: str,
+    flags: TaskFlags,
+    video: Path | None,
+    episode: str | None,
+    seed: int | None,
+    disturbed: DisturbanceFlags,
+    tier: str,
 ) -> int:
     """Plays one episode; returns 0 if the goal was reached."""
     check_tier(tier)
+    if seed is None:
+        refuse_without("--seed N", list(disturbed.given()))
+    elif episode is not None:
+        raise TaskError("give --episode or --seed, not both")
+    name, disturbance = _checked(episode), disturbed.disturbance()
     if video is None and not has_display():
         raise TaskError("there is no display here: give --video FILE.mp4 (or .gif)")
     if video is not None and video.suffix not in SUFFIXES:
         raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
     file, task = controller_and_task(controller, flags)
-    rollout = drive(task, read_source(file), seed, tier)
+    if seed is None:
+        rollout = drive(task, read_source(file), name, tier)
+    else:
+        rollout = drive_disturbed(task, read_source(file), seed, disturbance, tier)
     picked = frames(task, rollout)
     rate = 1.0 / (task.nominal.dt * STRIDE)
     if video is not None:
@@ -48,13 +68,12 @@ def run(
             window.show(frame)
         window.close()
     steps = rollout.trajectory.steps
-    print(f"{rollout.outcome} after {steps} steps" + _because(rollout))
+    print(f"{rollout.name}: {rollout.outcome} after {steps} steps" + _because(rollout))
     return 0 if rollout.reached else 1
 
 
-def drive(task: Task, source: bytes, seed: int, tier: str) -> Rollout:
-    """One judged episode: the nominal start, or jittered start `seed`."""
-    name = "nominal" if seed == 0 else f"jitter {seed}"
+def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
+    """One judged episode of the suite, as its report names it."""
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work = Path(folder)
         write_workdir(work, task)
@@ -63,6 +82,22 @@ def drive(task: Task, source: bytes, seed: int, tier: str) -> Rollout:
             return judge.drive(name)
         finally:
             judge.close()
+
+
+def drive_disturbed(
+    task: Task, source: bytes, seed: int, disturbance: Disturbance, tier: str
+) -> Rollout:
+    """The judged episode of a seed, as a robust verification runs it."""
+    with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
+        work, nursery = Path(folder), Nursery(ahead=False)
+        write_workdir(work, task)
+        stage = Stage(task, source, work, disturbance, tier, Limits(), nursery)
+        try:
+            return drive_seed(stage, seed)[0]
+        except SandboxError as error:
+            raise Fault(f"the sandbox failed: {error}") from error
+        finally:
+            nursery.close()
 
 
 def frames(task: Task, rollout: Rollout) -> Iterator[NDArray[np.uint8]]:
@@ -97,6 +132,14 @@ def has_display() -> bool:
     if sys.platform in ("darwin", "win32"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _checked(episode: str | None) -> str:
+    names = ["nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1))]
+    if episode is not None and episode not in names:
+        known = ", ".join(names)
+        raise TaskError(f"no episode {episode!r}; expected one of {known}")
+    return episode or "nominal"
 
 
 def _because(rollout: Rollout) -> str:

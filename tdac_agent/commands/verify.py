@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from rich.console import Console
 
 from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.report_view import show_report
+from tdac_agent.commands.robust_flags import RobustFlags
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
 from tdac_agent.report import Report
@@ -17,6 +20,9 @@ from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import Profile
 from tdac_agent.verification import verify
 from tdac_agent.warm import WarmJudge
+
+if TYPE_CHECKING:
+    from tdac_agent.robust_report import RobustReport
 
 
 def run(
@@ -29,31 +35,65 @@ def run(
     seed: int,
     junit: Path | None,
     as_json: bool,
+    robust: RobustFlags,
 ) -> int:
     """Verifies and prints; returns the exit code."""
     check_tier(tier)
+    robust.check()
     console = Console(stderr=as_json)
     # The judge warms up while the map is preprocessed.
-    with WarmJudge() as judge, console.status("preparing the task …") as status:
-        file, task = controller_and_task(controller, flags)
-        status.update(f"verifying {file.name} on {task.name} …")
-        report = verify(
-            file,
-            task,
-            profile=profile,
-            paper=paper,
-            suite=suite,
-            tier=tier,
-            seed=seed,
-            judge=judge,
-        )
-    if junit is not None:
-        write_junit(report, junit)
+    with WarmJudge(forked=True) as judge:
+        with console.status("preparing the task …") as status:
+            file, task = controller_and_task(controller, flags)
+            status.update(f"verifying {file.name} on {task.name} …")
+            report = verify(
+                file,
+                task,
+                profile=profile,
+                paper=paper,
+                suite=suite,
+                tier=tier,
+                seed=seed,
+                judge=judge,
+            )
+        if junit is not None:
+            write_junit(report, junit)
+        if not as_json:
+            show_report(report, console)
+        measured = None
+        if robust.robust is not None and report.passed:
+            from tdac_agent.commands.robust import measure
+
+            measured = measure(
+                file, task, robust, tier=tier, judge=judge, console=console
+            )
     if as_json:
-        sys.stdout.write(report.model_dump_json(indent=2) + "\n")
-    else:
-        show_report(report, console)
-    return 0 if report.passed else 1
+        sys.stdout.write(_json(report, robust, measured) + "\n")
+    elif measured is not None:
+        from tdac_agent.commands.robust_view import show_robust
+
+        show_robust(measured, console, _replay(controller, flags, robust, tier))
+    elif robust.robust is not None:
+        console.print("robustness not measured: the controller is not verified")
+    accepted = measured is None or measured.accepted
+    return 0 if report.passed and accepted else 1
+
+
+def _json(report: Report, robust: RobustFlags, measured: RobustReport | None) -> str:
+    """The report; with `--robust`, a part of that name, null where it was not run."""
+    if robust.robust is None:
+        return report.model_dump_json(indent=2)
+    content = report.model_dump(mode="json")
+    part = None if measured is None else measured.model_dump(mode="json")
+    return json.dumps({**content, "robust": part}, indent=2, ensure_ascii=False)
+
+
+def _replay(
+    controller: str, flags: TaskFlags, robust: RobustFlags, tier: str
+) -> list[str]:
+    """The command line that plays an episode of the same, but for its seed."""
+    words = ["tdac", "play", controller, *flags.words(), *robust.disturbed.words()]
+    return words if tier == "auto" else [*words, "--tier", tier]
 
 
 def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:

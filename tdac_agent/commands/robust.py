@@ -1,0 +1,62 @@
+"""The robust part of `tdac verify`, with its progress."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import TimeRemainingColumn as TimeLeft
+
+from tdac_agent.commands.robust_flags import RobustFlags
+from tdac_agent.robust import verify_robust
+from tdac_agent.robust_report import RobustReport
+from tdac_agent.sequential import MARGIN
+from tdac_agent.task import Task
+from tdac_agent.warm import WarmJudge
+
+
+def measure(
+    file: Path,
+    task: Task,
+    wanted: RobustFlags,
+    *,
+    tier: str,
+    judge: WarmJudge,
+    console: Console,
+) -> RobustReport:
+    """Runs the disturbed episodes, with a bar for whoever watches."""
+    assert wanted.robust is not None
+    columns = (
+        TextColumn("disturbed episodes"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[successes]} reached"),
+        TimeLeft(),
+    )
+    bar = Progress(*columns, console=console, transient=True)
+    seen = (0, 0)
+
+    def watch(episodes: int, successes: int) -> None:
+        nonlocal seen
+        seen = episodes, successes
+        bar.update(row, completed=episodes, successes=successes)
+
+    row = bar.add_task("", total=wanted.robust, successes=0)
+    try:
+        with bar:
+            return verify_robust(
+                file,
+                task,
+                wanted.robust,
+                disturbance=wanted.disturbed.disturbance(),
+                first_seed=wanted.first_seed or 0,
+                accept_at=wanted.accept_at,
+                margin=MARGIN if wanted.margin is None else wanted.margin,
+                tier=tier,
+                judge=judge,
+                watch=watch,
+            )
+    except KeyboardInterrupt:
+        console.print(f"{seen[1]} of {seen[0]} episodes had reached the goal; no rate")
+        raise

@@ -1,0 +1,127 @@
+"""A robust verification on the terminal."""
+
+from __future__ import annotations
+
+import shlex
+from functools import partial
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from tdac_agent.robust_report import Interval, RobustReport, SequentialResult
+from tdac_agent.seeded import SeededEpisode
+
+LEAST, MOST, ERRORS = 5, 10, 3
+REACHED = "reached"
+
+
+def show_robust(report: RobustReport, console: Console, play: list[str]) -> None:
+    """Prints the worst episodes, the count, and what follows from it.
+
+    Args:
+        report: The report.
+        console: Where to.
+        play: Command line that plays an episode, but for its seed.
+    """
+    # A command and a message are for copying: they are not wrapped.
+    whole = partial(console.print, soft_wrap=True, highlight=False)
+    say = partial(console.print, highlight=False)
+    say(worst_table(report))
+    for error in _errors(report):
+        whole(Text(f"  {error}"))
+    replay = shlex.join([*play, "--seed", str(report.worst[0].seed)])
+    whole(f"  replay the first of them: [bold]{escape(replay)}[/]")
+    say(f"  disturbance: {report.provenance.disturbance}")
+    outcomes = report.outcomes.items()
+    others = ", ".join(f"{count} {name}" for name, count in outcomes if name != REACHED)
+    say(
+        f"{report.successes} of {report.episodes} episodes reached the goal without a "
+        f"contact{f' ({others})' if others else ''}; they took {report.seconds:.0f} s"
+    )
+    if report.interval is not None and report.rate is not None:
+        say(_rate(report.rate, report.interval))
+    if report.sequential is not None:
+        result = report.sequential
+        colour = "green" if report.accepted else "red"
+        say(
+            f"[bold {colour}]{_decision(result)}[/] after {report.episodes} of at most "
+            f"{result.test.limit} episodes"
+        )
+        say(_error_rates(result))
+
+
+def worst_table(report: RobustReport) -> Table:
+    """The worst seeds: every failure up to a number, then the slowest successes."""
+    first, failures = report.provenance.first_seed, len(report.failed_seeds)
+    shown = report.worst[: max(LEAST, min(failures, MOST))]
+    further = f", {failures - MOST} further failures" if failures > MOST else ""
+    table = Table(
+        title=f"Worst of the seeds {first} to {first + report.episodes - 1} (px)"
+        + further,
+        title_justify="left",
+    )
+    table.add_column("seed", justify="right")
+    table.add_column("outcome")
+    for name in ("steps", "path left", "from step", "at"):
+        table.add_column(name, justify="right")
+    for episode in shown:
+        table.add_row(*_row(episode))
+    return table
+
+
+def _row(episode: SeededEpisode) -> list[str]:
+    cause = episode.side if episode.outcome == "collision" else episode.cause
+    more = "" if cause in (None, episode.outcome) else f", {cause}"
+    return [
+        str(episode.seed),
+        f"[{'green' if episode.success else 'red'}]{episode.outcome}{more}[/]",
+        str(episode.steps),
+        f"{episode.d_min:.0f} of {episode.d0:.0f}",
+        "" if episode.step is None else str(episode.step),
+        "" if episode.x is None else f"({episode.x:.0f}, {episode.y:.0f})",
+    ]
+
+
+def _errors(report: RobustReport) -> list[str]:
+    """What the controllers of the worst episodes did wrong, each thing once."""
+    first: dict[str, int] = {}
+    for episode in report.worst:
+        if episode.error is not None:
+            first.setdefault(episode.error, episode.seed)
+    return [f"seed {seed}: {error}" for error, seed in first.items()][:ERRORS]
+
+
+def _rate(rate: float, interval: Interval) -> str:
+    return (
+        f"[bold]success rate {_percent(rate)}[/], "
+        f"{100 * interval.confidence:.0f} % interval {_percent(interval.low)} to "
+        f"{_percent(interval.high)} ({interval.method})"
+    )
+
+
+def _decision(result: SequentialResult) -> str:
+    if result.decision == "accepted":
+        return f"accepted at {_percent(result.test.accept_at)}"
+    if result.decision == "rejected":
+        return f"rejected at {_percent(result.test.accept_at)}"
+    return "undecided, and so not accepted,"
+
+
+def _error_rates(result: SequentialResult) -> str:
+    low, high = result.at_refused_rate, result.at_accepted_rate
+    return (
+        f"  a controller of {_percent(low.rate)} is accepted with probability "
+        f"{_percent(low.accepted)}\n"
+        f"  a controller of {_percent(high.rate)} is rejected with "
+        f"{_percent(high.rejected)}, undecided with {_percent(high.undecided)}"
+    )
+
+
+def _percent(share: float) -> str:
+    """One decimal; three where one would make nearly all of it all."""
+    rounded = f"{100 * share:.1f}"
+    if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
+        rounded = f"{100 * share:.3f}"
+    return f"{rounded} %"
