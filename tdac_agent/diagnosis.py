@@ -51,7 +51,7 @@ def diagnose(rollout: Rollout, task: Map2DTask) -> Diagnosis:
     if rollout.error is not None:
         return _error(rollout)
     if rollout.trajectory.steps == 0:
-        return _diagnosis(rollout, "no motion", "no step was made.", 0)
+        return _diagnosis(rollout, "no motion", "no motion: no step was made.", 0)
     if rollout.outcome == "collision":
         return _collision(rollout, task)
     return _no_arrival(rollout, task)
@@ -65,7 +65,8 @@ def _error(rollout: Rollout) -> Diagnosis:
     elif _CONTRACT.search(message):
         cause = "contract"
     when = f"after {steps} steps" if steps else "before its first step"
-    return _diagnosis(rollout, cause, f"the controller failed {when}: {message}", steps)
+    text = f"{cause}: the controller failed {when}: {message}"
+    return _diagnosis(rollout, cause, text, steps)
 
 
 def _plain(message: str) -> str:
@@ -84,8 +85,8 @@ def _collision(rollout: Rollout, task: Map2DTask) -> Diagnosis:
     corner = where_on_the_wall(touch, towards)
     error, course = _course(rollout, task)
     text = (
-        f"in step {trajectory.steps} ({trajectory.steps * trajectory.dt:.1f} s) at "
-        f"{point(pose.x, pose.y)}, heading {pose.heading:z.2f} rad, at "
+        f"collision in step {trajectory.steps} "
+        f"({trajectory.steps * trajectory.dt:.1f} s) at {point(pose.x, pose.y)}, heading {pose.heading:z.2f} rad, at "
         f"{speed * task.robot.max_wheel_speed:.0f} px/s, the {side} of the body "
         f"touched the {'border of the map' if touch.border else 'wall'} at "
         f"{point(*touch.wall)}{', ' if corner else ''}{corner}. "
@@ -136,7 +137,8 @@ def _no_arrival(rollout: Rollout, task: Map2DTask) -> Diagnosis:
         text += f" The nearest wall is {touch.gap:.1f} px from the body, at its "
         text += f"{side_of(touch.bearing)}."
     error, course = _course(rollout, task)
-    return _diagnosis(rollout, cause, f"{text} {course}", step, heading_error=error)
+    text = f"{cause}: {text} {course}"
+    return _diagnosis(rollout, cause, text, step, heading_error=error)
 
 
 def _course(rollout: Rollout, task: Map2DTask) -> tuple[float | None, str]:
@@ -167,7 +169,7 @@ def _diagnosis(
 ) -> Diagnosis:
     """Adds the distances and the last poses to what is known."""
     trajectory = rollout.trajectory
-    text = f"{rollout.name}: {cause}: {text.strip()}"
+    text = f"{rollout.name}: {text.strip()}"
     if not len(trajectory.poses):
         return Diagnosis(cause=cause, text=text, step=step, episode=rollout.name)
     distances = trajectory.path_distances

@@ -17,7 +17,7 @@ def test_feedback_tells_what_happened(small_task, warm):
     text = render_feedback(report)
     assert text.startswith(f"{report.verdict.failed_tests} of ")
     assert "test_no_collisions" in text
-    assert "nominal: collision: in step" in text
+    assert "nominal: collision in step" in text
     assert "/tmp" not in text
     assert "0x" not in text
 

@@ -46,7 +46,7 @@ def test_paragraph(number):
     _, rollout = driven(number)
     diagnosis = found(number)
     text = diagnosis.text
-    assert text.startswith(f"{rollout.name}: {diagnosis.cause}: ")
+    assert text.startswith(f"{rollout.name}: {diagnosis.cause}")
     assert diagnosis.episode == rollout.name
     assert len(text) <= MAX_CHARS
     assert text.isprintable()
