@@ -86,7 +86,8 @@ def _collision(rollout: Rollout, task: Map2DTask) -> Diagnosis:
     error, course = _course(rollout, task)
     text = (
         f"collision in step {trajectory.steps} "
-        f"({trajectory.steps * trajectory.dt:.1f} s) at {point(pose.x, pose.y)}, heading {pose.heading:z.2f} rad, at "
+        f"({trajectory.steps * trajectory.dt:.1f} s) at {point(pose.x, pose.y)}, "
+        f"heading {pose.heading:z.2f} rad, at "
         f"{speed * task.robot.max_wheel_speed:.0f} px/s, the {side} of the body "
         f"touched the {'border of the map' if touch.border else 'wall'} at "
         f"{point(*touch.wall)}{', ' if corner else ''}{corner}. "
