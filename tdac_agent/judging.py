@@ -6,7 +6,6 @@ runs here, only in the sandboxed children that the judge starts.
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import os
 import signal
@@ -25,7 +24,7 @@ from tdac_agent.files import write_atomic
 from tdac_agent.judge import Judge
 from tdac_agent.nursery import Nursery
 from tdac_agent.report import Episode
-from tdac_agent.sandbox import Limits, SandboxError, best_tier
+from tdac_agent.sandbox import Limits
 from tdac_agent.seeded import SeededJob, judge_seeds
 from tdac_agent.suite_plugin import JudgePlugin, rollout_key
 from tdac_agent.task import Task, load_task
@@ -78,10 +77,14 @@ def serve() -> None:
         worker = os.fork()
         if worker == 0:
             work()
-        print(worker, flush=True)
+        _say(worker)
         code = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
         more = code != NO_JOB
-        print(code, flush=True)
+        _say(code)
+
+
+def _say(number: int) -> None:
+    os.write(1, b"%d\n" % number)
 
 
 def work() -> NoReturn:
@@ -89,7 +92,7 @@ def work() -> NoReturn:
     os.setpgid(0, 0)
     _end_with_parent()
     nursery = Nursery()
-    request = _read_line(sys.stdin.fileno())
+    request = _read_line(0)
     code = NO_JOB
     try:
         if request:
@@ -127,14 +130,12 @@ def _read_line(descriptor: int) -> str:
 
 
 def _warm_up() -> None:
-    """Loads what is compiled, and finds the best sandbox tier."""
+    """Loads what is compiled."""
     cells = np.zeros((40, 60), np.bool_)
     env = Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     env.nominal.path_from(env.nominal.start)
-    with contextlib.suppress(SandboxError):
-        best_tier()
 
 
 def do_job(request: Path, nursery: Nursery) -> None:

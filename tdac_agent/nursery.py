@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import Future, ThreadPoolExecutor
 
 from tdac_agent.sandbox import (
+    TIERS,
     Child,
     Limits,
+    SandboxError,
     Tier,
     Zygote,
-    best_tier,
     find_tier,
     fork_child,
     start_zygote,
 )
-
-Kind = tuple[str, int]
 
 
 class Nursery:
@@ -30,52 +28,79 @@ class Nursery:
     def __init__(self, *, ahead: bool = True) -> None:
         self._ahead = ahead
         self._lock = threading.Lock()
-        self._pool = ThreadPoolExecutor(max_workers=1)
+        self._best: Tier | None = None
         self._zygotes: list[Zygote] = []
-        self._next: Future[Zygote] | None = None
         if ahead:
-            self._next = self._pool.submit(_zygote_of_best_tier)
+            self._start_likely()
 
     def take(self, tier: str, limits: Limits) -> Child:
-        """A child that has no controller yet.
+        """A child that has no controller yet; several threads may ask at once.
 
         Raises:
             SandboxError: The tier does not work here.
         """
-        wanted = find_tier(tier)
         with self._lock:
-            zygote = self._zygote(wanted, limits)
-            child = fork_child(zygote, wanted, limits)
-            if not zygote.slots:
-                self._zygotes.remove(zygote)
-                if self._ahead and self._next is None:
-                    self._next = self._pool.submit(start_zygote, wanted, limits)
-        return child
+            if tier != "auto":
+                return self._child(find_tier(tier), limits)
+            if self._best is not None:
+                return self._child(self._best, limits)
+            return self._first_child(limits)
 
     def close(self) -> None:
         """Has no further children; ends the zygotes that have none."""
-        self._pool.shutdown()
-        if self._next is not None and self._next.exception() is None:
-            self._next.result().close()
-        for zygote in self._zygotes:
-            zygote.close()
+        with self._lock:
+            for zygote in self._zygotes:
+                zygote.close()
+            self._zygotes = []
+
+    def _first_child(self, limits: Limits) -> Child:
+        """One of the best tier that turns out to work."""
+        reasons = []
+        for tier in TIERS:
+            try:
+                child = self._child(tier, limits)
+            except SandboxError as error:
+                reasons.append(str(error))
+                continue
+            self._best = tier
+            return child
+        raise SandboxError("no sandbox tier works here: " + "; ".join(reasons))
+
+    def _child(self, tier: Tier, limits: Limits) -> Child:
+        zygote = self._zygote(tier, limits)
+        try:
+            child = fork_child(zygote, tier, limits)
+        except SandboxError:
+            self._drop(zygote)
+            raise
+        if not zygote.slots:
+            self._zygotes.remove(zygote)
+            if self._ahead:
+                self._zygotes.append(start_zygote(tier, limits))
+        return child
 
     def _zygote(self, tier: Tier, limits: Limits) -> Zygote:
         """One with room for a further child."""
-        if not any(_suits(zygote, tier, limits) for zygote in self._zygotes):
-            ready, self._next = self._next, None
-            if ready is not None:
-                self._zygotes.append(ready.result())
         for zygote in self._zygotes:
             if _suits(zygote, tier, limits):
                 return zygote
         self._zygotes.append(start_zygote(tier, limits))
         return self._zygotes[-1]
 
+    def _drop(self, zygote: Zygote) -> None:
+        self._zygotes.remove(zygote)
+        zygote.close()
+
+    def _start_likely(self) -> None:
+        """Starts a zygote of the first tier that lets one start."""
+        for tier in TIERS:
+            try:
+                self._zygotes.append(start_zygote(tier, Limits()))
+            except SandboxError:
+                continue
+            return
+
 
 def _suits(zygote: Zygote, tier: Tier, limits: Limits) -> bool:
-    return zygote.tier == tier.name and zygote.scratch_bytes == limits.scratch_bytes
-
-
-def _zygote_of_best_tier() -> Zygote:
-    return start_zygote(best_tier(), Limits())
+    same = zygote.scratch_bytes == limits.scratch_bytes
+    return zygote.tier == tier.name and same and zygote.slots > 0

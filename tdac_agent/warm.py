@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -39,9 +40,13 @@ class WarmJudge:
     """Does jobs, each in a process of its own that was started ahead of it.
 
     Making one returns at once: it warms up while the caller goes on. A context manager.
+
+    Args:
+        forked: Whether the server is forked from this process, which spares it the
+            importing; only for a process of one thread that has little else to do.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, forked: bool = False) -> None:
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -55,15 +60,8 @@ class WarmJudge:
         )
         environment["TMPDIR"] = self._folder.name
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
-        self._server = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tdac_agent.judging"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._log,
-            env=environment,
-            cwd=self._folder.name,
-            start_new_session=True,
-        )
+        start = _fork_server if forked else _start_server
+        self._server = start(environment, self._folder.name, self._log.fileno())
 
     def run(
         self,
@@ -82,9 +80,7 @@ class WarmJudge:
             Fault: The judge did not start, or the job took too long.
         """
         worker = int(self._line(START_SECONDS))
-        assert self._server.stdin is not None
-        self._server.stdin.write(f"{request}\n".encode())
-        self._server.stdin.flush()
+        os.write(self._server.requests, f"{request}\n".encode())
         try:
             self._line(seconds, meanwhile)
         except BaseException:
@@ -95,8 +91,7 @@ class WarmJudge:
 
     def close(self) -> None:
         """Ends the server; its worker ends with it, and the children with that."""
-        self._server.kill()
-        self._server.communicate()
+        self._server.end()
         self._log.close()
         self._folder.cleanup()
 
@@ -115,8 +110,7 @@ class WarmJudge:
         self, seconds: float, meanwhile: Callable[[], None] | None = None
     ) -> bytes:
         """The server's next line, without its end."""
-        assert self._server.stdout is not None
-        stream, deadline = self._server.stdout.fileno(), time.monotonic() + seconds
+        stream, deadline = self._server.answers, time.monotonic() + seconds
         line = b""
         while not line.endswith(b"\n"):
             left = max(deadline - time.monotonic(), 0.0)
@@ -137,3 +131,71 @@ class WarmJudge:
         text = self._log.read().decode("utf-8", "replace")
         kept = [line.strip() for line in text.splitlines() if line.strip()][-4:]
         return " | ".join(kept) or "no output"
+
+
+@dataclass(frozen=True, slots=True)
+class _Server:
+    """A server process.
+
+    Attributes:
+        requests: Descriptor to write to.
+        answers: Descriptor to read from.
+        end: Kills and reaps it, and closes both.
+    """
+
+    requests: int
+    answers: int
+    end: Callable[[], None]
+
+
+def _start_server(environment: dict[str, str], folder: str, log: int) -> _Server:
+    """A server in an interpreter of its own."""
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "tdac_agent.judging"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        env=environment,
+        cwd=folder,
+        start_new_session=True,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+
+    def end() -> None:
+        process.kill()
+        process.communicate()
+
+    return _Server(process.stdin.fileno(), process.stdout.fileno(), end)
+
+
+def _fork_server(environment: dict[str, str], folder: str, log: int) -> _Server:
+    """A server that has what this process has imported."""
+    from tdac_agent.judging import serve
+
+    (theirs_in, requests), (answers, theirs_out) = os.pipe(), os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            os.setsid()
+            for number, descriptor in enumerate((theirs_in, theirs_out, log)):
+                os.dup2(descriptor, number)
+            for descriptor in (theirs_in, theirs_out, requests, answers):
+                os.close(descriptor)
+            os.environ.clear()
+            os.environ.update(environment)
+            tempfile.tempdir = None
+            os.chdir(folder)
+            serve()
+        finally:
+            os._exit(1)
+    os.close(theirs_in)
+    os.close(theirs_out)
+
+    def end() -> None:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        os.close(requests)
+        os.close(answers)
+
+    return _Server(requests, answers, end)
