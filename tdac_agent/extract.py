@@ -3,35 +3,166 @@
 from __future__ import annotations
 
 import ast
-import re
-import textwrap
+import sys
+import warnings
+from typing import NamedTuple
 
 MAX_INNER_FENCES = 20
-_FENCE = re.compile(r"^[ \t]*(`{3,}|~{3,})[ \t]*([^`\n]*)$", re.MULTILINE)
+PYTHON = frozenset({"python", "py", "python3"})
+MARKDOWN = frozenset({"markdown", "md"})
+# Some of it is valid Python, but never the file.
+OTHER = frozenset({"bash", "console", "diff", "json", "output", "sh", "shell", "text"})
+OTHER |= frozenset({"csv", "html", "ini", "js", "toml", "txt", "xml", "yaml", "yml"})
+
+
+class _Fence(NamedTuple):
+    """A line of three or more backticks or tildes, and what stands after them."""
+
+    line: int
+    run: str
+    info: str
+
+    @property
+    def language(self) -> str:
+        return self.info.partition(" ")[0].strip("{}.").lower()
+
+    @property
+    def may_wrap(self) -> bool:
+        """Whether it may stand around a whole answer, fences and all."""
+        return self.language in MARKDOWN or (len(self.run) > 3 and not self.info)
+
+    def closes(self, opening: _Fence) -> bool:
+        """Stands alone on its line, and is as long as the opening one at least."""
+        return not self.info and self.run.startswith(opening.run)
+
+
+class _Block(NamedTuple):
+    """Lines between two fences; the source is None where they are no Python."""
+
+    opening: _Fence
+    length: int
+    source: str | None
 
 
 def extract_source(text: str) -> str | None:
-    """The longest fenced block that is valid Python, or None.
+    """The longest fenced block of Python, or None.
 
-    A closing fence stands alone on its line and is as long as the opening one at
-    least; a fence inside a string of the file therefore does not cut it as long as
-    the longer reading still parses.
+    A fence inside a string of the file does not cut it as long as the longer reading
+    still parses. Of a truncated or broken file nothing is used, nor an example that
+    stands in it or beside it: such an answer is to be asked for again.
     """
-    text = text.replace("\r\n", "\n")
-    best: str | None = None
-    fences = list(_FENCE.finditer(text))
-    for index, opening in enumerate(fences):
-        for closing in fences[index + 1 : index + 2 + MAX_INNER_FENCES]:
-            if closing[2].strip() or not closing[1].startswith(opening[1]):
-                continue
-            block = textwrap.dedent(text[opening.end() + 1 : closing.start()])
-            if (best is None or len(block) > len(best)) and _parses(block):
-                best = block
-    return best
+    lines = text.replace("\r\n", "\n").split("\n")
+    blocks = _blocks(lines, _fences(lines))
+    good = [block for block in blocks if block.source is not None]
+    best = max(good, key=lambda block: block.length, default=None)
+    if best is None or any(_overshadows(block, best) for block in blocks):
+        return None
+    return best.source
 
 
-def _parses(block: str) -> bool:
-    try:
-        return bool(ast.parse(block).body)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+def _overshadows(broken: _Block, best: _Block) -> bool:
+    """Whether a block that is no Python was more likely meant to be the file.
+
+    One before the best may reach to that, which then stands in one of its strings; and
+    who calls that one Python calls the file so, too.
+    """
+    if broken.source is not None or broken.opening.language in OTHER:
         return False
+    labelled = broken.opening.language in PYTHON
+    before = best.opening.line - broken.opening.line
+    if before < 0:
+        return labelled and broken.length >= best.length
+    if not best.opening.info:
+        return labelled or before >= best.length
+    return labelled and before >= best.length
+
+
+def _fences(lines: list[str]) -> list[_Fence]:
+    """The lines that are fences, by plain scanning: an answer may be garbage."""
+    found = []
+    for number, line in enumerate(lines):
+        text = line.lstrip(" \t")
+        sign = text[:1]
+        if sign and sign in "`~":
+            info = text.lstrip(sign)
+            run = text[: len(text) - len(info)]
+            if len(run) >= 3 and "`" not in info:
+                found.append(_Fence(number, run, info.strip()))
+    return found
+
+
+def _blocks(lines: list[str], fences: list[_Fence]) -> list[_Block]:
+    """Blocks one after the other; none where the last one has no end."""
+    blocks = []
+    wrapped = after_code = False
+    index = 0
+    while index < len(fences):
+        opening = fences[index]
+        closings = _closings(fences, index)
+        if not closings:
+            # One closing fence too many is the end of an answer in a fence of its own,
+            # or a slip of the pen; all else is the beginning of a block.
+            at_end = wrapped or not any(map(str.strip, lines[opening.line + 1 :]))
+            if opening.info or not after_code or not at_end:
+                return []
+            index += 1
+            continue
+        closing, source = closings[0], None
+        if opening.language not in OTHER:
+            closing, source = _longest(lines, fences, index, closings)
+        if source is None and opening.may_wrap and not wrapped:
+            wrapped = True
+            index += 1
+            continue
+        blocks.append(_Block(opening, fences[closing].line - opening.line, source))
+        if opening.language not in OTHER:
+            after_code = source is not None
+        index = closing + 1
+    return blocks
+
+
+def _closings(fences: list[_Fence], index: int) -> list[int]:
+    """The next fences that may close one; the first of them however far it is."""
+    near = index + 2 + MAX_INNER_FENCES
+    found: list[int] = []
+    for number in range(index + 1, len(fences)):
+        if number >= near and found:
+            break
+        if fences[number].closes(fences[index]):
+            found.append(number)
+    return found
+
+
+def _longest(
+    lines: list[str], fences: list[_Fence], index: int, closings: list[int]
+) -> tuple[int, str | None]:
+    """The last closing fence that makes a block Python; else the first, and None."""
+    first = fences[index].line + 1
+    broken = sys.maxsize
+    for closing in reversed(closings):
+        last = fences[closing].line
+        # A shorter reading that holds the error of a longer one fails on it, too.
+        if broken > last - first:
+            source = _source(lines[first:last])
+            broken = _broken_line(source)
+            if not broken:
+                return closing, source
+    return closings[0], None
+
+
+def _source(lines: list[str]) -> str:
+    """Lines without the indentation of the first of them that has text."""
+    text = next((line for line in lines if line.strip()), "")
+    margin = text[: len(text) - len(text.lstrip(" \t"))]
+    return "".join(f"{line.removeprefix(margin)}\n" for line in lines)
+
+
+def _broken_line(source: str) -> int:
+    """Line where a text ceases to be Python; 0 where it is Python to its end."""
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            return 0 if ast.parse(source).body else sys.maxsize
+    except SyntaxError as error:
+        return error.lineno or sys.maxsize
+    except (ValueError, RecursionError, MemoryError):
+        return sys.maxsize
