@@ -145,7 +145,7 @@ class Polygon:
     points: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
-        kept = tuple((metres("x", x), metres("y", y)) for x, y in self.points)
+        kept = _kept(self.points)
         if len(kept) < 3 or _hull(kept) != kept:
             raise WorldError(
                 "expected the vertices of a convex polygon, counter-clockwise, from "
@@ -160,8 +160,7 @@ class Polygon:
         Raises:
             WorldError: They lie on one line.
         """
-        at = np.asarray(points, np.float64).reshape(-1, 2)
-        return cls(_hull((metres("x", x), metres("y", y)) for x, y in at.tolist()))
+        return cls(_hull(_kept(points)))
 
     @property
     def vertices(self) -> Points:
@@ -230,6 +229,14 @@ def frame(floor: Rectangle, thickness: float) -> list[Polygon | Rectangle]:
         x, y = middle + side * (turn @ up)
         walls.append(Rectangle(x, y, floor.yaw, whole, thickness))
     return walls
+
+
+def _kept(points: ArrayLike) -> tuple[Point, ...]:
+    """Points to 1e-9, as `metres` does for one number."""
+    at = np.asarray(points, np.float64).reshape(-1, 2)
+    if not np.isfinite(at).all():
+        raise WorldError("expected finite coordinates of a polygon")
+    return tuple((x, y) for x, y in (np.round(at, DIGITS) + 0.0).tolist())
 
 
 def _hull(points: Iterable[Point]) -> tuple[Point, ...]:

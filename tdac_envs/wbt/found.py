@@ -9,7 +9,7 @@ from tdac_envs.wbt.frames import Frame
 from tdac_envs.wbt.tree import Node
 from tdac_envs.world import Arena, EPuck, Obstacle, Unmodelled
 
-MOST_PARTS = 20_000
+MOST_PARTS = 5_000
 """Convex pieces in a world, at most."""
 _GOAL = "goal"
 

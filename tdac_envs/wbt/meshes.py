@@ -15,7 +15,7 @@ from tdac_envs.world import Part
 MOST_FACES = 1000
 """Faces of a mesh that is not convex, at most."""
 MOST_CORNERS = 100
-"""Corners of a face, at most."""
+"""Corners of a face that is not convex, at most; of all such faces ten times that."""
 
 Points = NDArray[np.float64]
 Face = NDArray[np.int64]
@@ -46,14 +46,23 @@ def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
         return f"a mesh with {len(faces)} faces"
     if _is_convex(points, faces, used):
         return hull(used)
-    if len(faces) > MOST_FACES or max(map(len, faces)) > MOST_CORNERS:
+    return _over_faces(points, faces, used)
+
+
+def _over_faces(
+    points: Points, faces: list[Face], used: Points
+) -> tuple[Part, ...] | str:
+    """A prism over each face, as high as the mesh."""
+    bent = [len(face) for face in faces if not _is_flat_convex(points[face])]
+    if max(bent, default=0) > MOST_CORNERS or sum(bent) > 10 * MOST_CORNERS:
+        return "a mesh with many faces that are not convex"
+    if len(faces) > MOST_FACES:
         return f"a mesh with {len(faces)} faces that is not convex"
     low, high = float(used[:, 2].min()), float(used[:, 2].max())
     pieces = [piece for face in faces for piece in _convex_pieces(points[face])]
     shapes = [hull(piece)[0].shape for piece in pieces if _casts(piece)]
-    if not shapes:
-        return hull(used)
-    return tuple(Part(shape, low, high) for shape in dict.fromkeys(shapes))
+    parts = tuple(Part(shape, low, high) for shape in dict.fromkeys(shapes))
+    return parts or hull(used)
 
 
 def _points(node: Node) -> Points:
@@ -95,14 +104,19 @@ def _normal(corners: Points) -> Points:
     return np.asarray(np.cross(at, np.roll(at, -1, axis=0)).sum(axis=0))
 
 
-def _convex_pieces(corners: Points) -> list[Points]:
-    """A flat face as it is where it is convex, or cut into triangles."""
+def _is_flat_convex(corners: Points) -> bool:
+    """Whether all turns along a flat face go the same way."""
     normal = _normal(corners)
     edge = np.roll(corners, -1, axis=0) - corners
     turns = np.cross(edge, np.roll(edge, -1, axis=0)) @ normal
-    if (turns >= -1e-9 * float(normal @ normal)).all():
+    return bool((turns >= -1e-9 * float(normal @ normal)).all())
+
+
+def _convex_pieces(corners: Points) -> list[Points]:
+    """A flat face as it is where it is convex, or cut into triangles."""
+    if len(corners) == 3 or _is_flat_convex(corners):
         return [corners]
-    flat = np.delete(corners, int(np.abs(normal).argmax()), axis=1)
+    flat = np.delete(corners, int(np.abs(_normal(corners)).argmax()), axis=1)
     return [corners[list(triangle)] for triangle in _ears(flat)]
 
 

@@ -19,7 +19,7 @@ from tdac_envs.world import Part
 
 CLOSE = 1e-5
 """Lengths below this do not matter, m."""
-_ROUND = 64
+_ROUND = 40
 """Corners of the polygon around an ellipse."""
 
 Vectors = NDArray[np.float64]

@@ -11,7 +11,7 @@ from tdac_envs.wbt.tokens import Kind, Source, Token, tokens
 
 DEEPEST = 100
 """Nodes within nodes at most, so that no file exhausts the stack."""
-MOST_NODES = 20_000
+MOST_NODES = 5_000
 """Nodes at most, each USE counted as what it stands for."""
 
 _HEADER = re.compile(r"#VRML(?:_\w+)? +(\S+)(?: +utf8)?[^\S\n]*(?:\n|$)")
