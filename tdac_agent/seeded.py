@@ -18,7 +18,7 @@ from tdac_agent.episode import Record, not_driven, run_policy
 from tdac_agent.files import write_atomic
 from tdac_agent.nursery import Nursery
 from tdac_agent.report import Cause
-from tdac_agent.sandbox import ControllerFault, Limits, SandboxError, best_tier
+from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
 from tdac_agent.sequential import SequentialTest
 from tdac_agent.task import Task, load_task
 from tdac_agent.trajectory import Outcome, Rollout
@@ -102,20 +102,27 @@ class Stage:
     nursery: Nursery
 
 
-def drive_seed(stage: Stage, seed: int) -> tuple[Rollout, float]:
-    """The episode of a seed, and the CPU seconds of its child.
+@dataclass(frozen=True, slots=True, eq=False)
+class Driven:
+    """An episode, the CPU seconds of its child, and the sandbox tier of that."""
+
+    rollout: Rollout
+    cpu_seconds: float
+    tier: str
+
+
+def drive_seed(stage: Stage, seed: int) -> Driven:
+    """The episode of a seed.
 
     Start and noise are what the environment draws after `reset(seed=seed)`. A time-out
     may be the machine's doing, so it is tried once more.
     """
-    rollout, cpu = _drive(stage, seed)
-    if rollout.outcome == "error" and rollout.timed_out:
-        rollout, more = _drive(stage, seed)
-        cpu += more
-    return rollout, cpu
+    driven = _drive(stage, seed)
+    late = driven.rollout.outcome == "error" and driven.rollout.timed_out
+    return _drive(stage, seed) if late else driven
 
 
-def _drive(stage: Stage, seed: int) -> tuple[Rollout, float]:
+def _drive(stage: Stage, seed: int) -> Driven:
     env = stage.task.make_env(**stage.disturbance.env_options())
     record = Record(env, None, stage.task.nominal.horizon, seed=seed)
     name = f"seed {seed}"
@@ -129,7 +136,7 @@ def _drive(stage: Stage, seed: int) -> tuple[Rollout, float]:
         rollout = not_driven(record, name, fault)
     finally:
         usage = child.close()
-    return rollout, usage.cpu_seconds
+    return Driven(rollout, usage.cpu_seconds, child.tier)
 
 
 def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
@@ -143,13 +150,11 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
     stage = Stage(
         task, source, job.task, job.disturbance, job.tier, job.limits, nursery
     )
-    counts = [0, 0]
-    fault = None
-    tier = best_tier().name if job.tier == "auto" else job.tier
+    counts, tier, fault = [0, 0], job.tier, None
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
             with closing(_in_order(stage, job)) as episodes:
-                for episode in episodes:
+                for episode, tier in episodes:  # noqa: B007
                     file.write(episode.model_dump_json() + "\n")
                     file.flush()
                     counts[not episode.success] += 1
@@ -161,11 +166,12 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 
 
-def _in_order(stage: Stage, job: SeededJob) -> Generator[SeededEpisode]:
-    """The episodes, several at a time; closing it waits for those under way."""
+def _in_order(stage: Stage, job: SeededJob) -> Generator[tuple[SeededEpisode, str]]:
+    """Episodes and their tiers, several at a time; closing waits for the last."""
 
-    def run(seed: int) -> SeededEpisode:
-        return figures(*drive_seed(stage, seed), seed, stage.task)
+    def run(seed: int) -> tuple[SeededEpisode, str]:
+        driven = drive_seed(stage, seed)
+        return figures(driven, seed, stage.task), driven.tier
 
     seeds = range(job.first_seed, job.first_seed + job.episodes)
     with ThreadPoolExecutor(max_workers=max(2, os.cpu_count() or 2)) as pool:
@@ -175,11 +181,10 @@ def _in_order(stage: Stage, job: SeededJob) -> Generator[SeededEpisode]:
             pool.shutdown(cancel_futures=True)
 
 
-def figures(
-    rollout: Rollout, cpu_seconds: float, seed: int, task: Task
-) -> SeededEpisode:
+def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:
     """What is kept of an episode; its trajectory is not."""
-    distances, failure = rollout.distances(), {}
+    rollout, failure = driven.rollout, {}
+    distances = rollout.distances()
     if not rollout.reached or rollout.collisions:
         found = diagnose(rollout, task.nominal)
         failure = found.model_dump(include={"cause", "step", "x", "y", "side"})
@@ -191,6 +196,6 @@ def figures(
         d0=round(float(distances[0]), 2),
         d_min=round(float(distances.min()), 2),
         error=rollout.error,
-        cpu_seconds=round(cpu_seconds, 3),
+        cpu_seconds=round(driven.cpu_seconds, 3),
         **failure,
     )

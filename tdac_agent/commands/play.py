@@ -19,7 +19,7 @@ from tdac_agent.errors import Fault
 from tdac_agent.judge import JITTERS, Judge
 from tdac_agent.nursery import Nursery
 from tdac_agent.sandbox import Limits, SandboxError
-from tdac_agent.seeded import Stage, drive_seed
+from tdac_agent.seeded import Driven, Stage, drive_seed
 from tdac_agent.task import Task, write_workdir
 from tdac_agent.trajectory import Rollout
 from tdac_agent.verification import read_source
@@ -56,7 +56,8 @@ def run(
     if seed is None:
         rollout = drive(task, read_source(file), name, tier)
     else:
-        rollout = drive_disturbed(task, read_source(file), seed, disturbance, tier)
+        driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
+        rollout = driven.rollout
     picked = frames(task, rollout)
     rate = 1.0 / (task.nominal.dt * STRIDE)
     if video is not None:
@@ -86,14 +87,14 @@ def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
 
 def drive_disturbed(
     task: Task, source: bytes, seed: int, disturbance: Disturbance, tier: str
-) -> Rollout:
+) -> Driven:
     """The judged episode of a seed, as a robust verification runs it."""
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work, nursery = Path(folder), Nursery(ahead=False)
         write_workdir(work, task)
         stage = Stage(task, source, work, disturbance, tier, Limits(), nursery)
         try:
-            return drive_seed(stage, seed)[0]
+            return drive_seed(stage, seed)
         except SandboxError as error:
             raise Fault(f"the sandbox failed: {error}") from error
         finally:
