@@ -14,9 +14,10 @@ from tdac_agent.motion import (
     forward,
     lengths,
     rounds_about,
-    standing,
     swing,
     turns,
+    wheels_differ,
+    wheels_turn,
 )
 from tdac_agent.report import Cause
 from tdac_agent.trajectory import Rollout, Trajectory
@@ -32,6 +33,10 @@ _FLIPS = 0.05
 _AGAIN = 0.6
 # The largest circle that counts as spinning, radii of the body.
 _CIRCLE = 4.0
+# Rounds in the second half of the time without progress that count as spinning.
+_ROUNDS = 1.2
+# Mean wheel speed below which a robot does nothing on purpose.
+_IDLE = 0.01
 # Steps that a robot may trail off before it stands.
 _AT_ONCE = 10
 
@@ -78,10 +83,14 @@ def last_progress(rollout: Rollout) -> int:
 
 
 def standing_since(trajectory: Trajectory) -> int:
-    """First step of the rest at the end of an episode; T where it moved to the end."""
+    """First step of the rest at the end of an episode; T where it moved to the end.
+
+    Whoever trembles on the spot does not stand.
+    """
     x, y, heading = trajectory.poses.T
     moved = np.hypot(x - x[-1], y - y[-1]) > 0.5 * PROGRESS
     moved |= np.abs(np.unwrap(heading) - np.unwrap(heading)[-1]) > 0.05
+    moved[:-1] |= wheels_turn(trajectory)
     return int(np.flatnonzero(moved)[-1]) + 1 if moved.any() else 0
 
 
@@ -96,7 +105,7 @@ def _unfinished(trajectory: Trajectory, task: Map2DTask) -> Finding:
         f"steps, at {limit * speed:.1f} px/s on average ({percent(speed)} of the wheel "
         f"limit), {distances[0] / seconds:.1f} px/s or more were needed; {driven:.0f} "
         f"px driven for {distances[0] - distances[-1]:.0f} px of progress; both wheels "
-        f"stood in {percent(standing(trajectory))} of the steps."
+        f"stood in {percent(1 - wheels_turn(trajectory).mean())} of the steps."
     )
     reversed_share = flips(trajectory, 0)
     spin = float(np.abs(np.diff(trajectory.actions, axis=1)).mean()) / 2.0
@@ -123,7 +132,7 @@ def _missed_goal(rollout: Rollout, since: int) -> Finding | None:
     if distances[since] > near_goal(rollout):
         return None
     best = int(np.argmin(distances))
-    after = _after_the_goal(rollout, best)
+    after = _after_the_goal(rollout, since, best)
     if after is None:
         return None
     step, what = after
@@ -134,20 +143,20 @@ def _missed_goal(rollout: Rollout, since: int) -> Finding | None:
     return Finding("missed goal", text, step)
 
 
-def _after_the_goal(rollout: Rollout, best: int) -> tuple[int, str] | None:
+def _after_the_goal(rollout: Rollout, since: int, best: int) -> tuple[int, str] | None:
     """What a robot did after it had been nearest to its goal, if that is clear.
 
     Returns:
         The step to look at, and the words.
     """
-    trajectory, straight = rollout.trajectory, rollout.distances("euclidean")[best:]
-    rounds = rounds_about(trajectory, best, rollout.goal)
+    trajectory, straight = rollout.trajectory, rollout.distances("euclidean")[since:]
+    rounds = rounds_about(trajectory, since, rollout.goal)
     away = float(trajectory.path_distances[-1] - trajectory.path_distances[best])
     if abs(rounds) >= 2.0 and straight.max() < 4.0 * near_goal(rollout):
         way = "clockwise" if rounds > 0 else "counter-clockwise"
         return best, (
-            f"it then circled the goal {abs(rounds):.1f} times, {way} on the picture, "
-            f"{straight.min():.1f} to {straight.max():.1f} px from it"
+            f"since step {since} it circled the goal {abs(rounds):.1f} times, {way} on "
+            f"the picture, {straight.min():.1f} to {straight.max():.1f} px from it"
         )
     rest = standing_since(trajectory)
     if straight[-1] <= near_goal(rollout) and rest < trajectory.steps:
@@ -192,8 +201,8 @@ def _stalled(trajectory: Trajectory, since: int, radius: float) -> Finding:
     late = since + (trajectory.steps - since) // 2
     cause, text = (
         _spinning(trajectory, late, radius)
-        or _trembling(trajectory, late)
         or _going_over_its_trail(trajectory, since, radius)
+        or _trembling(trajectory, late, radius)
         or _wandering(trajectory, late)
     )
     place = point(*trajectory.poses[since, :2])
@@ -208,7 +217,7 @@ def _spinning(trajectory: Trajectory, late: int, radius: float) -> Habit | None:
     net, total = float(turned.sum()), float(np.abs(turned).sum())
     rounds, driven = abs(net) / math.tau, float(lengths(trajectory)[late:].sum())
     small = driven <= rounds * math.tau * _CIRCLE * radius
-    if rounds < 2.0 or abs(net) < 0.7 * total or not small:
+    if rounds < _ROUNDS or abs(net) < 0.7 * total or not small:
         return None
     way = "right" if net > 0 else "left"
     circle = driven / (rounds * math.tau)
@@ -219,25 +228,36 @@ def _spinning(trajectory: Trajectory, late: int, radius: float) -> Habit | None:
     )
 
 
-def _trembling(trajectory: Trajectory, late: int) -> Habit | None:
+def _trembling(trajectory: Trajectory, late: int, radius: float) -> Habit | None:
     turned, share = turns(trajectory)[late:], flips(trajectory, late)
-    if share < _FLIPS or abs(turned.sum()) >= 0.3 * max(np.abs(turned).sum(), 1.0):
+    actions = np.abs(trajectory.actions[late:])
+    if abs(turned.sum()) >= 0.3 * max(np.abs(turned).sum(), 1.0):
         return None
-    (x0, y0), (x1, y1) = _box(trajectory, late)
+    if share < _FLIPS and not _looking_about(trajectory, late, radius):
+        return None
+    if actions.mean() < _IDLE:
+        return None
     return "oscillating", (
         f"in the last {trajectory.steps - late} steps it reversed its turn or its "
         f"drive every {1 / share:.1f} steps, its heading within "
         f"{math.degrees(swing(trajectory, late)):.0f}°, its place within "
-        f"{math.hypot(x1 - x0, y1 - y0):.1f} px"
+        f"{_extent(trajectory, late):.1f} px"
     )
+
+
+def _looking_about(trajectory: Trajectory, late: int, radius: float) -> bool:
+    """Whether a robot turns to and fro on the spot most of the time."""
+    reversals = flips(trajectory, late) * (trajectory.steps - late)
+    turning = wheels_differ(trajectory)[late:].mean()
+    return reversals >= 4 and turning >= 0.5 and _extent(trajectory, late) < 3 * radius
 
 
 def _going_over_its_trail(
     trajectory: Trajectory, since: int, radius: float
 ) -> Habit | None:
-    (x0, y0), (x1, y1) = _box(trajectory, since)
-    if max(x1 - x0, y1 - y0) < 3.0 * radius:
+    if _extent(trajectory, since) < 3.0 * radius:
         return None
+    (x0, y0), (x1, y1) = _box(trajectory, since)
     again = find_returns(trajectory, since, radius)
     if again.same_way < _AGAIN:
         return None
@@ -253,7 +273,7 @@ def _wandering(trajectory: Trajectory, late: int) -> Habit:
     (x0, y0), (x1, y1) = _box(trajectory, late)
     driven = float(lengths(trajectory)[late:].sum())
     return "stuck", (
-        f"in the last {trajectory.steps - late} steps it drove {driven:.0f} px within "
+        f"in the last {trajectory.steps - late} steps it drove {driven:.1f} px within "
         f"x {x0:.1f} to {x1:.1f}, y {y0:.1f} to {y1:.1f}"
     )
 
@@ -264,6 +284,12 @@ def _box(
     """The least and the greatest (x, y) since a step."""
     places = trajectory.poses[since:, :2]
     return places.min(axis=0), places.max(axis=0)
+
+
+def _extent(trajectory: Trajectory, since: int) -> float:
+    """Diagonal of the box around all places since a step, px."""
+    low, high = _box(trajectory, since)
+    return float(np.hypot(*(high - low)))
 
 
 def point(x: float, y: float) -> str:

@@ -38,9 +38,15 @@ def saturated(trajectory: Trajectory) -> float:
     return float((np.abs(trajectory.actions) >= _SATURATED).any(axis=1).mean())
 
 
-def standing(trajectory: Trajectory) -> float:
-    """Share of steps in which neither wheel turned."""
-    return float((np.abs(trajectory.actions) < _DEAD_BAND).all(axis=1).mean())
+def wheels_turn(trajectory: Trajectory) -> NDArray[np.bool_]:
+    """Whether a wheel turned, for each step."""
+    return np.asarray((np.abs(trajectory.actions) >= _DEAD_BAND).any(axis=1))
+
+
+def wheels_differ(trajectory: Trajectory) -> NDArray[np.bool_]:
+    """Whether the robot was to turn, for each step."""
+    actions = trajectory.actions
+    return np.asarray(np.abs(actions[:, 0] - actions[:, 1]) >= _DEAD_BAND)
 
 
 def flips(trajectory: Trajectory, since: int) -> float:
@@ -90,7 +96,8 @@ def find_returns(trajectory: Trajectory, since: int, reach: float) -> Returns:
     Args:
         trajectory: Of the episode.
         since: First step to look at.
-        reach: Two poses this near to each other are at one place, px.
+        reach: Two poses this near to each other are at one place, px. For the other
+            direction it may be twice as far: there and back are seldom one line.
     """
     steps = np.linspace(since, trajectory.steps - 1, _SAMPLES).astype(int)
     steps = np.unique(steps[steps >= since])
@@ -100,10 +107,11 @@ def find_returns(trajectory: Trajectory, since: int, reach: float) -> Returns:
     # Backwards is the other way, whatever the heading says.
     course = heading + np.pi * (forward(trajectory)[steps] < 0.0)
     along = np.concatenate([[0.0], np.cumsum(lengths(trajectory))])[steps]
-    again = np.hypot(x[:, None] - x, y[:, None] - y) <= reach
-    again &= np.abs(along[:, None] - along) >= 6.0 * reach
+    apart = np.hypot(x[:, None] - x, y[:, None] - y)
+    later = np.abs(along[:, None] - along) >= 6.0 * reach
     angle = np.abs(np.angle(np.exp(1j * (course[:, None] - course))))
-    same, other = again & (angle < _SAME_WAY), again & (angle > np.pi - _SAME_WAY)
+    same = later & (apart <= reach) & (angle < _SAME_WAY)
+    other = later & (apart <= 2.0 * reach) & (angle > np.pi - _SAME_WAY)
     lag = np.where(same, np.abs(steps[:, None] - steps), np.inf).min(axis=1)
     lags = lag[np.isfinite(lag)]
     period = int(np.median(lags)) if lags.size else 0

@@ -153,6 +153,25 @@ def patrol(*places: tuple[float, float], near: float = 8.0) -> Fault:
     return plant
 
 
+def shuttle(there: tuple[float, float], back: tuple[float, float]) -> Fault:
+    """Plans to one place, then to the other, for ever."""
+
+    def plant(task: Map2DTask) -> Act:
+        ends = itertools.cycle([there, back])
+        way = Follower(task, goal=next(ends))
+
+        def act(obs: dict[str, Any]) -> tuple[float, float]:
+            nonlocal way
+            x, y, _ = (float(value) for value in obs["pose"])
+            if math.dist((x, y), way.goal) < 8.0:
+                way = Follower(task, goal=next(ends))
+            return way(obs)
+
+        return act
+
+    return plant
+
+
 def brake(at: float, back: float = 0.0) -> Fault:
     """Straight on until a ray reads less than `at` px, then at another speed."""
 

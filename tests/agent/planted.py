@@ -25,6 +25,7 @@ from faulty import (
     repeat,
     seeded_twitch,
     seldom,
+    shuttle,
     swapped,
     switch,
 )
@@ -378,7 +379,7 @@ DRIVING = (
         orbit(42.0),
         "missed goal",
         jitter=2,
-        says=("circled the goal",),
+        says=("it circled the goal",),
     ),
     Plant(
         "passes the goal and drives on",
@@ -401,6 +402,30 @@ DRIVING = (
         brake(45.0, back=-0.6),
         "oscillating",
         says=("at its front",),
+    ),
+    Plant(
+        "a little forward, a little back",
+        "thin_walls",
+        switch(48, follower(), repeat((1, 0.1, 0.1), (1, -0.1, -0.1))),
+        "oscillating",
+        jitter=3,
+        step=(48, 2),
+    ),
+    Plant(
+        "looks about, slowly",
+        "rooms",
+        switch(100, follower(), repeat((25, 0.5, -0.5), (25, -0.5, 0.5))),
+        "oscillating",
+        jitter=2,
+        step=(100, 3),
+    ),
+    Plant(
+        "to and fro on planned ways",
+        "street",
+        shuttle((432.0, 595.0), (288.0, 480.0)),
+        "oscillating",
+        jitter=2,
+        says=("to and fro",),
     ),
     Plant(
         "to and fro between two places",
@@ -454,6 +479,22 @@ DRIVING = (
         always(0.3, 0.6),
         "spinning",
         says=("to the left on a circle of 45 px",),
+    ),
+    Plant(
+        "one wheel stands",
+        "rooms",
+        switch(20, follower(), always(0.0, 0.05)),
+        "spinning",
+        jitter=1,
+        says=("to the left on a circle of 15 px",),
+    ),
+    Plant(
+        "spins slowly",
+        "street",
+        switch(60, follower(), always(-0.06, 0.06)),
+        "spinning",
+        step=(60, 2),
+        says=("to the left in place",),
     ),
     Plant("a twentieth of the speed", "maze", follower(speed=0.05), "too slow"),
     Plant("a tenth of the speed", "cave", follower(speed=0.1), "too slow", jitter=2),
@@ -557,7 +598,7 @@ def show(texts: bool) -> None:
         row = (plant.fault, plant.map, rollout.name, plant.cause, found.cause, wrong)
         table.add_row(*row)
         if texts:
-            console.print(f"[bold]{plant.fault}[/] ({plant.map})\n{found.text}\n")
+            console.print(f"{plant.fault} ({plant.map})\n{found.text}\n", markup=False)
     console.print(table)
     console.print(f"{right} of {len(PLANTS)} named right")
 
