@@ -34,7 +34,7 @@ _AGAIN = 0.6
 # The largest circle that counts as spinning, radii of the body.
 _CIRCLE = 4.0
 # Rounds in the second half of the time without progress that count as spinning.
-_ROUNDS = 1.2
+_ROUNDS = 1.0
 # Mean wheel speed below which a robot does nothing on purpose.
 _IDLE = 0.01
 # Steps that a robot may trail off before it stands.
