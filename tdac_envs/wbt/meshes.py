@@ -44,7 +44,7 @@ def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
     used = points[np.unique(np.concatenate(faces))]
     if len(faces) * len(used) > MOST_FACES**2:
         return f"a mesh with {len(faces)} faces"
-    if _is_convex(points, faces, used):
+    if not _is_flat(used) and _is_convex(points, faces, used):
         return hull(used)
     return _over_faces(points, faces, used)
 
@@ -84,6 +84,11 @@ def _faces(node: Node, count: int) -> list[Face]:
     pieces = np.split(index, np.flatnonzero(index == -1))
     faces = [piece[piece >= 0] for piece in pieces]
     return [face for face in faces if len(face) >= 3]
+
+
+def _is_flat(points: Points) -> bool:
+    """Whether all points lie in a plane."""
+    return bool(np.linalg.svd(points - points.mean(axis=0))[1][-1] < THINNEST)
 
 
 def _is_convex(points: Points, faces: list[Face], used: Points) -> bool:
