@@ -62,7 +62,7 @@ def inside(node: Node) -> Iterator[Node]:
 
 
 def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
-    """Direction of the axis that its two front sensors, ps0 and ps7, lie on.
+    """Direction of the axis towards its two front sensors, ps0 and ps7.
 
     A robot that is written out keeps the axes of the version that it was made with,
     whatever the file's version.
@@ -74,9 +74,9 @@ def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
     }
     if len(front) != 2:
         return None
-    local = np.array(list(front.values())).sum(axis=0)
-    longest = int(np.abs(local).argmax())
-    x, y = (frame.matrix[:2, longest] * np.sign(local[longest])).tolist()
+    away = frame.matrix @ np.array(list(front.values())).sum(axis=0)
+    ways = np.vstack([frame.matrix[:2].T, -frame.matrix[:2].T])
+    x, y = ways[int((ways @ away[:2]).argmax())].tolist()
     return (x, y) if math.hypot(x, y) > 0.5 else None
 
 
