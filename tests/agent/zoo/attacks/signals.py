@@ -8,9 +8,12 @@
 import os
 import signal
 
+NEIGHBOURS = {1, 2, os.getpid() - 1, os.getpid() + 1} - {0, os.getpid()}
+
 for number in (0, signal.SIGTERM, signal.SIGSTOP, signal.SIGKILL):
     attempt("parent", os.kill, os.getppid(), number)
     attempt("group", os.killpg, os.getpgrp(), number)
     attempt("everybody", os.kill, -1, number)
-    attempt("first", os.kill, 2, number)
+    for neighbour in NEIGHBOURS:
+        attempt("neighbour", os.kill, neighbour, number)
     attempt("descriptor", lambda n=number: signal.pidfd_send_signal(3, n))
