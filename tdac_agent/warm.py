@@ -171,9 +171,14 @@ def _start_server(environment: dict[str, str], folder: str, log: int) -> _Server
 
 def _fork_server(environment: dict[str, str], folder: str, log: int) -> _Server:
     """A server that has what this process has imported."""
+    import cv2
+
     from tdac_agent.judging import serve
 
     (theirs_in, requests), (answers, theirs_out) = os.pipe(), os.pipe()
+    # OpenCV's threads would not survive the fork, and the child would wait for them.
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
     pid = os.fork()
     if pid == 0:
         try:
@@ -189,6 +194,7 @@ def _fork_server(environment: dict[str, str], folder: str, log: int) -> _Server:
             serve()
         finally:
             os._exit(1)
+    cv2.setNumThreads(threads)
     os.close(theirs_in)
     os.close(theirs_out)
 
