@@ -375,18 +375,16 @@ def account(
         word for node in world.unmodelled for word in set(node.why.split())
     )
     own = Counter(thing.kind for thing in extras)
-    spare = 0
     for name, count in skipped.items():
         kind = name.split()[0].split(":")[-1]
-        explained = min(own[kind], count)
-        own[kind] -= explained
-        if listed[kind] + explained < count:
-            spare += count - listed[kind] - explained
-            if not +own:
-                row.problems.append(f"{name}: {count} skipped there, not listed here")
-    for kind, count in (+own).items():
-        if count > spare:
-            row.problems.append(f"{count} {kind} only here")
+        missing = count - listed[kind]
+        for ours in (kind, "Solid"):  # they may skip a geometry of a Solid
+            explained = max(min(own[ours], missing), 0)
+            own[ours] -= explained
+            missing -= explained
+        if missing > 0:
+            row.problems.append(f"{name}: {count} skipped there, not listed here")
+    row.problems += [f"{count} {kind} only here" for kind, count in (+own).items()]
 
 
 def show(rows: list[Row]) -> None:
