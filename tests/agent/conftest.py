@@ -1,6 +1,7 @@
 """A small task, a controller that solves it, and what must be gone afterwards."""
 
 import os
+import signal
 import time
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from small import QUICK, write_small_task
 
 from tdac_agent.builtin import Parameters, render_controller
+from tdac_agent.cli import main
 from tdac_agent.task import load_task
 from tdac_agent.warm import WarmJudge
 
@@ -30,6 +32,34 @@ def warm():
     """A judge that is ready, for tests that need nothing special of it."""
     with WarmJudge() as judge:
         yield judge
+
+
+@pytest.fixture
+def tdac(monkeypatch, capsys, tmp_path):
+    """Runs a command in an empty folder; gives exit code, stdout and stderr."""
+    place = tmp_path / "here"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    monkeypatch.setenv("COLUMNS", "200")
+    handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
+
+    def run(*words):
+        monkeypatch.setattr("sys.argv", ["tdac", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return (ended.value.code, *capsys.readouterr())
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def good(tmp_path, good_source):
+    """A folder with the small task and a controller that solves it."""
+    folder = write_small_task(tmp_path / "task")
+    (folder / "controller.py").write_text(good_source)
+    return folder
 
 
 @pytest.fixture

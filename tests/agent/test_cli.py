@@ -2,7 +2,6 @@
 
 import json
 import re
-import signal
 import struct
 import subprocess
 import sys
@@ -15,30 +14,8 @@ import numpy as np
 import pytest
 from small import small_cells, write_small_task
 
-from tdac_agent.cli import main
-
 COMMANDS = ["map", "synth", "verify", "play", "check-suite", "doctor"]
 ENDS = ["--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6"]
-
-
-@pytest.fixture
-def tdac(monkeypatch, capsys, tmp_path):
-    """Runs a command in an empty folder; gives exit code, stdout and stderr."""
-    place = tmp_path / "here"
-    place.mkdir()
-    monkeypatch.chdir(place)
-    monkeypatch.setenv("COLUMNS", "200")
-    handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
-
-    def run(*words):
-        monkeypatch.setattr("sys.argv", ["tdac", *map(str, words)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return (ended.value.code, *capsys.readouterr())
-
-    yield run
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
 
 
 @pytest.fixture
@@ -47,14 +24,6 @@ def image(tmp_path):
     path = tmp_path / "plan.png"
     cv2.imwrite(str(path), np.where(small_cells(), 0, 255).astype(np.uint8))
     return path
-
-
-@pytest.fixture
-def good(tmp_path, good_source):
-    """A folder with the small task and a controller that solves it."""
-    folder = write_small_task(tmp_path / "task")
-    (folder / "controller.py").write_text(good_source)
-    return folder
 
 
 def black_png(width, height):
