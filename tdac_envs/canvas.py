@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import cv2
@@ -52,6 +52,9 @@ class Canvas:
     Args:
         cells: Shape (height, width), bool, True = occupied.
         strip: Height of the strip, frame px.
+        scale: Frame pixels per map pixel; by default what suits the size.
+        origin: Map pixel (x, y) of the first cell, for a part of a map.
+        narrowest: Least number of columns.
 
     Attributes:
         image: Shape (rows, columns, 3), uint8 RGB; both sides even, as video codecs
@@ -60,19 +63,28 @@ class Canvas:
         strip_top: First row of the strip.
     """
 
-    def __init__(self, cells: BoolGrid, strip: int = 30) -> None:
+    def __init__(
+        self,
+        cells: BoolGrid,
+        strip: int = 30,
+        *,
+        scale: float | None = None,
+        origin: tuple[int, int] = (0, 0),
+        narrowest: int = NARROWEST,
+    ) -> None:
         height, width = cells.shape
-        self.scale = frame_scale(width, height)
+        self.scale = frame_scale(width, height) if scale is None else scale
         picture = _map_picture(cells, self.scale)
         rows, columns = picture.shape[:2]
-        total = self.frame_width(cells)
+        total = max(columns + columns % 2, narrowest)
         self._left = (total - columns) // 2
+        self._origin = origin
         self.strip_top = rows
         strip += (rows + strip) % 2
-        self.image: Image = np.empty((rows + strip, total, 3), np.uint8)
-        self.image[:rows] = WALL
+        self.image: Image = blank(rows + strip, total, PAPER)
+        if columns < total:
+            self.image[:rows] = WALL
         self.image[:rows, self._left : self._left + columns] = picture
-        self.image[rows:] = PAPER
 
     @staticmethod
     def frame_width(cells: BoolGrid) -> int:
@@ -90,12 +102,13 @@ class Canvas:
         """A canvas of its own with the same content."""
         twin = object.__new__(Canvas)
         twin.scale, twin._left, twin.strip_top = self.scale, self._left, self.strip_top
+        twin._origin = self._origin
         twin.image = self.image.copy()
         return twin
 
     def to_frame(self, points: ArrayLike) -> NDArray[np.float64]:
         """Frame coordinates of map points, shape (n, 2); pixel centres are whole."""
-        at = np.asarray(points, np.float64).reshape(-1, 2)
+        at = np.asarray(points, np.float64).reshape(-1, 2) - self._origin
         return (at + 0.5) * self.scale - 0.5 + (self._left, 0.0)
 
     def polygon(self, points: ArrayLike, colour: Colour, alpha: float = 1.0) -> None:
@@ -175,13 +188,7 @@ class Canvas:
 
     def text(self, x: int, baseline: int, text: str, colour: Colour) -> int:
         """Writes ASCII text at frame coordinates; returns the x after it."""
-        mask = _text_mask(text)
-        rows, columns = mask.shape
-        top = baseline - round(rows * 0.7)
-        target = self.image[max(top, 0) : top + rows, x : x + columns]
-        cover = mask[max(-top, 0) :][: target.shape[0], : target.shape[1], None]
-        target[...] = np.rint(target * (1 - cover) + np.array(colour) * cover)
-        return int(x + columns)
+        return write_text(self.image, x, baseline, text, colour)
 
     def _lines(
         self,
@@ -213,6 +220,25 @@ class Canvas:
         if alpha < 1.0:
             patch = np.asarray(cv2.addWeighted(patch, alpha, target, 1 - alpha, 0))
         target[...] = patch
+
+
+def blank(rows: int, columns: int, colour: Colour) -> Image:
+    """A picture of one colour."""
+    picture = np.empty((rows, columns, 3), np.uint8)
+    # Much faster than a broadcast over three channels.
+    cv2.rectangle(picture, (0, 0), (columns, rows), colour, cv2.FILLED)
+    return picture
+
+
+def write_text(image: Image, x: int, baseline: int, text: str, colour: Colour) -> int:
+    """Writes ASCII text on a picture; returns the x after it."""
+    mask = _text_mask(text)
+    rows, columns = mask.shape
+    top = baseline - round(rows * 0.7)
+    target = image[max(top, 0) : top + rows, x : x + columns]
+    cover = mask[max(-top, 0) :][: target.shape[0], : target.shape[1], None]
+    target[...] = np.rint(target * (1 - cover) + np.array(colour) * cover)
+    return int(x + columns)
 
 
 def _fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -257,15 +283,12 @@ def _dashes(points: NDArray[np.float64], dash: float) -> list[NDArray[np.float64
     """Cuts a polyline into dashes with gaps of the same length."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
-    pieces = []
-    for begin in np.arange(0.0, along[-1], 2 * dash):
-        inside = along[(along > begin) & (along < begin + dash)]
-        stops = np.concatenate([[begin], inside, [min(begin + dash, along[-1])]])
-        columns: Sequence[NDArray[np.float64]] = [
-            np.interp(stops, along, points[:, axis]) for axis in (0, 1)
-        ]
-        pieces.append(np.column_stack(columns))
-    return pieces
+    begins = np.arange(0.0, along[-1], 2 * dash)
+    ends = np.minimum(begins + dash, along[-1])
+    stops = np.unique(np.concatenate([along, begins, ends]))
+    cut = np.column_stack([np.interp(stops, along, points[:, k]) for k in (0, 1)])
+    first, last = np.searchsorted(stops, begins), np.searchsorted(stops, ends)
+    return [cut[i : j + 1] for i, j in zip(first, last, strict=True)]
 
 
 def _text_mask(text: str) -> NDArray[np.float32]:
