@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tdac_envs.wbt.fields import child, children, number, numbers
+from tdac_envs.wbt.fields import child, children, number, number_list, numbers
 from tdac_envs.wbt.frames import Frame, flu_size
 from tdac_envs.wbt.meshes import mesh
 from tdac_envs.wbt.placing import placed
@@ -60,9 +60,17 @@ def bounds(node: Node, frame: Frame) -> Pieces:
     if node.kind == "Shape":
         shape = child(node, "geometry")
         return Pieces() if shape is None else bounds(shape, frame)
-    if node.kind == "Plane" and not abs(frame.flu().tilt) < _FLAT:
-        return Pieces(missing=("a Plane that is not the ground",))
-    return Pieces() if node.kind == "Plane" else geometry(node, frame)
+    if not _is_plane(node):
+        return geometry(node, frame)
+    level = abs(frame.flu().tilt) < _FLAT
+    return Pieces(missing=() if level else ("a Plane that is not the ground",))
+
+
+def _is_plane(node: Node) -> bool:
+    """Whether it is a Plane, or a grid of equal elevations."""
+    if node.kind == "ElevationGrid":
+        return len(set(number_list(node, "height"))) <= 1
+    return node.kind == "Plane"
 
 
 def geometry(node: Node, frame: Frame) -> Pieces:

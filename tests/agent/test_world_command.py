@@ -91,3 +91,10 @@ def test_mistakes_are_one_line(tdac, tmp_path, words, said):
     assert (code, out) == (2, "")
     assert err.startswith(said)
     assert err.count("\n") == 1
+
+
+def test_help_has_an_example(tdac):
+    """`--help` shows how it is called."""
+    code, out, _ = tdac("--help")
+    assert code == 0
+    assert "Example: tdac world maze.wbt --png maze.png" in " ".join(out.split())

@@ -1,6 +1,7 @@
 """Promises of `load_world`: what nodes become, in any version and coordinate system."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -485,6 +486,17 @@ def test_scenery_is_no_obstacle():
     assert [thing.solid for thing in world.obstacles] == [()]
 
 
+@pytest.mark.parametrize(
+    ("heights", "left_out"), [("", 0), ("0 0 0 0", 0), ("0 0 0 0.1", 1)]
+)
+def test_a_grid_of_one_height_is_the_ground(heights, left_out):
+    """Hills are not modelled."""
+    world = read_world(
+        text(f"Solid {{ boundingObject ElevationGrid {{ height [ {heights} ] }} }}")
+    )
+    assert len(world.unmodelled) == left_out
+
+
 def test_unmodelled_nodes_are_refused_unless_named():
     """By name or type; a name that fits none is refused, too."""
     world = read_world(
@@ -640,6 +652,7 @@ def test_a_world_with_everything():
         "Shape", "Solid", "Solid", "Solid", "Solid",
     ]  # fmt: skip
     assert [node.kind for node in world.unmodelled] == ["CustomThing", "Robot"]
+    assert pickle.loads(pickle.dumps(world)) == world
     old = read_world(OLD)
     assert len(old.robots) == 1
     assert old.unmodelled == ()
