@@ -183,6 +183,14 @@ def verify(
         Optional[Path],  # noqa: UP045
         typer.Option(help="Write a JUnit XML report."),
     ] = None,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--out",
+            help="Folder for report.json, the trajectories, and a picture of each "
+            "episode that failed.",
+        ),
+    ] = None,
     as_json: Json = False,
     robust: Annotated[
         Optional[int],  # noqa: UP045
@@ -232,7 +240,17 @@ def verify(
     wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
     raise typer.Exit(
         command.run(
-            controller, spec, profile, paper, suite, tier, seed, junit, as_json, wanted
+            controller,
+            spec,
+            profile,
+            paper,
+            suite,
+            tier,
+            seed,
+            junit,
+            out,
+            as_json,
+            wanted,
         )
     )
 

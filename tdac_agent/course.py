@@ -10,7 +10,7 @@ import numpy as np
 from tdac_agent.reference import pull
 from tdac_agent.trajectory import Trajectory
 from tdac_envs.grid import body_free
-from tdac_envs.plan import descend
+from tdac_envs.plan import Path, descend
 from tdac_envs.task2d import Map2DTask, Pose
 from tdac_envs.terrain import entry
 
@@ -28,19 +28,30 @@ _RADII = 3.0
 
 
 def heading_error(task: Map2DTask, trajectory: Trajectory, step: int) -> float | None:
-    """Direction of the shortest path seen from the heading, rad, right positive.
+    """Direction of the shortest path seen from the heading, rad, right positive."""
+    for way in _ways(task, trajectory, step):
+        # A shortest path on a grid has many forms; a pulled one has a direction.
+        (x, y), (to_x, to_y), *_ = pull(task, way[:_PATH_AHEAD])
+        bearing = math.atan2(to_y - y, to_x - x)
+        heading = float(trajectory.poses[step, 2])
+        return math.remainder(bearing - heading, 2.0 * math.pi)
+    return None
 
-    At the wall itself there may be no path for the body; an earlier pose has one.
-    """
+
+def way_from(task: Map2DTask, trajectory: Trajectory, step: int) -> Path | None:
+    """Begin of the straightened shortest path from a pose, or from one just before."""
+    for way in _ways(task, trajectory, step):
+        return np.array(pull(task, way[: _PATH_AHEAD // 2]))
+    return None
+
+
+def _ways(task: Map2DTask, trajectory: Trajectory, step: int) -> Iterator[Path]:
+    """Shortest paths from a pose and from those before it; at a wall there are none."""
     first = max(step - _LAST_POSES + 1, 0)
     for x, y, heading in trajectory.poses[first : step + 1][::-1].tolist():
         path = task.path_from(Pose(x, y, heading))
         if len(path) > 1:
-            # A shortest path on a grid has many forms; a pulled one has a direction.
-            _, (to_x, to_y), *_ = pull(task, path[:_PATH_AHEAD])
-            bearing = math.atan2(to_y - y, to_x - x)
-            return math.remainder(bearing - heading, 2.0 * math.pi)
-    return None
+            yield path
 
 
 def goal_bearing(

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import cv2
+import numpy as np
+from numpy.typing import NDArray
 
+from tdac_agent.course import way_from
 from tdac_agent.files import write_atomic
+from tdac_agent.report import Diagnosis, Episode, Report
 from tdac_agent.task import Task
+from tdac_agent.touch import nearest_touch
 from tdac_agent.trajectory import Trajectory
+from tdac_envs.canvas import Image
+from tdac_envs.closeup import Background, Event, run_picture
 from tdac_envs.render import trajectory_picture
+from tdac_envs.task2d import Map2DTask, Pose
+
+MAX_FACT = 240
+_ERRORS = ("error", "time-out", "contract")
 
 
 def draw_trajectories(
@@ -38,5 +50,106 @@ def draw_trajectories(
         outcomes=[outcomes.get(name, "") for name in trajectories],
         labels=list(trajectories),
     )
+    _write(picture, path)
+
+
+def draw_failures(
+    task: Task, report: Report, trajectories: dict[str, Trajectory], folder: Path
+) -> list[Path]:
+    """Writes a PNG for each episode that failed, `NAME.png`; returns the files.
+
+    Args:
+        task: Whose map.
+        report: What failed, and why.
+        trajectories: By episode name; one that is missing gives no picture.
+        folder: Where to; it must exist.
+    """
+    background, files = None, []
+    for episode in report.episodes:
+        trajectory = trajectories.get(episode.name)
+        # A file may hold another run of that start, one driven by `run_episode`.
+        if trajectory is None or trajectory.steps != episode.steps:
+            continue
+        if episode.outcome in ("reached", "not run"):
+            continue
+        background = background or Background.of(task.nominal)
+        diagnosis = _diagnosis_of(report, episode)
+        event = event_of(task.nominal, trajectory, episode, diagnosis)
+        picture = run_picture(background, trajectory.poses, event)
+        files.append(folder / f"{file_stem(episode.name)}.png")
+        _write(picture, files[-1])
+    return files
+
+
+def _diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
+    """The diagnosis of an episode, not that of another run of its start."""
+    for failure in report.failures:
+        found = failure.diagnosis
+        if found is None or found.episode != episode.name:
+            continue
+        if (found.cause in _ERRORS) == (episode.outcome == "error"):
+            return found
+    return None
+
+
+def file_stem(name: str) -> str:
+    """What the files of an episode are called: `jitter_1` for `jitter 1`."""
+    return name.replace(" ", "_")
+
+
+def event_of(
+    task: Map2DTask,
+    trajectory: Trajectory,
+    episode: Episode,
+    diagnosis: Diagnosis | None,
+) -> Event:
+    """What a picture of a failed episode shows; its outcome where no cause is known."""
+    x, y, heading = trajectory.poses[-1].tolist()
+    held_out = " (held out)" if episode.held_out else ""
+    title = f"{episode.name}{held_out}: {episode.outcome}"
+    facts = [f"ended in step {trajectory.steps} at ({x:.1f}, {y:.1f})"]
+    where = trajectory.poses[-1:, :2]
+    if diagnosis is not None:
+        title = f"{episode.name}: {diagnosis.cause}"
+        facts = _facts(diagnosis)
+        where = _where(task, trajectory, diagnosis)
+    touch = None
+    if episode.outcome == "collision":
+        touch = nearest_touch(task, Pose(x, y, heading), task.robot.radius + 3.0)
+    return Event(
+        title=title,
+        facts=(*facts, f"path left: {episode.d_min:.0f} of {episode.d0:.0f} px"),
+        where=where,
+        contact=None if touch is None else touch.wall,
+        way=way_from(task, trajectory, trajectory.steps),
+    )
+
+
+def _facts(diagnosis: Diagnosis) -> list[str]:
+    """The first sentence of a diagnosis and its heading error, in ASCII."""
+    head = f"{diagnosis.episode}: "
+    words = diagnosis.text.removeprefix(head).removeprefix(diagnosis.cause)
+    sentence = words.lstrip(": ").partition(". ")[0].replace("°", " deg")
+    facts = [sentence.encode("ascii", "replace").decode()[:MAX_FACT]]
+    if diagnosis.heading_error is not None:
+        error = math.degrees(diagnosis.heading_error)
+        way = "right" if error > 0 else "left"
+        facts.append(f"heading error {abs(error):.0f} deg, path to the {way}")
+    return facts
+
+
+def _where(
+    task: Map2DTask, trajectory: Trajectory, diagnosis: Diagnosis
+) -> NDArray[np.float64]:
+    """The places to look at, shape (n, 2), px."""
+    places = trajectory.poses[:, :2]
+    if diagnosis.cause in ("stuck", "spinning", "oscillating"):
+        return places[diagnosis.step :]
+    if diagnosis.cause == "missed goal":
+        return np.vstack([places[diagnosis.step], places[-1], task.goal])
+    return places[-1:]
+
+
+def _write(picture: Image, path: Path) -> None:
     encoded = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1]
     write_atomic(path, encoded.tobytes())

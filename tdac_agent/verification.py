@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 from tdac_agent.errors import ControllerFileError
+from tdac_agent.figures import draw_failures
 from tdac_agent.files import write_atomic
 from tdac_agent.judging import Findings, Job
 from tdac_agent.provenance import origin, sha256_of
@@ -53,7 +54,8 @@ def verify(
         tier: Sandbox tier, `auto` for the best one here.
         seed: Of the jittered starts.
         limits: Of the controller's processes; `cpu_seconds` is for all of them.
-        out: Folder for `report.json` and `trajectories/`; none by default.
+        out: Folder for `report.json` and `trajectories/`, with a picture of each
+            episode that failed; none by default.
         judge: A warm one, for several verifications; one of its own by default.
 
     Returns:
@@ -98,7 +100,7 @@ def verify(
             seconds=round(time.monotonic() - began, 3),
         )
         if out is not None:
-            _keep(report, job.out, out)
+            _keep(report, task, job.out / "trajectories", out)
     return report
 
 
@@ -144,11 +146,12 @@ def load_trajectories(folder: Path) -> dict[str, Trajectory]:
     """The trajectories that a verification kept, by episode name."""
     return {
         path.stem.replace("_", " "): Trajectory.load(path)
-        for path in sorted(folder.glob("*.npz"), key=_nominal_first)
+        for path in sorted(folder.glob("*.npz"), key=nominal_first)
     }
 
 
-def _nominal_first(path: Path) -> tuple[bool, str]:
+def nominal_first(path: Path) -> tuple[bool, str]:
+    """Sorts the files of episodes: the nominal one first."""
     return path.stem != "nominal", path.stem
 
 
@@ -188,8 +191,15 @@ def _suite_hash(folder: Path) -> dict[str, str]:
     }
 
 
-def _keep(report: Report, results: Path, out: Path) -> None:
-    (out / "trajectories").mkdir(parents=True, exist_ok=True)
-    for path in sorted((results / "trajectories").glob("*.npz")):
-        write_atomic(out / "trajectories" / path.name, path.read_bytes())
+def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
+    """Keeps report, trajectories and pictures; those of an earlier one are removed."""
+    folder = out / "trajectories"
+    folder.mkdir(parents=True, exist_ok=True)
+    for pattern in ("nominal.*", "jitter_*.*"):
+        for path in folder.glob(pattern):
+            path.unlink()
+    for path in sorted(results.glob("*.npz")):
+        write_atomic(folder / path.name, path.read_bytes())
+    if not report.passed:
+        draw_failures(task, report, load_trajectories(folder), folder)
     write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.report import Report
+from tdac_agent.verification import nominal_first
 
 
-def show_report(report: Report, console: Console) -> None:
-    """Prints the verdict, the failures with their diagnosis, and the episodes."""
+def show_report(report: Report, console: Console, out: Path | None = None) -> None:
+    """Prints the verdict, the failures with their diagnosis, and the episodes.
+
+    Args:
+        report: What to show.
+        console: Where to.
+        out: Folder to which the report and its pictures were written.
+    """
     verdict, about = report.verdict, report.provenance
     for warning in about.warnings:
         console.print(f"[yellow]warning: {warning}[/]")
@@ -29,12 +38,20 @@ def show_report(report: Report, console: Console) -> None:
             console.print(f"[cyan]diagnosis[/] {escape(diagnosis.cause)}")
             console.print(Text(f"  {diagnosis.text}"), soft_wrap=True)
     console.print(episode_table(report))
+    if out is not None:
+        _show_files(out, console)
     colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
     console.print(
         f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
         f"passed in {report.seconds:.1f} s  (task {escape(about.task)}, profile "
         f"{about.profile}, sandbox {about.sandbox})"
     )
+
+
+def _show_files(out: Path, console: Console) -> None:
+    for path in sorted((out / "trajectories").glob("*.png"), key=nominal_first):
+        console.print(Text(f"picture: {path}"), soft_wrap=True)
+    console.print(Text(f"report: {out / 'report.json'}"), soft_wrap=True)
 
 
 def episode_table(report: Report) -> Table:

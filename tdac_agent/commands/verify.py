@@ -34,12 +34,15 @@ def run(
     tier: str,
     seed: int,
     junit: Path | None,
+    out: Path | None,
     as_json: bool,
     robust: RobustFlags,
 ) -> int:
     """Verifies and prints; returns the exit code."""
     check_tier(tier)
     robust.check()
+    if out is not None:
+        _make_folder(out)
     console = Console(stderr=as_json)
     # The judge warms up while the map is preprocessed.
     with WarmJudge(forked=True) as judge:
@@ -54,12 +57,13 @@ def run(
                 suite=suite,
                 tier=tier,
                 seed=seed,
+                out=out,
                 judge=judge,
             )
         if junit is not None:
             write_junit(report, junit)
         if not as_json:
-            show_report(report, console)
+            show_report(report, console, out)
         measured = None
         if robust.robust is not None and report.passed:
             from tdac_agent.commands.robust import measure
@@ -94,6 +98,14 @@ def _replay(
     """The command line that plays an episode of the same, but for its seed."""
     words = ["tdac", "play", controller, *flags.words(), *robust.disturbed.words()]
     return words if tier == "auto" else [*words, "--tier", tier]
+
+
+def _make_folder(out: Path) -> None:
+    """Makes the folder before the work is done, or says why it cannot be."""
+    try:
+        (out / "trajectories").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ControllerFileError(f"cannot write to {out}: {error.strerror}") from error
 
 
 def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:

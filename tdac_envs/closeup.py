@@ -1,0 +1,236 @@
+"""A picture of one run: the whole map, a close-up of where it ended, and a caption."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import textwrap
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.canvas import (
+    FREE,
+    GREEN,
+    GREY,
+    INK,
+    PAPER,
+    TRAIL,
+    Canvas,
+    Colour,
+    Image,
+    blank,
+    write_text,
+)
+from tdac_envs.grid import BoolGrid
+from tdac_envs.marks import draw_task
+from tdac_envs.task2d import Map2DTask
+
+Points = NDArray[np.float64]
+
+# Told apart from the green of the goal by all kinds of colour vision.
+EVENT: Colour = (213, 94, 0)
+EARLY: Colour = (176, 168, 232)
+COLUMN, CLOSE_UP, MARGIN = 400, 372, 14
+_LINE, _CHARACTERS = 21, 50
+_PIECES = 16
+# A close-up shows this much around the event at least, radii of the body.
+_AROUND = 5.0
+# Below this enlargement there is nothing to be gained from a close-up.
+_WORTH = 1.5
+_SMALLEST_BODY = 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Background:
+    """What the pictures of all runs of a task have in common."""
+
+    task: Map2DTask
+    canvas: Canvas
+    path: Points
+
+    @classmethod
+    def of(cls, task: Map2DTask) -> Background:
+        """The map with start, goal and shortest path."""
+        background = cls(
+            task,
+            Canvas(task.terrain.grid.cells, strip=0),
+            task.path_from(task.start),
+        )
+        background.draw_task(background.canvas, background.path)
+        return background
+
+    def draw_task(self, canvas: Canvas, path: Points) -> None:
+        """Draws start, goal and a part of the shortest path."""
+        task = self.task
+        draw_task(canvas, task.start, task.goal, task.goal_tolerance, path)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Event:
+    """What is to be seen in a run.
+
+    Attributes:
+        title: First line of the caption, ASCII.
+        facts: Further lines; long ones are wrapped.
+        where: Shape (n, 2): places that the close-up must hold, px.
+        contact: Point of a wall that the body touched.
+        way: Shape (m, 2): the way that should have been taken from the end.
+    """
+
+    title: str
+    facts: tuple[str, ...]
+    where: Points
+    contact: tuple[float, float] | None = None
+    way: Points | None = None
+
+
+def run_picture(background: Background, poses: Points, event: Event) -> Image:
+    """The picture of a run, uint8 RGB.
+
+    Args:
+        background: Of the run's task.
+        poses: Shape (T + 1, 3): x, y, heading.
+        event: What is to be seen.
+    """
+    canvas, radius = background.canvas.copy(), background.task.robot.radius
+    _draw_run(canvas, poses, event, radius)
+    window = _window(event, poses, radius, canvas.scale)
+    close = None
+    if window is not None:
+        close = _close_up(background, poses, event, window)
+        _draw_window(canvas, *window)
+    column = _column(event, close)
+    columns = canvas.image.shape[1]
+    rows = max(canvas.strip_top, column.shape[0])
+    picture = blank(rows, columns + COLUMN, PAPER)
+    picture[: canvas.strip_top, :columns] = canvas.image[: canvas.strip_top]
+    picture[: column.shape[0], columns:] = column
+    return picture
+
+
+def _draw_run(canvas: Canvas, poses: Points, event: Event, radius: float) -> None:
+    """Trail, body at the end, and the contact."""
+    body = max(radius * canvas.scale, _SMALLEST_BODY)
+    canvas.disc(poses[0, :2], 4, FREE)
+    canvas.disc(poses[0, :2], 4, EARLY, width=2)
+    _draw_trail(canvas, poses[:, :2])
+    x, y, heading = poses[-1]
+    canvas.disc((x, y), body, TRAIL, 0.35)
+    canvas.disc((x, y), body, TRAIL, width=2)
+    turns = heading + np.array([0.0, 2.6, -2.6])
+    nose = np.column_stack([np.cos(turns), np.sin(turns)]) * 0.6 * body / canvas.scale
+    canvas.polygon(np.add(nose, (x, y)), TRAIL)
+    if event.contact is not None:
+        size = max(0.3 * body, 6.0)
+        canvas.disc(event.contact, size, FREE, 0.9, 5)
+        canvas.disc(event.contact, size, EVENT, width=3)
+
+
+def _draw_trail(canvas: Canvas, places: Points) -> None:
+    """A line that gets darker along the way driven."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
+    cuts = np.searchsorted(along, np.linspace(0.0, along[-1], _PIECES + 1))
+    early, late = np.array(EARLY), np.array(TRAIL)
+    for k, (first, last) in enumerate(itertools.pairwise(cuts.tolist())):
+        shade = k / (_PIECES - 1)
+        red, green, blue = np.rint((1.0 - shade) * early + shade * late).tolist()
+        canvas.line(places[first : last + 1], (red, green, blue), 2)
+
+
+def _window(
+    event: Event, poses: Points, radius: float, scale: float
+) -> tuple[int, int, int] | None:
+    """First column, first row and size of the part to enlarge, map px.
+
+    None where the map itself shows as much.
+    """
+    for where in (event.where, poses[-1:, :2]):
+        low, high = where.min(axis=0), where.max(axis=0)
+        extent = float((high - low).max()) + 2.0 * _AROUND * radius
+        side = max(math.ceil(extent), 8)
+        if CLOSE_UP / side >= _WORTH * scale:
+            x, y = np.floor((low + high - side) / 2.0 + 0.5).astype(int).tolist()
+            return x, y, side
+    return None
+
+
+def _draw_window(canvas: Canvas, x: int, y: int, side: int) -> None:
+    corners = np.array([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
+    at = corners + np.array([x - 0.5, y - 0.5])
+    for colour, width in ((FREE, 4), (EVENT, 2)):
+        # Not in one go: a closed line has no farthest point.
+        canvas.line(at[:3], colour, width)
+        canvas.line(at[2:], colour, width)
+
+
+def _close_up(
+    background: Background, poses: Points, event: Event, window: tuple[int, int, int]
+) -> Image:
+    """The part of the map around the event, enlarged and framed."""
+    x, y, side = window
+    task = background.task
+    cells = _part(task.terrain.grid.cells, x, y, side)
+    canvas = Canvas(cells, 0, scale=CLOSE_UP / side, origin=(x, y), narrowest=CLOSE_UP)
+    background.draw_task(canvas, _inside(background.path, x, y, side))
+    if event.way is not None:
+        canvas.line(event.way, GREEN, 2, 0.9, dash=6)
+    _draw_run(canvas, poses, event, task.robot.radius)
+    close = canvas.image[: canvas.strip_top]
+    cv2.rectangle(close, (0, 0), (close.shape[1] - 1, close.shape[0] - 1), EVENT, 2)
+    return close
+
+
+def _inside(path: Points, x: int, y: int, side: int) -> Points:
+    """The part of a path from its first to its last point in a window."""
+    inside = ((path >= (x, y)) & (path < (x + side, y + side))).all(axis=1)
+    found = np.flatnonzero(inside)
+    return path[max(found[0] - 1, 0) : found[-1] + 2] if found.size else path[:0]
+
+
+def _part(cells: BoolGrid, x: int, y: int, side: int) -> BoolGrid:
+    """A square part of a map, occupied where it reaches beyond it."""
+    height, width = cells.shape
+    part = np.ones((side, side), np.bool_)
+    x0, y0, x1, y1 = max(x, 0), max(y, 0), min(x + side, width), min(y + side, height)
+    if x0 < x1 and y0 < y1:
+        part[y0 - y : y1 - y, x0 - x : x1 - x] = cells[y0:y1, x0:x1]
+    return part
+
+
+def _column(event: Event, close: Image | None) -> Image:
+    """Caption, close-up and legend, one below the other."""
+    lines = [line for fact in event.facts for line in textwrap.wrap(fact, _CHARACTERS)]
+    legend = [(GREY, True, "shortest path"), (TRAIL, False, "driven, light to dark")]
+    if event.way is not None and close is not None:
+        legend.append((GREEN, True, "shortest path from the end"))
+    if event.contact is not None:
+        legend.append((EVENT, False, "contact"))
+    rows = len(lines) + len(legend) + 1
+    tall = 0 if close is None else close.shape[0] + MARGIN
+    column = blank(2 * MARGIN + _LINE * rows + 10 + tall, COLUMN, PAPER)
+    at = MARGIN + 12
+    write_text(column, MARGIN, at, event.title, EVENT)
+    for line in lines:
+        at += _LINE
+        write_text(column, MARGIN, at, line, INK)
+    at += MARGIN
+    if close is not None:
+        column[at : at + close.shape[0], MARGIN : MARGIN + close.shape[1]] = close
+        at += close.shape[0]
+    at += 10
+    for colour, dashed, text in legend:
+        at += _LINE
+        _draw_key(column, at - 5, colour, dashed)
+        write_text(column, MARGIN + 34, at, text, INK)
+    return column
+
+
+def _draw_key(column: Image, y: int, colour: Colour, dashed: bool) -> None:
+    """The line of a legend's entry."""
+    ends = ((0, 7), (10, 17), (20, 26)) if dashed else ((0, 26),)
+    for first, last in ends:
+        begin, end = (MARGIN + first, y), (MARGIN + last, y)
+        cv2.line(column, begin, end, colour, 2, cv2.LINE_AA)
