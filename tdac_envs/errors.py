@@ -15,3 +15,7 @@ class TaskError(TdacError):
 
 class WorldError(TdacError):
     """A Webots world cannot be used."""
+
+
+class WorldFileError(WorldError):
+    """A `.wbt` file is broken; the message begins with file, line and column."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tdac_envs.footprint import ring
+from tdac_envs.footprint import THINNEST, ring
 from tdac_envs.wbt.appearance import reflectance
 from tdac_envs.wbt.fields import flag, number, numbers, text
 from tdac_envs.wbt.frames import Frame, flu_size, own_axes
@@ -28,6 +28,9 @@ _WOOD = 0.298
 """Reflectance of a WoodenBox, as measured on its textures."""
 _ROUNDNESS = 0.01
 """By how much of its thickness a pipe in pieces may depart from a round one."""
+
+_NARROWEST = 1e-3
+"""Radius of a pipe, at least, m."""
 
 # Outlines at scale 1, m, and how far up and down the rock reaches.
 _ROCKS: dict[str, tuple[list[tuple[float, float]], float, float]] = {
@@ -154,12 +157,13 @@ def _traffic_cone(node: Node, frame: Frame) -> Body:
 
 
 def _solid_pipe(node: Node, frame: Frame) -> Body:
-    radius = _positive(node, "radius", 1.0)
+    radius = max(_positive(node, "radius", 1.0), _NARROWEST)
     height = _positive(node, "height", 2.0)
     thickness = number(node, "thickness", 0.1)
     if not 0.0 < thickness < radius:
         thickness = radius / 2  # as Webots does
     own = placed(node, frame, (0.0, 0.0, 1.0))
+    thickness = max(thickness, THINNEST)
     facets = _facets(node, radius, thickness)
     pieces = ring(0.0, 0.0, radius - thickness, radius, facets)
     local = own.flu()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tdac_envs.arguments import finite_point
 from tdac_envs.bodies import bodies, floor_under
-from tdac_envs.errors import WorldError
+from tdac_envs.errors import WorldError, WorldFileError
 from tdac_envs.wbt.fields import number, numbers, text
 from tdac_envs.wbt.found import Found
 from tdac_envs.wbt.frames import Frame, world_frame
@@ -63,7 +63,12 @@ def read_world(
     frame = _world_frame(document, info)
     found = Found()
     for node in document.nodes:
-        walk(node, frame, found)
+        try:
+            walk(node, frame, found)
+        except WorldFileError:
+            raise
+        except WorldError as error:  # a value that no shape can have
+            raise node.error(str(error)) from None
     world = World(
         robots=_driven_first(found.robots, robot, name),
         goal=found.goals[0] if found.goals else None,

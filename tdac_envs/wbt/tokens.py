@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal, NamedTuple
 
-from tdac_envs.errors import WorldError
+from tdac_envs.errors import WorldFileError
 
 Kind = Literal["number", "string", "word", "mark", "end"]
 
@@ -55,18 +55,18 @@ class Source:
         """Number of the line, from 1."""
         return self.text.count("\n", 0, offset) + 1
 
-    def error(self, offset: int, message: str) -> WorldError:
+    def error(self, offset: int, message: str) -> WorldFileError:
         """An error that says line and column, both from 1."""
         column = offset - self.text.rfind("\n", 0, offset)
         where = f"{self.name}, line {self.line(offset)}, column {column}"
-        return WorldError(f"{where}: {message}")
+        return WorldFileError(f"{where}: {message}")
 
 
 def tokens(source: Source, start: int = 0) -> Iterator[Token]:
     """The words from `start` on, and an end.
 
     Raises:
-        WorldError: A string is not closed, or a number cannot be read.
+        WorldFileError: A string is not closed, or a number cannot be read.
     """
     for match in _TOKEN.finditer(source.text, start):
         kind, text = match.lastgroup, match.group()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tdac_envs.errors import WorldError
+from tdac_envs.errors import WorldFileError
 from tdac_envs.wbt.tokens import Kind, Source, Token, tokens
 
 DEEPEST = 100
@@ -54,7 +54,7 @@ class Node:
     offset: int
     size: int
 
-    def error(self, message: str, field: str = "") -> WorldError:
+    def error(self, message: str, field: str = "") -> WorldFileError:
         """An error at one of its fields, or at the node."""
         at = self.fields[field].offset if field in self.fields else self.offset
         return self.source.error(at, message)
@@ -88,7 +88,7 @@ def parse(text: str, name: str) -> Document:
         name: What errors call it.
 
     Raises:
-        WorldError: The text is not a Webots world; it says line and column.
+        WorldFileError: The text is not a Webots world; it says line and column.
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     source = Source(name, text)
@@ -238,7 +238,7 @@ class _Parser:
             self._next = next(self._stream)
         return token
 
-    def _unexpected(self, wanted: str) -> WorldError:
+    def _unexpected(self, wanted: str) -> WorldFileError:
         got = self._next.text if self._next.kind == "end" else repr(self._next.text)
         got = got if len(got) <= 50 else got[:47] + "…'"
         return self._source.error(self._next.offset, f"expected {wanted}, got {got}")

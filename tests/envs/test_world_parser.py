@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from worlds import EVERYTHING, OLD, mutated, text
 
+from tdac_envs import write_world
 from tdac_envs.errors import WorldError
 from tdac_envs.wbt.reader import load_world, read_world
 from tdac_envs.wbt.tree import DEEPEST, MOST_NODES, Node, parse
@@ -225,6 +226,28 @@ def test_a_wrong_value_says_where(content):
     with pytest.raises(WorldError, match=r"^w\.wbt, line 3, column \d+: ") as caught:
         read_world(text(content), "w.wbt")
     assert WRONG[content] in str(caught.value)
+
+
+@pytest.mark.parametrize("tiny", ["1e-9", "1e-300", "0.0001"])
+def test_tiny_lengths_do_no_harm(tiny):
+    """Nothing is too small to be drawn."""
+    world = read_world(
+        text(
+            f"SolidPipe {{ radius {tiny} }}",
+            f"SolidPipe {{ thickness {tiny} }}",
+            f"SolidPipe {{ height {tiny} radius {tiny} rotation 1 0 0 1 }}",
+            f"CircleArena {{ radius {tiny} wallThickness {tiny} wallHeight {tiny} }}",
+            f"RectangleArena {{ floorSize {tiny} 1 }}",
+            f"OilBarrel {{ radius {tiny} height {tiny} rotation 1 1 0 1 }}",
+            f"Rock {{ scale {tiny} }}",
+            f"Wall {{ size {tiny} {tiny} {tiny} rotation 1 2 3 4 }}",
+            f"Transform {{ scale {tiny} {tiny} {tiny} children Solid {{ boundingObject",
+            "  Group { children [ Box { } Sphere { } Capsule { } Cylinder { } ] } } }",
+        )
+    )
+    assert len(world.arenas) == 2
+    assert len(world.obstacles) == 7
+    assert read_world(write_world(world)) == world
 
 
 def test_the_coordinate_system_must_be_known():
