@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 
 ALLOWED_IMPORTS = frozenset(
@@ -83,7 +84,7 @@ def import_problems(tree: ast.Module) -> list[str]:
     """Imports of modules that are not allowed, or anywhere but at the top."""
     top = set(tree.body)
     problems = []
-    for node in ast.walk(tree):
+    for node in nodes_of(tree):
         if isinstance(node, ast.Import):
             modules = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -111,9 +112,9 @@ def _is_hidden(name: str) -> bool:
 
 def _reached_modules(tree: ast.Module) -> Iterator[str]:
     """Modules that are reached through an imported one, such as `random._os`."""
-    imports = [n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
+    imports = [n for n in nodes_of(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
     bound = {name for name, _ in _bindings([*imports])}
-    for node in ast.walk(tree):
+    for node in nodes_of(tree):
         if isinstance(node, ast.Attribute) and _is_hidden(node.attr):
             root: ast.expr = node
             while isinstance(root, ast.Attribute):
@@ -151,9 +152,15 @@ def positional_arity(function: ast.FunctionDef) -> tuple[int, int]:
     return total - len(arguments.defaults), 99 if arguments.vararg else total
 
 
+@functools.lru_cache(maxsize=8)
+def nodes_of(node: ast.AST) -> tuple[ast.AST, ...]:
+    """A node and all below it; a module is asked for many times."""
+    return tuple(ast.walk(node))
+
+
 def calls(node: ast.AST) -> Iterator[ast.Call]:
     """Every call inside a node."""
-    return (child for child in ast.walk(node) if isinstance(child, ast.Call))
+    return (child for child in nodes_of(node) if isinstance(child, ast.Call))
 
 
 def call_name(call: ast.Call) -> str:

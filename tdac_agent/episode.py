@@ -23,6 +23,7 @@ from tdac_envs.task2d import Pose
 # A policy is cut off when its mean call is this many times too slow.
 SLOW_FACTOR = 2.0
 SLOW_AFTER_CALLS = 50
+LARGEST = 1e30
 
 
 @dataclass(slots=True)
@@ -80,7 +81,7 @@ class Record:
         if wheels is None:
             raise EnvRefusalError(wrong_action(action))
         observation, reward, terminated, truncated, info = self.env.step(wheels)
-        self._actions.append(np.clip(wheels, -1.0, 1.0))
+        self._actions.append(wheels)
         info = self._note(observation, info)
         if info["collision"]:
             self.outcome = "collision"
@@ -97,7 +98,7 @@ class Record:
         """What was recorded so far."""
         return Trajectory(
             np.array(self._poses, np.float64).reshape(-1, 3),
-            np.array(self._actions, np.float32).reshape(-1, 2),
+            np.array(self._actions, np.float32).reshape(-1, 2).clip(-1.0, 1.0),
             np.array(self._distances, np.float64),
             np.array(self._ranges, np.float32),
             self._collisions,
@@ -115,6 +116,11 @@ class Record:
 
 def as_wheels(action: Any) -> NDArray[np.float32] | None:
     """An answer of `policy` as two finite numbers, or None where it is not that."""
+    if type(action) is tuple and len(action) == 2:
+        left, right = action
+        if type(left) is float and type(right) is float:
+            finite = abs(left) < LARGEST and abs(right) < LARGEST
+            return np.array(action, np.float32) if finite else None
     if isinstance(action, np.ndarray):
         if action.shape != (2,) or action.dtype.kind not in "fiu":
             return None
@@ -129,7 +135,7 @@ def as_wheels(action: Any) -> NDArray[np.float32] | None:
         wheels = np.array([float(value) for value in action])
     except OverflowError:
         return None
-    return wheels.astype(np.float32) if np.abs(wheels).max() < 1e30 else None
+    return wheels.astype(np.float32) if np.abs(wheels).max() < LARGEST else None
 
 
 def wrong_action(action: Any) -> str:

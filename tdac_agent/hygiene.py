@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator
 
-from tdac_agent.contract import call_name, calls, last_name
+from tdac_agent.contract import call_name, calls, last_name, nodes_of
 
 FORBIDDEN_CALLS = frozenset(
     ["eval", "exec", "compile", "__import__", "breakpoint", "input", "globals", "vars"]
@@ -27,7 +27,7 @@ SAVERS = frozenset(
 
 def forbidden_calls(tree: ast.Module) -> Iterator[str]:
     """Calls and names that run or reach code a reader cannot see."""
-    for node in ast.walk(tree):
+    for node in nodes_of(tree):
         if (
             isinstance(node, ast.Name)
             and node.id in FORBIDDEN_CALLS | FORBIDDEN_ATTRIBUTES
@@ -46,7 +46,7 @@ def file_writes(tree: ast.Module) -> Iterator[str]:
         if name in SAVERS:
             yield f"line {node.lineno}: {name}()"
     called = {node.func for node in calls(tree)}
-    for other in ast.walk(tree):
+    for other in nodes_of(tree):
         if isinstance(other, ast.Name) and other.id == "open" and other not in called:
             yield f"line {other.lineno}: open under another name"
 
@@ -68,7 +68,7 @@ def sleeps(tree: ast.Module) -> Iterator[str]:
     for node in calls(tree):
         if call_name(node) == "sleep":
             yield f"line {node.lineno}: sleep()"
-    for statement in ast.walk(tree):
+    for statement in nodes_of(tree):
         if isinstance(statement, ast.ImportFrom) and statement.module == "time":
             names = {alias.name for alias in statement.names}
             yield from (f"line {statement.lineno}: import of sleep",) * (
@@ -78,7 +78,7 @@ def sleeps(tree: ast.Module) -> Iterator[str]:
 
 def swallowed_errors(tree: ast.Module) -> Iterator[str]:
     """Bare `except`, and handlers that do nothing."""
-    for node in ast.walk(tree):
+    for node in nodes_of(tree):
         if not isinstance(node, ast.ExceptHandler):
             continue
         if node.type is None:
@@ -97,7 +97,7 @@ def _does_nothing(node: ast.stmt) -> bool:
 
 def runtime_errors(tree: ast.Module) -> Iterator[str]:
     """`raise RuntimeError`."""
-    for node in ast.walk(tree):
+    for node in nodes_of(tree):
         if isinstance(node, ast.Raise) and node.exc is not None:
             raised = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
             if isinstance(raised, ast.Name) and raised.id == "RuntimeError":
@@ -106,7 +106,7 @@ def runtime_errors(tree: ast.Module) -> Iterator[str]:
 
 def surface_indexing(tree: ast.Module) -> Iterator[str]:
     """Subscripts of a drawing surface, which is not an array."""
-    for node in ast.walk(tree):
+    for node in nodes_of(tree):
         if isinstance(node, ast.Subscript):
             name = last_name(node.value)
             if name in {"surface", "screen", "window", "map_img", "display"}:
@@ -139,7 +139,7 @@ def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
 def _random_modules(tree: ast.Module) -> set[str]:
     """How this file spells the modules (and functions) that draw random numbers."""
     names = set()
-    for node in ast.walk(tree):
+    for node in nodes_of(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 spelled = alias.asname or alias.name

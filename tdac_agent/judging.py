@@ -33,6 +33,19 @@ from tdac_agent.trajectory import Rollout
 from tdac_envs.map2d import Map2DEnv
 
 NO_JOB = 77
+# Threads drive episodes beside the tests: none of them should wait for another long.
+SWITCH_SECONDS = 2e-4
+# Some of these cost a verification more than its tests do.
+UNUSED_PLUGINS = (
+    "cacheprovider",
+    "unraisableexception",
+    "threadexception",
+    "doctest",
+    "pastebin",
+    "stepwise",
+    "faulthandler",
+    "legacypath",
+)
 
 
 class Job(BaseModel):
@@ -71,6 +84,7 @@ def serve() -> None:
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
+    sys.setswitchinterval(SWITCH_SECONDS)
     _warm_up()
     more = True
     while more:
@@ -188,8 +202,7 @@ def _arguments(job: Job) -> list[str]:
         "-p",
         "pytest_reportlog.plugin",
         f"--report-log={job.out / 'report.jsonl'}",
-        "-p",
-        "no:cacheprovider",
+        *(word for name in UNUSED_PLUGINS for word in ("-p", f"no:{name}")),
         "--import-mode=importlib",
         "--assert=plain",
         "--strict-markers",

@@ -35,6 +35,15 @@ class Remote:
         """Calls a method; values as for `Unit.call`."""
         return self._unit.send((self._handle, method), args, kwargs)
 
+    def call_each(self, method: str, calls: list[tuple[Any, ...]]) -> list[Any]:
+        """Results of many calls of a method, which together may take as long as one."""
+        target = (self._handle, method)
+        return list(
+            self._unit._ask(
+                lambda seconds: self._unit._child.call_each(target, calls, seconds)
+            )
+        )
+
 
 class Unit:
     """The top level of a controller that was imported in its sandbox.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import json
 from collections.abc import Callable
 from importlib.util import decode_source
@@ -34,7 +35,7 @@ class Controller:
         self._judge = judge
         self.source = judge.source.decode("utf-8", "replace")
 
-    @property
+    @functools.cached_property
     def tree(self) -> ast.Module:
         """Syntax tree of the source; a source that does not parse fails the test."""
         size = len(self._judge.source)

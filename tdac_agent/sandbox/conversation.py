@@ -25,6 +25,7 @@ from tdac_agent.sandbox.errors import (
 from tdac_agent.sandbox.explain import controller_error, explain_end
 from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
+from tdac_agent.sandbox.inner.layout import Layout
 from tdac_agent.sandbox.inner.wire import Kind, RemoteError, WireError
 from tdac_agent.sandbox.limits import Limits
 
@@ -57,6 +58,7 @@ class Conversation:
         self._end = end
         self._sequence = 0
         self._fault: Exception | None = None
+        self._layout: Layout | None = None
 
     def request(self, kind: Kind, value: Any, phase: str, seconds: float) -> Any:
         """Return the child's answer to one request."""
@@ -74,11 +76,21 @@ class Conversation:
         if self._fault is not None:
             raise self._fault.with_traceback(None)
         self._sequence = (self._sequence + 1) & 0xFFFFFFFF
-        payload = encode(value)
+        payload = self._payload(kind, value)
         try:
             self._channel.send(kind, self._sequence, payload, deadline)
         except (ChannelClosedError, DeadlineError, FrameError, OutputFloodError) as e:
             self._fail(e, phase, seconds)
+
+    def _payload(self, kind: Kind, value: Any) -> bytes:
+        """The value's bytes; observations, which are many, in a faster way."""
+        if kind != Kind.POLICY or type(value) is not dict:
+            return encode(value)
+        payload = None if self._layout is None else self._layout.encode(value)
+        if payload is None:
+            self._layout = Layout.of(value)
+            payload = encode(value)
+        return payload
 
     def receive(self, phase: str, deadline: float, seconds: float) -> tuple[int, Any]:
         """Return kind and value of the answer to the last frame that was sent."""

@@ -129,6 +129,18 @@ class Child:
         seconds = timeout or self.limits.call_seconds
         return self._talk.request(Kind.CALL, request, phase, seconds)
 
+    def call_each(
+        self,
+        target: str | tuple[Handle, str],
+        calls: list[tuple[Any, ...]],
+        timeout: float | None = None,
+    ) -> Any:
+        """Return the results of many calls of one function or method, in one answer."""
+        owner, name = _split(target)
+        seconds = timeout or self.limits.call_seconds
+        phase = name if name is not None else "call"
+        return self._talk.request(Kind.CALL_EACH, (owner, name, calls), phase, seconds)
+
     def reset(self, observation: Any, timeout: float | None = None) -> Any:
         """Call `reset(obs)`; None where the controller has none."""
         seconds = timeout or self.limits.reset_seconds

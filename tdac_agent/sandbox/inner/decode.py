@@ -25,6 +25,8 @@ from .wire import (
     WireError,
 )
 
+# Two floats in a tuple or a list, as most answers are.
+PAIR = struct.Struct("<cIcdcd")
 SIZES = [dtype.itemsize for dtype in DTYPES]
 BOOL = CODES[np.dtype(np.bool_)]
 SHAPES = [struct.Struct(f"<{count}I") for count in range(MAX_DIMENSIONS + 1)]
@@ -54,6 +56,13 @@ def decode(data: bytes, pos: int = 0, resolve: Resolver | None = None) -> Any:
     Raises:
         WireError: The bytes are not exactly one value.
     """
+    if len(data) - pos == PAIR.size:
+        outer, count, first, left, second, right = PAIR.unpack_from(data, pos)
+        if count == 2 and first == b"f" and second == b"f":
+            if outer == b"t":
+                return left, right
+            if outer == b"l":
+                return [left, right]
     reader = _Reader(data, pos, resolve)
     try:
         value = _take(reader)

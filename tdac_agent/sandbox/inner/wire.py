@@ -45,6 +45,7 @@ class Kind(IntEnum):
     RUN_EPISODE = 7
     ENV_REPLY = 8
     ENV_REFUSAL = 9
+    CALL_EACH = 10
     VALUE = 32
     ERROR = 33
     ENV_RESET = 34

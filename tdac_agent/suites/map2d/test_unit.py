@@ -63,8 +63,10 @@ def test_file_constants(controller, name):
 def test_is_occupied_inside(small_map):
     """Every pixel of the map is answered as it is, indexed [y, x]."""
     occ, own = small_map
-    for y, x in np.ndindex(occ.shape):
-        found = own.call("is_occupied", x, y)
+    pixels = [(x, y) for y, x in np.ndindex(occ.shape)]
+    answers = own.call_each("is_occupied", pixels)
+    assert len(answers) == len(pixels), f"{len(answers)} answers to {len(pixels)}"
+    for (x, y), found in zip(pixels, answers, strict=True):
         assert found == occ[y, x], f"is_occupied({x}, {y}) is {found}, not {occ[y, x]}"
 
 

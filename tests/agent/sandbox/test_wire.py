@@ -14,6 +14,7 @@ from hypothesis.extra import numpy as hnp
 from tdac_agent.sandbox.inner import wire
 from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
+from tdac_agent.sandbox.inner.layout import Layout
 from tdac_agent.sandbox.inner.wire import Handle, RemoteError, WireError
 
 texts = st.text(st.characters(exclude_categories=()), max_size=20)
@@ -235,3 +236,47 @@ def test_a_list_that_holds_itself_is_refused():
 def test_forged_bytes_are_refused(data, match):
     with pytest.raises(WireError, match=match):
         decode(data)
+
+
+def observation(random):
+    return {
+        "pose": random.normal(size=3).astype(np.float32),
+        "ranges": random.normal(size=18).astype(np.float32),
+        "grid": random.integers(0, 9, (2, 3)),
+    }
+
+
+def test_a_layout_writes_and_reads_what_the_format_does():
+    """The shorter way for observations gives the same bytes, and the same values."""
+    random = np.random.default_rng(0)
+    layout = Layout.of(observation(random))
+    for _ in range(20):
+        value = observation(random)
+        data = encode(value)
+        assert layout.encode(value) == data
+        read = layout.decode(data)
+        assert list(read) == list(value)
+        for name, array in read.items():
+            assert array.dtype == value[name].dtype
+            assert array.flags.writeable
+            np.testing.assert_array_equal(array, value[name])
+
+
+def test_a_layout_leaves_other_values_alone():
+    """A value of another form is none of its business, nor are other bytes."""
+    random = np.random.default_rng(0)
+    value = observation(random)
+    layout = Layout.of(value)
+    data = encode(value)
+    for other in (
+        {**value, "pose": value["pose"].astype(np.float64)},
+        {**value, "pose": np.zeros(4, np.float32)},
+        {"pose": value["pose"]},
+        {"a": value["pose"], "ranges": value["ranges"], "grid": value["grid"]},
+        {**value, "grid": [1, 2]},
+    ):
+        assert layout.encode(other) is None
+    for index in (0, 5, 6, 20, len(data)):
+        assert layout.decode(data[:index] + b"\xff" + data[index + 1 :]) is None
+    for other in (None, {}, {"a": 1}, {1: value["pose"]}, {"a": np.zeros(0)}, [1]):
+        assert Layout.of(other) is None

@@ -1,0 +1,201 @@
+"""What a verification costs, and how much of that is not the controller's.
+
+    python -m benchmarks.verify [--task maze] [--runs N] [--json]
+
+Three controllers are verified from the command line and, as in the loop, by a warm
+judge: `builtin` as `tdac synth` leaves it; the privileged reference, which computes next
+to nothing, so that what its verification costs is our share; one that stands still until
+the time is up. For `builtin` our share is the wall time that is left when the time in
+which its processes computed is spread over the cores and taken away.
+
+Prints the median and the range of the wall times, s. The judge is given time to get
+ready before each run of the loop, as a learner gives it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from tdac_agent import load_task, synthesize, verify
+from tdac_agent.privileged import (
+    DO_NOTHING,
+    REFERENCE,
+    privileged_controller,
+    reference_ways,
+)
+from tdac_agent.task import Task, portable_task_file, write_workdir
+from tdac_agent.warm import WarmJudge
+
+READY_SECONDS = 2.0
+LIMITS = {"command line": (2.0, 0.8), "loop": (1.0, 0.3)}
+STUCK_LIMIT = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Cost of one controller's verification.
+
+    Attributes:
+        controller: Whose.
+        way: `command line` or `loop`.
+        passed: Whether it was verified.
+        wall: Median of the wall times, s.
+        fastest: Least of them, s.
+        slowest: Greatest of them, s.
+        computing: CPU time of the controller's processes, s.
+        share: Wall time that is not the controller's, s.
+        limit: What the share should not exceed, s.
+    """
+
+    controller: str
+    way: str
+    passed: bool
+    wall: float
+    fastest: float
+    slowest: float
+    computing: float
+    share: float
+    limit: float
+
+
+def main() -> int:
+    """Returns the exit code: 1 where a share or a wall time exceeds its limit."""
+    options = _options()
+    task = load_task(options.task)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        controllers = _controllers(task, folder)
+        rows = []
+        for controller, source in controllers.items():
+            run = _run_folder(folder / controller, task, source)
+            rows.append(_row(controller, "command line", _from_cli(run), options.runs))
+        with WarmJudge() as judge:
+            for controller, source in controllers.items():
+                measure = _from_loop(task, source, judge)
+                rows.append(_row(controller, "loop", measure, options.runs))
+    if options.json:
+        print(json.dumps([asdict(row) for row in rows], indent=1))
+    else:
+        _show(rows, options.task)
+    slow = [row for row in rows if row.share > row.limit or _too_long(row)]
+    return 1 if slow else 0
+
+
+def _controllers(task: Task, folder: Path) -> dict[str, str]:
+    run = synthesize(task, out=folder / "run")
+    assert run.verified
+    ways = reference_ways(task.nominal, 0)
+    return {
+        "builtin": run.controller.read_text(),
+        REFERENCE: privileged_controller(task.nominal, ways),
+        DO_NOTHING: privileged_controller(task.nominal, ways, DO_NOTHING),
+    }
+
+
+def _run_folder(folder: Path, task: Task, source: str) -> Path:
+    write_workdir(folder, task)
+    (folder / "task.yaml").write_text(portable_task_file(task))
+    (folder / "controller.py").write_text(source)
+    return folder
+
+
+Measure = Callable[[], tuple[float, float, bool]]
+
+
+def _from_cli(run: Path) -> Measure:
+    """Wall time, CPU time of the controller's processes, verdict; from outside."""
+    command = [sys.executable, "-m", "tdac_agent.cli", "verify", str(run), "--json"]
+
+    def measure() -> tuple[float, float, bool]:
+        began = time.perf_counter()
+        done = subprocess.run(command, capture_output=True, check=False)
+        wall = time.perf_counter() - began
+        report = json.loads(done.stdout)
+        return wall, report["child_cpu_seconds"], report["verdict"]["passed"]
+
+    return measure
+
+
+def _from_loop(task: Task, source: str, judge: WarmJudge) -> Measure:
+    def measure() -> tuple[float, float, bool]:
+        time.sleep(READY_SECONDS)
+        began = time.perf_counter()
+        with tempfile.TemporaryDirectory() as out:
+            report = verify(source.encode(), task, judge=judge, out=Path(out))
+        wall = time.perf_counter() - began
+        return wall, report.child_cpu_seconds, report.passed
+
+    return measure
+
+
+def _row(controller: str, way: str, measure: Measure, runs: int) -> Row:
+    measure()
+    results = [measure() for _ in range(runs)]
+    walls = [wall for wall, _, _ in results]
+    wall = statistics.median(walls)
+    computing = statistics.median(cpu for _, cpu, _ in results)
+    cores = min(os.cpu_count() or 1, 2)
+    own = computing / cores if controller == "builtin" else 0.0
+    return Row(
+        controller=controller,
+        way=way,
+        passed=all(passed for _, _, passed in results),
+        wall=round(wall, 3),
+        fastest=round(min(walls), 3),
+        slowest=round(max(walls), 3),
+        computing=round(computing, 3),
+        share=round(wall - own, 3),
+        limit=STUCK_LIMIT if controller == DO_NOTHING else LIMITS[way][1],
+    )
+
+
+def _too_long(row: Row) -> bool:
+    return row.controller == "builtin" and row.wall > LIMITS[row.way][0]
+
+
+def _show(rows: list[Row], task: str) -> None:
+    load = f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
+    table = Table(title=f"Verification on {task}, s ({load})", title_justify="left")
+    for name in ("controller", "from", "verdict"):
+        table.add_column(name)
+    for name in ("wall", "range", "controller's CPU", "our share", "limit"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        colour = "red" if row.share > row.limit else "green"
+        table.add_row(
+            row.controller,
+            row.way,
+            "verified" if row.passed else "not verified",
+            f"{row.wall:.2f}",
+            f"{row.fastest:.2f} to {row.slowest:.2f}",
+            f"{row.computing:.2f}",
+            f"[{colour}]{row.share:.2f}[/]",
+            f"{row.limit:.1f}",
+        )
+    Console().print(table)
+
+
+def _options() -> argparse.Namespace:
+    about = (__doc__ or "").partition("\n")[0]
+    parser = argparse.ArgumentParser(prog="benchmarks.verify", description=about)
+    parser.add_argument("--task", default="maze", help="bundled name or task.yaml")
+    parser.add_argument("--runs", type=int, default=5, help="of each kind")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
