@@ -1,16 +1,19 @@
 """Judges the whole zoo and prints a table; exit 1 where a verdict is not as expected.
 
-python tests/agent/zoo/run.py [NAME ...]
+python tests/agent/zoo/run.py [NAME ...] [--tier TIER]
 """
 
 from __future__ import annotations
 
-import sys
+import difflib
 import time
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
 from queue import SimpleQueue
+from typing import Annotated
 
+import typer
 from enclosure import (
     ATTACKS,
     GOOD,
@@ -20,44 +23,78 @@ from enclosure import (
     differences,
     load_case,
     tiers_of,
+    working_tiers,
     zoo_task,
 )
+from rich.console import Console
+from rich.table import Table
 
-WORKERS = 2
+# One more than the least machine has processors: some attacks only wait.
+WORKERS = 3
+Job = tuple[Case, str]
+CONSOLE = Console(width=100, highlight=False)
 
 
-def main() -> int:
-    """Returns the exit code."""
-    chosen = set(sys.argv[1:])
-    paths = [path for path in (*GOOD, *ATTACKS) if not chosen or path.stem in chosen]
-    cases = [load_case(path) for path in paths]
-    jobs = [(case, tier) for case in cases for tier in tiers_of(case)]
+def main(
+    names: Annotated[list[str] | None, typer.Argument(help="All by default.")] = None,
+    tier: Annotated[str | None, typer.Option(help="Only on this one.")] = None,
+    workers: Annotated[int, typer.Option(help="Verifications at a time.")] = WORKERS,
+) -> None:
+    """Judges controllers of the zoo and compares with what their headers promise."""
+    if tier not in (None, *working_tiers()):
+        works = ", ".join(working_tiers())
+        raise typer.BadParameter(
+            f"expected one that works here ({works}), got {tier!r}"
+        )
+    cases = chosen_cases(names or [])
+    jobs = [(case, t) for case in cases for t in tiers_of(case) if tier in (None, t)]
+    # What waits for a limit comes first, so that it is not waited for at the end.
+    jobs.sort(key=lambda job: "limits" not in job[0].header)
     zoo_task()
-    began, wrong = time.monotonic(), 0
-    with ExitStack() as stack, ThreadPoolExecutor(WORKERS) as pool:
+    began = time.monotonic()
+    told: dict[str, list[tuple[Result, bool]]] = {t: [] for t in working_tiers()}
+    for case, result in judged(jobs, workers):
+        problems = differences(case, result)
+        told[result.tier].append((result, not problems))
+        CONSOLE.print(row(case, result, problems), markup=False)
+        for problem in problems:
+            CONSOLE.print(f"    {problem[:600]}", markup=False)
+    CONSOLE.print(summary(told))
+    wrong = sum(not right for results in told.values() for _, right in results)
+    CONSOLE.print(
+        f"{len(cases)} controllers, {len(jobs)} verdicts, {wrong} not as expected, "
+        f"{time.monotonic() - began:.0f} s"
+    )
+    raise typer.Exit(1 if wrong or not jobs else 0)
+
+
+def chosen_cases(names: list[str]) -> list[Case]:
+    """The cases of these names, all where none is given."""
+    paths = {path.stem: path for path in (*GOOD, *ATTACKS)}
+    for name in names:
+        if name not in paths:
+            near = ", ".join(difflib.get_close_matches(name, paths))
+            raise typer.BadParameter(f"no controller {name!r}; near: {near or 'none'}")
+    return [load_case(paths[name]) for name in (names or paths)]
+
+
+def judged(jobs: list[Job], workers: int) -> Iterator[tuple[Case, Result]]:
+    """Results as they come, each from an enclosure that is not in use meanwhile."""
+    with ExitStack() as stack:
         free: SimpleQueue[Enclosure] = SimpleQueue()
-        for _ in range(WORKERS):
+        for _ in range(workers):
             free.put(stack.enter_context(Enclosure()))
-        results = pool.map(lambda job: judge(free, *job), jobs)
-        for (case, _), result in zip(jobs, results, strict=True):
-            problems = differences(case, result)
-            wrong += bool(problems)
-            print(row(case, result, problems), flush=True)
-            for problem in problems:
-                print(f"    {problem[:600]}")
-    seconds = time.monotonic() - began
-    print(f"{len(cases)} controllers, {len(jobs)} verdicts, {wrong} not as expected")
-    print(f"{seconds:.0f} s")
-    return 1 if wrong else 0
 
+        def judge(case: Case, tier: str) -> tuple[Case, Result]:
+            enclosure = free.get()
+            try:
+                return case, enclosure.judge(case, tier)
+            finally:
+                free.put(enclosure)
 
-def judge(free: SimpleQueue[Enclosure], case: Case, tier: str) -> Result:
-    """Judges a case in an enclosure that is not in use."""
-    enclosure = free.get()
-    try:
-        return enclosure.judge(case, tier)
-    finally:
-        free.put(enclosure)
+        pool = stack.enter_context(ThreadPoolExecutor(workers))
+        for future in as_completed([pool.submit(judge, *job) for job in jobs]):
+            yield future.result()
 
 
 def row(case: Case, result: Result, problems: list[str]) -> str:
@@ -68,10 +105,29 @@ def row(case: Case, result: Result, problems: list[str]) -> str:
     harm = f" harm: {', '.join(result.harm)}" if result.harm else ""
     kind = "good" if case.good else "attacks"
     return (
-        f"{kind + '/' + case.name:40} {result.tier:11} {expected:7} {got:7} "
+        f"{kind + '/' + case.name:30} {result.tier:11} {expected:7} {got:7} "
         f"{result.seconds:5.1f} s{harm}{mark}"
     )
 
 
+def summary(told: dict[str, list[tuple[Result, bool]]]) -> Table:
+    """What came of each tier."""
+    table = Table("tier")
+    for name in ("verdicts", "as expected", "passed", "harmed", "seconds", "longest"):
+        table.add_column(name, justify="right")
+    for tier, results in told.items():
+        seconds = [result.seconds for result, _ in results]
+        table.add_row(
+            tier,
+            str(len(results)),
+            str(sum(right for _, right in results)),
+            str(sum(result.passed for result, _ in results)),
+            str(sum(bool(result.harm) for result, _ in results)),
+            f"{sum(seconds):.0f}",
+            f"{max(seconds, default=0.0):.1f}",
+        )
+    return table
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -1,7 +1,7 @@
 # idea: ignore the signal that says that the CPU time is used up
 # profile: policy
 # tiers: every
-# limits: cpu_seconds=2 call_seconds=20
+# limits: cpu_seconds=1 call_seconds=20
 # fails: test_imports, test_reaches_goal
 # error: used more than . s of CPU time|used . s of CPU time, all it may
 # why: a second limit kills without a signal that can be caught
