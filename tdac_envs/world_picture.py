@@ -213,14 +213,10 @@ def _draw_cross(view: View, place: tuple[float, float]) -> None:
 def _write_strip(view: View, world: World) -> None:
     canvas, first = view.canvas, view.canvas.strip_top + 24
     x = _LEFT
-    kinds = dict.fromkeys(thing.kind for thing in world.obstacles if thing.solid)
-    entries = [(kind, _KINDS.get(kind, STEEL)) for kind in kinds]
-    if world.goal is not None:
-        entries.append(("goal", GREEN))
-    if any(node.may_be_solid for node in world.unmodelled):
-        entries.append(("not modelled", RED))
+    entries = _legend(world)
     room = canvas.image.shape[1] - 150
-    for name, colour in entries:
+    for label, colour in entries:
+        name = label.encode("ascii", "replace").decode()
         if x + 24 + canvas.text_width(name) > room:
             break
         canvas.image[first - 10 : first + 1, x : x + 13] = colour
@@ -234,6 +230,17 @@ def _write_strip(view: View, world: World) -> None:
     ascii_only = "  ".join(filter(None, words)).encode("ascii", "replace").decode()
     canvas.text(_LEFT, first + 24, ascii_only, GREY)
     view.scale_bar()
+
+
+def _legend(world: World) -> list[tuple[str, Colour]]:
+    """What the colours mean; kinds of one colour together."""
+    entries = [("goal", GREEN)] if world.goal is not None else []
+    if any(node.may_be_solid for node in world.unmodelled):
+        entries.append(("not modelled", RED))
+    kinds: dict[Colour, list[str]] = {}
+    for kind in dict.fromkeys(t.kind for t in world.obstacles if t.solid):
+        kinds.setdefault(_KINDS.get(kind, STEEL), []).append(kind)
+    return entries + [(", ".join(kinds[colour][:3]), colour) for colour in kinds]
 
 
 def _extent(shape: Disc | Rectangle) -> str:
