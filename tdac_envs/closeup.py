@@ -96,13 +96,14 @@ def run_picture(background: Background, poses: Points, event: Event) -> Image:
         event: What is to be seen.
     """
     canvas, radius = background.canvas.copy(), background.task.robot.radius
-    _draw_run(canvas, poses, event, radius)
     window = _window(event, poses, radius, canvas.scale)
-    close = None
-    if window is not None:
-        close = _close_up(background, poses, event, window)
+    if window is None:
+        _draw_run(canvas, poses, event, radius, way=True)
+        column = _column(event, None)
+    else:
+        _draw_run(canvas, poses, event, radius, way=False)
         _draw_window(canvas, *window)
-    column = _column(event, close)
+        column = _column(event, _close_up(background, poses, event, window))
     columns = canvas.image.shape[1]
     rows = max(canvas.strip_top, column.shape[0])
     picture = blank(rows, columns + COLUMN, PAPER)
@@ -111,8 +112,12 @@ def run_picture(background: Background, poses: Points, event: Event) -> Image:
     return picture
 
 
-def _draw_run(canvas: Canvas, poses: Points, event: Event, radius: float) -> None:
-    """Trail, body at the end, and the contact."""
+def _draw_run(
+    canvas: Canvas, poses: Points, event: Event, radius: float, *, way: bool
+) -> None:
+    """Trail, body at the end, the contact, and perhaps the way from there."""
+    if way and event.way is not None:
+        canvas.line(event.way, GREEN, 2, 0.9, dash=6)
     body = max(radius * canvas.scale, _SMALLEST_BODY)
     canvas.disc(poses[0, :2], 4, FREE)
     canvas.disc(poses[0, :2], 4, EARLY, width=2)
@@ -175,9 +180,7 @@ def _close_up(
     cells = _part(task.terrain.grid.cells, x, y, side)
     canvas = Canvas(cells, 0, scale=CLOSE_UP / side, origin=(x, y), narrowest=CLOSE_UP)
     background.draw_task(canvas, _inside(background.path, x, y, side))
-    if event.way is not None:
-        canvas.line(event.way, GREEN, 2, 0.9, dash=6)
-    _draw_run(canvas, poses, event, task.robot.radius)
+    _draw_run(canvas, poses, event, task.robot.radius, way=True)
     close = canvas.image[: canvas.strip_top]
     cv2.rectangle(close, (0, 0), (close.shape[1] - 1, close.shape[0] - 1), EVENT, 2)
     return close
@@ -204,7 +207,7 @@ def _column(event: Event, close: Image | None) -> Image:
     """Caption, close-up and legend, one below the other."""
     lines = [line for fact in event.facts for line in textwrap.wrap(fact, _CHARACTERS)]
     legend = [(GREY, True, "shortest path"), (TRAIL, False, "driven, light to dark")]
-    if event.way is not None and close is not None:
+    if event.way is not None:
         legend.append((GREEN, True, "shortest path from the end"))
     if event.contact is not None:
         legend.append((EVENT, False, "contact"))
