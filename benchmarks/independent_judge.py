@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,8 @@ import numpy as np
 
 from benchmarks.independent_oracles import contract_violations
 from benchmarks.witness import Witness
-from tdac_agent.sandbox import (
-    Child,
-    ControllerFault,
-    Limits,
-    start,
-)
+from tdac_agent.nursery import Nursery
+from tdac_agent.sandbox import Child, ControllerFault, Limits
 from tdac_agent.task import Task, write_workdir
 from tdac_envs.map2d import Map2DEnv
 
@@ -67,9 +64,7 @@ class IndependentJudge:
         """
         with tempfile.TemporaryDirectory() as name:
             write_workdir(Path(name), self.task)
-            begin = functools.partial(
-                start, Path(name), text.encode(), limits=self.limits
-            )
+            begin = functools.partial(self._child, Path(name), text.encode())
             if profile == "paper":
                 reason = next(self._violations(begin, text), "")
                 if reason:
@@ -78,6 +73,11 @@ class IndependentJudge:
             if nominal:
                 return Judgement(f"nominal start: {nominal}")
             return self._jittered(begin, all_seeds)
+
+    def _child(self, workdir: Path, source: bytes) -> Child:
+        child = _nursery().take("auto", self.limits)
+        child.furnish(workdir, source)
+        return child
 
     def _jittered(self, begin: Any, all_seeds: bool) -> Judgement:
         failed, last = 0, ""
@@ -142,6 +142,14 @@ class IndependentJudge:
             return "collision" if info["collision"] else "out of time"
         slow = seconds / steps > 2 * self.task.nominal.dt
         return "too slow" if slow else ""
+
+
+@functools.cache
+def _nursery() -> Nursery:
+    """One for each process of the pool; it ends with the process."""
+    nursery = Nursery()
+    Finalize(None, nursery.close, exitpriority=1)
+    return nursery
 
 
 def _wheels(child: Child, observation: Any) -> Any:
