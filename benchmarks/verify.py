@@ -3,10 +3,10 @@
     python -m benchmarks.verify [--task maze] [--runs N] [--json]
 
 Three controllers are verified from the command line and, as in the loop, by a warm
-judge: `builtin` as `tdac synth` leaves it; the privileged reference, which computes next
-to nothing, so that what its verification costs is our share; one that stands still until
-the time is up. For `builtin` our share is the wall time that is left when the time in
-which its processes computed is spread over the cores and taken away.
+judge: `builtin` as `tdac synth` leaves it; the privileged reference, which computes
+next to nothing, so that what its verification costs is our share; one that stands
+still until the time is up. For `builtin` our share is the wall time that is left when
+the time in which its processes computed is spread over the cores and taken away.
 
 Prints the median and the range of the wall times, s. The judge is given time to get
 ready before each run of the loop, as a learner gives it.
