@@ -6,14 +6,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tdac_agent.disturbance import Disturbance
     from tdac_agent.policy import Policy, load_controller
     from tdac_agent.records import Run, load_run
     from tdac_agent.report import Report
+    from tdac_agent.robust import verify_robust
     from tdac_agent.synthesis import synthesize
     from tdac_agent.task import Task, load_task
     from tdac_agent.verification import verify
 
 __all__ = [
+    "Disturbance",
     "Policy",
     "Report",
     "Run",
@@ -23,9 +26,11 @@ __all__ = [
     "load_task",
     "synthesize",
     "verify",
+    "verify_robust",
 ]
 
 _HOME = {
+    "Disturbance": "disturbance",
     "Policy": "policy",
     "Report": "report",
     "Run": "records",
@@ -35,6 +40,7 @@ _HOME = {
     "load_task": "task",
     "synthesize": "synthesis",
     "verify": "verification",
+    "verify_robust": "robust",
 }
 
 
