@@ -39,7 +39,7 @@ class Witness:
     def step(self, action: Any) -> Any:
         if self.over or len(self.speeds) >= self.most or not self.positions:
             raise EnvRefusalError("a step before the beginning or after the end")
-        wheels = np.clip(np.asarray(action, float), -1.0, 1.0)
+        wheels = self._wheels(action)
         observation, reward, terminated, truncated, info = self.env.step(wheels)
         self.over = terminated or truncated
         self.positions.append(observation["pose"][:2])
@@ -48,6 +48,16 @@ class Witness:
         self.collisions = info["collisions"] + self.bumps
         info = {**info, "collisions": self.collisions}
         return observation, reward, terminated, truncated, info
+
+    @staticmethod
+    def _wheels(action: Any) -> Any:
+        try:
+            wheels = np.asarray(action, float)
+        except (TypeError, ValueError) as error:
+            raise EnvRefusalError("an action that is no numbers") from error
+        if wheels.shape != (2,) or not np.isfinite(wheels).all():
+            raise EnvRefusalError("an action that is not two finite numbers")
+        return np.clip(wheels, -1.0, 1.0)
 
     def contradictions(self, told: Any) -> Iterator[str]:
         """What of a returned dict is not what happened."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 
 from tdac_agent.episode import Record, run_own_loop, run_policy
@@ -23,6 +23,7 @@ from tdac_agent.sandbox import (
 from tdac_agent.starts import spread_starts
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Outcome, Rollout
+from tdac_agent.turns import Turns
 from tdac_envs.task2d import Pose
 
 JITTERS = 5
@@ -76,6 +77,7 @@ class Judge:
         self._owns_nursery = nursery is None
         self._pool = ThreadPoolExecutor(max_workers=max(2, os.cpu_count() or 2))
         self._lock = threading.Lock()
+        self._turns = Turns()
         self._episodes: dict[Key, Future[Rollout]] = {}
         self._unit: Unit | None = None
         self._import_fault: ControllerFault | None = None
@@ -92,14 +94,21 @@ class Judge:
         if self._unit is not None and self._unit.fault is not None:
             self._end_unit()
         if self._unit is None:
-            self._unit = Unit(self._load(), self._deadline)
+            with self._turns.shared():
+                self._unit = Unit(self._load(), self._deadline)
         return self._unit
 
     def call_timed_out(self) -> bool:
-        """Whether the latest call of a function of the controller took too long."""
-        return self._unit is not None and isinstance(
+        """Whether the latest call of a function of the controller took too long.
+
+        Where it did, the episodes under way are waited for: what follows is alone.
+        """
+        late = self._unit is not None and isinstance(
             self._unit.fault, ControllerTimeout
         )
+        if late:
+            wait(self._episodes.values())
+        return late
 
     def rollout(
         self, name: str = "nominal", *, steps: int | None = None, drive: str = "policy"
@@ -173,14 +182,22 @@ class Judge:
         if name != "nominal" and not self.rollout("nominal").reached:
             reason = "not run, since the nominal episode failed"
             return self._skipped(name, "not run", reason)
-        rollout = self.drive(name, steps, drive)
-        # A time-out may be the machine's doing, so it is tried once more.
-        return self.drive(name, steps, drive) if rollout.timed_out else rollout
+        with self._turns.shared():
+            rollout = self._drive(name, steps, drive)
+            if not rollout.timed_out:
+                return rollout
+            # It may be the machine's doing, or that of those beside it.
+            with self._turns.alone():
+                return self._drive(name, steps, drive)
 
     def drive(
         self, name: str, steps: int | None = None, drive: str = "policy"
     ) -> Rollout:
         """Runs an episode in a fresh child; arguments as for `rollout`."""
+        with self._turns.shared():
+            return self._drive(name, steps, drive)
+
+    def _drive(self, name: str, steps: int | None, drive: str) -> Rollout:
         limit = steps if steps is not None else self.task.nominal.horizon
         record = Record(self.task.make_env(), self.start_pose(name), limit)
         if drive == "truncated run_episode":
@@ -209,7 +226,9 @@ class Judge:
         return f"used {self._limits.cpu_seconds} s of CPU time, all it may"
 
     def _load(self) -> Child:
-        """A fresh child with the controller imported; a time-out is tried once more.
+        """A fresh child with the controller imported.
+
+        A time-out is tried once more, alone.
 
         Raises:
             ControllerFault: It cannot be imported; the same at each later request.
@@ -220,7 +239,8 @@ class Judge:
             try:
                 return self._loaded_child()
             except ControllerTimeout:
-                return self._loaded_child()
+                with self._turns.alone():
+                    return self._loaded_child()
         except ControllerFault as fault:
             self._import_fault = fault
             raise

@@ -90,9 +90,10 @@ def test_nearest_free_of_a_free_pixel(controller, small_map):
     """A free pixel is its own nearest free pixel, as Python ints."""
     occ, own = small_map
     for y, x in np.argwhere(~occ)[::40].tolist():
-        found = controller.call("nearest_free", own, x, y, 10)
-        assert is_int_pair(found), f"nearest_free returned {found!r}, not (int, int)"
-        assert found == (x, y), f"nearest_free({x}, {y}) is {found} though it is free"
+        for reach in (10, 0):
+            found = controller.call("nearest_free", own, x, y, reach)
+            assert is_int_pair(found), f"nearest_free is {found!r}, not (int, int)"
+            assert found == (x, y), f"nearest_free({x}, {y}, {reach}) is {found}: free"
 
 
 def test_nearest_free_is_nearest(controller, oracle):
@@ -111,6 +112,17 @@ def test_nearest_free_is_nearest(controller, oracle):
         assert got <= best + 1e-9, (
             f"nearest_free({x}, {y}) is {found}, {got:.2f} px away, not {best:.2f}"
         )
+
+
+def test_nearest_free_at_the_end_of_its_reach(controller):
+    """The only free pixel is found on every side, exactly max_rad away."""
+    for dx, dy in ((5, 0), (-5, 0), (0, 5), (0, -5), (3, -4), (-4, 3)):
+        occ = np.ones((21, 31), np.bool_)
+        occ[10 + dy, 15 + dx] = False
+        own = controller.call("OccMap2D", occ)
+        found = controller.call("nearest_free", own, 15, 10, 5)
+        only = (15 + dx, 10 + dy)
+        assert found == only, f"nearest_free(15, 10, 5) is {found}, not {only}"
 
 
 def test_nearest_free_raises(controller):
