@@ -1,4 +1,7 @@
-"""Gymnasium environments on map images: `gym.make("TDAC-Map2D-v0")`."""
+"""Gymnasium environments on map images and in Webots worlds.
+
+`gym.make("TDAC-Map2D-v0")`, `gym.make("TDAC-EPuck-v0")`.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
     from tdac_envs.wbt.reader import load_world, read_world
     from tdac_envs.wbt.writer import write_world
     from tdac_envs.world import World
+    from tdac_envs.worlds import bundled_worlds
 
 __all__ = [
     "MapError",
@@ -29,6 +33,7 @@ __all__ = [
     "WorldError",
     "bundled_map",
     "bundled_maps",
+    "bundled_worlds",
     "load_world",
     "preprocess",
     "read_world",
@@ -42,6 +47,7 @@ _HOME = {
     "World": "tdac_envs.world",
     "bundled_map": "tdac_envs.maps",
     "bundled_maps": "tdac_envs.maps",
+    "bundled_worlds": "tdac_envs.worlds",
     "load_world": "tdac_envs.wbt.reader",
     "preprocess": "tdac_envs.preprocess",
     "read_world": "tdac_envs.wbt.reader",
@@ -56,5 +62,6 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(_HOME[name]), name)
 
 
-# The horizon depends on the task, so the env truncates itself: no TimeLimit here.
+# The horizon depends on the task, so the envs truncate themselves: no TimeLimit here.
 gym.register("TDAC-Map2D-v0", entry_point="tdac_envs.map2d:Map2DEnv")
+gym.register("TDAC-EPuck-v0", entry_point="tdac_envs.epuck.env:EPuckEnv")

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Integral
+from typing import Any
+
+import numpy as np
 
 from tdac_envs.errors import TaskError
 
@@ -57,6 +60,29 @@ def positive(name: str, value: float) -> float:
     return number
 
 
+def not_negative(name: str, value: float) -> float:
+    """The value as a float.
+
+    Raises:
+        TaskError: It is not a finite number of at least 0.
+    """
+    number = finite(name, value)
+    if number < 0.0:
+        raise TaskError(f"expected {name} of at least 0, got {value!r}")
+    return number
+
+
+def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
+    """Accepts one of the allowed values.
+
+    Raises:
+        TaskError: It is another one.
+    """
+    if value not in allowed:
+        choices = ", ".join(map(repr, allowed))
+        raise TaskError(f"expected {name} to be one of {choices}, got {value!r}")
+
+
 def whole_number(name: str, value: float, least: int) -> int:
     """The value as an int.
 
@@ -68,3 +94,30 @@ def whole_number(name: str, value: float, least: int) -> int:
             f"expected {name} to be a whole number from {least}, got {value!r}"
         )
     return int(value)
+
+
+def wheel_command(action: Any) -> tuple[tuple[float, float], bool]:
+    """The wheel speeds of an action, clipped to [-1, 1], and whether they had to be.
+
+    Raises:
+        ValueError: The action is not two finite numbers.
+    """
+    try:
+        left, right = np.asarray(action).tolist()
+        usual = -1.0 <= left <= 1.0 and -1.0 <= right <= 1.0
+        wheels = float(left), float(right)
+    except (TypeError, ValueError):
+        raise ValueError(_not_an_action(action)) from None
+    if usual:
+        return wheels, False
+    if not (math.isfinite(left) and math.isfinite(right)):
+        raise ValueError(_not_an_action(action))
+    return (_clip(wheels[0]), _clip(wheels[1])), True
+
+
+def _not_an_action(action: Any) -> str:
+    return f"expected an action of two finite numbers in [-1, 1], got {action!r}"
+
+
+def _clip(value: float) -> float:
+    return min(max(value, -1.0), 1.0)

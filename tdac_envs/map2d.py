@@ -14,7 +14,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from tdac_envs.arguments import finite, positive, whole_number
+from tdac_envs.arguments import (
+    not_negative,
+    one_of,
+    positive,
+    wheel_command,
+    whole_number,
+)
 from tdac_envs.errors import TaskError
 from tdac_envs.kernels import GOAL_X, GOAL_Y, drive, sense
 from tdac_envs.params import RobotParams
@@ -141,9 +147,9 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         snap: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        _choose("on_collision", on_collision, ("terminate", "block"))
-        _choose("variation", variation, VARIATIONS)
-        _choose("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        one_of("on_collision", on_collision, ("terminate", "block"))
+        one_of("variation", variation, VARIATIONS)
+        one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         prepared = prepare(
             map, start, goal, heading=heading, robot_radius=robot_radius, snap=snap
         )
@@ -171,9 +177,9 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.task = self.nominal
         self.on_collision = on_collision
         self.variation = variation
-        self.range_noise = _not_negative("range_noise", range_noise)
-        self.wheel_slip = _not_negative("wheel_slip", wheel_slip)
-        self.motor_lag = _not_negative("motor_lag", motor_lag)
+        self.range_noise = not_negative("range_noise", range_noise)
+        self.wheel_slip = not_negative("wheel_slip", wheel_slip)
+        self.motor_lag = not_negative("motor_lag", motor_lag)
         self.delay = whole_number("delay", delay, 0)
         self.weights = RewardWeights()
         self.render_mode = render_mode
@@ -337,18 +343,8 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     def _wanted(self, action: Any) -> tuple[float, float]:
         """The wheel speeds of an action, clipped and delayed."""
-        wanted = np.asarray(action)
-        try:
-            left, right = wanted.tolist()
-            usual = -1.0 <= left <= 1.0 and -1.0 <= right <= 1.0
-            wheels = float(left), float(right)
-        except (TypeError, ValueError):
-            raise ValueError(_not_an_action(action)) from None
-        if not usual:
-            if not (math.isfinite(left) and math.isfinite(right)):
-                raise ValueError(_not_an_action(action))
-            self._clipped += 1
-            wheels = _clip(wheels[0]), _clip(wheels[1])
+        wheels, clipped = wheel_command(action)
+        self._clipped += clipped
         if self.delay:
             self._queue.append(wheels)
             wheels = self._queue.popleft()
@@ -460,24 +456,3 @@ def _override(robot: RobotParams, **given: float | None) -> RobotParams:
         first = error.errors()[0]
         name = str(first["loc"][0]).removesuffix("_deg")
         raise TaskError(f"{name} {first['input']!r}: {first['msg']}") from None
-
-
-def _choose(name: str, value: object, allowed: tuple[object, ...]) -> None:
-    if value not in allowed:
-        choices = ", ".join(map(repr, allowed))
-        raise TaskError(f"expected {name} to be one of {choices}, got {value!r}")
-
-
-def _not_negative(name: str, value: float) -> float:
-    number = finite(name, value)
-    if number < 0.0:
-        raise TaskError(f"expected {name} of at least 0, got {value!r}")
-    return number
-
-
-def _not_an_action(action: Any) -> str:
-    return f"expected an action of two finite numbers in [-1, 1], got {action!r}"
-
-
-def _clip(value: float) -> float:
-    return min(max(value, -1.0), 1.0)

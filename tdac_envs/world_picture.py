@@ -124,18 +124,8 @@ def draw_world(world: World) -> Image:
     What the robot cannot hit is pale: it is above or below it, or not solid. Nodes that
     may be solid and are not modelled are crossed.
     """
-    view, floor = View(_bounds(world)), floor_under(world)
-    for arena in world.arenas:
-        view.fill(arena.inside, FREE)
-        view.outline(arena.inside, GREY, 0.6)
-    for thing in world.obstacles:
-        for part in (*thing.solid, *thing.visible):
-            if abs(part.top - floor) <= _LEVEL:
-                view.fill(part.shape, FREE)
-    view.grid()
-    for thing in bodies(world):
-        if thing.kind != "E-puck":
-            _draw_obstacle(view, thing, floor)
+    view = View(_bounds(world))
+    draw_things(view, world, bodies(world))
     if world.goal is not None:
         _draw_goal(view, world.goal)
     for robot in reversed(world.robots):
@@ -145,6 +135,27 @@ def draw_world(world: World) -> Image:
             _draw_cross(view, (node.x, node.y))
     _write_strip(view, world)
     return view.canvas.image
+
+
+def draw_things(view: View, world: World, things: Iterable[Obstacle]) -> None:
+    """Floors, faint lines, and what stands on them; robots are left out."""
+    floor = floor_under(world)
+    for arena in world.arenas:
+        view.fill(arena.inside, FREE)
+        view.outline(arena.inside, GREY, 0.6)
+    for thing in world.obstacles:
+        for part in (*thing.solid, *thing.visible):
+            if abs(part.top - floor) <= _LEVEL:
+                view.fill(part.shape, FREE)
+    view.grid()
+    for thing in things:
+        if thing.kind != "E-puck":
+            _draw_obstacle(view, thing, floor)
+
+
+def colour_of(kind: str) -> Colour:
+    """The colour of an obstacle of some type."""
+    return _KINDS.get(kind, STEEL)
 
 
 def _bounds(world: World) -> tuple[float, float, float, float]:
@@ -163,7 +174,7 @@ def _bounds(world: World) -> tuple[float, float, float, float]:
 
 
 def _draw_obstacle(view: View, thing: Obstacle, floor: float) -> None:
-    colour = GREEN if thing.is_goal else _KINDS.get(thing.kind, STEEL)
+    colour = GREEN if thing.is_goal else colour_of(thing.kind)
     near = set(at_body_height(thing.solid, floor))
     pale = {
         part.shape: None

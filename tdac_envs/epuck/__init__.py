@@ -1,0 +1,1 @@
+"""TDAC-EPuck-v0: prisms → contact → infra-red → ground → task → env."""

@@ -1,0 +1,106 @@
+"""Parts of a world as arrays, for compiled code; and what of them can be pushed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.footprint import Disc
+from tdac_envs.world import Part
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+# Columns of `Prisms.extent`.
+MID_X, MID_Y, REACH, ROUND, LOW, HIGH, FACTOR = range(7)
+FIXED = -1
+
+
+class Owned(NamedTuple):
+    """A part, and whose it is.
+
+    Attributes:
+        part: A prism.
+        owner: Number of the thing that can be pushed; `FIXED` of what cannot.
+        factor: Its reflectance.
+    """
+
+    part: Part
+    owner: int = FIXED
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prisms:
+    """Discs and convex polygons between two heights, m.
+
+    Attributes:
+        points: Shape (m, 2): vertices of all parts, counter-clockwise; of a disc its
+            centre.
+        first: Shape (n + 1,): where in `points` each of n parts begins.
+        extent: Shape (n, 7): centre and radius of a circle around the part, its own
+            radius (0 of a polygon), bottom, top, reflectance.
+        owner: Shape (n,), of the thing that can be pushed, or `FIXED`.
+    """
+
+    points: Array
+    first: Index
+    extent: Array
+    owner: Index
+
+    @classmethod
+    def of(cls, owned: Iterable[Owned]) -> Prisms:
+        """The arrays of some parts, in their order."""
+        outlines: list[Array] = []
+        extent: list[tuple[float, ...]] = []
+        owners: list[int] = []
+        for part, owner, factor in owned:
+            shape = part.shape
+            if isinstance(shape, Disc):
+                outline, reach = np.array([[shape.x, shape.y]]), shape.radius
+            else:
+                outline, reach = shape.vertices, 0.0
+            middle = (outline.min(axis=0) + outline.max(axis=0)) / 2
+            far = float(np.hypot(*(outline - middle).T).max())
+            x, y = middle.tolist()
+            extent.append((x, y, far + reach, reach, part.bottom, part.top, factor))
+            outlines.append(outline)
+            owners.append(owner)
+        ends = np.cumsum([0, *map(len, outlines)], dtype=np.int64)
+        return cls(
+            np.concatenate([np.empty((0, 2)), *outlines]),
+            ends,
+            np.array(extent).reshape(-1, 7),
+            np.array(owners, np.int64),
+        )
+
+    def copy(self) -> Prisms:
+        """The same with places of its own, which may be changed."""
+        return Prisms(self.points.copy(), self.first, self.extent.copy(), self.owner)
+
+    def outline(self, part: int) -> Array:
+        """Vertices of a part, shape (n, 2)."""
+        return self.points[self.first[part] : self.first[part + 1]]
+
+    def carry(self, origin: Prisms, centres: Array, poses: Array) -> None:
+        """Puts the parts that can be pushed where their things are.
+
+        Args:
+            origin: The parts where they were at first.
+            centres: Shape (k, 2): then the place of each thing.
+            poses: Shape (k, 3) or more: its x, y and angle now.
+        """
+        for part in np.flatnonzero(self.owner != FIXED).tolist():
+            thing = int(self.owner[part])
+            x, y, angle = poses[thing, :3].tolist()
+            cos, sin = np.cos(angle), np.sin(angle)
+            turn = np.array([[cos, sin], [-sin, cos]])
+            place = np.array([x, y])
+            own = origin.outline(part) - centres[thing]
+            self.outline(part)[:] = own @ turn + place
+            middle = origin.extent[part, :2] - centres[thing]
+            self.extent[part, :2] = middle @ turn + place

@@ -1,0 +1,66 @@
+"""From what `world=`, `start=` and `goal=` name to a world, a start and a goal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from tdac_envs.arguments import finite_numbers, finite_point
+from tdac_envs.errors import TaskError
+from tdac_envs.task2d import Pose
+from tdac_envs.wbt.reader import load_world
+from tdac_envs.world import EPuck, World, check_modelled
+from tdac_envs.worlds import world_file
+
+WorldSource = str | Path | World
+
+
+def open_world(
+    source: WorldSource,
+    start: Sequence[float] | None = None,
+    goal: Sequence[float] | None = None,
+    ignore: Iterable[str] = (),
+) -> World:
+    """The world, with its first e-puck at the start, and with the goal.
+
+    A mark of the file's own goal stays one if the goal is another: it is never an
+    obstacle.
+
+    Args:
+        source: Name of a bundled world, path of a `.wbt` file, or a world.
+        start: (x, y) or (x, y, heading); by default the file's e-puck.
+        goal: (x, y); by default the file's.
+        ignore: Names or types of nodes that may be missing.
+
+    Raises:
+        WorldError: The world cannot be used.
+        TaskError: There is no start or no goal, or it is not made of numbers.
+    """
+    if isinstance(ignore, str):
+        raise TaskError(f"expected ignore to be a list of names, got {ignore!r}")
+    world = source if isinstance(source, World) else load_world(world_file(source))
+    check_modelled(world, ignore)
+    if goal is not None:
+        world = replace(world, goal=finite_point("goal", goal))
+    if world.goal is None:
+        raise TaskError(f"{_name(world)} names no goal; give goal=(x, y), in metres")
+    if start is None and not world.robots:
+        raise TaskError(
+            f"{_name(world)} has no e-puck in it; give start=(x, y, heading)"
+        )
+    return world if start is None else _started(world, start)
+
+
+def _started(world: World, start: Sequence[float]) -> World:
+    there = world.robots[0] if world.robots else EPuck("e-puck", 0.0, 0.0, 0.0)
+    given = tuple(start) if isinstance(start, Iterable) else (start,)
+    if len(given) == 2:
+        given = (*given, there.heading)
+    pose = Pose(*finite_numbers("start", given, 3))
+    robot = replace(there, x=pose.x, y=pose.y, heading=pose.heading)
+    return replace(world, robots=(robot, *world.robots[1:]))
+
+
+def _name(world: World) -> str:
+    return world.source or "the world"
