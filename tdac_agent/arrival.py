@@ -201,7 +201,7 @@ def _stalled(trajectory: Trajectory, since: int, radius: float) -> Finding:
     late = since + (trajectory.steps - since) // 2
     cause, text = (
         _spinning(trajectory, late, radius)
-        or _going_over_its_trail(trajectory, since, radius)
+        or _going_over_its_trail(trajectory, since, late, radius)
         or _trembling(trajectory, late, radius)
         or _wandering(trajectory, late)
     )
@@ -253,9 +253,9 @@ def _looking_about(trajectory: Trajectory, late: int, radius: float) -> bool:
 
 
 def _going_over_its_trail(
-    trajectory: Trajectory, since: int, radius: float
+    trajectory: Trajectory, since: int, late: int, radius: float
 ) -> Habit | None:
-    if _extent(trajectory, since) < 3.0 * radius:
+    if _extent(trajectory, late) < 3.0 * radius:
         return None
     (x0, y0), (x1, y1) = _box(trajectory, since)
     again = find_returns(trajectory, since, radius)

@@ -116,7 +116,7 @@ def _seen(touch: Touch, trajectory: Trajectory, task: Map2DTask) -> str:
         )
     before = max(trajectory.steps - 10, 0)
     shortest = float(trajectory.ranges[before].min())
-    return f"In step {before} the shortest ray read {shortest:.1f} px."
+    return f"In step {before} the shortest ray read {shortest:.1f} px from the centre."
 
 
 def _passed_goal(rollout: Rollout) -> str:

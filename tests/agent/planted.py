@@ -401,7 +401,7 @@ DRIVING = (
         "office",
         brake(45.0, back=-0.6),
         "oscillating",
-        says=("at its front",),
+        says=("reversed its turn or its drive every 1.0 steps", "at its front"),
     ),
     Plant(
         "a little forward, a little back",
