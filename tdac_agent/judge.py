@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 from pathlib import Path
 
 from tdac_agent.episode import Record, run_own_loop, run_policy
@@ -75,9 +76,11 @@ class Judge:
         self._deadline = time.monotonic() + WALL_SECONDS
         self._nursery = nursery or Nursery(ahead=False)
         self._owns_nursery = nursery is None
-        self._pool = ThreadPoolExecutor(max_workers=max(2, os.cpu_count() or 2))
+        workers = max(2, os.cpu_count() or 2)
+        self._pool = ThreadPoolExecutor(max_workers=workers)
+        # The suite's own calls are made beside the episodes.
+        self._turns = Turns(workers + 1)
         self._lock = threading.Lock()
-        self._turns = Turns()
         self._episodes: dict[Key, Future[Rollout]] = {}
         self._unit: Unit | None = None
         self._import_fault: ControllerFault | None = None
@@ -94,8 +97,7 @@ class Judge:
         if self._unit is not None and self._unit.fault is not None:
             self._end_unit()
         if self._unit is None:
-            with self._turns.shared():
-                self._unit = Unit(self._load(), self._deadline)
+            self._unit = Unit(self._loaded(), self._deadline)
         return self._unit
 
     def call_timed_out(self) -> bool:
@@ -182,30 +184,33 @@ class Judge:
         if name != "nominal" and not self.rollout("nominal").reached:
             reason = "not run, since the nominal episode failed"
             return self._skipped(name, "not run", reason)
-        with self._turns.shared():
+        with self._turns.beside():
             rollout = self._drive(name, steps, drive)
-            if not rollout.timed_out:
-                return rollout
-            # It may be the machine's doing, or that of those beside it.
-            with self._turns.alone():
-                return self._drive(name, steps, drive)
+        if not rollout.timed_out:
+            return rollout
+        # It may be the machine's doing, or that of those beside it.
+        with self._turns.alone():
+            return self._drive(name, steps, drive, final=True)
 
     def drive(
         self, name: str, steps: int | None = None, drive: str = "policy"
     ) -> Rollout:
         """Runs an episode in a fresh child; arguments as for `rollout`."""
-        with self._turns.shared():
-            return self._drive(name, steps, drive)
+        return self._drive(name, steps, drive)
 
-    def _drive(self, name: str, steps: int | None, drive: str) -> Rollout:
+    def _drive(
+        self, name: str, steps: int | None, drive: str, *, final: bool = False
+    ) -> Rollout:
         limit = steps if steps is not None else self.task.nominal.horizon
         record = Record(self.task.make_env(), self.start_pose(name), limit)
         if drive == "truncated run_episode":
             record.truncates, record.collisions_before = True, 2
         try:
-            child = self._load()
+            child = self._load(final=final)
         except ControllerFault as fault:
-            return self._skipped(name, "error", str(fault))
+            late = isinstance(fault, ControllerTimeout)
+            skipped = self._skipped(name, "error", str(fault))
+            return replace(skipped, timed_out=late)
         try:
             if drive != "policy":
                 seconds = child.limits.reset_seconds + 2 * limit * self.task.nominal.dt
@@ -225,10 +230,20 @@ class Judge:
     def _overspent(self) -> str:
         return f"used {self._limits.cpu_seconds} s of CPU time, all it may"
 
-    def _load(self) -> Child:
+    def _loaded(self) -> Child:
+        """A fresh child with the controller imported; a time-out is tried again."""
+        try:
+            with self._turns.beside():
+                return self._load()
+        except ControllerTimeout:
+            with self._turns.alone():
+                return self._load(final=True)
+
+    def _load(self, *, final: bool = False) -> Child:
         """A fresh child with the controller imported.
 
-        A time-out is tried once more, alone.
+        Args:
+            final: A time-out will not be tried once more.
 
         Raises:
             ControllerFault: It cannot be imported; the same at each later request.
@@ -236,13 +251,10 @@ class Judge:
         if self._import_fault is not None:
             raise self._import_fault.with_traceback(None)
         try:
-            try:
-                return self._loaded_child()
-            except ControllerTimeout:
-                with self._turns.alone():
-                    return self._loaded_child()
+            return self._loaded_child()
         except ControllerFault as fault:
-            self._import_fault = fault
+            if final or not isinstance(fault, ControllerTimeout):
+                self._import_fault = fault
             raise
 
     def _loaded_child(self) -> Child:

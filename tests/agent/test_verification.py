@@ -26,7 +26,7 @@ def failed_with(report, test):
     return next(f.message for f in report.failures if f.test.endswith(f"::{test}"))
 
 
-@pytest.mark.parametrize(("profile", "tests"), [("paper", 40), ("policy", 21)])
+@pytest.mark.parametrize(("profile", "tests"), [("paper", 41), ("policy", 21)])
 def test_a_good_controller_passes(small_task, good_source, profile, tests, no_traces):
     """A controller that solves the task is verified, in both profiles."""
     report = verify(good_source, small_task, profile=profile)
