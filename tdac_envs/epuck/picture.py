@@ -153,7 +153,7 @@ def _draw_rays(
     for sensor in range(N_SENSORS):
         x, y, azimuth = PLACES[sensor].tolist()
         reach = float(reaches[sensor]) * math.cos(ELEVATION)
-        near = level(float(readings[sensor])) > 0.0
+        near = level(float(readings[sensor])) > 1e-3
         colour = ray_colour(float(readings[sensor]))
         turns = azimuth + np.array([-0.1, 0.1])
         tips = np.column_stack([np.cos(turns), np.sin(turns)]) * reach + (x, y)

@@ -28,6 +28,7 @@ _SUBSTEP = 0.002
 _GRAVITY = 9.81
 _AXLE = 0.052
 _STILL = 1e-5
+_LEAST = 0.05
 # Nothing moves farther than this in a step, m.
 _NEAR = 0.05
 _ROBOT = 1
@@ -45,6 +46,24 @@ class Drive(NamedTuple):
     forward: float
     turn: float
     dt: float
+
+
+class Foot(NamedTuple):
+    """A thing that can be pushed, and its friction on the ground.
+
+    Attributes:
+        body: Its body.
+        slide: Friction against sliding.
+        spin: Friction against turning.
+        weight: The first's limit while it only slides, N.
+        spread: Mean distance of its foot from the centre, m.
+    """
+
+    body: Any
+    slide: Any
+    spin: Any
+    weight: float
+    spread: float
 
 
 def is_near(solid: Prisms, state: Array, things: Array, reach: float) -> bool:
@@ -93,7 +112,7 @@ def push(
     space.iterations = 30
     # The defaults are made for pixels: these are metres.
     space.collision_slop, space.collision_bias = 1e-6, 0.0
-    bodies = [
+    feet = [
         _thing(space, origin, k, centres[k], float(masses[k]), things[k])
         for k in range(len(things))
     ]
@@ -104,10 +123,12 @@ def push(
     count = max(math.ceil(drive.dt / _SUBSTEP), 1)
     for _ in range(count):
         _wish(wheels, robot, drive, count)
+        for foot in feet:
+            _share_friction(foot)
         space.step(drive.dt / count)
     state[:3] = *robot.position, math.remainder(robot.angle, 2.0 * math.pi)
     speed[:] = *robot.velocity, robot.angular_velocity
-    for body, row in zip(bodies, things, strict=True):
+    for (body, *_), row in zip(feet, things, strict=True):
         row[:] = *body.position, body.angle, *body.velocity, body.angular_velocity
         if np.abs(row[3:]).max() < _STILL:
             row[3:] = 0.0
@@ -148,7 +169,7 @@ def _robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
 
 def _thing(
     space: Any, origin: Prisms, number: int, centre: Array, mass: float, row: Array
-) -> Any:
+) -> Foot:
     """A thing that can be pushed, with friction on the ground."""
     outlines: list[tuple[Array, float]] = []
     for part in np.flatnonzero(origin.owner == number).tolist():
@@ -167,8 +188,19 @@ def _thing(
     for at, radius in outlines:
         _add_shape(space, body, at, radius)
     weight = SLIDE * mass * _GRAVITY
-    space.add(*_held(space.static_body, body, weight, weight * spread))
-    return body
+    slide, spin = _held(space.static_body, body, weight, weight * spread)
+    space.add(slide, spin)
+    return Foot(body, slide, spin, weight, spread)
+
+
+def _share_friction(foot: Foot) -> None:
+    """What slides turns easily, and the other way round: an elliptic limit surface."""
+    slid = foot.body.velocity.length
+    spun = abs(foot.body.angular_velocity) * foot.spread
+    speed = math.hypot(slid, spun)
+    shares = (slid / speed, spun / speed) if speed > _STILL else (1.0, 1.0)
+    foot.slide.max_force = foot.weight * max(shares[0], _LEAST)
+    foot.spin.max_force = foot.weight * foot.spread * max(shares[1], _LEAST)
 
 
 def _held(one: Any, other: Any, force: float, torque: float) -> list[Any]:

@@ -26,6 +26,23 @@ VARIANTS = [
             "delay": 2,
         },
     ),
+    (
+        "TDAC-EPuck-v0",
+        {
+            "world": "crates",
+            "variation": "jitter",
+            "on_collision": "block",
+            "sensor_noise": 1.0,
+            "reflectance": "webots",
+            "wheel_slip": 0.1,
+            "motor_lag": 0.1,
+            "delay": 2,
+            "ground_sensors": True,
+            "gps": True,
+            "compass": True,
+        },
+    ),
+    ("TDAC-EPuck-v0", {"world": "maze", "variation": "random"}),
 ]
 variants = pytest.mark.parametrize(("name", "options"), VARIANTS)
 every_env = pytest.mark.parametrize("name", IDS)
@@ -53,7 +70,7 @@ def rollout(env, seed, steps=150):
 
 
 def test_there_are_envs():
-    assert "TDAC-Map2D-v0" in IDS
+    assert {"TDAC-Map2D-v0", "TDAC-EPuck-v0"} <= set(IDS)
 
 
 @variants
