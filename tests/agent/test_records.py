@@ -31,6 +31,7 @@ def test_each_call_is_on_record_before_and_after(small_task, good_source, tmp_pa
 
     class Watcher:
         name = "watcher"
+        paid = False
 
         def complete(self, request):
             prompt = out / "iterations" / "k01" / "j0" / "generate.prompt.md"

@@ -18,6 +18,7 @@ ROBOT = UNIT + "test_robot_constants"
 ROBOT_IMG = UNIT + "test_file_constants[ROBOT_IMG]"
 STOP_DIST = UNIT + "test_tuning_constants[STOP_DIST]"
 NEAREST = UNIT + "test_nearest_free_is_nearest"
+REACH = UNIT + "test_nearest_free_at_the_end_of_its_reach"
 ITSELF = UNIT + "test_nearest_free_of_a_free_pixel"
 PLAN = UNIT + "test_plan_path"
 AGREES = END + "test_run_episode_agrees_with_the_judge"
@@ -55,7 +56,7 @@ WRONG = {
     "numpy bool": (OCCUPIED, OCCUPIED.replace("bool", "np.bool_"), [BOOL]),
     "integer for bool": (OCCUPIED, OCCUPIED.replace("bool", "int"), [BOOL]),
     "free outside": (f"{GUARD}{TRUE}", f"{GUARD}{FALSE}", [OUTSIDE, PLAN]),
-    "nearest by Manhattan": (DISTANCE2, MANHATTAN, [NEAREST]),
+    "nearest by Manhattan": (DISTANCE2, MANHATTAN, [NEAREST, REACH]),
     "nearest as NumPy": (
         "return int(columns[best]) + x0,",
         "return columns[best] + x0,",
