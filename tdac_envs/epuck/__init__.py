@@ -1,1 +1,1 @@
-"""TDAC-EPuck-v0: prisms → contact → infra-red → ground → task → env."""
+"""TDAC-EPuck-v0: prisms → contact → infra-red → ground → paths → task → env."""

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from tdac_envs.arguments import finite_numbers, finite_point, positive, whole_number
 from tdac_envs.bodies import BODY_RADIUS
-from tdac_envs.epuck.ground import (
-    Ground,
-    Point,
+from tdac_envs.epuck.ground import Ground, Point
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
+from tdac_envs.epuck.paths import (
     at_goal,
     check_stands,
     entry,
@@ -22,7 +22,6 @@ from tdac_envs.epuck.ground import (
     path_down,
     route,
 )
-from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.errors import TaskError
 from tdac_envs.plan import Path
 from tdac_envs.task2d import JITTER_HEADING, MAX_DRAWS, MIN_HORIZON, Pose
@@ -44,7 +43,7 @@ class EPuckTask:
         dt: Duration of a step, s.
         horizon: Steps before the episode is cut off.
         field: Length of the shortest path for the body from each grid point to the
-            goal, m; see `ground.route`.
+            goal, m; see `paths.route`.
         shortest: d0, length of that path from the nominal start, m.
     """
 

@@ -1,0 +1,180 @@
+"""Where an e-puck may stand in a world, and its shortest ways over it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.epuck.contact import first_touch
+from tdac_envs.epuck.ground import Ground, Point
+from tdac_envs.epuck.infrared import sees
+from tdac_envs.errors import TaskError
+from tdac_envs.plan import Path, descend, distance_field
+
+
+def at_goal(ground: Ground, goal: Point, tolerance: float, x: float, y: float) -> bool:
+    """Whether (x, y) is within the tolerance and nothing solid is in between."""
+    gap, solid = math.hypot(goal[0] - x, goal[1] - y), ground.solid
+    if gap > tolerance:
+        return False
+    return gap < ground.gap(x, y) or sees(
+        solid.points, solid.first, solid.extent, x, y, *goal
+    )
+
+
+def check_stands(ground: Ground, name: str, x: float, y: float) -> None:
+    """Refuses a place, called `name`, where an e-puck cannot stand.
+
+    Raises:
+        TaskError: It is outside, in an obstacle or too near to one; says what is near.
+    """
+    point = f"{name} ({x:g}, {y:g})"
+    left, low, right, high = ground.bounds
+    if not (left <= x <= right and low <= y <= high):
+        raise TaskError(
+            f"{point} lies outside the world, which reaches from ({left:.2f}, "
+            f"{low:.2f}) to ({right:.2f}, {high:.2f})"
+        )
+    room = ground.gap(x, y)
+    if room >= BODY_RADIUS:
+        return
+    problem = "lies in an obstacle"
+    if room > 0.0:
+        problem = (
+            f"is {1e3 * room:.1f} mm from an obstacle, too near for a body of "
+            f"{1e3 * BODY_RADIUS:g} mm"
+        )
+    raise TaskError(f"{point} {problem}; {_nearest_place(ground, x, y)}")
+
+
+def _nearest_place(ground: Ground, x: float, y: float) -> str:
+    rows, columns = np.nonzero(ground.free(BODY_RADIUS))
+    if rows.size == 0:
+        return "an e-puck fits nowhere"
+    left, low, _, _ = ground.bounds
+    u, v = (x - left) / ground.spacing, (y - low) / ground.spacing
+    nearest = int(np.argmin((columns - u) ** 2 + (rows - v) ** 2))
+    near_x, near_y = ground.at(int(columns[nearest]), int(rows[nearest]))
+    return f"the nearest free place is ({near_x:.3f}, {near_y:.3f})"
+
+
+def entry(
+    ground: Ground, open_: NDArray[np.bool_], at: Point
+) -> tuple[int, int] | None:
+    """The nearest grid point (column, row) to which the body gets straight on.
+
+    Args:
+        ground: The ground.
+        open_: Shape (height, width): which grid points come into question.
+        at: Where it is.
+    """
+    for column, row in _near(ground, at):
+        if open_[row, column] and _may_hop(ground, at, ground.at(column, row)):
+            return column, row
+    return None
+
+
+def _near(ground: Ground, at: Point) -> Iterator[tuple[int, int]]:
+    """Grid points within 3 of a place, the nearest first."""
+    left, low, _, _ = ground.bounds
+    u, v = (at[0] - left) / ground.spacing, (at[1] - low) / ground.spacing
+    height, width = ground.clear.shape
+    column, row = round(u), round(v)
+    found = [
+        (math.hypot(i - u, j - v), i, j)
+        for j in range(max(row - 3, 0), min(row + 4, height))
+        for i in range(max(column - 3, 0), min(column + 4, width))
+    ]
+    for _, i, j in sorted(found):
+        yield i, j
+
+
+def _may_hop(ground: Ground, begin: Point, end: Point) -> bool:
+    """Whether the body touches nothing on the straight line between two points."""
+    solid = ground.solid
+    heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
+    touch = first_touch(
+        solid.points, solid.first, solid.extent, *begin, heading,
+        math.dist(begin, end), 0.0, BODY_RADIUS,
+    )  # fmt: skip
+    return touch > 1.0
+
+
+def route(ground: Ground, start: Point, goal: Point) -> NDArray[np.float32]:
+    """Length of the shortest path to the goal from each grid point, m.
+
+    Paths lead along the grid in eight directions: they are at most 8.3 % longer than
+    the shortest of all, and 5 % in the mean, but for some mm at corners.
+
+    Returns:
+        Shape (height, width), float32, read-only; inf where there is no path.
+
+    Raises:
+        TaskError: The body cannot get from start to goal; says how wide one could be.
+    """
+    end = entry(ground, ground.free(BODY_RADIUS), goal)
+    if end is not None:
+        field = field_to(ground, end)
+        if entry(ground, np.isfinite(field), start) is not None:
+            return field
+    widest = widest_body(ground, start, goal)
+    reason = f"the widest body that gets through has a radius of {1e3 * widest:.1f} mm"
+    if widest <= 0.0:
+        reason = "they are in separate rooms"
+    raise TaskError(
+        f"no free path for a body of {1e3 * BODY_RADIUS:g} mm from start "
+        f"({start[0]:g}, {start[1]:g}) to goal ({goal[0]:g}, {goal[1]:g}): {reason}"
+    )
+
+
+@lru_cache(maxsize=4)
+def field_to(ground: Ground, goal: tuple[int, int]) -> NDArray[np.float32]:
+    """Length of the shortest path to a grid point (column, row); as of `route`."""
+    steps = distance_field(ground.free(BODY_RADIUS), goal)
+    field = (steps * ground.spacing).astype(np.float32)
+    field.flags.writeable = False
+    return field
+
+
+def path_down(ground: Ground, field: NDArray[np.float32], start: Point) -> Path:
+    """The path from a place down a field of `route`, shape (n, 2), m.
+
+    It ends at the field's grid point; empty where there is none.
+    """
+    begin = entry(ground, np.isfinite(field), start)
+    if begin is None:
+        return np.empty((0, 2))
+    steps = np.asarray(field, np.float64) / ground.spacing
+    path = descend(ground.free(BODY_RADIUS), _exact(steps), begin)
+    return np.vstack([start, path * ground.spacing + ground.bounds[:2]])
+
+
+def _exact(steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(steps < 1e-6, 0.0, steps)
+
+
+def widest_body(ground: Ground, start: Point, goal: Point) -> float:
+    """Radius of the largest disc, m, that gets from start to goal; 0 if none does.
+
+    To the spacing of the grid.
+    """
+    ends = [next(_near(ground, point))[::-1] for point in (start, goal)]
+    low, high = 0.0, float(min(ground.clear[end] for end in ends))
+
+    def joined(radius: float) -> bool:
+        free = (ground.clear > radius).astype(np.uint8)
+        _, labels = cv2.connectedComponents(free, connectivity=4)
+        return bool(labels[ends[0]] == labels[ends[1]] != 0)
+
+    if not joined(0.0):
+        return 0.0
+    while high - low > 1e-4:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if joined(middle) else (low, middle)
+    return low
