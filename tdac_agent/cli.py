@@ -187,8 +187,8 @@ def verify(
         Optional[Path],  # noqa: UP045
         typer.Option(
             "--out",
-            help="Folder for report.json, the trajectories, and a picture of each "
-            "episode that failed.",
+            help="Folder for report.json (and robust.json), the trajectories, and a "
+            "picture of each episode that failed.",
         ),
     ] = None,
     as_json: Json = False,

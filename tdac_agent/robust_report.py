@@ -71,6 +71,9 @@ class RobustReport(_Record):
     rate: float | None = Field(description="None with a test: it would be biased.")
     interval: Interval | None = Field(description="None with a test, likewise.")
     outcomes: dict[Outcome, int]
+    time_outs: int = Field(
+        description="Failures by time-out: perhaps of a busy machine."
+    )
     failed_seeds: tuple[int, ...]
     worst: tuple[SeededEpisode, ...] = Field(description="The worst first.")
     sequential: SequentialResult | None = None
@@ -99,6 +102,7 @@ def summarise(
         rate=None if test else successes / count,
         interval=None if test else success_interval(successes, count),
         outcomes=dict(Counter(e.outcome for e in episodes).most_common()),
+        time_outs=sum(e.cause == "time-out" for e in episodes),
         failed_seeds=tuple(failed),
         worst=tuple(sorted(episodes, key=badness)[:WORST]),
         sequential=None if test is None else result_of(test, successes, len(failed)),

@@ -22,8 +22,10 @@ from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
 from tdac_agent.sequential import SequentialTest
 from tdac_agent.task import Task, load_task
 from tdac_agent.trajectory import Outcome, Rollout
+from tdac_agent.turns import Turns
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
+WORKERS = max(2, os.cpu_count() or 2)
 
 
 class SeededJob(BaseModel):
@@ -91,6 +93,7 @@ class Stage:
         tier: Sandbox tier, or `auto`.
         limits: Of each child, and so of each episode.
         nursery: Where children come from.
+        turns: Who may drive when.
     """
 
     task: Task
@@ -100,6 +103,7 @@ class Stage:
     tier: str
     limits: Limits
     nursery: Nursery
+    turns: Turns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,11 +119,14 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
     """The episode of a seed.
 
     Start and noise are what the environment draws after `reset(seed=seed)`. A time-out
-    may be the machine's doing, so it is tried once more.
+    may be the machine's doing, so it is tried once more, alone.
     """
-    driven = _drive(stage, seed)
-    late = driven.rollout.outcome == "error" and driven.rollout.timed_out
-    return _drive(stage, seed) if late else driven
+    with stage.turns.beside():
+        driven = _drive(stage, seed)
+    if driven.rollout.outcome != "error" or not driven.rollout.timed_out:
+        return driven
+    with stage.turns.alone():
+        return _drive(stage, seed)
 
 
 def _drive(stage: Stage, seed: int) -> Driven:
@@ -146,9 +153,15 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
     they happen to end; those after its decision are dropped.
     """
     job.out.mkdir(exist_ok=True)
-    task, source = load_task(job.task), job.controller.read_bytes()
     stage = Stage(
-        task, source, job.task, job.disturbance, job.tier, job.limits, nursery
+        load_task(job.task),
+        job.controller.read_bytes(),
+        job.task,
+        job.disturbance,
+        job.tier,
+        job.limits,
+        nursery,
+        Turns(WORKERS),
     )
     counts, tier, fault = [0, 0], job.tier, None
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
@@ -174,7 +187,7 @@ def _in_order(stage: Stage, job: SeededJob) -> Generator[tuple[SeededEpisode, st
         return figures(driven, seed, stage.task), driven.tier
 
     seeds = range(job.first_seed, job.first_seed + job.episodes)
-    with ThreadPoolExecutor(max_workers=max(2, os.cpu_count() or 2)) as pool:
+    with ThreadPoolExecutor(max_workers=WORKERS) as pool:
         try:
             yield from pool.map(run, seeds)
         finally:

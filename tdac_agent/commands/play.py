@@ -22,6 +22,7 @@ from tdac_agent.sandbox import Limits, SandboxError
 from tdac_agent.seeded import Driven, Stage, drive_seed
 from tdac_agent.task import Task, write_workdir
 from tdac_agent.trajectory import Rollout
+from tdac_agent.turns import Turns
 from tdac_agent.verification import read_source
 from tdac_envs.errors import TaskError
 from tdac_envs.render import Scene, Status
@@ -92,7 +93,9 @@ def drive_disturbed(
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work, nursery = Path(folder), Nursery(ahead=False)
         write_workdir(work, task)
-        stage = Stage(task, source, work, disturbance, tier, Limits(), nursery)
+        stage = Stage(
+            task, source, work, disturbance, tier, Limits(), nursery, Turns(1)
+        )
         try:
             return drive_seed(stage, seed)
         except SandboxError as error:

@@ -22,6 +22,7 @@ def measure(
     wanted: RobustFlags,
     *,
     tier: str,
+    out: Path | None,
     judge: WarmJudge,
     console: Console,
 ) -> RobustReport:
@@ -34,13 +35,14 @@ def measure(
         TextColumn("{task.fields[successes]} reached"),
         TimeLeft(),
     )
-    bar = Progress(*columns, console=console, transient=True)
+    # Drawn where there is something new, and not ten times a second.
+    bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
     seen = (0, 0)
 
     def watch(episodes: int, successes: int) -> None:
         nonlocal seen
         seen = episodes, successes
-        bar.update(row, completed=episodes, successes=successes)
+        bar.update(row, completed=episodes, successes=successes, refresh=True)
 
     row = bar.add_task("", total=wanted.robust, successes=0)
     try:
@@ -54,6 +56,7 @@ def measure(
                 accept_at=wanted.accept_at,
                 margin=MARGIN if wanted.margin is None else wanted.margin,
                 tier=tier,
+                out=out,
                 judge=judge,
                 watch=watch,
             )

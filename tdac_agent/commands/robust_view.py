@@ -40,6 +40,11 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
         f"{report.successes} of {report.episodes} episodes reached the goal without a "
         f"contact{f' ({others})' if others else ''}; they took {report.seconds:.0f} s"
     )
+    if report.time_outs:
+        say(
+            f"[yellow]warning: {report.time_outs} of them timed out, also when tried "
+            "again alone; if this machine was busy, count again when it is not[/]"
+        )
     if report.interval is not None and report.rate is not None:
         say(_rate(report.rate, report.interval))
     if report.sequential is not None:

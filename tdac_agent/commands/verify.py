@@ -69,7 +69,7 @@ def run(
             from tdac_agent.commands.robust import measure
 
             measured = measure(
-                file, task, robust, tier=tier, judge=judge, console=console
+                file, task, robust, tier=tier, out=out, judge=judge, console=console
             )
     if as_json:
         sys.stdout.write(_json(report, robust, measured) + "\n")

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -268,6 +269,7 @@ def test_a_broken_controller_is_a_report(small_task, warm, source, reason):
     assert report.outcomes == {"error": 2}
     assert all(re.search(reason, episode.error) for episode in report.worst)
     assert report.interval.low == 0.0
+    assert report.time_outs == (2 if reason == "did not end within" else 0)
 
 
 def test_a_broken_sandbox_is_a_fault(small_task, good_source, warm):
@@ -394,15 +396,18 @@ def test_the_episode_of_a_suite_is_played_by_its_name(tdac, good):
 
 
 def test_robust_json(tdac, good):
-    """One object on stdout, with both reports; errors and progress elsewhere."""
+    """One object on stdout, with both reports, and in `--out` a file of each."""
     words = ["verify", good, "--profile", "policy", "--robust", 3, "--json"]
-    code, out, _ = tdac(*words, "--first-seed", 40)
+    code, out, _ = tdac(*words, "--first-seed", 40, "--out", "kept")
     content = json.loads(out)
     assert code == 0
     assert content["verdict"]["passed"]
     report = RobustReport.model_validate(content["robust"])
     assert report.provenance.first_seed == 40
     assert sorted(episode.seed for episode in report.worst) == [40, 41, 42]
+    kept = Path("kept", "robust.json").read_text()
+    assert RobustReport.model_validate_json(kept) == report
+    assert Path("kept", "report.json").is_file()
 
 
 def test_what_is_not_verified_is_not_disturbed(tdac, good):
