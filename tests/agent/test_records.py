@@ -30,7 +30,7 @@ def test_each_call_is_on_record_before_and_after(small_task, good_source, tmp_pa
     seen = []
 
     class Watcher:
-        name, paid = "watcher", False
+        name = "watcher"
         paid = False
 
         def complete(self, request):
