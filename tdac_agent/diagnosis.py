@@ -7,16 +7,11 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from tdac_agent.arrival import (
-    PROGRESS,
-    near_goal,
-    percent,
-    point,
-    why_no_arrival,
-)
+from tdac_agent.arrival import near_goal, why_no_arrival
 from tdac_agent.course import goal_bearing, heading_error, turned_away
 from tdac_agent.motion import forward, saturated
 from tdac_agent.report import Cause, Diagnosis
+from tdac_agent.stall import PROGRESS, percent, point
 from tdac_agent.touch import Touch, nearest_touch, side_of, where_on_the_wall
 from tdac_agent.trajectory import Rollout, Trajectory
 from tdac_envs.task2d import Map2DTask, Pose
