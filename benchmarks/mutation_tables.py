@@ -13,7 +13,7 @@ from typing import Any
 def write_csv(path: Path, rows: Sequence[Any]) -> None:
     """One line a mutant."""
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(asdict(rows[0])), lineterm="\n")
+        writer = csv.DictWriter(file, list(asdict(rows[0])), lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
 
