@@ -276,7 +276,8 @@ def play(
     episode: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option(
-            help="Episode of the suite: `nominal`, `jitter 1` …  [default: nominal]"
+            help="Episode of the suite, of its --seed 0: `nominal`, `jitter 1` …  "
+            "[default: nominal]"
         ),
     ] = None,
     seed: Annotated[

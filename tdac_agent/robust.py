@@ -17,8 +17,13 @@ from tdac_agent.files import write_atomic
 from tdac_agent.provenance import origin
 from tdac_agent.robust_report import RobustProvenance, RobustReport, summarise
 from tdac_agent.sandbox import Limits
-from tdac_agent.seeded import ENDING_FILE, EPISODES_FILE, Ending, SeededEpisode
-from tdac_agent.seeded import SeededJob as Job
+from tdac_agent.seeded import (
+    ENDING_FILE,
+    EPISODES_FILE,
+    Ending,
+    SeededEpisode,
+    SeededJob,
+)
 from tdac_agent.sequential import MARGIN, SequentialTest
 from tdac_agent.task import Task, portable_task_file, write_workdir
 from tdac_agent.verification import DEADLINE_SECONDS, read_source
@@ -77,7 +82,7 @@ def verify_robust(
     source = read_source(controller)
     with tempfile.TemporaryDirectory(prefix="tdac-robust-") as name:
         folder = Path(name)
-        job = Job(
+        job = SeededJob(
             task=folder / "work",
             controller=folder / "controller.py",
             disturbance=disturbance or Disturbance(),
@@ -102,7 +107,7 @@ def verify_robust(
 
 
 def _run(
-    job: Job,
+    job: SeededJob,
     task: Task,
     source: bytes,
     folder: Path,

@@ -60,19 +60,17 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
 def worst_table(report: RobustReport) -> Table:
     """The worst seeds: every failure up to a number, then the slowest successes."""
     first, failures = report.provenance.first_seed, len(report.failed_seeds)
-    shown = report.worst[: max(LEAST, min(failures, MOST))]
-    further = f", {failures - MOST} further failures" if failures > MOST else ""
-    table = Table(
-        title=f"Worst of the seeds {first} to {first + report.episodes - 1} (px)"
-        + further,
-        title_justify="left",
-    )
+    seeds = f"the seeds {first} to {first + report.episodes - 1} (px)"
+    title = f"Worst of {seeds}" if failures else f"No failure; the slowest of {seeds}"
+    if failures > MOST:
+        title += f", {failures - MOST} further failures"
+    table = Table(title=title, title_justify="left")
     table.add_column("seed", justify="right")
     table.add_column("outcome")
-    for name in ("steps", "path left", "from step", "at"):
+    for name in ("steps", "path left", *(("from step", "at") if failures else ())):
         table.add_column(name, justify="right")
-    for episode in shown:
-        table.add_row(*_row(episode))
+    for episode in report.worst[: max(LEAST, min(failures, MOST))]:
+        table.add_row(*_row(episode)[: len(table.columns)])
     return table
 
 
