@@ -14,7 +14,7 @@ Every file starts with comment lines `# key: value` (further lines are indented)
     onto          file that the source is appended to
     repeat        `N TEXT`: the source ends with so many repetitions of a text
     hides         pattern that the feedback must not match
-    limits        `name=value` of the sandbox, where not the zoo's
+    limits        `name=value` of the sandbox, where not the zoo's (attacks') or the usual
 
 `@SECRET@`, `@TARGET@`, `@PACKAGE@`, `@TCP@`, `@UDP@` and `@UNIX@` in a source stand for
 a secret file, a folder to write to, the installed package, two ports, a socket file.
@@ -241,9 +241,10 @@ def _processes() -> dict[int, tuple[int, bytes]]:
 
 
 def _limits(case: Case) -> Limits:
+    """The usual ones for who shall pass; less patience with attacks."""
     words = [word.split("=") for word in case.header.get("limits", "").split()]
     changes = {name: type(getattr(LIMITS, name))(value) for name, value in words}
-    return replace(LIMITS, **changes)
+    return replace(Limits() if case.good else LIMITS, **changes)
 
 
 def differences(case: Case, result: Result) -> list[str]:
