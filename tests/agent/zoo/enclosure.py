@@ -14,7 +14,8 @@ Every file starts with comment lines `# key: value` (further lines are indented)
     onto          file that the source is appended to
     repeat        `N TEXT`: the source ends with so many repetitions of a text
     hides         pattern that the feedback must not match
-    limits        `name=value` of the sandbox, where not the zoo's (attacks') or the usual
+    limits        `name=value` of the sandbox, where not the zoo's (of attacks) or
+                  the usual ones
 
 `@SECRET@`, `@TARGET@`, `@PACKAGE@`, `@TCP@`, `@UDP@` and `@UNIX@` in a source stand for
 a secret file, a folder to write to, the installed package, two ports, a socket file.
