@@ -14,7 +14,7 @@ Every file starts with comment lines `# key: value` (further lines are indented)
     onto          file that the source is appended to
     repeat        `N TEXT`: the source ends with so many repetitions of a text
     hides         pattern that the feedback must not match
-    limits        `name=value` of the sandbox, where not the zoo's (of attacks) or
+    limits        `name=value` of the sandbox, where not the zoo's or the usual ones
                   the usual ones
 
 `@SECRET@`, `@TARGET@`, `@PACKAGE@`, `@TCP@`, `@UDP@` and `@UNIX@` in a source stand for
