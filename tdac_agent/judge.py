@@ -185,22 +185,22 @@ class Judge:
             reason = "not run, since the nominal episode failed"
             return self._skipped(name, "not run", reason)
         with self._turns.beside():
-            rollout = self._drive(name, steps, drive)
+            rollout = self.drive(name, steps, drive)
         if not rollout.timed_out:
             return rollout
         # It may be the machine's doing, or that of those beside it.
         with self._turns.alone():
-            return self._drive(name, steps, drive, final=True)
+            return self.drive(name, steps, drive, final=True)
 
     def drive(
-        self, name: str, steps: int | None = None, drive: str = "policy"
+        self,
+        name: str,
+        steps: int | None = None,
+        drive: str = "policy",
+        *,
+        final: bool = False,
     ) -> Rollout:
-        """Runs an episode in a fresh child; arguments as for `rollout`."""
-        return self._drive(name, steps, drive)
-
-    def _drive(
-        self, name: str, steps: int | None, drive: str, *, final: bool = False
-    ) -> Rollout:
+        """Runs an episode in a fresh child; arguments as for `rollout` and `_load`."""
         limit = steps if steps is not None else self.task.nominal.horizon
         record = Record(self.task.make_env(), self.start_pose(name), limit)
         if drive == "truncated run_episode":

@@ -96,6 +96,17 @@ def whole_number(name: str, value: float, least: int) -> int:
     return int(value)
 
 
+def check_reset_options(options: dict[str, Any]) -> None:
+    """Refuses options of `reset` that are neither a start nor a goal.
+
+    Raises:
+        TaskError: There is another one.
+    """
+    unknown = sorted(map(str, options.keys() - {"start", "goal"}))
+    if unknown:
+        raise TaskError(f"unknown reset options {unknown}; expected 'start' and 'goal'")
+
+
 def wheel_command(action: Any) -> tuple[tuple[float, float], bool]:
     """The wheel speeds of an action, clipped to [-1, 1], and whether they had to be.
 

@@ -170,6 +170,23 @@ def _is_edge(cells: BoolGrid, i: int, j: int) -> bool:
 
 
 @kernel()
+def free_way(rest: float, approach: float, curvature: float) -> float:
+    """Way that is surely free: to the root of `rest + approach h - curvature h^2 / 2`.
+
+    Args:
+        rest: Distance to the body.
+        approach: Rate at which it grows along the tangent, in [-1, 1].
+        curvature: Of the arc.
+    """
+    root = math.sqrt(approach * approach + 2.0 * curvature * rest)
+    if approach < 0.0:
+        return 2.0 * rest / (root - approach)
+    if curvature > 0.0:
+        return (approach + root) / curvature
+    return math.inf
+
+
+@kernel()
 def _travel(
     x: float,
     y: float,
@@ -210,13 +227,7 @@ def _travel(
             rest = SINK
         if rest <= _CLOSE:
             return way
-        root = math.sqrt(approach * approach + 2.0 * curvature * rest)
-        if approach < 0.0:
-            way += 2.0 * rest / (root - approach)
-        elif curvature > 0.0:
-            way += (approach + root) / curvature
-        else:
-            return limit
+        way += free_way(rest, approach, curvature)
         if way >= limit:
             return limit
         part = way / length

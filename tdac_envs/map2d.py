@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from tdac_envs.arguments import (
+    check_reset_options,
     not_negative,
     one_of,
     positive,
@@ -24,7 +25,7 @@ from tdac_envs.arguments import (
 from tdac_envs.errors import TaskError
 from tdac_envs.kernels import GOAL_X, GOAL_Y, drive, sense
 from tdac_envs.params import RobotParams
-from tdac_envs.render import Scene, Status
+from tdac_envs.render import Scene, Status, ending
 from tdac_envs.rewards import RewardWeights, step_reward
 from tdac_envs.source2d import MapSource, prepare
 from tdac_envs.task2d import (
@@ -313,11 +314,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         )
 
     def _draw_task(self, options: dict[str, Any]) -> Map2DTask:
-        unknown = sorted(map(str, options.keys() - {"start", "goal"}))
-        if unknown:
-            raise TaskError(
-                f"unknown reset options {unknown}; expected 'start' and 'goal'"
-            )
+        check_reset_options(options)
         task = self.nominal
         if options:
             start = (*options.get("start", task.start), task.start.heading)[:3]
@@ -378,12 +375,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
         self._trail.append((float(self._state[0]), float(self._state[1])))
-        if reached:
-            self._status = "reached"
-        elif collided:
-            self._status = "collision"
-        elif truncated:
-            self._status = "out of time"
+        self._status = ending(reached, collided, truncated) or self._status
         if self.render_mode == "human":
             self.render()
 

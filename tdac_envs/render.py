@@ -56,6 +56,15 @@ class Status(NamedTuple):
     outcome: str = ""
 
 
+def ending(reached: bool, collided: bool, truncated: bool) -> str:
+    """The outcome that a step brings, for `Status`."""
+    if reached:
+        return "reached"
+    if collided:
+        return "collision"
+    return "out of time" if truncated else ""
+
+
 class Scene:
     """What stays the same in an episode's frames, drawn once.
 

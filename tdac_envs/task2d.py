@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -107,7 +107,7 @@ class Map2DTask:
             goal = self.goal
         else:
             field = route(self.terrain, start[:2], goal, radius)
-        start = start._replace(heading=_wrapped(start.heading))
+        start = start._replace(heading=wrapped(start.heading))
         shortest = way(self.terrain, field, start.x, start.y)
         return replace(self, start=start, goal=goal, field=field, shortest=shortest)
 
@@ -139,7 +139,7 @@ def make_task(
             which and what to do.
     """
     begin = Pose(*finite_numbers("start", start, 3))
-    begin = begin._replace(heading=_wrapped(begin.heading))
+    begin = begin._replace(heading=wrapped(begin.heading))
     end = finite_point("goal", goal)
     dt = positive("dt", dt)
     check_stands(terrain, "start", begin.x, begin.y, robot.radius)
@@ -163,17 +163,32 @@ def make_task(
 
 def default_horizon(shortest: float, robot: RobotParams, dt: float) -> int:
     """Steps in which to drive `shortest` px: six times what it takes, or 2500."""
-    steps = 6.0 * shortest / (robot.max_wheel_speed * dt)
-    return max(MIN_HORIZON, math.ceil(min(steps, 2.0**62)))
+    return generous_horizon(shortest, robot.max_wheel_speed * dt)
+
+
+def generous_horizon(shortest: float, full_step: float) -> int:
+    """Six times the full-speed steps of a shortest path, or 2500; any one unit."""
+    return max(MIN_HORIZON, math.ceil(min(6.0 * shortest / full_step, 2.0**62)))
 
 
 def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
-    """A feasible start within one body radius of the nominal one, heading +- 0.5 rad.
+    """A feasible start within one body radius of the nominal, heading +- 0.5 rad."""
+    return jittered_pose(
+        task.start, task.robot.radius, random, lambda pose: _may_start(task, pose)
+    )
+
+
+def jittered_pose(
+    nominal: Pose,
+    reach: float,
+    random: np.random.Generator,
+    may_start: Callable[[Pose], bool],
+) -> Pose:
+    """A pose within `reach` of the nominal one that may be a start, heading +- 0.5 rad.
 
     The disc that is drawn from shrinks slowly; where the body fits nowhere but at the
     nominal start, only the heading changes.
     """
-    nominal, reach = task.start, task.robot.radius
     for _ in range(MAX_DRAWS):
         distance = reach * math.sqrt(random.random())
         bearing = random.uniform(-math.pi, math.pi)
@@ -181,9 +196,9 @@ def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
         pose = Pose(
             nominal.x + distance * math.cos(bearing),
             nominal.y + distance * math.sin(bearing),
-            _wrapped(nominal.heading + turn),
+            wrapped(nominal.heading + turn),
         )
-        if _may_start(task, pose):
+        if may_start(pose):
             return pose
         reach *= 0.98
     return nominal._replace(heading=pose.heading)
@@ -200,7 +215,7 @@ def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
     for _ in range(MAX_DRAWS):
         goal_y, goal_x = divmod(int(random.choice(connected)), width)
         start_y, start_x = divmod(int(random.choice(connected)), width)
-        heading = _wrapped(random.uniform(-math.pi, math.pi))
+        heading = wrapped(random.uniform(-math.pi, math.pi))
         start, goal = Pose(start_x, start_y, heading), (float(goal_x), float(goal_y))
         if not at_goal(task.terrain, goal, task.goal_tolerance, start_x, start_y):
             field = field_to(task.terrain, (goal_x, goal_y), task.robot.radius)
@@ -209,10 +224,10 @@ def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
     return task
 
 
-def _wrapped(heading: float) -> float:
+def wrapped(heading: float) -> float:
     """The same direction in (-pi, pi], for a heading of any size."""
-    wrapped = math.remainder(heading, 2.0 * math.pi)
-    return math.pi if wrapped <= -math.pi else wrapped
+    turn = math.remainder(heading, 2.0 * math.pi)
+    return math.pi if turn <= -math.pi else turn
 
 
 def _may_start(task: Map2DTask, pose: Pose) -> bool:

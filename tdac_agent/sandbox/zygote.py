@@ -7,7 +7,6 @@ one of them could have written.
 
 from __future__ import annotations
 
-import array
 import contextlib
 import errno
 import fcntl
@@ -229,7 +228,8 @@ def _pipes(
     theirs: contextlib.ExitStack, ours: contextlib.ExitStack
 ) -> tuple[list[int], list[int]]:
     """Ends for the child and for us: requests, answers, output, lifeline."""
-    inner, outer = array.array("i"), []
+    inner: list[int] = []
+    outer: list[int] = []
     for we_write in (True, False, False, True):
         ends = os.pipe()
         mine, other = ends[::-1] if we_write else ends
@@ -237,7 +237,7 @@ def _pipes(
         theirs.callback(os.close, other)
         outer.append(mine)
         inner.append(other)
-    return list(inner), outer
+    return inner, outer
 
 
 def _end(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.compiled import kernel
-from tdac_envs.contact import move, wrap_angle
+from tdac_envs.contact import free_way, move, wrap_angle
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, ROUND, Array, Index
 
 # As in `tdac_envs.contact`, but in metres: a disc in touch may get this much deeper
@@ -232,13 +232,7 @@ def _travel(
             rest = SINK
         if rest <= _CLOSE:
             return way
-        root = math.sqrt(approach * approach + 2.0 * curvature * rest)
-        if approach < 0.0:
-            way += 2.0 * rest / (root - approach)
-        elif curvature > 0.0:
-            way += (approach + root) / curvature
-        else:
-            return limit
+        way += free_way(rest, approach, curvature)
         if way >= limit:
             return limit
         share = way / length

@@ -14,6 +14,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tdac_envs.arguments import (
+    check_reset_options,
     finite_numbers,
     not_negative,
     one_of,
@@ -33,8 +34,7 @@ from tdac_envs.epuck.task import (
     make_task,
     random_task,
 )
-from tdac_envs.errors import TaskError
-from tdac_envs.render import Status
+from tdac_envs.render import Status, ending
 from tdac_envs.rewards import RewardWeights, step_reward
 
 if TYPE_CHECKING:
@@ -354,11 +354,7 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._seen.carry(self._visible, ground.centres, self._things)
 
     def _draw_task(self, options: dict[str, Any]) -> EPuckTask:
-        unknown = sorted(map(str, options.keys() - {"start", "goal"}))
-        if unknown:
-            raise TaskError(
-                f"unknown reset options {unknown}; expected 'start' and 'goal'"
-            )
+        check_reset_options(options)
         task = self.nominal
         if options:
             start = tuple(options.get("start", task.start))
@@ -441,13 +437,7 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
         self._trail.append((float(self._state[0]), float(self._state[1])))
-        self._status = ""
-        if reached:
-            self._status = "reached"
-        elif collided:
-            self._status = "collision"
-        elif truncated:
-            self._status = "out of time"
+        self._status = ending(reached, collided, truncated)
         if self.render_mode == "human":
             self.render()
 

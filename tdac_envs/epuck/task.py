@@ -24,7 +24,13 @@ from tdac_envs.epuck.paths import (
 )
 from tdac_envs.errors import TaskError
 from tdac_envs.plan import Path
-from tdac_envs.task2d import JITTER_HEADING, MAX_DRAWS, MIN_HORIZON, Pose
+from tdac_envs.task2d import (
+    MAX_DRAWS,
+    Pose,
+    generous_horizon,
+    jittered_pose,
+    wrapped,
+)
 
 TOLERANCE = 0.02
 """m, as the paper has it."""
@@ -81,7 +87,7 @@ class EPuckTask:
         field = self.field
         if goal != self.goal:
             field = route(self.ground, start[:2], goal)
-        start = start._replace(heading=_wrapped(start.heading))
+        start = start._replace(heading=wrapped(start.heading))
         shortest = way(self.ground, field, start[:2])
         return replace(self, start=start, goal=goal, field=field, shortest=shortest)
 
@@ -113,7 +119,7 @@ def make_task(
             which and what to do.
     """
     begin = Pose(*finite_numbers("start", start, 3))
-    begin = begin._replace(heading=_wrapped(begin.heading))
+    begin = begin._replace(heading=wrapped(begin.heading))
     end = finite_point("goal", goal)
     tolerance = positive("goal_tolerance", goal_tolerance)
     limit, dt = positive("max_wheel_speed", max_wheel_speed), positive("dt", dt)
@@ -134,8 +140,7 @@ def make_task(
 
 def default_horizon(task: EPuckTask) -> int:
     """Steps for a task: six times what its shortest path takes, or 2500."""
-    steps = 6.0 * task.shortest / task.full_step
-    return max(MIN_HORIZON, math.ceil(min(steps, 2.0**62)))
+    return generous_horizon(task.shortest, task.full_step)
 
 
 def way(ground: Ground, field: NDArray[np.float32], at: Point) -> float:
@@ -148,25 +153,10 @@ def way(ground: Ground, field: NDArray[np.float32], at: Point) -> float:
 
 
 def jittered_start(task: EPuckTask, random: np.random.Generator) -> Pose:
-    """A feasible start within one body radius of the nominal one, heading +- 0.5 rad.
-
-    The disc that is drawn from shrinks slowly; where the body fits nowhere but at the
-    nominal start, only the heading changes.
-    """
-    nominal, reach = task.start, BODY_RADIUS
-    for _ in range(MAX_DRAWS):
-        distance = reach * math.sqrt(random.random())
-        bearing = random.uniform(-math.pi, math.pi)
-        turn = random.uniform(-JITTER_HEADING, JITTER_HEADING)
-        pose = Pose(
-            nominal.x + distance * math.cos(bearing),
-            nominal.y + distance * math.sin(bearing),
-            _wrapped(nominal.heading + turn),
-        )
-        if _may_start(task, pose):
-            return pose
-        reach *= 0.98
-    return nominal._replace(heading=pose.heading)
+    """A feasible start within one body radius of the nominal, heading +- 0.5 rad."""
+    return jittered_pose(
+        task.start, BODY_RADIUS, random, lambda pose: _may_start(task, pose)
+    )
 
 
 def random_task(task: EPuckTask, random: np.random.Generator) -> EPuckTask:
@@ -178,7 +168,7 @@ def random_task(task: EPuckTask, random: np.random.Generator) -> EPuckTask:
     connected = np.flatnonzero(np.isfinite(task.field))
     for _ in range(MAX_DRAWS):
         ends = [_place(task, int(random.choice(connected))) for _ in range(2)]
-        heading = _wrapped(random.uniform(-math.pi, math.pi))
+        heading = wrapped(random.uniform(-math.pi, math.pi))
         goal, start = (ground.at(*end) for end in ends)
         if not at_goal(ground, goal, task.goal_tolerance, *start):
             field = field_to(ground, ends[0])
@@ -196,12 +186,6 @@ def random_task(task: EPuckTask, random: np.random.Generator) -> EPuckTask:
 def _place(task: EPuckTask, index: int) -> tuple[int, int]:
     row, column = divmod(index, task.field.shape[1])
     return column, row
-
-
-def _wrapped(heading: float) -> float:
-    """The same direction in (-pi, pi], for a heading of any size."""
-    wrapped = math.remainder(heading, 2.0 * math.pi)
-    return math.pi if wrapped <= -math.pi else wrapped
 
 
 def _may_start(task: EPuckTask, pose: Pose) -> bool:
