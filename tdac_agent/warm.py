@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -80,12 +81,13 @@ class WarmJudge:
             Fault: The judge did not start, or the job took too long.
         """
         worker = int(self._line(START_SECONDS))
-        os.write(self._server.requests, f"{request}\n".encode())
         try:
+            os.write(self._server.requests, f"{request}\n".encode())
             self._line(seconds, meanwhile)
         except BaseException:
             # A worker leads a process group; its children end with it.
-            os.killpg(worker, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # just ended by itself
+                os.killpg(worker, signal.SIGKILL)
             self._line(FAREWELL_SECONDS)
             raise
 
