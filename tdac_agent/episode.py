@@ -16,8 +16,8 @@ from tdac_agent.sandbox import (
     ControllerTimeout,
     EnvRefusalError,
 )
+from tdac_agent.setting import JudgedEnv, Observation
 from tdac_agent.trajectory import Outcome, Rollout, Trajectory
-from tdac_envs.map2d import Map2DEnv, Observation
 from tdac_envs.task2d import Pose
 
 # A policy is cut off when its mean call is this many times too slow.
@@ -40,7 +40,7 @@ class Record:
         seed: Of the environment's random numbers.
     """
 
-    env: Map2DEnv
+    env: JudgedEnv
     start: Pose | None
     max_steps: int
     truncates: bool = False
@@ -102,14 +102,14 @@ class Record:
             np.array(self._distances, np.float64),
             np.array(self._ranges, np.float32),
             self._collisions,
-            self.env.task.dt,
+            self.env.nominal.dt,
         )
 
     def _note(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
         """Writes a moment down; returns what the controller may know of it."""
         self._poses.append(self.env.pose())
         self._distances.append(info["path_distance"])
-        self._ranges.append(observation["ranges"])
+        self._ranges.append(observation[self.env.readings])
         self._collisions = self.collisions_before + info["collisions"]
         return {**info, "collisions": self._collisions}
 
@@ -167,7 +167,7 @@ def run_policy(
             action = child.policy(observation)
             calls.append(time.perf_counter() - began)
             observation = record.step(action)[0]
-            error = _too_slow(calls, record.env.task.dt)
+            error = _too_slow(calls, record.env.nominal.dt)
             if time.monotonic() > deadline:
                 error = "stopped: the verification as a whole took too long"
             if error is not None:
@@ -234,7 +234,7 @@ def _rollout(
         outcome="error" if error is not None else record.outcome or "stopped",
         trajectory=record.trajectory(),
         goal=task.goal,
-        radius=task.robot.radius,
+        radius=task.body_radius,
         tolerance=task.goal_tolerance,
         error=None if error is None else str(error),
         call_ms=(mean, float(np.percentile(times, 99))),

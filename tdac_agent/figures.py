@@ -13,6 +13,7 @@ from tdac_agent.course import way_from
 from tdac_agent.files import write_atomic
 from tdac_agent.report import Diagnosis, Episode, Report
 from tdac_agent.task import Task
+from tdac_agent.task_map2d import map_setting
 from tdac_agent.touch import nearest_touch
 from tdac_agent.trajectory import Trajectory
 from tdac_envs.canvas import Image
@@ -38,7 +39,7 @@ def draw_trajectories(
         outcomes: By episode name.
         path: The file.
     """
-    nominal = task.nominal
+    nominal = map_setting(task.setting).nominal
     picture = trajectory_picture(
         nominal.terrain.grid.cells,
         [trajectory.poses for trajectory in trajectories.values()],
@@ -65,6 +66,7 @@ def draw_failures(
         folder: Where to; it must exist.
     """
     background, files = None, []
+    nominal = map_setting(task.setting).nominal
     for episode in report.episodes:
         trajectory = trajectories.get(episode.name)
         # A file may hold another run of that start, one driven by `run_episode`.
@@ -72,9 +74,9 @@ def draw_failures(
             continue
         if episode.outcome in ("reached", "not run"):
             continue
-        background = background or Background.of(task.nominal)
+        background = background or Background.of(nominal)
         diagnosis = _diagnosis_of(report, episode)
-        event = event_of(task.nominal, trajectory, episode, diagnosis)
+        event = event_of(nominal, trajectory, episode, diagnosis)
         picture = run_picture(background, trajectory.poses, event)
         files.append(folder / f"{file_stem(episode.name)}.png")
         _write(picture, files[-1])

@@ -276,7 +276,7 @@ class Judge:
             outcome,
             record.trajectory(),
             task.goal,
-            task.robot.radius,
+            task.body_radius,
             task.goal_tolerance,
             error=reason,
         )

@@ -14,6 +14,7 @@ from tdac_agent.hygiene import FORBIDDEN_ATTRIBUTES, FORBIDDEN_CALLS
 from tdac_agent.report import Report
 from tdac_agent.rules import RepairRule, render_block
 from tdac_agent.task import SENSORS_FILE, Task
+from tdac_agent.task_map2d import map_setting
 from tdac_envs.map2d import Map2DEnv
 
 
@@ -30,7 +31,7 @@ def _templates() -> Environment:
 
 def generate_prompt(task: Task, rules: tuple[RepairRule, ...]) -> str:
     """The question for a new controller (Listing 1 of the paper, for `policy(obs)`)."""
-    nominal, progress = task.nominal, task.spec.progress
+    nominal, progress = map_setting(task.setting).nominal, task.spec.progress
     sections = _docstring_sections()
     context = {
         "env_description": sections["Description"],

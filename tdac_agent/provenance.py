@@ -32,7 +32,7 @@ def origin(
     return {
         "task": task.name,
         "task_sha256": task.sha256(),
-        "map_sha256": task.nominal.terrain.grid.sha256(),
+        "map_sha256": task.setting.world_sha256(),
         "params_sha256": sha256_of(task.params.model_dump_json().encode()),
         "sensors_sha256": sha256_of((workdir / "sensors.py").read_bytes()),
         "controller_sha256": sha256_of(source),

@@ -103,7 +103,7 @@ class Recorder:
     _previous: str = ""
 
     def start(self, task: Task) -> None:
-        """Makes the folder: task, map image, suite, working files, empty journal."""
+        """Makes the folder: task, original, suite, working files, empty journal."""
         folder = self.run.folder
         write_workdir(folder, task)
         write_atomic(
@@ -112,9 +112,9 @@ class Recorder:
         if task.suite is not None:
             ignored = shutil.ignore_patterns("__pycache__")
             shutil.copytree(task.suite, folder / OWN_SUITE, ignore=ignored)
-        if task.image is not None:
-            copy = folder / f"map{task.image.suffix}"
-            write_atomic(copy, task.image.read_bytes())
+        original = task.setting.original
+        if original is not None:
+            write_atomic(folder / original.name, original.file.read_bytes())
         self.event("run.start", task=task.name, learner=self.run.learner)
         self.save()
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tdac_envs.task2d import JITTER_HEADING, Map2DTask, Pose, jittered_start
+from tdac_agent.setting import Nominal
+from tdac_envs.task2d import JITTER_HEADING, Pose
 
 DRAWS = 64
 # Signs of the offset in x, in y and of the turn. Each pair of two signs comes once, so
@@ -12,7 +13,7 @@ DRAWS = 64
 CORNERS = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
 
 
-def spread_starts(task: Map2DTask, seed: int, count: int) -> tuple[Pose, ...]:
+def spread_starts(task: Nominal, seed: int, count: int) -> tuple[Pose, ...]:
     """Starts of the jitter variation, the first four of them at its margins.
 
     A controller that fails at a margin would often pass a few independent starts.
@@ -25,7 +26,7 @@ def spread_starts(task: Map2DTask, seed: int, count: int) -> tuple[Pose, ...]:
         count: Number of starts.
     """
     random = np.random.default_rng(seed)
-    drawn = [jittered_start(task, random) for _ in range(DRAWS + count)]
+    drawn = [task.jittered(random) for _ in range(DRAWS + count)]
     offsets = np.array([_offset(task, pose) for pose in drawn[:DRAWS]])
     # The disc's rim in a diagonal direction, and the greatest turn.
     corners = np.array(CORNERS[:count]) * (np.sqrt(0.5), np.sqrt(0.5), 1.0)
@@ -36,9 +37,9 @@ def spread_starts(task: Map2DTask, seed: int, count: int) -> tuple[Pose, ...]:
     return tuple((at_margins + drawn[DRAWS:])[:count])
 
 
-def _offset(task: Map2DTask, pose: Pose) -> tuple[float, float, float]:
+def _offset(task: Nominal, pose: Pose) -> tuple[float, float, float]:
     """Where a start lies in the variation: each entry in [-1, 1]."""
-    nominal, radius = task.start, task.robot.radius
+    nominal, radius = task.start, task.body_radius
     turn = np.remainder(pose.heading - nominal.heading + np.pi, 2 * np.pi) - np.pi
     return (
         (pose.x - nominal.x) / radius,

@@ -15,6 +15,7 @@ from tdac_agent.records import Event, Recorder, Run
 from tdac_agent.report import Report
 from tdac_agent.suite_check import prove_suite
 from tdac_agent.task import Task
+from tdac_agent.task_map2d import map_setting
 from tdac_agent.verification import load_trajectories, verify
 from tdac_agent.warm import WarmJudge
 from tdac_envs.errors import TaskError
@@ -127,7 +128,8 @@ def _provider(given: str | Provider, task: Task) -> Provider:
         return given
     if given != "builtin":
         raise TaskError(f"unknown learner {given!r}; available: 'builtin' (no model)")
-    return Builtin(task.nominal, task.params)
+    setting = map_setting(task.setting)
+    return Builtin(setting.nominal, setting.params)
 
 
 def _recorder(

@@ -11,8 +11,17 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_envs.errors import TaskError
 from tdac_envs.maps import bundled_maps
+from tdac_envs.worlds import bundled_worlds
 
 Profile = Literal["policy", "paper"]
+EnvName = Literal["TDAC-Map2D-v0", "TDAC-EPuck-v0"]
+MAP2D: EnvName = "TDAC-Map2D-v0"
+EPUCK: EnvName = "TDAC-EPuck-v0"
+OWN_KEYS: dict[EnvName, tuple[str, ...]] = {
+    MAP2D: ("map", "robot", "snap"),
+    EPUCK: ("world", "ignore", "left_out"),
+}
+"""Keys of a task file that mean something in one environment only."""
 
 
 class _Strict(BaseModel):
@@ -44,14 +53,23 @@ class TaskFile(_Strict):
 
     schema_version: Literal[1] = Field(1, alias="schema")
     name: str | None = Field(None, description="For people.")
-    env: Literal["TDAC-Map2D-v0"] = "TDAC-Map2D-v0"
+    env: EnvName = MAP2D
     map: str = Field("maze", description="Bundled name, or a path beside this file.")
+    world: str = Field("arena", description="The same of a Webots world.")
+    ignore: tuple[str, ...] = Field(
+        (), description="Nodes of the world that may be solid and are left out."
+    )
+    left_out: tuple[str, ...] = Field(
+        (), description="Nodes that were left out when the world was written."
+    )
     robot: RobotSpec = RobotSpec()
     start: tuple[float, float] | tuple[float, float, float] | None = None
     goal: tuple[float, float] | None = None
     snap: bool = Field(False, description="Move start and goal to a free place.")
-    tolerance: float | None = Field(None, gt=0, description="px")
-    dt: float = Field(0.05, gt=0, description="s")
+    tolerance: float | None = Field(None, gt=0, description="px; e-puck: m")
+    dt: float | None = Field(
+        None, gt=0, description="s; default 0.05, e-puck: the world's basicTimeStep."
+    )
     horizon: int | None = Field(None, gt=0, description="steps")
     progress: ProgressSpec = ProgressSpec()
     variation: Literal["nominal", "jitter", "random"] = "jitter"
@@ -75,8 +93,9 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
     try:
         data = yaml.safe_load(path.read_text())
     except OSError as error:
-        names = ", ".join(bundled_maps())
-        close = difflib.get_close_matches(str(asked), bundled_maps(), n=1)
+        known = bundled_tasks()
+        names = ", ".join(known)
+        close = difflib.get_close_matches(str(asked), known, n=1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
         raise TaskError(
             f"no task {str(asked)!r}: {error.strerror}{hint}; bundled tasks: {names}"
@@ -100,8 +119,35 @@ def checked(data: dict[str, Any], source: str) -> TaskFile:
         TaskError: A key is wrong or unknown; the message names it.
     """
     try:
-        return TaskFile.model_validate(data)
+        spec = TaskFile.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise TaskError(f"{source}: {where}: {first['msg']}") from error
+    for env, keys in OWN_KEYS.items():
+        for key in spec.model_fields_set.intersection(keys):
+            if env != spec.env:
+                raise TaskError(f"{source}: {key}: only with env: {env}")
+    return spec
+
+
+def bundled_tasks() -> tuple[str, ...]:
+    """Names of the bundled tasks: the maps, then the e-puck's worlds."""
+    return (*bundled_maps(), *_worlds())
+
+
+def bundled_task(name: str) -> TaskFile | None:
+    """Contents of a bundled task, or None where there is none of that name.
+
+    A map's task is called as the map; `epuck` is the world `arena`, `epuck-maze` the
+    world `maze`.
+    """
+    if name in bundled_maps():
+        return TaskFile(map=name)
+    world = _worlds().get(name)
+    return None if world is None else TaskFile(env=EPUCK, world=world)
+
+
+def _worlds() -> dict[str, str]:
+    default, *others = bundled_worlds()
+    return {"epuck": default, **{f"epuck-{name}": name for name in others}}

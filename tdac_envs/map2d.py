@@ -123,6 +123,8 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         "render_modes": ["rgb_array", "human"],
         "render_fps": 20,
     }
+    readings = "ranges"
+    """Key of the distance sensors in an observation."""
 
     def __init__(
         self,

@@ -83,6 +83,20 @@ class Map2DTask:
         rest = (self.robot, self.goal_tolerance, self.dt, self.horizon)
         return _restored, (self.terrain, self.start, self.goal, *rest)
 
+    @property
+    def body_radius(self) -> float:
+        """Of the disc, px."""
+        return self.robot.radius
+
+    @property
+    def full_step(self) -> float:
+        """Way of one step at full speed, px."""
+        return self.robot.max_wheel_speed * self.dt
+
+    def jittered(self, random: np.random.Generator) -> Pose:
+        """A start of the jitter variation; see `jittered_start`."""
+        return jittered_start(self, random)
+
     def path_from(self, start: Pose) -> Path:
         """Shortest path for the body, shape (n, 2); starts at the given point.
 

@@ -21,8 +21,8 @@ from tdac_agent.nursery import Nursery
 from tdac_agent.sandbox import Limits, SandboxError
 from tdac_agent.seeded import Driven, Stage, drive_seed
 from tdac_agent.task import Task, write_workdir
+from tdac_agent.task_map2d import map_setting
 from tdac_agent.trajectory import Rollout
-from tdac_agent.turns import Turns
 from tdac_agent.verification import read_source
 from tdac_envs.errors import TaskError
 from tdac_envs.render import Scene, Status
@@ -93,9 +93,7 @@ def drive_disturbed(
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work, nursery = Path(folder), Nursery(ahead=False)
         write_workdir(work, task)
-        stage = Stage(
-            task, source, work, disturbance, tier, Limits(), nursery, Turns(1)
-        )
+        stage = Stage(task, source, work, disturbance, tier, Limits(), nursery)
         try:
             return drive_seed(stage, seed)
         except SandboxError as error:
@@ -106,7 +104,8 @@ def drive_disturbed(
 
 def frames(task: Task, rollout: Rollout) -> Iterator[NDArray[np.uint8]]:
     """A frame for every second step, and the last one."""
-    nominal, trajectory = task.nominal, rollout.trajectory
+    setting, trajectory = map_setting(task.setting), rollout.trajectory
+    nominal = setting.nominal
     start = trajectory.poses[0]
     scene = Scene(
         nominal.terrain.grid.cells,
@@ -115,7 +114,7 @@ def frames(task: Task, rollout: Rollout) -> Iterator[NDArray[np.uint8]]:
         goal_tolerance=nominal.goal_tolerance,
         robot=nominal.robot,
         path=nominal.path_from(nominal.start),
-        robot_image=task.robot_image,
+        robot_image=setting.robot_image,
     )
     last = trajectory.steps
     gaps = rollout.distances("euclidean")

@@ -18,6 +18,7 @@ from tdac_agent.errors import ControllerFileError
 from tdac_agent.records import Run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
+from tdac_agent.task_map2d import map_setting
 from tdac_agent.verification import read_source
 
 
@@ -141,14 +142,14 @@ def _heading(task: Task, learner: str) -> str:
     model = " (a tuned template, no language model)" if learner == "builtin" else ""
     return (
         f"task [bold]{escape(task.name)}[/]: {nominal.shortest:.0f} px for a disc of "
-        f"{nominal.robot.radius:g} px, at most {nominal.horizon} steps; learner "
+        f"{nominal.body_radius:g} px, at most {nominal.horizon} steps; learner "
         f"[bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
     )
 
 
 def _remarks(task: Task) -> list[str]:
     """How the map was read, and what a person should look at."""
-    params = task.params
+    params = map_setting(task.setting).params
     lines = [f"\nmap: {params.polarity} obstacles, {escape(params.method)}"]
     if params.method == "given":
         lines = []

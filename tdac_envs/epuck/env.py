@@ -133,6 +133,8 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
         "render_modes": ["rgb_array", "human"],
         "render_fps": 31,
     }
+    readings = "ps"
+    """Key of the distance sensors in an observation."""
 
     def __init__(
         self,

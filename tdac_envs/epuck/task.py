@@ -68,9 +68,18 @@ class EPuckTask:
         return _restored, (self.ground, self.start, self.goal, *rest)
 
     @property
+    def body_radius(self) -> float:
+        """Of the disc, m."""
+        return BODY_RADIUS
+
+    @property
     def full_step(self) -> float:
         """Way of one step at full speed, m."""
         return self.max_wheel_speed * WHEEL_RADIUS * self.dt
+
+    def jittered(self, random: np.random.Generator) -> Pose:
+        """A start of the jitter variation; see `jittered_start`."""
+        return jittered_start(self, random)
 
     def path_from(self, start: Pose) -> Path:
         """Shortest path for the body, shape (n, 2), m; empty where there is none."""

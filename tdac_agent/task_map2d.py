@@ -1,0 +1,171 @@
+"""Tasks on maps: what is theirs alone of a `task.yaml` and of a working folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from tdac_agent.setting import Original, Setting
+from tdac_agent.task_file import RobotSpec, TaskFile
+from tdac_envs.errors import TaskError
+from tdac_envs.grid import OccupancyGrid
+from tdac_envs.map2d import Map2DEnv
+from tdac_envs.map_folder import write_grid
+from tdac_envs.maps import bundled_maps
+from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.render import ROBOT_IMAGE
+from tdac_envs.source2d import prepare
+from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
+
+DT = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Map2DSetting:
+    """A map with a start, a goal and a robot.
+
+    Attributes:
+        params: Of the map, start, goal and robot filled in.
+        nominal: The feasible task.
+        image: Map image, where there is one.
+        robot_image: Picture of the robot.
+    """
+
+    params: MapParams
+    nominal: Map2DTask
+    image: Path | None
+    robot_image: Path
+
+    @property
+    def original(self) -> Original | None:
+        """The map image."""
+        if self.image is None:
+            return None
+        return Original(f"map{self.image.suffix}", self.image)
+
+    @property
+    def suite(self) -> str:
+        """Table I."""
+        return "map2d"
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Nothing: a map is all there is."""
+        return ()
+
+    def env_kwargs(self) -> dict[str, Any]:
+        """Arguments that make this task's environment; see `Map2DEnv`."""
+        nominal, robot = self.nominal, self.nominal.robot
+        return {
+            "map": nominal.terrain.grid.cells,
+            "start": tuple(nominal.start),
+            "goal": nominal.goal,
+            "robot_radius": robot.radius,
+            "axle_length": robot.axle_length,
+            "max_wheel_speed": robot.max_wheel_speed,
+            "n_rays": robot.n_rays,
+            "field_of_view": robot.field_of_view_deg,
+            "range_max": robot.range_max,
+            "dt": nominal.dt,
+            "horizon": nominal.horizon,
+            "goal_tolerance": nominal.goal_tolerance,
+        }
+
+    def make_env(self, **options: Any) -> Map2DEnv:
+        """The environment of this task; options as for `Map2DEnv`."""
+        return Map2DEnv(**{**self.env_kwargs(), **options})
+
+    def facts(self) -> dict[str, Any]:
+        """The arguments, the map by its hash."""
+        return {**self.env_kwargs(), "map": self.world_sha256()}
+
+    def world_sha256(self) -> str:
+        """Hash of the grid."""
+        return self.nominal.terrain.grid.sha256()
+
+    def write_files(self, folder: Path) -> None:
+        """Writes `params.json`, `occupancy.npy`, `occupancy.png` and `robot.png`."""
+        write_grid(folder, self.nominal.terrain.grid, self.params)
+        (folder / "robot.png").write_bytes(self.robot_image.read_bytes())
+
+    def portable(self) -> dict[str, Any]:
+        """The map is the folder's own grid."""
+        robot = self.nominal.robot
+        return {
+            "map": ".",
+            "robot": {
+                "radius": robot.radius,
+                "axle": robot.axle_length,
+                "max_wheel_speed": robot.max_wheel_speed,
+                "n_rays": robot.n_rays,
+                "field_of_view": robot.field_of_view_deg,
+                "range_max": robot.range_max,
+                "image": "robot.png",
+            },
+        }
+
+
+def map_setting(setting: Setting) -> Map2DSetting:
+    """The setting, which must be a map.
+
+    Raises:
+        TaskError: It is a world.
+    """
+    if isinstance(setting, Map2DSetting):
+        return setting
+    raise TaskError("this is not there yet for TDAC-EPuck-v0")
+
+
+def open_map(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
+    """The map's name, and the feasible task on it.
+
+    Args:
+        spec: Contents of the task file.
+        base: Folder that relative paths refer to.
+
+    Raises:
+        MapError: The map cannot be used.
+        TaskError: The task cannot be done, or the robot's picture is none.
+    """
+    bundled = spec.map in bundled_maps()
+    prepared = prepare(
+        spec.map if bundled else str(base / spec.map),
+        spec.start,
+        spec.goal,
+        robot_radius=spec.robot.radius,
+        snap=spec.snap,
+    )
+    params = _with_robot(prepared.params, spec.robot)
+    nominal = _feasible(prepared.grid, params, spec)
+    robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
+    if not robot_image.is_file():
+        raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
+    if not cv2.haveImageReader(str(robot_image)):
+        raise TaskError(f"the robot image {str(robot_image)!r} is not a PNG or JPEG")
+    name = spec.map if bundled else Path(spec.map).stem
+    return name, Map2DSetting(params, nominal, prepared.image, robot_image)
+
+
+def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
+    given = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
+    fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
+    changes = {fields.get(key, key): value for key, value in given.items()}
+    robot = RobotParams(**{**params.robot.model_dump(), **changes})
+    return params.model_copy(update={"robot": robot})
+
+
+def _feasible(grid: OccupancyGrid, params: MapParams, spec: TaskFile) -> Map2DTask:
+    assert params.start is not None
+    assert params.goal is not None
+    return make_task(
+        Terrain.of(grid),
+        Pose(*params.start, params.heading),
+        params.goal,
+        params.robot,
+        dt=DT if spec.dt is None else spec.dt,
+        goal_tolerance=spec.tolerance,
+        horizon=spec.horizon,
+    )
