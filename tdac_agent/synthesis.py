@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from pathlib import Path
 
-from tdac_agent.builtin import Builtin
+from tdac_agent.builtin import builtin_for
 from tdac_agent.dialogue import Candidate, Dialogue
 from tdac_agent.errors import RunError
 from tdac_agent.figures import draw_trajectories
@@ -15,7 +15,6 @@ from tdac_agent.records import Event, Recorder, Run
 from tdac_agent.report import Report
 from tdac_agent.suite_check import prove_suite
 from tdac_agent.task import Task
-from tdac_agent.task_map2d import map_setting
 from tdac_agent.verification import load_trajectories, verify
 from tdac_agent.warm import WarmJudge
 from tdac_envs.errors import TaskError
@@ -128,8 +127,7 @@ def _provider(given: str | Provider, task: Task) -> Provider:
         return given
     if given != "builtin":
         raise TaskError(f"unknown learner {given!r}; available: 'builtin' (no model)")
-    setting = map_setting(task.setting)
-    return Builtin(setting.nominal, setting.params)
+    return builtin_for(task.setting)
 
 
 def _recorder(

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Generic
+
 from tdac_agent.builtin.parameters import (
+    EPuckParameters,
+    P,
     Parameters,
     read_parameters,
-    render_controller,
 )
 from tdac_agent.builtin.repair import (
     learn_bounds,
@@ -13,40 +18,62 @@ from tdac_agent.builtin.repair import (
     repair,
     write_rules,
 )
-from tdac_agent.provider import Reply, Request
-from tdac_envs.params import MapParams
-from tdac_envs.task2d import Map2DTask
+from tdac_agent.builtin.templates import render_controller, render_epuck
+from tdac_agent.provider import Provider, Reply, Request
+from tdac_agent.setting import Setting
 
-__all__ = ["Builtin", "Parameters", "read_parameters", "render_controller"]
+__all__ = [
+    "Builtin",
+    "EPuckParameters",
+    "Parameters",
+    "builtin_for",
+    "read_parameters",
+    "render_controller",
+    "render_epuck",
+]
 
 
-class Builtin:
+def builtin_for(setting: Setting) -> Provider:
+    """The provider for a task's setting."""
+    if setting.suite == "epuck":
+        from tdac_agent.task_epuck import EPuckSetting
+
+        assert isinstance(setting, EPuckSetting)
+        return Builtin(EPuckParameters, partial(render_epuck, task=setting.nominal))
+    from tdac_agent.task_map2d import map_setting
+
+    own = map_setting(setting)
+    robot, dt = own.params.robot, own.nominal.dt
+    return Builtin(Parameters, partial(render_controller, robot=robot, dt=dt))
+
+
+class Builtin(Generic[P]):
     """Learner and optimizer that fill in and tune a parametrised controller.
 
     It sees what a model sees: the question, the rules, the controller and the
     report. Everything it learns passes through the rules.
 
     Args:
-        task: Gives the duration of a step.
-        params: The map's `params.json`; gives the robot.
+        kind: Of the parameters; its defaults are the first values.
+        render: Source of the controller with some parameters.
     """
 
     name = "builtin"
     paid = False
 
-    def __init__(self, task: Map2DTask, params: MapParams) -> None:
-        self.dt = task.dt
-        self.robot = params.robot
+    def __init__(self, kind: type[P], render: Callable[[P], str]) -> None:
+        self.kind = kind
+        self.render = render
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
         if request.kind == "generate":
-            parameters, _ = read_rules(request.rules)
+            parameters, _ = read_rules(request.rules, self.kind)
             return Reply(self._file(parameters), notes=(_describe(parameters),))
         if request.report is None:
             raise ValueError(f"a request to {request.kind} needs a report")
-        remembered, bounds = read_rules(request.rules)
-        known = read_parameters(request.controller or "")
+        remembered, bounds = read_rules(request.rules, self.kind)
+        known = read_parameters(request.controller or "", self.kind)
         failed = remembered if known is None else known
         bounds = learn_bounds(bounds, failed, request.report)
         _, k, j = request.sample
@@ -61,11 +88,10 @@ class Builtin:
             return Reply("\n".join(f"- {rule}" for rule in rules), notes=tuple(notes))
         return Reply(self._file(parameters), notes=tuple(notes))
 
-    def _file(self, parameters: Parameters) -> str:
-        source = render_controller(parameters, self.robot, self.dt)
-        return f"```python\n{source}```\n"
+    def _file(self, parameters: P) -> str:
+        return f"```python\n{self.render(parameters)}```\n"
 
 
-def _describe(parameters: Parameters) -> str:
-    neutral = Parameters()
-    return "neutral parameters" if parameters == neutral else f"{parameters}"
+def _describe(parameters: P) -> str:
+    neutral = parameters == type(parameters)()
+    return "neutral parameters" if neutral else f"{parameters}"

@@ -1,30 +1,64 @@
-"""What of the template can be tuned, and the way into a controller and back."""
+"""What of the templates can be tuned, and the way out of a controller again."""
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from importlib.resources import files
-from typing import Any
-
-import jinja2
-
-from tdac_envs.params import RobotParams
+from typing import Any, ClassVar, Protocol, TypeVar
 
 
-def _tunable(neutral: float, low: float, high: float, unit: str, meaning: str) -> float:
-    """A field with its bounds, as metadata, for the template and the repair table."""
-    about = {"low": low, "high": high, "unit": unit, "meaning": meaning}
-    value: float = field(default=neutral, metadata=about)
+class Tuned(Protocol):
+    """Values of the tuning constants of a template; the defaults are neutral.
+
+    The constants in the file have the same names, in capitals.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def inflation_margin(self) -> float:
+        """Room wanted beside the body."""
+
+
+P = TypeVar("P", bound=Tuned)
+
+
+def _tunable(
+    neutral: float,
+    low: float,
+    high: float,
+    unit: str,
+    meaning: str,
+    *,
+    step: float = 0.0,
+) -> float:
+    """A field with its bounds, as metadata, for the templates and the repair table.
+
+    Args:
+        neutral: First value.
+        low: Least value.
+        high: Greatest value.
+        unit: Empty for a plain number.
+        meaning: For the template's comment.
+        step: In which the repair searches for a better value.
+    """
+    known = {"low": low, "high": high, "unit": unit, "meaning": meaning, "step": step}
+    value: float = field(default=neutral, metadata=known)
     return value
 
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """Constants of the controller; the defaults are the neutral first values."""
+    """Constants of the controller for maps; the defaults are neutral."""
 
     inflation_margin: float = _tunable(
-        0.0, 0.0, 12.0, "px", "room wanted beside the body where the map has it"
+        0.0,
+        0.0,
+        12.0,
+        "px",
+        "room wanted beside the body where the map has it",
+        step=2.0,
     )
     lookahead: float = _tunable(
         120.0,
@@ -53,68 +87,97 @@ class Parameters:
     )
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value, about = getattr(self, item.name), item.metadata
-            if not about["low"] <= value <= about["high"]:
-                raise ValueError(
-                    f"expected {item.name} in [{about['low']:g}, {about['high']:g}], "
-                    f"got {value!r}"
-                )
+        _check(self)
 
     def changed(self, **values: float) -> Parameters:
         """A copy with some values replaced, each moved into its bounds."""
-        bounded = {
-            item.name: _bounded(values[item.name], item.metadata)
-            for item in fields(self)
-            if item.name in values
-        }
-        return replace(self, **bounded)
+        return changed(self, values)
 
 
-def _bounded(value: float, about: Any) -> float:
-    return round(min(max(value, float(about["low"])), float(about["high"])), 3)
+@dataclass(frozen=True, slots=True)
+class EPuckParameters:
+    """Constants of the controller for the e-puck; the defaults are neutral."""
 
-
-def unit_of(name: str) -> str:
-    """Unit of a parameter, empty for a plain number."""
-    return next(str(f.metadata["unit"]) for f in fields(Parameters) if f.name == name)
-
-
-def render_controller(parameters: Parameters, robot: RobotParams, dt: float) -> str:
-    """Source of the controller with these parameters.
-
-    Args:
-        parameters: Values of the tuning constants.
-        robot: Values of the robot's constants.
-        dt: Duration of a step, s.
-    """
-    template = files("tdac_agent.builtin").joinpath("controller_map2d.py.j2")
-    environment = jinja2.Environment(
-        undefined=jinja2.StrictUndefined, keep_trailing_newline=True
+    inflation_margin: float = _tunable(
+        0.0,
+        0.0,
+        0.03,
+        "m",
+        "room wanted beside the body where the world has it",
+        step=0.002,
     )
-    tuning = [
-        {
-            "constant": item.name.upper(),
-            "value": float(getattr(parameters, item.name)),
-            "meaning": ", ".join(
-                part
-                for part in (item.metadata["unit"], item.metadata["meaning"])
-                if part
-            ),
-        }
+    cruise_speed: float = _tunable(
+        1.0, 0.25, 1.0, "", "share of the wheel limit on a free way"
+    )
+    slow_dist: float = _tunable(
+        0.0, 0.0, 0.06, "m", "free length ahead below which it slows down"
+    )
+    blocked: float = _tunable(
+        1000.0, 300.0, 4000.0, "", "reading of ps0 or ps7 at which it does not drive on"
+    )
+    turn_gain: float = _tunable(
+        0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
+    )
+    turn_in_place: float = _tunable(
+        0.8, 0.05, 1.2, "rad", "heading error above which it turns in place"
+    )
+    look_steps: float = _tunable(
+        5.0, 1.0, 40.0, "steps", "from one look whether the way is clear to the next"
+    )
+    unstick_after: float = _tunable(
+        0.0, 0.0, 400.0, "steps", "without progress until it trusts the map alone"
+    )
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    def changed(self, **values: float) -> EPuckParameters:
+        """A copy with some values replaced, each moved into its bounds."""
+        return changed(self, values)
+
+
+def changed(parameters: P, values: Mapping[str, float]) -> P:
+    """A copy with some values replaced, each moved into its bounds."""
+    bounded: dict[str, Any] = {
+        item.name: _bounded(values[item.name], item.metadata)
         for item in fields(parameters)
-    ]
-    source = environment.from_string(template.read_text(encoding="utf-8"))
-    return str(source.render(robot=robot, dt=dt, fields=tuning))
+        if item.name in values
+    }
+    return replace(parameters, **bounded)
 
 
-def read_parameters(source: str) -> Parameters | None:
-    """The parameters of a controller made from the template; None of another one."""
+def _check(parameters: Tuned) -> None:
+    for item in fields(parameters):
+        value = getattr(parameters, item.name)
+        low, high = item.metadata["low"], item.metadata["high"]
+        if not low <= value <= high:
+            raise ValueError(
+                f"expected {item.name} in [{low:g}, {high:g}], got {value!r}"
+            )
+
+
+def _bounded(value: float, known: Mapping[str, Any]) -> float:
+    digits = 5 if known["unit"] == "m" else 3
+    return round(min(max(value, float(known["low"])), float(known["high"])), digits)
+
+
+def names_of(kind: type[Tuned]) -> tuple[str, ...]:
+    """Names of the parameters, in their order."""
+    return tuple(item.name for item in fields(kind))
+
+
+def about(kind: type[Tuned], name: str) -> Mapping[str, Any]:
+    """What is known of a parameter: `low`, `high`, `unit`, `meaning`, `step`."""
+    return next(item.metadata for item in fields(kind) if item.name == name)
+
+
+def read_parameters(source: str, kind: type[P]) -> P | None:
+    """The parameters of a controller made from a template; None of another one."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
         return None
-    names = {item.name.upper(): item.name for item in fields(Parameters)}
+    names = {name.upper(): name for name in names_of(kind)}
     found: dict[str, float] = {}
     for node in tree.body:
         match node:
@@ -125,4 +188,4 @@ def read_parameters(source: str) -> Parameters | None:
                 found[names[name]] = float(value)
     if len(found) < len(names):
         return None
-    return Parameters().changed(**found)
+    return changed(kind(), found)

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from tdac_agent.builtin import (
@@ -12,13 +11,13 @@ from tdac_agent.builtin import (
     read_parameters,
     render_controller,
 )
-from tdac_agent.builtin.repair import Bounds, read_rules, repair
+from tdac_agent.builtin.remedies import Bounds
+from tdac_agent.builtin.repair import read_rules, repair
 from tdac_agent.extract import extract_source
 from tdac_agent.provider import Request
 from tdac_agent.report import Diagnosis, Failure, Report
 from tdac_agent.rules import MAX_RULE_CHARS, add_rules, parse_rules
-from tdac_envs.map2d import Map2DEnv
-from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.params import RobotParams
 
 MIDDLE = Parameters(
     inflation_margin=2.0,
@@ -50,17 +49,9 @@ def report(*failures):
 
 @pytest.fixture(scope="module")
 def builtin():
-    env = Map2DEnv(np.zeros((90, 120), bool), (20, 20, 0), (90, 70), robot_radius=8)
-    params = MapParams(
-        source="array",
-        source_sha256="",
-        width=120,
-        height=90,
-        robot=env.nominal.robot,
-        polarity="given",
-        method="given",
+    return Builtin(
+        Parameters, lambda chosen: render_controller(chosen, RobotParams(), 0.05)
     )
-    return Builtin(env.nominal, params)
 
 
 def source_of(reply):
@@ -72,7 +63,7 @@ def source_of(reply):
 def test_first_candidate_is_neutral(builtin):
     """Without rules, the parameters have their neutral values."""
     reply = builtin.complete(Request("generate", ""))
-    assert read_parameters(source_of(reply)) == Parameters()
+    assert read_parameters(source_of(reply), Parameters) == Parameters()
     assert reply.stop == "end"
 
 
@@ -106,7 +97,7 @@ def test_each_failure_changes_its_parameter(builtin, cause, name, way):
     text = render_controller(MIDDLE, RobotParams(), 0.05)
     failed = report((f"{END}test_x", cause))
     reply = builtin.complete(Request("edit", "", controller=text, report=failed))
-    after = read_parameters(source_of(reply))
+    after = read_parameters(source_of(reply), Parameters)
     change = getattr(after, name) - getattr(MIDDLE, name)
     assert change * way > 0
     note = f"{END}test_x -> {name} {getattr(MIDDLE, name):g} -> "
@@ -124,7 +115,9 @@ def test_late_progress_is_too_slow(builtin):
     text = render_controller(MIDDLE, RobotParams(), 0.05)
     failed = report((f"{END}test_progress", None))
     reply = builtin.complete(Request("edit", "", controller=text, report=failed))
-    assert read_parameters(source_of(reply)).cruise_speed > MIDDLE.cruise_speed
+    assert (
+        read_parameters(source_of(reply), Parameters).cruise_speed > MIDDLE.cruise_speed
+    )
 
 
 def test_collision_is_laid_to_the_collision_test():
@@ -172,16 +165,19 @@ def test_rules_carry_the_parameters_over(builtin):
     assert all(len(rule) <= MAX_RULE_CHARS for rule in told)
     rules = add_rules((), ["Turn in place when lost.", *told], 3, ())
     request = Request("generate", "", rules=tuple(rule.text for rule in rules))
-    parameters = read_parameters(source_of(builtin.complete(request)))
+    parameters = read_parameters(source_of(builtin.complete(request)), Parameters)
     wanted, _ = repair(MIDDLE, failed, Bounds(above=2.0), 301)
     assert parameters == wanted
-    assert read_rules(told)[1].above == 2.0
+    assert read_rules(told, Parameters)[1].above == 2.0
 
 
 def test_a_persons_rule_counts(builtin):
     """A rule in the documented words, written by hand, is obeyed."""
     request = Request("generate", "", rules=("set LOOKAHEAD = 55 px",))
-    assert read_parameters(source_of(builtin.complete(request))).lookahead == 55.0
+    assert (
+        read_parameters(source_of(builtin.complete(request)), Parameters).lookahead
+        == 55.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -196,7 +192,7 @@ def test_never_tries_the_same_twice(builtin, cause):
         reply = builtin.complete(Request("generate", "", rules=texts, sample=(0, k, 0)))
         for j, kind in enumerate(("edit", "summarise")):
             text = source_of(reply)
-            tried.append(read_parameters(text))
+            tried.append(read_parameters(text, Parameters))
             reply = builtin.complete(
                 Request(
                     kind,
@@ -216,7 +212,7 @@ def test_foreign_controller_is_replaced(builtin):
     failed = report((f"{END}test_x", "collision"))
     request = Request("edit", "", controller="def policy(obs): ...", report=failed)
     reply = builtin.complete(request)
-    assert read_parameters(source_of(reply)).inflation_margin > 0
+    assert read_parameters(source_of(reply), Parameters).inflation_margin > 0
     assert "not from the template" in reply.notes[0]
 
 

@@ -43,7 +43,7 @@ def test_parameters_are_read_back(seed):
     }
     parameters = Parameters().changed(**drawn)
     text = render_controller(parameters, RobotParams.disc(7.25), 0.05)
-    assert read_parameters(text) == parameters
+    assert read_parameters(text, Parameters) == parameters
 
 
 def test_parameters_have_bounds():
