@@ -7,12 +7,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tdac_agent.reference import pull
+from tdac_agent.surroundings import Surroundings
 from tdac_agent.trajectory import Trajectory
-from tdac_envs.grid import body_free
-from tdac_envs.plan import Path, descend
-from tdac_envs.task2d import Map2DTask, Pose
-from tdac_envs.terrain import entry
+from tdac_envs.plan import Path
+from tdac_envs.task2d import Pose
 
 _PATH_AHEAD = 400
 _LAST_POSES = 20
@@ -27,29 +25,31 @@ _OPPOSITE = 0.5
 _RADII = 3.0
 
 
-def heading_error(task: Map2DTask, trajectory: Trajectory, step: int) -> float | None:
+def heading_error(
+    around: Surroundings, trajectory: Trajectory, step: int
+) -> float | None:
     """Direction of the shortest path seen from the heading, rad, right positive."""
-    for way in _ways(task, trajectory, step):
+    for way in _ways(around, trajectory, step):
         # A shortest path on a grid has many forms; a pulled one has a direction.
-        (x, y), (to_x, to_y), *_ = pull(task, way[:_PATH_AHEAD])
+        (x, y), (to_x, to_y), *_ = around.pull(way[:_PATH_AHEAD])
         bearing = math.atan2(to_y - y, to_x - x)
         heading = float(trajectory.poses[step, 2])
         return math.remainder(bearing - heading, 2.0 * math.pi)
     return None
 
 
-def way_from(task: Map2DTask, trajectory: Trajectory, step: int) -> Path | None:
+def way_from(around: Surroundings, trajectory: Trajectory, step: int) -> Path | None:
     """Begin of the straightened shortest path from a pose, or from one just before."""
-    for way in _ways(task, trajectory, step):
-        return np.array(pull(task, way[: _PATH_AHEAD // 2]))
+    for way in _ways(around, trajectory, step):
+        return np.array(around.pull(way[: _PATH_AHEAD // 2]))
     return None
 
 
-def _ways(task: Map2DTask, trajectory: Trajectory, step: int) -> Iterator[Path]:
+def _ways(around: Surroundings, trajectory: Trajectory, step: int) -> Iterator[Path]:
     """Shortest paths from a pose and from those before it; at a wall there are none."""
     first = max(step - _LAST_POSES + 1, 0)
     for x, y, heading in trajectory.poses[first : step + 1][::-1].tolist():
-        path = task.path_from(Pose(x, y, heading))
+        path = around.path_from(Pose(x, y, heading))
         if len(path) > 1:
             yield path
 
@@ -63,7 +63,9 @@ def goal_bearing(
     return math.remainder(bearing - heading, 2.0 * math.pi)
 
 
-def turned_away(task: Map2DTask, trajectory: Trajectory) -> tuple[float, int]:
+def turned_away(
+    around: Surroundings, trajectory: Trajectory, goal: tuple[float, float]
+) -> tuple[float, int]:
     """Share of steps that turned away from the shortest path and from the goal itself.
 
     Returns:
@@ -74,33 +76,30 @@ def turned_away(task: Map2DTask, trajectory: Trajectory) -> tuple[float, int]:
     turning = np.flatnonzero(np.abs(difference) > _TURNING)
     steps = turning[:_SAMPLES].tolist()
     clear = []
-    for step, error in zip(steps, _path_bearings(task, trajectory, steps), strict=True):
+    for step, error in zip(
+        steps, _path_bearings(around, trajectory, steps), strict=True
+    ):
         if error is not None and abs(error) > math.pi - _OPPOSITE:
             break
         if error is not None and abs(error) > _ALIGNED:
             clear.append((step, error))
     away = sum(
         error * difference[step] < 0.0
-        and goal_bearing(trajectory, task.goal, step) * difference[step] < 0.0
+        and goal_bearing(trajectory, goal, step) * difference[step] < 0.0
         for step, error in clear
     )
     return (away / len(clear) if clear else 0.0), len(clear)
 
 
 def _path_bearings(
-    task: Map2DTask, trajectory: Trajectory, steps: Sequence[int]
+    around: Surroundings, trajectory: Trajectory, steps: Sequence[int]
 ) -> Iterator[float | None]:
     """Like `heading_error` for many steps, from the nearest part of the path."""
-    free = body_free(task.terrain.clear, task.robot.radius)
-    field = np.asarray(task.field, np.float64)
-    for step in steps:
-        x, y, heading = trajectory.poses[step].tolist()
-        first = entry(task.terrain, task.field, x, y, task.robot.radius)
-        if first is None:
+    poses = trajectory.poses[list(steps)]
+    ahead = around.places_ahead(poses[:, :2], _RADII * around.radius)
+    for (x, y, heading), place in zip(poses.tolist(), ahead, strict=True):
+        if place is None:
             yield None
             continue
-        path = descend(free, field, first)
-        far = np.hypot(path[:, 0] - x, path[:, 1] - y) >= _RADII * task.robot.radius
-        to_x, to_y = path[int(np.argmax(far)) if far.any() else -1]
-        bearing = math.atan2(to_y - y, to_x - x)
+        bearing = math.atan2(place[1] - y, place[0] - x)
         yield math.remainder(bearing - heading, 2.0 * math.pi)

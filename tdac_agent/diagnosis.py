@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from typing import Any
 
 from tdac_agent.arrival import near_goal, why_no_arrival
 from tdac_agent.course import goal_bearing, heading_error, turned_away
 from tdac_agent.motion import forward, saturated
 from tdac_agent.report import Cause, Diagnosis
-from tdac_agent.stall import PROGRESS, percent, point
-from tdac_agent.touch import Touch, nearest_touch, side_of, where_on_the_wall
+from tdac_agent.setting import Nominal
+from tdac_agent.stall import PROGRESS, percent
+from tdac_agent.surroundings import Surroundings, surroundings_of
+from tdac_agent.touch import side_of, where_on_the_wall
 from tdac_agent.trajectory import Rollout, Trajectory
-from tdac_envs.task2d import Map2DTask, Pose
+from tdac_agent.units import Units
+from tdac_envs.task2d import Pose
 
 LAST_POSES = 4
 MAX_MESSAGE = 300
@@ -28,12 +30,12 @@ _FOLDERS = re.compile(r"(?<![\w.])(?:/[\w.+-]+)+/(?=[\w.+-])")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+|0x[0-9a-fA-F]{6,}")
 
 
-def diagnose(rollout: Rollout, task: Map2DTask) -> Diagnosis:
+def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
     """Cause and circumstances of a failed (or late) episode.
 
     Args:
         rollout: The episode.
-        task: Map and body of the episode.
+        task: Map or world of the episode.
 
     Returns:
         For an episode that is held out: the cause `held out`, and no figures.
@@ -43,16 +45,22 @@ def diagnose(rollout: Rollout, task: Map2DTask) -> Diagnosis:
     if rollout.held_out:
         text = "A start that is held out failed; nothing more is told of it."
         return Diagnosis(cause="held out", text=text)
+    around = surroundings_of(task)
+    return _on_screen(around.units.rollout(rollout), around)
+
+
+def _on_screen(rollout: Rollout, around: Surroundings) -> Diagnosis:
     if rollout.error is not None:
-        return _error(rollout)
+        return _error(rollout, around.units)
     if rollout.trajectory.steps == 0:
-        return _diagnosis(rollout, "no motion", "no motion: no step was made.", 0)
+        text = "no motion: no step was made."
+        return _diagnosis(rollout, around.units, "no motion", text, 0)
     if rollout.outcome == "collision":
-        return _collision(rollout, task)
-    return _no_arrival(rollout, task)
+        return _collision(rollout, around)
+    return _no_arrival(rollout, around)
 
 
-def _error(rollout: Rollout) -> Diagnosis:
+def _error(rollout: Rollout, units: Units) -> Diagnosis:
     message, steps = _plain(rollout.error or ""), rollout.trajectory.steps
     cause: Cause = "error"
     if rollout.timed_out or _OUT_OF_CPU.search(message):
@@ -61,7 +69,7 @@ def _error(rollout: Rollout) -> Diagnosis:
         cause = "contract"
     when = f"after {steps} steps" if steps else "before its first step"
     text = f"{cause}: the controller failed {when}: {message}"
-    return _diagnosis(rollout, cause, text, steps)
+    return _diagnosis(rollout, units, cause, text, steps)
 
 
 def _plain(message: str) -> str:
@@ -70,77 +78,70 @@ def _plain(message: str) -> str:
     return f"{line if len(line) <= MAX_MESSAGE else line[:MAX_MESSAGE] + ' …'}."
 
 
-def _collision(rollout: Rollout, task: Map2DTask) -> Diagnosis:
-    trajectory = rollout.trajectory
+def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
+    trajectory, units = rollout.trajectory, around.units
     pose, speed = _pose(trajectory, trajectory.steps), float(forward(trajectory)[-1])
-    touch = nearest_touch(task, pose, rollout.radius + 3.0)
+    touch = around.touch(pose, rollout.radius + 3.0)
     assert touch is not None
     side, share = side_of(touch.bearing), saturated(trajectory)
     towards = pose.heading + (math.pi if speed < 0.0 else 0.0)
     corner = where_on_the_wall(touch, towards)
-    error, course = _course(rollout, task)
+    error, course = _course(rollout, around)
     text = (
         f"collision in step {trajectory.steps} "
-        f"({trajectory.steps * trajectory.dt:.1f} s) at {point(pose.x, pose.y)}, "
-        f"heading {pose.heading:z.2f} rad, at "
-        f"{speed * task.robot.max_wheel_speed:.0f} px/s, the {side} of the body "
-        f"touched the {'border of the map' if touch.border else 'wall'} at "
-        f"{point(*touch.wall)}{', ' if corner else ''}{corner}. "
-        f"{_seen(touch, trajectory, task)} A wheel was at its limit in "
-        f"{percent(share)} of the steps. {_passed_goal(rollout)}{course}"
+        f"({trajectory.steps * trajectory.dt:.1f} s) at {units.point(pose.x, pose.y)}, "
+        f"heading {units.heading_of(pose.heading):z.2f} rad, at "
+        f"{speed * around.full_speed:.0f} {units.length}/s, the {side} of the body "
+        f"touched the {touch.thing} at "
+        f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
+        f"{around.seen(touch, trajectory)} A wheel was at its limit in "
+        f"{percent(share)} of the steps. {_passed_goal(rollout, units)}{course}"
     )
     return _diagnosis(
         rollout,
+        units,
         "collision",
         text,
         trajectory.steps,
         side=side,
-        wall=_rounded(*touch.wall),
+        wall=units.kept_place(*touch.wall),
         corner=touch.corner,
+        thing=touch.thing,
         heading_error=error,
         saturated=round(share, 3),
     )
 
 
-def _seen(touch: Touch, trajectory: Trajectory, task: Map2DTask) -> str:
-    """Whether the range sensor looks at what was touched."""
-    half, off = task.robot.field_of_view_deg / 2.0, abs(math.degrees(touch.bearing))
-    if off > half:
-        return (
-            f"No ray looks there: {off:.0f}° off the heading, the fan has ±{half:g}°."
-        )
-    before = max(trajectory.steps - 10, 0)
-    shortest = float(trajectory.ranges[before].min())
-    return f"In step {before} the shortest ray read {shortest:.1f} px from the centre."
-
-
-def _passed_goal(rollout: Rollout) -> str:
+def _passed_goal(rollout: Rollout, units: Units) -> str:
     distances = rollout.trajectory.path_distances
     best = int(distances.argmin())
     if distances[best] > near_goal(rollout):
         return ""
     if distances[-1] - distances[best] < PROGRESS:
         return ""
-    return f"It had passed the goal in step {best}, {distances[best]:.1f} px off. "
+    off = f"{distances[best]:.1f} {units.length} off"
+    return f"It had passed the goal in step {best}, {off}. "
 
 
-def _no_arrival(rollout: Rollout, task: Map2DTask) -> Diagnosis:
-    cause, text, step = why_no_arrival(rollout, task)
+def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
+    cause, text, step = why_no_arrival(rollout, around)
     trajectory = rollout.trajectory
     end = _pose(trajectory, trajectory.steps)
-    touch = nearest_touch(task, end, 5.0 * rollout.radius)
+    touch = around.touch(end, 5.0 * rollout.radius)
     if touch is not None and cause in ("stuck", "oscillating", "no motion"):
-        text += f" The nearest wall is {touch.gap:.1f} px from the body, at its "
+        near = "wall" if touch.border else touch.thing
+        text += f" The nearest {near} is "
+        text += f"{touch.gap:.1f} {around.units.length} from the body, at its "
         text += f"{side_of(touch.bearing)}."
-    error, course = _course(rollout, task)
+    error, course = _course(rollout, around)
     text = f"{cause}: {text} {course}"
-    return _diagnosis(rollout, cause, text, step, heading_error=error)
+    return _diagnosis(rollout, around.units, cause, text, step, heading_error=error)
 
 
-def _course(rollout: Rollout, task: Map2DTask) -> tuple[float | None, str]:
+def _course(rollout: Rollout, around: Surroundings) -> tuple[float | None, str]:
     """Where the shortest path lay at the end, and whether the robot turned to it."""
     trajectory = rollout.trajectory
-    error = heading_error(task, trajectory, trajectory.steps)
+    error = heading_error(around, trajectory, trajectory.steps)
     if error is None:
         return None, ""
     straight = goal_bearing(trajectory, rollout.goal)
@@ -148,7 +149,7 @@ def _course(rollout: Rollout, task: Map2DTask) -> tuple[float | None, str]:
         f"Heading error {_turn(error)} to the shortest path, {_turn(straight)} to the "
         f"goal itself. "
     )
-    share, steps = turned_away(task, trajectory)
+    share, steps = turned_away(around, trajectory, rollout.goal)
     if steps >= _AWAY_STEPS and share >= _AWAY:
         text += f"In {percent(share)} of its first {steps} steps with a turn it turned "
         text += "away from both: look at the sign of the turn. "
@@ -161,7 +162,7 @@ def _turn(angle: float) -> str:
 
 
 def _diagnosis(
-    rollout: Rollout, cause: Cause, text: str, step: int, **facts: Any
+    rollout: Rollout, units: Units, cause: Cause, text: str, step: int, **facts: Any
 ) -> Diagnosis:
     """Adds the distances and the last poses to what is known."""
     trajectory = rollout.trajectory
@@ -170,30 +171,30 @@ def _diagnosis(
         return Diagnosis(cause=cause, text=text, step=step, episode=rollout.name)
     distances = trajectory.path_distances
     d0, d_min = float(distances[0]), float(distances.min())
-    x, y, _ = trajectory.poses[step].tolist()
+    x, y = units.kept_place(*trajectory.poses[step, :2].tolist())
     if trajectory.steps:
-        text += f" Path left: {d0:.1f} px at the start, {d_min:.1f} px at best. "
-        text += _last_poses(trajectory)
+        text += f" Path left: {d0:.1f} {units.length} at the start, {d_min:.1f} "
+        text += f"{units.length} at best. {_last_poses(trajectory, units)}"
     return Diagnosis(
         cause=cause,
         text=text,
         episode=rollout.name,
         step=step,
-        x=round(x, 2),
-        y=round(y, 2),
-        d0=round(d0, 2),
-        d_min=round(d_min, 2),
+        x=x,
+        y=y,
+        d0=units.kept(d0),
+        d_min=units.kept(d_min),
         **facts,
     )
 
 
-def _last_poses(trajectory: Trajectory) -> str:
+def _last_poses(trajectory: Trajectory, units: Units) -> str:
     """The last poses with the wheel speeds that followed, equal ones told once."""
     poses, actions = trajectory.poses.tolist(), trajectory.actions.tolist()
-    end = _pose_text(poses[-1])
+    end = units.pose(*poses[-1])
     groups = [(trajectory.steps, trajectory.steps, end)]
     for step in range(trajectory.steps - 1, -1, -1):
-        place, (left, right) = _pose_text(poses[step]), actions[step]
+        place, (left, right) = units.pose(*poses[step]), actions[step]
         row = f"{place} [{left:z.2f} {right:z.2f}]"
         _, last, told = groups[-1]
         # The pose at the end has no wheel speeds of its own.
@@ -210,14 +211,5 @@ def _last_poses(trajectory: Trajectory) -> str:
     return f"Last poses (step: x y heading [left right]): {'; '.join(rows)}."
 
 
-def _pose_text(pose: Sequence[float]) -> str:
-    x, y, heading = pose
-    return f"{x:z.1f} {y:z.1f} {heading:z.2f}"
-
-
 def _pose(trajectory: Trajectory, step: int) -> Pose:
     return Pose(*trajectory.poses[step].tolist())
-
-
-def _rounded(x: float, y: float) -> tuple[float, float]:
-    return round(x, 2), round(y, 2)

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from tdac_agent.course import way_from
 from tdac_agent.files import write_atomic
 from tdac_agent.report import Diagnosis, Episode, Report
+from tdac_agent.setting import Nominal
+from tdac_agent.surroundings import surroundings_of
 from tdac_agent.task import Task
 from tdac_agent.task_map2d import map_setting
-from tdac_agent.touch import nearest_touch
 from tdac_agent.trajectory import Trajectory
 from tdac_envs.canvas import Image
 from tdac_envs.closeup import Background, Event, run_picture
 from tdac_envs.render import trajectory_picture
-from tdac_envs.task2d import Map2DTask, Pose
+from tdac_envs.task2d import Pose
 
 MAX_FACT = 240
 _ERRORS = ("error", "time-out", "contract")
@@ -100,16 +101,18 @@ def file_stem(name: str) -> str:
 
 
 def event_of(
-    task: Map2DTask,
+    task: Nominal,
     trajectory: Trajectory,
     episode: Episode,
     diagnosis: Diagnosis | None,
 ) -> Event:
     """What a picture of a failed episode shows; its outcome where no cause is known."""
-    x, y, heading = trajectory.poses[-1].tolist()
+    around = surroundings_of(task)
+    units, shown = around.units, around.units.trajectory(trajectory)
+    end = Pose(*shown.poses[-1].tolist())
     held_out = " (held out)" if episode.held_out else ""
     title = f"{episode.name}{held_out}: {episode.outcome}"
-    facts = [f"ended in step {trajectory.steps} at ({x:.1f}, {y:.1f})"]
+    facts = [f"ended in step {trajectory.steps} at {units.point(*end[:2])}"]
     where = trajectory.poses[-1:, :2]
     if diagnosis is not None:
         title = f"{episode.name}: {diagnosis.cause}"
@@ -117,13 +120,15 @@ def event_of(
         where = _where(task, trajectory, diagnosis)
     touch = None
     if episode.outcome == "collision":
-        touch = nearest_touch(task, Pose(x, y, heading), task.robot.radius + 3.0)
+        touch = around.touch(end, around.radius + 3.0)
+    d_min, d0 = (units.scale * d for d in (episode.d_min, episode.d0))
+    way = way_from(around, shown, trajectory.steps)
     return Event(
         title=title,
-        facts=(*facts, f"path left: {episode.d_min:.0f} of {episode.d0:.0f} px"),
+        facts=(*facts, f"path left: {d_min:.0f} of {d0:.0f} {units.length}"),
         where=where,
-        contact=None if touch is None else touch.wall,
-        way=way_from(task, trajectory, trajectory.steps),
+        contact=None if touch is None else units.place_of(*touch.wall),
+        way=None if way is None else np.array([units.place_of(x, y) for x, y in way]),
     )
 
 
@@ -141,9 +146,9 @@ def _facts(diagnosis: Diagnosis) -> list[str]:
 
 
 def _where(
-    task: Map2DTask, trajectory: Trajectory, diagnosis: Diagnosis
+    task: Nominal, trajectory: Trajectory, diagnosis: Diagnosis
 ) -> NDArray[np.float64]:
-    """The places to look at, shape (n, 2), px."""
+    """The places to look at, shape (n, 2)."""
     places = trajectory.poses[:, :2]
     if diagnosis.cause in ("stuck", "spinning", "oscillating"):
         return places[diagnosis.step :]

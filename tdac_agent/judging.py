@@ -29,7 +29,6 @@ from tdac_agent.seeded import SeededJob, judge_seeds
 from tdac_agent.suite_plugin import JudgePlugin, rollout_key
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import Profile
-from tdac_agent.task_map2d import map_setting
 from tdac_agent.trajectory import Rollout
 from tdac_envs.map2d import Map2DEnv
 
@@ -218,9 +217,7 @@ def _findings(task: Task, judge: Judge, plugin: JudgePlugin) -> Findings:
         if steps is None and drive == "policy"
     ]
     diagnoses = {
-        rollout_key(*key): diagnose(
-            rollout, map_setting(task.setting).nominal
-        ).model_dump_json()
+        rollout_key(*key): diagnose(rollout, task.nominal).model_dump_json()
         for key, rollout in judge.rollouts.items()
         if rollout.outcome != "not run"
         and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))

@@ -1,4 +1,7 @@
-"""What the motion of an episode was like: turning, reversing, going in rounds."""
+"""What the motion of an episode was like: turning, reversing, going in rounds.
+
+Lengths and headings are those of the screen; see `tdac_agent.units`.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ def turns(trajectory: Trajectory) -> NDArray[np.float64]:
 
 
 def lengths(trajectory: Trajectory) -> NDArray[np.float64]:
-    """Way driven in each step, px."""
+    """Way driven in each step."""
     return np.asarray(np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T))
 
 
@@ -96,7 +99,7 @@ def find_returns(trajectory: Trajectory, since: int, reach: float) -> Returns:
     Args:
         trajectory: Of the episode.
         since: First step to look at.
-        reach: Two poses this near to each other are at one place, px. For the other
+        reach: Two poses this near to each other are at one place. For the other
             direction it may be twice as far: there and back are seldom one line.
     """
     steps = np.linspace(since, trajectory.steps - 1, _SAMPLES).astype(int)

@@ -32,7 +32,7 @@ class _Record(BaseModel):
 class Diagnosis(_Record):
     """What happened in an episode, computed from its trajectory.
 
-    Figures are there where they apply; distances and places in px.
+    Figures are there where they apply; distances and places in px, of the e-puck in m.
     """
 
     cause: Cause
@@ -43,6 +43,7 @@ class Diagnosis(_Record):
     y: float | None = None
     side: str | None = Field(None, description="Of the body that was hit.")
     wall: tuple[float, float] | None = Field(None, description="What was touched.")
+    thing: str | None = Field(None, description="What that is.")
     corner: tuple[float, float] | None = Field(
         None, description="Corner of the wall within a body radius of that."
     )
@@ -66,7 +67,7 @@ class Failure(_Record):
 
 
 class Episode(_Record):
-    """Figures of one judged episode; distances in px."""
+    """Figures of one judged episode; distances in px, of the e-puck in m."""
 
     # JSON has no word for infinity: a report with one would not read back.
     model_config = ConfigDict(allow_inf_nan=False)

@@ -21,7 +21,6 @@ from tdac_agent.report import Cause
 from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
 from tdac_agent.sequential import SequentialTest
 from tdac_agent.task import Task, load_task
-from tdac_agent.task_map2d import map_setting
 from tdac_agent.trajectory import Outcome, Rollout
 from tdac_agent.turns import Turns
 
@@ -200,7 +199,7 @@ def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:
     rollout, failure = driven.rollout, {}
     distances = rollout.distances()
     if not rollout.reached or rollout.collisions:
-        found = diagnose(rollout, map_setting(task.setting).nominal)
+        found = diagnose(rollout, task.nominal)
         failure = found.model_dump(include={"cause", "step", "x", "y", "side"})
     return SeededEpisode(
         seed=seed,

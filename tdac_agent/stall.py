@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tdac_agent.motion import (
     find_returns,
@@ -19,8 +18,9 @@ from tdac_agent.motion import (
 )
 from tdac_agent.report import Cause
 from tdac_agent.trajectory import Trajectory
+from tdac_agent.units import Points, Units
 
-# A step nearer than this, px, is no progress: it is what a turn in place drifts.
+# A step nearer than this, px or mm, is no progress: a turn in place drifts as much.
 PROGRESS = 1.0
 # Share of steps that reverse a turn or a drive: a period of 40 steps (2 s) or less.
 FLIPS = 0.05
@@ -47,27 +47,33 @@ class Finding(NamedTuple):
     step: int
 
 
-def why_stalled(trajectory: Trajectory, since: int, radius: float) -> Finding:
+def why_stalled(
+    trajectory: Trajectory, since: int, radius: float, units: Units
+) -> Finding:
     """No progress since a step: standing, spinning, oscillating, looping or stuck."""
     rest = standing_since(trajectory)
     if trajectory.steps - rest >= 0.5 * (trajectory.steps - since):
-        text = f"it stands at {point(*trajectory.poses[-1, :2])} since step {rest}"
+        text = (
+            f"it stands at {units.point(*trajectory.poses[-1, :2])} since step {rest}"
+        )
         if rest - since > _AT_ONCE:
             text += f", and made no progress since step {since}"
         return Finding("stuck", f"{text}.", rest)
     # The first half may still be on the way to what the robot then did for good.
     late = since + (trajectory.steps - since) // 2
     cause, text = (
-        _spinning(trajectory, late, radius)
-        or _going_over_its_trail(trajectory, since, late, radius)
-        or _trembling(trajectory, late, radius)
-        or _wandering(trajectory, late)
+        _spinning(trajectory, late, radius, units)
+        or _going_over_its_trail(trajectory, since, late, radius, units)
+        or _trembling(trajectory, late, radius, units)
+        or _wandering(trajectory, late, units)
     )
-    place = point(*trajectory.poses[since, :2])
+    place = units.point(*trajectory.poses[since, :2])
     return Finding(cause, f"no progress since step {since} at {place}; {text}.", since)
 
 
-def _spinning(trajectory: Trajectory, late: int, radius: float) -> Habit | None:
+def _spinning(
+    trajectory: Trajectory, late: int, radius: float, units: Units
+) -> Habit | None:
     turned = turns(trajectory)[late:]
     net, total = float(turned.sum()), float(np.abs(turned).sum())
     rounds, driven = abs(net) / math.tau, float(lengths(trajectory)[late:].sum())
@@ -76,14 +82,17 @@ def _spinning(trajectory: Trajectory, late: int, radius: float) -> Habit | None:
         return None
     way = "right" if net > 0 else "left"
     circle = driven / (rounds * math.tau)
-    where = f"on a circle of {circle:.0f} px" if circle >= PROGRESS else "in place"
+    wide = f"on a circle of {circle:.0f} {units.length}"
+    where = wide if circle >= PROGRESS else "in place"
     return "spinning", (
         f"in the last {trajectory.steps - late} steps it turned {rounds:.1f} times to "
         f"the {way} {where}"
     )
 
 
-def _trembling(trajectory: Trajectory, late: int, radius: float) -> Habit | None:
+def _trembling(
+    trajectory: Trajectory, late: int, radius: float, units: Units
+) -> Habit | None:
     turned, share = turns(trajectory)[late:], flips(trajectory, late)
     actions = np.abs(trajectory.actions[late:])
     if abs(turned.sum()) >= 0.3 * max(np.abs(turned).sum(), 1.0):
@@ -96,7 +105,7 @@ def _trembling(trajectory: Trajectory, late: int, radius: float) -> Habit | None
         f"in the last {trajectory.steps - late} steps it reversed its turn or its "
         f"drive every {1 / share:.1f} steps, its heading within "
         f"{math.degrees(swing(trajectory, late)):.0f}°, its place within "
-        f"{_extent(trajectory, late):.1f} px"
+        f"{_extent(trajectory, late):.1f} {units.length}"
     )
 
 
@@ -108,11 +117,11 @@ def _looking_about(trajectory: Trajectory, late: int, radius: float) -> bool:
 
 
 def _going_over_its_trail(
-    trajectory: Trajectory, since: int, late: int, radius: float
+    trajectory: Trajectory, since: int, late: int, radius: float, units: Units
 ) -> Habit | None:
     if _extent(trajectory, late) < 3.0 * radius:
         return None
-    (x0, y0), (x1, y1) = _box(trajectory, since)
+    box = units.box(*_box(trajectory, since), less=1)
     again = find_returns(trajectory, since, radius)
     if again.same_way < _AGAIN:
         return None
@@ -120,29 +129,27 @@ def _going_over_its_trail(
     how = "to and fro" if cause == "oscillating" else "in rounds"
     return cause, (
         f"since then it drove {how} over its own trail, every {again.period} steps the "
-        f"same, within x {x0:.0f} to {x1:.0f}, y {y0:.0f} to {y1:.0f}"
+        f"same, within {box}"
     )
 
 
-def _wandering(trajectory: Trajectory, late: int) -> Habit:
-    (x0, y0), (x1, y1) = _box(trajectory, late)
+def _wandering(trajectory: Trajectory, late: int, units: Units) -> Habit:
+    box = units.box(*_box(trajectory, late))
     driven = float(lengths(trajectory)[late:].sum())
     return "stuck", (
-        f"in the last {trajectory.steps - late} steps it drove {driven:.1f} px within "
-        f"x {x0:.1f} to {x1:.1f}, y {y0:.1f} to {y1:.1f}"
+        f"in the last {trajectory.steps - late} steps it drove {driven:.1f} "
+        f"{units.length} within {box}"
     )
 
 
-def _box(
-    trajectory: Trajectory, since: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _box(trajectory: Trajectory, since: int) -> tuple[Points, Points]:
     """The least and the greatest (x, y) since a step."""
     places = trajectory.poses[since:, :2]
     return places.min(axis=0), places.max(axis=0)
 
 
 def _extent(trajectory: Trajectory, since: int) -> float:
-    """Diagonal of the box around all places since a step, px."""
+    """Diagonal of the box around all places since a step."""
     low, high = _box(trajectory, since)
     return float(np.hypot(*(high - low)))
 
@@ -157,11 +164,6 @@ def standing_since(trajectory: Trajectory) -> int:
     moved |= np.abs(np.unwrap(heading) - np.unwrap(heading)[-1]) > 0.05
     moved[:-1] |= wheels_turn(trajectory)
     return int(np.flatnonzero(moved)[-1]) + 1 if moved.any() else 0
-
-
-def point(x: float, y: float) -> str:
-    """A place in words, px."""
-    return f"({x:z.1f}, {y:z.1f})"
 
 
 def percent(share: float) -> str:

@@ -44,6 +44,7 @@ class Touch:
         gap: Between body and wall, px.
         border: Whether it is the border of the map.
         corner: The nearest outer corner of the wall within a radius of that point.
+        thing: What it is.
     """
 
     wall: Point
@@ -51,6 +52,7 @@ class Touch:
     gap: float
     border: bool
     corner: Point | None
+    thing: str = "wall"
 
 
 def nearest_touch(task: Map2DTask, pose: Pose, reach: float) -> Touch | None:
@@ -72,6 +74,7 @@ def nearest_touch(task: Map2DTask, pose: Pose, reach: float) -> Touch | None:
         gap=max(math.dist(pose[:2], wall) - task.robot.radius, 0.0),
         border=border,
         corner=None if border else nearest_corner(task, wall, task.robot.radius),
+        thing="border of the map" if border else "wall",
     )
 
 

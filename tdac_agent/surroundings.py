@@ -1,0 +1,69 @@
+"""What a diagnosis asks about a map or a world, in units of the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+
+from tdac_agent.setting import Nominal
+from tdac_agent.touch import Touch
+from tdac_agent.trajectory import Trajectory
+from tdac_agent.units import Points, Units
+from tdac_envs.plan import Path
+from tdac_envs.task2d import Map2DTask, Pose
+
+Point = tuple[float, float]
+
+
+class Surroundings(Protocol):
+    """A task's map or world; places and lengths as in `units`."""
+
+    @property
+    def units(self) -> Units:
+        """Of the environment."""
+
+    @property
+    def radius(self) -> float:
+        """Of the body."""
+
+    @property
+    def full_speed(self) -> float:
+        """Lengths a second."""
+
+    def touch(self, pose: Pose, reach: float) -> Touch | None:
+        """What the body touches, or would touch first, within `reach`."""
+
+    def seen(self, touch: Touch, trajectory: Trajectory) -> str:
+        """Whether the distance sensors look at what was touched, in words."""
+
+    def path_from(self, pose: Pose) -> Path:
+        """Shortest path to the goal, shape (n, 2); empty where there is none."""
+
+    def pull(self, path: Path) -> list[Point]:
+        """Corners of a path after every shortcut that the body can take."""
+
+    def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
+        """Where the shortest path from each place first is so far away, or ends."""
+
+    def mistaken_goals(self) -> dict[str, Point]:
+        """Where the goal is for one who mixes up coordinates, by the mistake."""
+
+
+def surroundings_of(task: Nominal) -> Surroundings:
+    """The surroundings of a task of either kind."""
+    if isinstance(task, Map2DTask):
+        from tdac_agent.surroundings_map2d import MapSurroundings
+
+        return MapSurroundings(task)
+    from tdac_agent.surroundings_epuck import world_surroundings
+
+    return world_surroundings(task)
+
+
+def first_beyond(path: Path, x: float, y: float, far: float) -> Point:
+    """The first point of a path that is so far from (x, y), or its last one."""
+    distant = np.hypot(path[:, 0] - x, path[:, 1] - y) >= far
+    to_x, to_y = path[int(np.argmax(distant)) if distant.any() else -1].tolist()
+    return to_x, to_y

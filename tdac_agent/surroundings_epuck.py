@@ -1,0 +1,173 @@
+"""A Webots world as a diagnosis asks about it; mm, on the screen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tdac_agent.setting import Nominal
+from tdac_agent.surroundings import first_beyond
+from tdac_agent.touch import Touch
+from tdac_agent.trajectory import Trajectory
+from tdac_agent.units import METRES, Points, Units
+from tdac_envs.bodies import BODY_RADIUS, at_body_height
+from tdac_envs.epuck.contact import first_touch, part_gap
+from tdac_envs.epuck.infrared import PLACES
+from tdac_envs.epuck.prisms import Owned, Prisms
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.plan import Path
+from tdac_envs.task2d import Pose
+from tdac_envs.world import Obstacle
+
+Point = tuple[float, float]
+
+FENCE = "fence around the world"
+# A sensor that is farther off the bearing than this does not look there, rad.
+_OFF = 0.3
+
+
+def world_surroundings(task: Nominal) -> WorldSurroundings:
+    """The surroundings of an e-puck's task."""
+    if not isinstance(task, EPuckTask):
+        raise TypeError(f"expected an EPuckTask, got {type(task).__name__}")
+    return WorldSurroundings(task)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldSurroundings:
+    """The world of a task; see `Surroundings`."""
+
+    task: EPuckTask
+
+    @property
+    def units(self) -> Units:
+        """Metres, told in mm."""
+        return METRES
+
+    @property
+    def radius(self) -> float:
+        """Of the body."""
+        return BODY_RADIUS * METRES.scale
+
+    @property
+    def full_speed(self) -> float:
+        """Of the body, mm/s."""
+        return self.task.full_step / self.task.dt * METRES.scale
+
+    def touch(self, pose: Pose, reach: float) -> Touch | None:
+        """The nearest thing, by its name."""
+        x, y = METRES.place_of(pose.x, pose.y)
+        name, gap, (away_x, away_y) = _nearest(self.task, x, y)
+        if gap * METRES.scale > reach:
+            return None
+        wall = METRES.on_screen([(x - gap * away_x, y - gap * away_y)])[0].tolist()
+        bearing = math.atan2(away_y, -away_x) - pose.heading
+        return Touch(
+            wall=(wall[0], wall[1]),
+            bearing=math.remainder(bearing, 2.0 * math.pi),
+            gap=max(gap * METRES.scale - self.radius, 0.0),
+            border=name == FENCE,
+            corner=None,
+            thing=name,
+        )
+
+    def seen(self, touch: Touch, trajectory: Trajectory) -> str:
+        """Which infra-red sensor looks there, and what it read."""
+        off = np.abs(np.angle(np.exp(1j * (PLACES[:, 2] + touch.bearing))))
+        sensor, before = int(off.argmin()), max(trajectory.steps - 10, 0)
+        reading = f"ps{sensor} read {trajectory.ranges[before, sensor]:.0f}"
+        if off[sensor] > _OFF:
+            angle = math.degrees(float(off[sensor]))
+            return (
+                f"No sensor looks there: the nearest is {angle:.0f}° off; in step "
+                f"{before} {reading}."
+            )
+        return (
+            f"In step {before} {reading}, the sensor on that side (67: nothing near)."
+        )
+
+    def path_from(self, pose: Pose) -> Path:
+        """Shortest path to the goal."""
+        start = Pose(*METRES.place_of(pose.x, pose.y), 0.0)
+        return METRES.on_screen(self.task.path_from(start))
+
+    def pull(self, path: Path) -> list[Point]:
+        """Corners of a path after every shortcut that the body can take."""
+        places = [METRES.place_of(x, y) for x, y in path.tolist()]
+        corners, at = [0], 0
+        while at < len(places) - 1:
+            reach = 1
+            while at + 2 * reach < len(places) and self._free(places, at, 2 * reach):
+                reach *= 2
+            stride = reach
+            while stride >= 1:
+                beyond = reach + stride
+                if at + beyond < len(places) and self._free(places, at, beyond):
+                    reach = beyond
+                stride //= 2
+            at += reach
+            corners.append(at)
+        return [(x, y) for x, y in path[corners].tolist()]
+
+    def _free(self, places: list[Point], at: int, reach: int) -> bool:
+        """Whether the body gets straight from one place of a path to a later one."""
+        begin, end = places[at], places[at + reach]
+        solid = self.task.ground.solid
+        heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
+        touch = first_touch(
+            solid.points, solid.first, solid.extent, *begin, heading,
+            math.dist(begin, end), 0.0, BODY_RADIUS,
+        )  # fmt: skip
+        return touch > 1.0
+
+    def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
+        """Where the shortest path from each place first is so far away, or ends."""
+        for x, y in places.tolist():
+            path = self.path_from(Pose(x, y, 0.0))
+            yield first_beyond(path, x, y, far) if len(path) else None
+
+    def mistaken_goals(self) -> dict[str, Point]:
+        """X and y swapped, or a wrong sign."""
+        x, y = self.task.goal
+        places = {
+            "x and y swapped": (y, x),
+            "the sign of y wrong": (x, -y),
+            "the sign of x wrong": (-x, y),
+        }
+        screen = METRES.on_screen(list(places.values())).tolist()
+        return {name: (u, v) for name, (u, v) in zip(places, screen, strict=True)}
+
+
+def _nearest(task: EPuckTask, x: float, y: float) -> tuple[str, float, Point]:
+    """Name of the nearest thing, its distance, and the unit vector away from it."""
+    ground = task.ground
+    best: tuple[str, float, Point] = ("", math.inf, (1.0, 0.0))
+    things = [
+        (_name(thing), at_body_height(thing.solid, ground.floor))
+        for thing in ground.things
+    ]
+    for name, parts in things:
+        prisms = Prisms.of(map(Owned, parts))
+        for part in range(len(parts)):
+            gap, *away = part_gap(
+                prisms.points, prisms.first, prisms.extent, part, x, y
+            )
+            if gap < best[1]:
+                best = (name, float(gap), (float(away[0]), float(away[1])))
+    left, low, right, high = ground.bounds
+    sides = [(x - left, (1.0, 0.0)), (right - x, (-1.0, 0.0))]
+    sides += [(y - low, (0.0, 1.0)), (high - y, (0.0, -1.0))]
+    for gap, way in sides:
+        if gap < best[1]:
+            best = (FENCE, gap, way)
+    return best
+
+
+def _name(thing: Obstacle) -> str:
+    """`WoodenBox 'box 3'`, `wall of the arena`, `Rock`."""
+    if thing.kind in ("CircleArena", "RectangleArena"):
+        return "wall of the arena"
+    return f"{thing.kind} {thing.name!r}" if thing.name else thing.kind

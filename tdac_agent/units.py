@@ -1,0 +1,109 @@
+"""How lengths and places of an environment are told, and put on the screen.
+
+Motion is looked at on the screen: x to the right, y down, headings clockwise, so that
+right is positive, in lengths of which the robot drives about four in a step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tdac_agent.trajectory import Rollout, Trajectory
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """The units of an environment.
+
+    Attributes:
+        place: Of coordinates in the environment.
+        length: Of lengths on the screen, and in words.
+        scale: Lengths in one unit of a coordinate.
+        up: Whether y points up, and headings are counter-clockwise.
+        decimals: Of coordinates in words.
+        digits: Of figures that are kept.
+    """
+
+    place: str
+    length: str
+    scale: float
+    up: bool
+    decimals: int
+    digits: int
+
+    def on_screen(self, points: ArrayLike) -> Points:
+        """Places, shape (n, 2), or poses, shape (n, 3), of the environment."""
+        rows = np.array(points, np.float64)
+        rows[:, :2] *= self.scale
+        if self.up:
+            rows[:, 1:] *= -1.0
+        return rows
+
+    def trajectory(self, trajectory: Trajectory) -> Trajectory:
+        """A trajectory on the screen."""
+        return replace(
+            trajectory,
+            poses=self.on_screen(trajectory.poses),
+            path_distances=trajectory.path_distances * self.scale,
+        )
+
+    def rollout(self, rollout: Rollout) -> Rollout:
+        """An episode on the screen."""
+        (goal,) = self.on_screen([rollout.goal])
+        return replace(
+            rollout,
+            trajectory=self.trajectory(rollout.trajectory),
+            goal=(float(goal[0]), float(goal[1])),
+            radius=rollout.radius * self.scale,
+            tolerance=rollout.tolerance * self.scale,
+        )
+
+    def place_of(self, x: float, y: float) -> tuple[float, float]:
+        """A place on the screen in the environment."""
+        return x / self.scale, (-y if self.up else y) / self.scale
+
+    def kept(self, length: float) -> float:
+        """A length in the environment's unit, rounded."""
+        return round(length / self.scale, self.digits)
+
+    def kept_place(self, x: float, y: float) -> tuple[float, float]:
+        """A place in the environment, rounded."""
+        x, y = self.place_of(x, y)
+        return round(x, self.digits), round(y, self.digits)
+
+    def heading_of(self, heading: float) -> float:
+        """A heading on the screen in the environment."""
+        return -heading if self.up else heading
+
+    def point(self, x: float, y: float) -> str:
+        """A place on the screen in words."""
+        x, y = self.place_of(x, y)
+        return f"({x:z.{self.decimals}f}, {y:z.{self.decimals}f})"
+
+    def pose(self, x: float, y: float, heading: float) -> str:
+        """A pose on the screen in words."""
+        x, y = self.place_of(x, y)
+        place = f"{x:z.{self.decimals}f} {y:z.{self.decimals}f}"
+        return f"{place} {self.heading_of(heading):z.2f}"
+
+    def box(self, low: Points, high: Points, less: int = 0) -> str:
+        """A box on the screen in words: `x 3.0 to 4.5, y 0.2 to 1.0`.
+
+        Args:
+            low: Its least x and y.
+            high: Its greatest.
+            less: Decimals to leave out.
+        """
+        corners = [self.place_of(*low), self.place_of(*high)]
+        (x0, x1), (y0, y1) = (sorted(values) for values in zip(*corners, strict=True))
+        d = self.decimals - less
+        return f"x {x0:.{d}f} to {x1:.{d}f}, y {y0:.{d}f} to {y1:.{d}f}"
+
+
+PIXELS = Units("px", "px", 1.0, up=False, decimals=1, digits=2)
+METRES = Units("m", "mm", 1000.0, up=True, decimals=3, digits=4)
