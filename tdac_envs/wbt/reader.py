@@ -47,7 +47,7 @@ def load_world(
             and column.
     """
     file = Path(path)
-    return read_world(_read(file), file.name, robot=robot, goal=goal)
+    return read_world(read_text(file), file.name, robot=robot, goal=goal)
 
 
 def read_world(
@@ -59,8 +59,7 @@ def read_world(
 ) -> World:
     """Reads the text of a `.wbt` file; see `load_world`."""
     document = parse(content, name)
-    info = next((node for node in document.nodes if node.kind == "WorldInfo"), None)
-    frame = _world_frame(document, info)
+    info, frame = _world_info(document), frame_of(document)
     found = Found()
     for node in document.nodes:
         try:
@@ -90,7 +89,12 @@ def with_goal(world: World, goal: tuple[float, float]) -> World:
     return replace(world, goal=goal, obstacles=marks)
 
 
-def _read(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        WorldError: It cannot be read, or is too large.
+    """
     try:
         data = path.read_bytes() if path.stat().st_size <= LARGEST_FILE else None
     except FileNotFoundError:
@@ -107,7 +111,13 @@ def _read(path: Path) -> str:
         return data.decode("latin-1")  # comments of old files
 
 
-def _world_frame(document: Document, info: Node | None) -> Frame:
+def frame_of(document: Document) -> Frame:
+    """The frame of the nodes at the top of a file.
+
+    Raises:
+        WorldFileError: It names an unknown system of coordinates.
+    """
+    info = _world_info(document)
     z_up = document.release >= _ENU_SINCE
     if info is not None and "coordinateSystem" in info.fields:
         system = text(info, "coordinateSystem")
@@ -122,6 +132,10 @@ def _world_frame(document: Document, info: Node | None) -> Frame:
         x, y, z = numbers(info, "gravity", (0.0, -9.81, 0.0))
         z_up = -z > max(abs(x), abs(y))
     return world_frame(z_up, y_up_objects=document.release < _FLU_SINCE)
+
+
+def _world_info(document: Document) -> Node | None:
+    return next((node for node in document.nodes if node.kind == "WorldInfo"), None)
 
 
 def _items(node: Node, name: str) -> tuple[object, ...]:

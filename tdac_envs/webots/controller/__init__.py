@@ -1,0 +1,89 @@
+"""What `from controller import Robot` means here: the Python API of Webots R2025a.
+
+The package needs the standard library only, and nothing of the rest of tdac: it is
+copied to where a controller runs. All that it knows of the simulation comes from the
+process that called `connect`, a step at a time. What it does where a call is wrong is
+what Webots does, as far as that is known.
+"""
+
+from .absent import (
+    Accelerometer,
+    Altimeter,
+    Brake,
+    Camera,
+    CameraRecognitionObject,
+    Connector,
+    Display,
+    Emitter,
+    Gyro,
+    Lidar,
+    LidarPoint,
+    Pen,
+    Radar,
+    RadarTarget,
+    RangeFinder,
+    Receiver,
+    Skin,
+    Speaker,
+    TouchSensor,
+    VacuumGripper,
+)
+from .ansi import AnsiCodes
+from .connection import connect
+from .device import Device
+from .field import Field
+from .input import Joystick, Keyboard, Mouse
+from .led import LED
+from .motor import Motor
+from .node import Node
+from .robot import Robot
+from .sensors import (
+    GPS,
+    Compass,
+    DistanceSensor,
+    InertialUnit,
+    LightSensor,
+    PositionSensor,
+)
+from .supervisor import Supervisor
+
+__all__ = [
+    "GPS",
+    "LED",
+    "Accelerometer",
+    "Altimeter",
+    "AnsiCodes",
+    "Brake",
+    "Camera",
+    "CameraRecognitionObject",
+    "Compass",
+    "Connector",
+    "Device",
+    "Display",
+    "DistanceSensor",
+    "Emitter",
+    "Field",
+    "Gyro",
+    "InertialUnit",
+    "Joystick",
+    "Keyboard",
+    "Lidar",
+    "LidarPoint",
+    "LightSensor",
+    "Motor",
+    "Mouse",
+    "Node",
+    "Pen",
+    "PositionSensor",
+    "Radar",
+    "RadarTarget",
+    "RangeFinder",
+    "Receiver",
+    "Robot",
+    "Skin",
+    "Speaker",
+    "Supervisor",
+    "TouchSensor",
+    "VacuumGripper",
+    "connect",
+]

@@ -1,0 +1,215 @@
+"""Motors, in position or in velocity control."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .connection import c_double, connection
+from .device import Device
+from .messages import complain, unsupported
+
+
+class Motor(Device):
+    """A wheel's motor: until `setPosition(inf)` it holds its position 0.
+
+    Args:
+        name: As in the world.
+    """
+
+    ROTATIONAL, LINEAR = 0, 1
+
+    def __new__(cls, name: str) -> Motor:
+        """The one motor of that name: both of two objects know what was set."""
+        made: dict[str, Motor] = connection.__dict__.setdefault("motors", {})
+        if name not in made:
+            made[name] = super().__new__(cls)
+        return made[name]
+
+    def __init__(self, name: str) -> None:
+        if "name" in self.__dict__:
+            return
+        super().__init__(name)
+        self._position = 0.0
+        self._velocity = self.max_velocity
+        self._acceleration = -1.0
+        self._torque = self.max_torque
+
+    def setPosition(self, position: float) -> None:
+        """Turns to an angle (rad) at the set velocity; inf: velocity control."""
+        self.target_position = position
+
+    def setVelocity(self, velocity: float) -> None:
+        """rad/s; in position control the highest, and not below 0."""
+        self.target_velocity = velocity
+
+    def setAcceleration(self, acceleration: float) -> None:
+        """rad/s²; -1 is unlimited."""
+        self.target_acceleration = acceleration
+
+    def setAvailableTorque(self, torque: float) -> None:
+        """N m; kept, and without effect: the motor always gets its speed."""
+        self._set_torque(torque)
+
+    setAvailableForce = setAvailableTorque
+
+    def setControlPID(self, p: float, i: float, d: float) -> None:
+        """Of position control; 10, 0, 0 at first."""
+        gains = [c_double(p), c_double(i), c_double(d)]
+        for gain, name, words in zip(
+            gains, "pid", ("negative or zero", "negative", "negative"), strict=True
+        ):
+            if gain < 0.0 or (name == "p" and gain == 0.0):
+                complain(
+                    f"Error: wb_motor_set_control_pid() called with {words} '{name}' "
+                    "argument."
+                )
+                return
+        connection.command(self.name, "pid", gains)
+
+    def getTargetPosition(self) -> float:
+        """As set."""
+        return self.target_position
+
+    def getMinPosition(self) -> float:
+        """0: no limit."""
+        return 0.0
+
+    def getMaxPosition(self) -> float:
+        """0: no limit."""
+        return 0.0
+
+    def getVelocity(self) -> float:
+        """As set, not as driven."""
+        return self.target_velocity
+
+    def getMaxVelocity(self) -> float:
+        """rad/s."""
+        return self.max_velocity
+
+    def getAcceleration(self) -> float:
+        """As set."""
+        return self.target_acceleration
+
+    def getAvailableTorque(self) -> float:
+        """As set."""
+        return self._torque
+
+    def getMaxTorque(self) -> float:
+        """N m."""
+        return self.max_torque
+
+    getAvailableForce = getAvailableTorque
+    getMaxForce = getMaxTorque
+
+    def getMultiplier(self) -> float:
+        """1."""
+        return 1.0
+
+    def getType(self) -> int:
+        """ROTATIONAL."""
+        return self.ROTATIONAL
+
+    def getPositionSensor(self) -> Any:
+        """The wheel's sensor."""
+        from .robot import Robot
+
+        name = self._facts.get("sensor", "")
+        return getattr(Robot.created, "devices", {}).get(name)
+
+    def getBrake(self) -> None:
+        """None: there is none."""
+
+    setTorque: Any = unsupported("Motor.setTorque")
+    setForce: Any = unsupported("Motor.setForce")
+    enableTorqueFeedback: Any = unsupported("Motor.enableTorqueFeedback")
+    enableForceFeedback: Any = unsupported("Motor.enableForceFeedback")
+    getTorqueFeedback: Any = unsupported("Motor.getTorqueFeedback", math.nan)
+    getForceFeedback: Any = unsupported("Motor.getForceFeedback", math.nan)
+
+    @property
+    def max_velocity(self) -> float:
+        """See `getMaxVelocity`."""
+        return float(self._facts.get("max_velocity", math.nan))
+
+    @property
+    def max_torque(self) -> float:
+        """See `getMaxTorque`."""
+        return 10.0
+
+    @property
+    def position_sensor(self) -> Any:
+        """See `getPositionSensor`."""
+        return self.getPositionSensor()
+
+    @property
+    def target_position(self) -> float:
+        """See `setPosition`."""
+        return self._position
+
+    @target_position.setter
+    def target_position(self, position: float) -> None:
+        wanted = c_double(position)
+        if math.isnan(wanted):
+            complain(
+                "Error: wb_motor_set_position() called with an invalid 'position' "
+                "argument (NaN)."
+            )
+            return
+        self._position = wanted
+        self._send("position", wanted)
+
+    @property
+    def target_velocity(self) -> float:
+        """See `setVelocity`."""
+        return self._velocity
+
+    @target_velocity.setter
+    def target_velocity(self, velocity: float) -> None:
+        wanted = c_double(velocity)
+        if math.isnan(wanted):
+            complain(
+                "Error: wb_motor_set_velocity() called with an invalid 'velocity' "
+                "argument (NaN)."
+            )
+            return
+        if wanted < 0.0 and not math.isinf(self._position):
+            complain(
+                "Error: wb_motor_set_velocity() called with negative 'velocity' "
+                f"argument in position control mode ({self._position:g})."
+            )
+            return
+        self._velocity = wanted
+        self._send("velocity", wanted)
+
+    @property
+    def target_acceleration(self) -> float:
+        """See `setAcceleration`."""
+        return self._acceleration
+
+    @target_acceleration.setter
+    def target_acceleration(self, acceleration: float) -> None:
+        wanted = c_double(acceleration)
+        if math.isnan(wanted) or (wanted < 0.0 and wanted != -1.0):
+            what = "an invalid" if math.isnan(wanted) else "negative"
+            complain(
+                f"Error: wb_motor_set_acceleration() called with {what} "
+                "'acceleration' argument."
+            )
+            return
+        self._acceleration = wanted
+        self._send("acceleration", wanted)
+
+    def _set_torque(self, torque: float) -> None:
+        wanted = c_double(torque)
+        if not wanted >= 0.0:
+            complain(
+                "Error: wb_motor_set_available_torque() called with negative 'torque' "
+                "argument."
+            )
+            return
+        self._torque = min(wanted, self.max_torque)
+
+    def _send(self, what: str, value: float) -> None:
+        if self._facts:
+            connection.command(self.name, what, value)

@@ -1,0 +1,232 @@
+"""Nodes of the world, as a supervisor sees them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .connection import connection
+from .field import Field
+from .messages import complain, unsupported
+from .pose import absolute, moved, product, transposed
+
+_NAMES = (
+    "NO_NODE", "APPEARANCE", "BACKGROUND", "BILLBOARD", "BOX", "CAD_SHAPE", "CAPSULE",
+    "COLOR", "CONE", "COORDINATE", "CYLINDER", "DIRECTIONAL_LIGHT", "ELEVATION_GRID",
+    "FOG", "GROUP", "IMAGE_TEXTURE", "INDEXED_FACE_SET", "INDEXED_LINE_SET",
+    "MATERIAL", "MESH", "MUSCLE", "NORMAL", "PBR_APPEARANCE", "PLANE", "POINT_LIGHT",
+    "POINT_SET", "POSE", "SHAPE", "SPHERE", "SPOT_LIGHT", "TEXTURE_COORDINATE",
+    "TEXTURE_TRANSFORM", "TRANSFORM", "VIEWPOINT", "ROBOT", "ACCELEROMETER",
+    "ALTIMETER", "BRAKE", "CAMERA", "COMPASS", "CONNECTOR", "DISPLAY",
+    "DISTANCE_SENSOR", "EMITTER", "GPS", "GYRO", "INERTIAL_UNIT", "LED", "LIDAR",
+    "LIGHT_SENSOR", "LINEAR_MOTOR", "PEN", "POSITION_SENSOR", "PROPELLER", "RADAR",
+    "RANGE_FINDER", "RECEIVER", "ROTATIONAL_MOTOR", "SKIN", "SPEAKER", "TOUCH_SENSOR",
+    "VACUUM_GRIPPER", "BALL_JOINT", "BALL_JOINT_PARAMETERS", "CHARGER",
+    "CONTACT_PROPERTIES", "DAMPING", "FLUID", "FOCUS", "HINGE_JOINT",
+    "HINGE_JOINT_PARAMETERS", "HINGE_2_JOINT", "IMMERSION_PROPERTIES",
+    "JOINT_PARAMETERS", "LENS", "LENS_FLARE", "PHYSICS", "RECOGNITION",
+    "SLIDER_JOINT", "SLOT", "SOLID", "SOLID_REFERENCE", "TRACK", "TRACK_WHEEL",
+    "WORLD_INFO", "ZOOM", "MICROPHONE", "RADIO",
+)  # fmt: skip
+
+
+class Node:
+    """A node.
+
+    Args:
+        number: In the scene.
+    """
+
+    NO_NODE, GROUP, ROBOT, COMPASS, DISTANCE_SENSOR, GPS = 0, 14, 34, 39, 42, 44
+    POSITION_SENSOR, ROTATIONAL_MOTOR, SOLID = 52, 57, 80
+
+    def __init__(self, number: int) -> None:
+        self.id = number
+        self._data: dict[str, Any] = connection.facts["scene"][number]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Node) and other.id == self.id
+
+    def __hash__(self) -> int:
+        return hash(self.id)
+
+    def getId(self) -> int:
+        """Number of the node."""
+        return self.id
+
+    def getDef(self) -> str:
+        """DEF name, or empty."""
+        return self.DEF
+
+    def getType(self) -> int:
+        """One of the constants, of the base type."""
+        return self.type
+
+    def getTypeName(self) -> str:
+        """Node type, or name of the PROTO."""
+        return self.type_name
+
+    def getBaseTypeName(self) -> str:
+        """Node type; of a PROTO, what it is made of."""
+        return self.base_type_name
+
+    @property
+    def DEF(self) -> str:
+        """See `getDef`."""
+        return str(self._data["def"])
+
+    @property
+    def type(self) -> int:
+        """See `getType`."""
+        name = "".join(
+            f"_{c}" if c.isupper() and k else c
+            for k, c in enumerate(self.base_type_name)
+        ).upper()
+        known = {"G_P_S": "GPS", "L_E_D": "LED", "P_B_R_APPEARANCE": "PBR_APPEARANCE"}
+        name = known.get(name, name)
+        return _NAMES.index(name) if name in _NAMES else 0
+
+    @property
+    def type_name(self) -> str:
+        """See `getTypeName`."""
+        return str(self._data["type"])
+
+    @property
+    def base_type_name(self) -> str:
+        """See `getBaseTypeName`."""
+        return str(self._data["base"])
+
+    def isProto(self) -> bool:
+        """Whether it is one."""
+        return self.type_name != self.base_type_name
+
+    def getParentNode(self) -> Node | None:
+        """The node that it is in; None of the root."""
+        number = self._data["parent"]
+        return node_of(number) if number >= 0 else None
+
+    def getField(self, name: str) -> Field | None:
+        """A field, or None."""
+        for entry in self._data["fields"]:
+            if entry[0] == name:
+                return Field(self.id, entry)
+        return None
+
+    def getFieldByIndex(self, index: int) -> Field | None:
+        """A field by its number, or None."""
+        fields = self._data["fields"]
+        return Field(self.id, fields[index]) if 0 <= index < len(fields) else None
+
+    def getNumberOfFields(self) -> int:
+        """How many there are."""
+        return self.number_of_fields
+
+    @property
+    def number_of_fields(self) -> int:
+        """See `getNumberOfFields`."""
+        return len(self._data["fields"])
+
+    def getPosition(self) -> list[float]:
+        """In the world, m."""
+        return self._place()[0]
+
+    def getOrientation(self) -> list[float]:
+        """Rotation matrix in the world, nine numbers, row after row."""
+        return [value for row in self._place()[1] for value in row]
+
+    def getPose(self, fromNode: Node | None = None) -> list[float]:
+        """Sixteen numbers: rotation and position, row after row."""
+        position, turn = self._place()
+        if fromNode is not None:
+            origin, base = fromNode._place()
+            back = transposed(base)
+            off = [a - b for a, b in zip(position, origin, strict=True)]
+            position, turn = moved(back, [0.0] * 3, off), product(back, turn)
+        rows = [[*turn[k], position[k]] for k in range(3)]
+        return [*rows[0], *rows[1], *rows[2], 0.0, 0.0, 0.0, 1.0]
+
+    def getVelocity(self) -> list[float]:
+        """Three of motion (m/s), three of rotation (rad/s); 0 but for the robot."""
+        own = self.id == connection.facts["self"]
+        return list(connection.velocity) if own else [0.0] * 6
+
+    def setVelocity(self, velocity: list[float]) -> None:
+        """Ends the run, which fails: it is judged."""
+        del velocity
+        self._change("setVelocity")
+
+    def resetPhysics(self) -> None:
+        """Ends the run, which fails: it is judged."""
+        self._change("resetPhysics")
+
+    def remove(self) -> None:
+        """Ends the run, which fails: it is judged."""
+        self._change("remove")
+
+    def loadState(self, stateName: str) -> None:
+        """Ends the run, which fails: it is judged."""
+        del stateName
+        self._change("loadState")
+
+    def addForce(self, force: list[float], relative: bool) -> None:
+        """Ends the run, which fails: it is judged."""
+        del force, relative
+        self._change("addForce")
+
+    def addForceWithOffset(
+        self, force: list[float], offset: list[float], relative: bool
+    ) -> None:
+        """Ends the run, which fails: it is judged."""
+        del force, offset, relative
+        self._change("addForceWithOffset")
+
+    def addTorque(self, torque: list[float], relative: bool) -> None:
+        """Ends the run, which fails: it is judged."""
+        del torque, relative
+        self._change("addTorque")
+
+    def setJointPosition(self, position: float, index: int = 1) -> None:
+        """Ends the run, which fails: it is judged."""
+        del position, index
+        self._change("setJointPosition")
+
+    saveState: Any = unsupported("Node.saveState")
+    restartController: Any = unsupported("Node.restartController")
+    moveViewpoint: Any = unsupported("Node.moveViewpoint")
+    setVisibility: Any = unsupported("Node.setVisibility")
+    getContactPoints: Any = unsupported("Node.getContactPoints", ())
+    enableContactPointsTracking: Any = unsupported("Node.enableContactPointsTracking")
+    disableContactPointsTracking: Any = unsupported("Node.disableContactPointsTracking")
+    enablePoseTracking: Any = unsupported("Node.enablePoseTracking")
+    disablePoseTracking: Any = unsupported("Node.disablePoseTracking")
+    getCenterOfMass: Any = unsupported("Node.getCenterOfMass")
+    getStaticBalance: Any = unsupported("Node.getStaticBalance", True)
+    exportString: Any = unsupported("Node.exportString", "")
+    getFromProtoDef: Any = unsupported("Node.getFromProtoDef")
+    getBaseNodeField: Any = unsupported("Node.getBaseNodeField")
+    getProtoField: Any = unsupported("Node.getProtoField")
+
+    def _place(self) -> tuple[list[float], list[list[float]]]:
+        return absolute(connection.facts["scene"], connection.places, self.id)
+
+    def _change(self, call: str) -> None:
+        connection.tell(call, self.id)
+
+
+for _number, _name in enumerate(_NAMES):
+    setattr(Node, _name, _number)
+
+
+def node_of(number: int) -> Node:
+    """The node of a number."""
+    return Node(number)
+
+
+def may_supervise(function: str) -> bool:
+    """Whether the robot is a supervisor; complains where it is not."""
+    if connection.facts["supervisor"]:
+        return True
+    complain(
+        f"Error: ignoring illegal call to {function}() in a 'Robot' controller.\n"
+        "Error: this function can only be used in a 'Supervisor' controller."
+    )
+    return False

@@ -1,0 +1,249 @@
+"""The robot that a controller drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from . import led, motor, sensors
+from .connection import c_int, connection
+from .device import Device
+from .input import Joystick, Keyboard, Mouse
+from .messages import complain, once, unsupported
+
+_KINDS: dict[str, type[Device]] = {
+    "Motor": motor.Motor,
+    "DistanceSensor": sensors.DistanceSensor,
+    "LightSensor": sensors.LightSensor,
+    "PositionSensor": sensors.PositionSensor,
+    "GPS": sensors.GPS,
+    "Compass": sensors.Compass,
+    "InertialUnit": sensors.InertialUnit,
+    "LED": led.LED,
+}
+
+
+def _deprecated(getter: str) -> Callable[[Any, str], Device | None]:
+    def get(robot: Any, name: str) -> Device | None:
+        complain(
+            f"DEPRECATION: Robot.{getter} is deprecated, please use Robot.getDevice "
+            "instead."
+        )
+        found: Device | None = robot.getDevice(name)
+        return found
+
+    get.__name__ = getter
+    get.__doc__ = "As `getDevice`, with a warning."
+    return get
+
+
+class Robot:
+    """The robot. A second one says so and has no devices.
+
+    Attributes:
+        created: The first one.
+    """
+
+    MODE_SIMULATION, MODE_CROSS_COMPILATION, MODE_REMOTE_CONTROL = 0, 1, 2
+    EVENT_QUIT, EVENT_NO_EVENT = -1, 0
+    created: Robot | None = None
+
+    def __init__(self) -> None:
+        connection.check()
+        if Robot.created is not None:
+            complain(
+                "Error: only one Robot instance can be created per controller process."
+            )
+            return
+        Robot.created = self
+        self.devices: dict[str, Device] = {
+            name: _KINDS[facts["kind"]](name)
+            for name, facts in connection.devices.items()
+        }
+        self.keyboard = Keyboard()
+        self.mouse = Mouse()
+        self.joystick = Joystick()
+
+    def step(self, time_step: int | None = None) -> int:
+        """Lets the simulation go on by `time_step` ms; -1 when it has ended.
+
+        It goes on in steps of the world's `basicTimeStep`, so that other durations are
+        rounded up to a multiple.
+        """
+        duration = int(self.basic_time_step) if time_step is None else c_int(time_step)
+        if duration < 0:
+            complain("Error: wb_robot_step() called with negative duration.")
+            return -1
+        return connection.step(duration)
+
+    def getDevice(self, name: str) -> Device | None:
+        """A device, or None."""
+        if name in self.devices:
+            return self.devices[name]
+        if name in connection.facts["not_modelled"]:
+            once(f'tdac: the device "{name}" is not modelled here; it is missing')
+        complain(f'Device "{name}" was not found on robot "{self.name}"')
+        return None
+
+    def getDeviceByIndex(self, index: int) -> Device:
+        """A device by its number, from 0."""
+        return list(self.devices.values())[index]
+
+    def getNumberOfDevices(self) -> int:
+        """How many there are."""
+        return self.number_of_devices
+
+    def getBasicTimeStep(self) -> float:
+        """In ms."""
+        return self.basic_time_step
+
+    def getTime(self) -> float:
+        """Simulated, s."""
+        return self.time
+
+    def getName(self) -> str:
+        """Name of the robot."""
+        return self.name
+
+    def getModel(self) -> str:
+        """Model of the robot."""
+        return self.model
+
+    def getCustomData(self) -> str:
+        """The robot's field."""
+        return self.custom_data
+
+    def setCustomData(self, data: str) -> None:
+        """Sets the robot's field."""
+        self.custom_data = data
+
+    def getSupervisor(self) -> bool:
+        """Whether it may call a supervisor's functions."""
+        return self.supervisor
+
+    def getSynchronization(self) -> bool:
+        """Whether the simulation waits for it: it does."""
+        return self.synchronization
+
+    def getMode(self) -> int:
+        """MODE_SIMULATION."""
+        return self.MODE_SIMULATION
+
+    def getType(self) -> int:
+        """`Node.ROBOT`."""
+        return int(connection.facts["node_type"])
+
+    def getWorldPath(self) -> str:
+        """Of the world's file."""
+        return self.world_path
+
+    def getProjectPath(self) -> str:
+        """Of the controller's folder."""
+        return self.project_path
+
+    def getKeyboard(self) -> Keyboard:
+        """A keyboard without anybody at it."""
+        return self.keyboard
+
+    def getMouse(self) -> Mouse:
+        """A mouse without anybody at it."""
+        return self.mouse
+
+    def getJoystick(self) -> Joystick:
+        """A joystick without anybody at it."""
+        return self.joystick
+
+    getAccelerometer = _deprecated("getAccelerometer")
+    getCamera = _deprecated("getCamera")
+    getCompass = _deprecated("getCompass")
+    getDisplay = _deprecated("getDisplay")
+    getDistanceSensor = _deprecated("getDistanceSensor")
+    getEmitter = _deprecated("getEmitter")
+    getGPS = _deprecated("getGPS")
+    getGyro = _deprecated("getGyro")
+    getInertialUnit = _deprecated("getInertialUnit")
+    getLED = _deprecated("getLED")
+    getLidar = _deprecated("getLidar")
+    getLightSensor = _deprecated("getLightSensor")
+    getMotor = _deprecated("getMotor")
+    getPen = _deprecated("getPen")
+    getPositionSensor = _deprecated("getPositionSensor")
+    getRangeFinder = _deprecated("getRangeFinder")
+    getReceiver = _deprecated("getReceiver")
+    getSpeaker = _deprecated("getSpeaker")
+    getTouchSensor = _deprecated("getTouchSensor")
+
+    setMode: Any = unsupported("Robot.setMode")
+    getUrdf: Any = unsupported("Robot.getUrdf", "")
+    getData: Any = unsupported("Robot.getData", "")
+    setData: Any = unsupported("Robot.setData")
+    batterySensorEnable: Any = unsupported("Robot.batterySensorEnable")
+    batterySensorDisable: Any = unsupported("Robot.batterySensorDisable")
+    batterySensorGetSamplingPeriod: Any = unsupported(
+        "Robot.batterySensorGetSamplingPeriod", 0
+    )
+    batterySensorGetValue: Any = unsupported(
+        "Robot.batterySensorGetValue", float("nan")
+    )
+    wwiSendText: Any = unsupported("Robot.wwiSendText")
+    wwiReceiveText: Any = unsupported("Robot.wwiReceiveText")
+    waitForUserInputEvent: Any = unsupported("Robot.waitForUserInputEvent", 0)
+
+    @property
+    def basic_time_step(self) -> float:
+        """See `getBasicTimeStep`."""
+        return float(connection.facts["basic_time_step"])
+
+    @property
+    def time(self) -> float:
+        """See `getTime`."""
+        return connection.time
+
+    @property
+    def name(self) -> str:
+        """See `getName`."""
+        return str(connection.facts["name"])
+
+    @property
+    def model(self) -> str:
+        """See `getModel`."""
+        return str(connection.facts["model"])
+
+    @property
+    def custom_data(self) -> str:
+        """See `getCustomData`."""
+        return str(connection.facts["custom_data"])
+
+    @custom_data.setter
+    def custom_data(self, data: str) -> None:
+        connection.facts["custom_data"] = str(data)
+
+    @property
+    def supervisor(self) -> bool:
+        """See `getSupervisor`."""
+        return bool(connection.facts["supervisor"])
+
+    @property
+    def synchronization(self) -> bool:
+        """See `getSynchronization`."""
+        return bool(connection.facts["synchronization"])
+
+    @property
+    def mode(self) -> int:
+        """See `getMode`."""
+        return self.getMode()
+
+    @property
+    def number_of_devices(self) -> int:
+        """See `getNumberOfDevices`."""
+        return len(connection.devices)
+
+    @property
+    def world_path(self) -> str:
+        """See `getWorldPath`."""
+        return str(connection.facts["world_path"])
+
+    @property
+    def project_path(self) -> str:
+        """See `getProjectPath`."""
+        return str(connection.facts["project_path"])

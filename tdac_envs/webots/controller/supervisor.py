@@ -1,0 +1,142 @@
+"""A robot that may look at the whole world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .connection import c_int, connection
+from .device import Device
+from .messages import unsupported
+from .node import Node, may_supervise, node_of
+from .robot import Robot
+
+
+class Supervisor(Robot):
+    """A robot with `supervisor TRUE`; without it each call here is refused.
+
+    It may look at everything. Here it may not move anything, since the run is judged.
+    """
+
+    SIMULATION_MODE_PAUSE, SIMULATION_MODE_REAL_TIME, SIMULATION_MODE_FAST = 0, 1, 2
+    _mode = SIMULATION_MODE_FAST
+
+    def getRoot(self) -> Node | None:
+        """The node whose `children` are the file's nodes."""
+        return node_of(0) if may_supervise("wb_supervisor_node_get_root") else None
+
+    def getSelf(self) -> Node | None:
+        """The robot's node."""
+        if not may_supervise("wb_supervisor_node_get_self"):
+            return None
+        return node_of(connection.facts["self"])
+
+    def getFromDef(self, name: str) -> Node | None:
+        """The node with a DEF name, or None; `A.B` is B within A."""
+        if not may_supervise("wb_supervisor_node_get_from_def"):
+            return None
+        found, within = -1, -1
+        for part in name.split("."):
+            found = _defined(part, within)
+            if found < 0:
+                return None
+            within = found
+        return node_of(found)
+
+    def getFromId(self, number: int) -> Node | None:
+        """The node of a number, or None."""
+        if not may_supervise("wb_supervisor_node_get_from_id"):
+            return None
+        return node_of(number) if 0 <= number < len(_scene()) else None
+
+    def getFromDevice(self, device: Device) -> Node | None:
+        """A device's node; None, since an e-puck's are within its PROTO."""
+        del device
+        may_supervise("wb_supervisor_node_get_from_device")
+        return None
+
+    def getSelected(self) -> None:
+        """None: nobody selects anything."""
+        may_supervise("wb_supervisor_node_get_selected")
+
+    def simulationGetMode(self) -> int:
+        """As set; as fast as possible at first."""
+        return self._mode
+
+    def simulationSetMode(self, mode: int) -> None:
+        """Kept, and without effect."""
+        if may_supervise("wb_supervisor_simulation_set_mode"):
+            self._mode = c_int(mode)
+
+    @property
+    def simulation_mode(self) -> int:
+        """See `simulationGetMode` and `simulationSetMode`."""
+        return self.simulationGetMode()
+
+    @simulation_mode.setter
+    def simulation_mode(self, mode: int) -> None:
+        self.simulationSetMode(mode)
+
+    def simulationQuit(self, status: int) -> None:
+        """Ends the run."""
+        if may_supervise("wb_supervisor_simulation_quit"):
+            c_int(status)
+            connection.tell("simulationQuit")
+
+    def simulationReset(self) -> None:
+        """Ends the run, which fails: it is judged."""
+        if may_supervise("wb_supervisor_simulation_reset"):
+            connection.tell("simulationReset")
+
+    def simulationResetPhysics(self) -> None:
+        """Ends the run, which fails: it is judged."""
+        if may_supervise("wb_supervisor_simulation_reset_physics"):
+            connection.tell("simulationResetPhysics")
+
+    def worldReload(self) -> None:
+        """Ends the run, which fails: it is judged."""
+        if may_supervise("wb_supervisor_world_reload"):
+            connection.tell("worldReload")
+
+    def worldLoad(self, filename: str) -> None:
+        """Ends the run, which fails: it is judged."""
+        del filename
+        if may_supervise("wb_supervisor_world_load"):
+            connection.tell("worldLoad")
+
+    setLabel: Any = unsupported("Supervisor.setLabel")
+    worldSave: Any = unsupported("Supervisor.worldSave", False)
+    exportImage: Any = unsupported("Supervisor.exportImage")
+    movieStartRecording: Any = unsupported("Supervisor.movieStartRecording")
+    movieStopRecording: Any = unsupported("Supervisor.movieStopRecording")
+    movieIsReady: Any = unsupported("Supervisor.movieIsReady", True)
+    movieFailed: Any = unsupported("Supervisor.movieFailed", False)
+    animationStartRecording: Any = unsupported(
+        "Supervisor.animationStartRecording", False
+    )
+    animationStopRecording: Any = unsupported(
+        "Supervisor.animationStopRecording", False
+    )
+    virtualRealityHeadsetIsUsed: Any = unsupported(
+        "Supervisor.virtualRealityHeadsetIsUsed", False
+    )
+
+
+def _scene() -> list[dict[str, Any]]:
+    scene: list[dict[str, Any]] = connection.facts["scene"]
+    return scene
+
+
+def _defined(name: str, within: int) -> int:
+    """Number of the first node with a DEF name, or -1."""
+    for number, node in enumerate(_scene()):
+        if node["def"] == name and (within < 0 or _is_in(number, within)):
+            return number
+    return -1
+
+
+def _is_in(number: int, outer: int) -> bool:
+    while number > 0:
+        number = _scene()[number]["parent"]
+        if number == outer:
+            return True
+    return False

@@ -1,0 +1,73 @@
+"""From the environment's frame (ENU) to a file's own coordinates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tdac_envs.wbt.frames import Frame, Matrix, axis_angle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FileFrame:
+    """How a file says where the robot is.
+
+    Attributes:
+        world: Shape (3, 3): from the file's coordinates to ENU.
+        turn: Shape (3, 3): from the robot's axes to ENU, at the start.
+        heading: At the start, rad.
+        height: z of the robot's origin, m.
+    """
+
+    world: Matrix
+    turn: Matrix
+    heading: float
+    height: float
+
+    @classmethod
+    def of(cls, top: Frame, robot: Frame, heading: float) -> FileFrame:
+        """From the frames of the file and of the robot, and the robot's heading."""
+        return cls(top.matrix, robot.matrix, heading, float(robot.origin[2]))
+
+    def vector(self, x: float, y: float, z: float = 0.0) -> list[float]:
+        """A vector of ENU in the file's coordinates."""
+        return [float(value) for value in self.world.T @ (x, y, z)]
+
+    def point(self, x: float, y: float) -> list[float]:
+        """Where the robot is, from its place in the plane."""
+        return self.vector(x, y, self.height)
+
+    def rotation(self, heading: float) -> Matrix:
+        """Shape (3, 3): from the robot's axes to the file's coordinates."""
+        spin = axis_angle(0.0, 0.0, 1.0, heading - self.heading)
+        return np.asarray(self.world.T @ spin @ self.turn)
+
+    def axis_angle(self, heading: float) -> list[float]:
+        """The robot's rotation as an axis and an angle in [0, pi]."""
+        vector = Rotation.from_matrix(self.rotation(heading)).as_rotvec()
+        angle = float(np.linalg.norm(vector))
+        if angle < 1e-12:
+            return [0.0, 0.0, 1.0, 0.0]
+        return [*(float(part / angle) for part in vector), angle]
+
+    def attitude(self, heading: float) -> list[float]:
+        """Roll, pitch, yaw, and the quaternion (x, y, z, w), of an inertial unit."""
+        turn = self.rotation(heading)
+        if abs(self.world[2, 2]) > 0.5:  # z is up
+            roll = math.atan2(turn[2, 1], turn[2, 2])
+            pitch = -math.asin(float(np.clip(turn[2, 0], -1.0, 1.0)))
+            yaw = math.atan2(turn[1, 0], turn[0, 0])
+        else:
+            roll = math.atan2(-turn[1, 2], turn[1, 1])
+            pitch = math.asin(float(np.clip(turn[1, 0], -1.0, 1.0)))
+            yaw = math.atan2(-turn[2, 0], turn[0, 0])
+        quaternion = Rotation.from_matrix(turn).as_quat()
+        return [roll, pitch, yaw, *(float(part) for part in quaternion)]
+
+    def north(self, heading: float) -> list[float]:
+        """The direction of north as the robot sees it: +y, or +x where y is up."""
+        ahead = (0.0, 1.0, 0.0) if abs(self.world[2, 2]) > 0.5 else (1.0, 0.0, 0.0)
+        return [float(value) for value in self.rotation(heading).T @ ahead]

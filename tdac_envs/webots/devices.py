@@ -1,0 +1,114 @@
+"""Which devices a robot has, and which of them have no model here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from tdac_envs.epuck.infrared import TABLE
+from tdac_envs.wbt.fields import children, numbers, text
+from tdac_envs.wbt.robots import inside
+from tdac_envs.wbt.tree import Node
+
+Offset = tuple[float, float, float]
+
+WHEELS = (("left wheel motor", "left wheel sensor"),
+          ("right wheel motor", "right wheel sensor"))  # fmt: skip
+ENCODER_STEP = 0.00628
+"""Resolution of the wheels' position sensors, rad."""
+DARK = 4095.0
+"""Reading of a light sensor in the dark: light is not modelled."""
+_LIGHT_TABLE = [1.0, DARK, 0.01, 2.0, 0.0, 0.01]
+_GROUND_TABLE = [0.0, 1000.0, 0.002, 0.016, 300.0, 0.004]
+_TURRET: Offset = (-0.0095, 0.0, 0.0486)
+_PLACED = {
+    "GPS": ("gps", 44),
+    "Compass": ("compass", 39),
+    "InertialUnit": ("inertial unit", 46),
+}
+_ALWAYS_ABSENT = (
+    "camera", "accelerometer", "gyro", "emitter", "receiver", "speaker",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFacts:
+    """A device.
+
+    Attributes:
+        name: Of the device.
+        kind: Class of the `controller` package.
+        node_type: Webots' number of the type.
+        more: What else the class wants to know.
+        offset: In the robot's own axes, m, of those for which it matters.
+    """
+
+    name: str
+    kind: str
+    node_type: int
+    more: dict[str, Any]
+    offset: Offset = (0.0, 0.0, 0.0)
+
+    def plain(self) -> dict[str, Any]:
+        """As it is sent."""
+        own = {"name": self.name, "kind": self.kind, "node_type": self.node_type}
+        return {**own, **self.more}
+
+
+def find_devices(
+    robot: Node, max_velocity: float
+) -> tuple[tuple[DeviceFacts, ...], tuple[str, ...]]:
+    """The devices of an e-puck, and the names of those that are not modelled.
+
+    Args:
+        robot: Its node: the PROTO, or a Robot that is written out.
+        max_velocity: Of the motors, rad/s.
+    """
+    devices = [*_standard(max_velocity), *_ground(robot)]
+    absent = list(_ALWAYS_ABSENT)
+    if text(robot, "version") == "2":
+        absent.append("tof")
+    for node, offset in _added(robot):
+        name, number = _PLACED.get(node.kind, ("", 0))
+        called = text(node, "name", name)
+        if number:
+            devices.append(DeviceFacts(called, node.kind, number, {}, offset))
+        elif called:
+            absent.append(called)
+    known = {device.name for device in devices}
+    return tuple(devices), tuple(name for name in absent if name not in known)
+
+
+def _standard(max_velocity: float) -> list[DeviceFacts]:
+    devices = []
+    for wheel, sensor in WHEELS:
+        more = {"max_velocity": max_velocity, "sensor": sensor}
+        devices.append(DeviceFacts(wheel, "Motor", 57, more))
+        devices.append(DeviceFacts(sensor, "PositionSensor", 52, {"motor": wheel}))
+    table = {"table": [float(x) for x in TABLE.ravel()], "aperture": 0.1}
+    devices += [DeviceFacts(f"ps{k}", "DistanceSensor", 42, table) for k in range(8)]
+    light = {"table": _LIGHT_TABLE}
+    devices += [DeviceFacts(f"ls{k}", "LightSensor", 49, light) for k in range(8)]
+    devices += [DeviceFacts(f"led{k}", "LED", 47, {}) for k in range(10)]
+    return devices
+
+
+def _ground(robot: Node) -> list[DeviceFacts]:
+    slot = children(robot, "groundSensorsSlot")
+    if not any(node.kind == "E-puckGroundSensors" for node in slot):
+        return []
+    more = {"table": _GROUND_TABLE, "aperture": 0.1}
+    return [DeviceFacts(f"gs{k}", "DistanceSensor", 42, more) for k in range(3)]
+
+
+def _added(robot: Node) -> list[tuple[Node, Offset]]:
+    """Devices in the turret slot, or in a Robot that is written out."""
+    slot = children(robot, "turretSlot")
+    own = [node for node in inside(robot) if node.kind in _PLACED and node is not robot]
+    found = [(node, _moved(node, _TURRET)) for top in slot for node in inside(top)]
+    return found + [(node, _moved(node, (0.0, 0.0, 0.0))) for node in own]
+
+
+def _moved(node: Node, origin: Offset) -> Offset:
+    x, y, z = numbers(node, "translation", (0.0, 0.0, 0.0))
+    return origin[0] + x, origin[1] + y, origin[2] + z

@@ -1,0 +1,185 @@
+"""A world file, ready for a controller: environment, scene, devices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tdac_envs.arguments import finite_point
+from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.epuck.ground import Ground
+from tdac_envs.epuck.paths import entry, field_to
+from tdac_envs.errors import WorldError
+from tdac_envs.wbt.fields import children, flag, text
+from tdac_envs.wbt.frames import Frame
+from tdac_envs.wbt.geometry import GROUPS
+from tdac_envs.wbt.placing import placed
+from tdac_envs.wbt.reader import frame_of, read_text, read_world, with_goal
+from tdac_envs.wbt.robots import is_epuck
+from tdac_envs.wbt.tree import Node, parse
+from tdac_envs.webots.coordinates import FileFrame
+from tdac_envs.webots.devices import DeviceFacts, find_devices
+from tdac_envs.webots.scene import Scene
+from tdac_envs.world import World, check_modelled
+
+Found = tuple[Node, Frame]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """Where a controller is run.
+
+    Attributes:
+        name: Of the file.
+        text: Of the file.
+        world: With a goal; see `has_goal`.
+        has_goal: Whether there is one; else that of `world` is the farthest place.
+        left_out: Nodes that may be solid and are ignored.
+        scene: The file's nodes.
+        robot: The robot's node.
+        frame: How the file says where it is.
+        devices: Of the robot.
+        absent: Names of its devices that are not modelled.
+    """
+
+    name: str
+    text: str
+    world: World
+    has_goal: bool
+    left_out: tuple[str, ...]
+    scene: Scene
+    robot: Node
+    frame: FileFrame
+    devices: tuple[DeviceFacts, ...]
+    absent: tuple[str, ...]
+
+    @property
+    def is_supervisor(self) -> bool:
+        """Whether the robot may look at the world."""
+        return flag(self.robot, "supervisor", False)
+
+    def facts(self) -> dict[str, Any]:
+        """What the `controller` package is told at the beginning."""
+        number = self.scene.number(self.robot)
+        nodes = [node.plain() for node in self.scene.nodes]
+        return {
+            "name": text(self.robot, "name", "e-puck"),
+            "model": text(self.robot, "model", "GCtronic e-puck"),
+            "node_type": 34,
+            "basic_time_step": self.world.time_step,
+            "supervisor": self.is_supervisor,
+            "synchronization": flag(self.robot, "synchronization", True),
+            "custom_data": text(self.robot, "customData"),
+            "devices": [device.plain() for device in self.devices],
+            "not_modelled": list(self.absent),
+            "self": number,
+            "scene": nodes if self.is_supervisor else nodes[:1],
+        }
+
+    def arguments(self) -> tuple[str, ...]:
+        """The robot's `controllerArgs`."""
+        if "controllerArgs" not in self.robot.fields:
+            return ()
+        items = self.robot.fields["controllerArgs"].items
+        return tuple(item for item in items if isinstance(item, str))
+
+    def make_env(
+        self, *, steps: int | None = None, webots_sensors: bool = False, **options: Any
+    ) -> EPuckEnv:
+        """The environment; contacts are counted, and the robot drives on.
+
+        Args:
+            steps: Horizon.
+            webots_sensors: With Webots' noise and materials, the goal's mark seen.
+            options: Of `EPuckEnv`.
+        """
+        sensors: dict[str, Any] = {}
+        if webots_sensors:
+            sensors = {
+                "sensor_noise": 1.0,
+                "reflectance": "webots",
+                "goal_visible": True,
+            }
+        return EPuckEnv(
+            self.world,
+            horizon=steps,
+            on_collision="block",
+            ground_sensors=any(device.name == "gs0" for device in self.devices),
+            ignore=self.left_out,
+            **sensors,
+            **options,
+        )
+
+
+def open_stage(
+    path: Path, goal: Sequence[float] | None = None, ignore: Iterable[str] = ()
+) -> Stage:
+    """Reads a world for a controller.
+
+    Args:
+        path: The `.wbt` file.
+        goal: (x, y), m; by default the file's. There need not be one.
+        ignore: Names or types of nodes that may be missing.
+
+    Raises:
+        WorldError: The world cannot be used.
+    """
+    content = read_text(path)
+    world = read_world(content, path.name)
+    if not world.robots:
+        raise WorldError(f"{path.name}: there is no e-puck in it")
+    names = tuple(ignore)
+    check_modelled(world, names)
+    if goal is not None:
+        world = with_goal(world, finite_point("goal", goal))
+    has_goal = world.goal is not None
+    if not has_goal:
+        world = replace(world, goal=_farthest(world))
+    document = parse(content, path.name)
+    top = frame_of(document)
+    robot, own = _find_robot(document.nodes, top, path.name)
+    devices, absent = find_devices(robot, world.robot.max_wheel_speed)
+    frame = FileFrame.of(top, own, world.robot.heading)
+    scene = Scene(document.nodes)
+    return Stage(
+        path.name, content, world, has_goal, names, scene, robot, frame, devices, absent
+    )
+
+
+def _find_robot(nodes: Iterable[Node], top: Frame, name: str) -> Found:
+    found = _search(nodes, top)
+    if found is None:
+        raise WorldError(
+            f"{name}: the e-puck is within a node that is no Group, Pose or Solid"
+        )
+    return found
+
+
+def _search(nodes: Iterable[Node], frame: Frame) -> Found | None:
+    """The first e-puck and its frame, as the reader finds it."""
+    for node in nodes:
+        if is_epuck(node):
+            return node, placed(node, frame)
+        if node.kind in GROUPS or node.kind == "Solid":
+            inner = frame if node.kind == "Group" else placed(node, frame, scaled=True)
+            found = _search(children(node), inner)
+            if found is not None:
+                return found
+    return None
+
+
+def _farthest(world: World) -> tuple[float, float]:
+    """The place that is farthest from the robot, for the body; its own if shut in."""
+    ground = Ground.of(world)
+    begin = entry(ground, ground.free(BODY_RADIUS), world.robot.pose[:2])
+    if begin is None:
+        return world.robot.pose[:2]
+    field = field_to(ground, begin)
+    away = np.where(np.isfinite(field), field, -1.0)
+    row, column = divmod(int(away.argmax()), away.shape[1])
+    return ground.at(column, row)
