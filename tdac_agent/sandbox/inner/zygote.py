@@ -6,6 +6,7 @@ No controller's code runs here: a child reads its first request only after the f
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import signal
 import socket
@@ -24,6 +25,22 @@ FORK, REAP = b"F", b"R"
 # number. To REAP: exit code or minus the signal, CPU seconds, largest resident kB.
 REPLY = struct.Struct("<qdq")
 DESCRIPTORS = 4
+# What controllers and `sensors.py` import; loaded once and not in each child.
+LIKELY = (
+    "bisect",
+    "dataclasses",
+    "heapq",
+    "itertools",
+    "json",
+    "math",
+    "numpy.typing",
+    "pathlib",
+    "random",
+    "re",
+    "time",
+    "typing",
+    "zlib",
+)
 
 
 def main(control: int, lifeline: int, site: str) -> None:
@@ -37,7 +54,10 @@ def main(control: int, lifeline: int, site: str) -> None:
     if os.getpid() == 1:
         # Die with bubblewrap: the lifeline's signal does not reach a first process.
         kernel.prctl(kernel.PR_SET_PDEATHSIG, signal.SIGKILL)
+    for name in LIKELY:
+        importlib.import_module(name)
     # What is alive now stays shared with the children.
+    gc.collect()
     gc.freeze()
     link = socket.socket(fileno=control)
     while True:
