@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from tdac_agent.crew import SIZE, Crew
 from tdac_agent.episode import Record, run_own_loop, run_policy
 from tdac_agent.errors import Fault
 from tdac_agent.nursery import Nursery
 from tdac_agent.remote import Unit
 from tdac_agent.sandbox import (
     Child,
-    ChildUsage,
     ControllerFault,
     ControllerTimeout,
     Limits,
@@ -33,6 +32,24 @@ WALL_SECONDS = 600.0
 
 Key = tuple[str, int | None, str]
 NOMINAL: Key = ("nominal", None, "policy")
+OWN_LOOP: Key = ("nominal", None, "run_episode")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Driven:
+    """An episode as it was driven.
+
+    Attributes:
+        rollout: What came of it.
+        cpu_seconds: CPU time of its child.
+        tier: Sandbox tier of its child.
+        import_fault: Why the controller could not be imported, where it could not.
+    """
+
+    rollout: Rollout
+    cpu_seconds: float
+    tier: str
+    import_fault: ControllerFault | None = None
 
 
 class Judge:
@@ -76,10 +93,11 @@ class Judge:
         self._deadline = time.monotonic() + WALL_SECONDS
         self._nursery = nursery or Nursery(ahead=False)
         self._owns_nursery = nursery is None
-        workers = max(2, os.cpu_count() or 2)
-        self._pool = ThreadPoolExecutor(max_workers=workers)
+        # Before the first thread.
+        self._crew = Crew(self._in_crew, self._nursery.close)
+        self._pool = ThreadPoolExecutor(max_workers=SIZE)
         # The suite's own calls are made beside the episodes.
-        self._turns = Turns(workers + 1)
+        self._turns = Turns(SIZE + 1)
         self._lock = threading.Lock()
         self._episodes: dict[Key, Future[Rollout]] = {}
         self._unit: Unit | None = None
@@ -135,9 +153,11 @@ class Judge:
             if not future.cancelled() and future.exception() is None
         }
 
-    def begin(self, *, jitters: bool) -> None:
+    def begin(self, *, jitters: bool, own_loop: bool) -> None:
         """Starts the episodes that every suite asks for, beside its other tests."""
         self._submit(NOMINAL)
+        if own_loop:
+            self._submit(OWN_LOOP)
         if jitters:
             for number in range(1, JITTERS + 1):
                 self._submit((f"jitter {number}", None, "policy"))
@@ -145,18 +165,19 @@ class Judge:
     def close(self) -> None:
         """Waits for the episodes under way and ends the children."""
         self._pool.shutdown(cancel_futures=True)
+        self._crew.close()
         self._end_unit()
         if self._owns_nursery:
             self._nursery.close()
 
     def _end_unit(self) -> None:
         if self._unit is not None:
-            self._account(self._unit.close())
+            self._account(self._unit.close().cpu_seconds)
             self._unit = None
 
-    def _account(self, usage: ChildUsage) -> None:
+    def _account(self, cpu_seconds: float) -> None:
         with self._lock:
-            self.cpu_seconds += usage.cpu_seconds
+            self.cpu_seconds += cpu_seconds
 
     def _submit(self, key: Key) -> Future[Rollout]:
         """The episode's future, from the queue.
@@ -200,17 +221,44 @@ class Judge:
         *,
         final: bool = False,
     ) -> Rollout:
-        """Runs an episode in a fresh child; arguments as for `rollout` and `_load`."""
+        """Runs an episode in a fresh child.
+
+        Args:
+            name: As for `rollout`, as are the next two.
+            steps: Most steps.
+            drive: By what.
+            final: A time-out will not be tried once more.
+        """
+        try:
+            self._may_start()
+            driven = self._crew.do(name, steps, drive)
+        except ControllerFault as fault:
+            return self._not_driven(name, fault)
+        except Fault as fault:
+            self.fault = str(fault)
+            raise
+        self.tier = driven.tier
+        self._account(driven.cpu_seconds)
+        if driven.import_fault is not None:
+            self._remember(driven.import_fault, final=final)
+        # Children side by side may together use more than each may by itself.
+        if self.cpu_seconds > self._limits.cpu_seconds:
+            return self._skipped(name, "error", f"the controller {self._overspent()}")
+        return driven.rollout
+
+    def _in_crew(self, name: str, steps: int | None, drive: str) -> Driven:
+        """The same in a process of the crew."""
         limit = steps if steps is not None else self.task.nominal.horizon
         record = Record(self.task.make_env(), self.start_pose(name), limit)
         if drive == "truncated run_episode":
             record.truncates, record.collisions_before = True, 2
+        child = self._child()
         try:
-            child = self._load(final=final)
+            self._import(child)
         except ControllerFault as fault:
-            late = isinstance(fault, ControllerTimeout)
-            skipped = self._skipped(name, "error", str(fault))
-            return replace(skipped, timed_out=late)
+            cpu_seconds = child.close().cpu_seconds
+            rollout = self._not_driven(name, fault)
+            return Driven(rollout, cpu_seconds, child.tier, fault)
         try:
             if drive != "policy":
                 seconds = child.limits.reset_seconds + 2 * limit * self.task.nominal.dt
@@ -221,11 +269,8 @@ class Judge:
                     child, record, name, held_out=held_out, deadline=self._deadline
                 )
         finally:
-            self._account(child.close())
-        # Children side by side may together use more than each may by itself.
-        if self.cpu_seconds > self._limits.cpu_seconds:
-            return self._skipped(name, "error", f"the controller {self._overspent()}")
-        return rollout
+            cpu_seconds = child.close().cpu_seconds
+        return Driven(rollout, cpu_seconds, child.tier)
 
     def _overspent(self) -> str:
         return f"used {self._limits.cpu_seconds} s of CPU time, all it may"
@@ -248,23 +293,39 @@ class Judge:
         Raises:
             ControllerFault: It cannot be imported; the same at each later request.
         """
-        if self._import_fault is not None:
-            raise self._import_fault.with_traceback(None)
+        self._may_start()
+        child = self._child()
         try:
-            return self._loaded_child()
+            self._import(child)
         except ControllerFault as fault:
-            if final or not isinstance(fault, ControllerTimeout):
-                self._import_fault = fault
-            raise
-
-    def _loaded_child(self) -> Child:
-        child = self._start()
-        try:
-            child.load()
-        except ControllerFault:
-            self._account(child.close())
+            self._account(child.close().cpu_seconds)
+            self._remember(fault, final=final)
             raise
         return child
+
+    def _may_start(self) -> None:
+        """Whether to start a further child.
+
+        Raises:
+            ControllerFault: The controller could not be imported, or may use no more.
+        """
+        if self._import_fault is not None:
+            raise self._import_fault.with_traceback(None)
+        if self.cpu_seconds >= self._limits.cpu_seconds:
+            raise ControllerFault(f"the controller {self._overspent()}", "import")
+        if time.monotonic() > self._deadline:
+            raise ControllerFault(
+                f"the verification took longer than {WALL_SECONDS:g} s", "import"
+            )
+
+    def _remember(self, fault: ControllerFault, *, final: bool) -> None:
+        """An import that failed is not tried again, unless for want of time."""
+        if final or not isinstance(fault, ControllerTimeout):
+            self._import_fault = fault
+
+    def _not_driven(self, name: str, fault: ControllerFault) -> Rollout:
+        late = isinstance(fault, ControllerTimeout)
+        return replace(self._skipped(name, "error", str(fault)), timed_out=late)
 
     def _skipped(self, name: str, outcome: Outcome, reason: str) -> Rollout:
         record = Record(self.task.make_env(), self.start_pose(name), 1)
@@ -284,22 +345,17 @@ class Judge:
     def _held_out(self, name: str) -> bool:
         return name != "nominal" and int(name.split()[1]) > SHOWN_JITTERS
 
-    def _start(self) -> Child:
-        if self.cpu_seconds >= self._limits.cpu_seconds:
-            raise ControllerFault(f"the controller {self._overspent()}", "import")
-        if time.monotonic() > self._deadline:
-            raise ControllerFault(
-                f"the verification took longer than {WALL_SECONDS:g} s", "import"
-            )
+    def _child(self) -> Child:
+        """A child without files."""
         try:
             child = self._nursery.take(self._wanted_tier, self._limits)
         except SandboxError as error:
             self.fault = f"the sandbox failed: {error}"
             raise Fault(self.fault) from error
         self.tier = child.tier
-        try:
-            child.furnish(self._workdir, self.source)
-        except ControllerFault:
-            child.close()
-            raise
         return child
+
+    def _import(self, child: Child) -> None:
+        """Gives a child its files, and has it import the controller."""
+        child.furnish(self._workdir, self.source)
+        child.load()

@@ -6,9 +6,7 @@ runs here, only in the sandboxed children that the judge starts.
 
 from __future__ import annotations
 
-import ctypes
 import os
-import signal
 import sys
 import traceback
 from pathlib import Path
@@ -19,6 +17,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
+from tdac_agent.crew import end_with_parent
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.files import write_atomic
 from tdac_agent.judge import Judge
@@ -104,7 +103,7 @@ def _say(number: int) -> None:
 def work() -> NoReturn:
     """Starts children, waits for a job on standard input, does it and ends."""
     os.setpgid(0, 0)
-    _end_with_parent()
+    end_with_parent()
     nursery = Nursery()
     request = _read_line(0)
     code = NO_JOB
@@ -123,13 +122,6 @@ def work() -> NoReturn:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
-
-
-def _end_with_parent() -> None:
-    """Lets the kernel kill this process when the server ends (Linux)."""
-    if sys.platform == "linux":
-        pr_set_pdeathsig = 1
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
 
 
 def _read_line(descriptor: int) -> str:
@@ -176,7 +168,7 @@ def judge_suite(job: Job, nursery: Nursery) -> None:
         nursery=nursery,
     )
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
-    judge.begin(jitters=not job.paper)
+    judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")
     try:
         pytest.main(_arguments(job), plugins=[plugin])
     finally:

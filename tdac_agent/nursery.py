@@ -8,6 +8,7 @@ from tdac_agent.sandbox import (
     TIERS,
     Child,
     Limits,
+    NoRoomError,
     SandboxError,
     Tier,
     Zygote,
@@ -30,6 +31,8 @@ class Nursery:
         self._lock = threading.Lock()
         self._best: Tier | None = None
         self._zygotes: list[Zygote] = []
+        # Without room, but perhaps with children, which another process may have.
+        self._full: list[Zygote] = []
         if ahead:
             self._start_likely()
 
@@ -49,9 +52,9 @@ class Nursery:
     def close(self) -> None:
         """Has no further children; ends the zygotes that have none."""
         with self._lock:
-            for zygote in self._zygotes:
+            for zygote in self._zygotes + self._full:
                 zygote.close()
-            self._zygotes = []
+            self._zygotes, self._full = [], []
 
     def _first_child(self, limits: Limits) -> Child:
         """One of the best tier that turns out to work."""
@@ -70,17 +73,20 @@ class Nursery:
         zygote = self._zygote(tier, limits)
         try:
             child = fork_child(zygote, tier, limits)
+        except NoRoomError:
+            return self._child(tier, limits)
         except SandboxError:
             self._drop(zygote)
             raise
-        if not zygote.slots:
-            self._zygotes.remove(zygote)
-            if self._ahead:
-                self._zygotes.append(start_zygote(tier, limits))
+        if self._ahead and not zygote.slots:
+            self._zygotes.append(start_zygote(tier, limits))
         return child
 
     def _zygote(self, tier: Tier, limits: Limits) -> Zygote:
         """One with room for a further child."""
+        full = [zygote for zygote in self._zygotes if not zygote.slots]
+        self._full = [zygote for zygote in self._full + full if not zygote.ended]
+        self._zygotes = [zygote for zygote in self._zygotes if zygote.slots]
         for zygote in self._zygotes:
             if _suits(zygote, tier, limits):
                 return zygote
@@ -103,4 +109,4 @@ class Nursery:
 
 def _suits(zygote: Zygote, tier: Tier, limits: Limits) -> bool:
     same = zygote.scratch_bytes == limits.scratch_bytes
-    return zygote.tier == tier.name and same and zygote.slots > 0
+    return zygote.tier == tier.name and same

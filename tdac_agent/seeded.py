@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from tdac_agent.crew import SIZE, Crew
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.disturbance import Disturbance
 from tdac_agent.episode import Record, not_driven, run_policy
@@ -25,7 +26,6 @@ from tdac_agent.trajectory import Outcome, Rollout
 from tdac_agent.turns import Turns
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
-WORKERS = max(2, os.cpu_count() or 2)
 
 
 class SeededJob(BaseModel):
@@ -93,7 +93,6 @@ class Stage:
         tier: Sandbox tier, or `auto`.
         limits: Of each child, and so of each episode.
         nursery: Where children come from.
-        turns: Who may drive when.
     """
 
     task: Task
@@ -103,7 +102,6 @@ class Stage:
     tier: str
     limits: Limits
     nursery: Nursery
-    turns: Turns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,20 +114,10 @@ class Driven:
 
 
 def drive_seed(stage: Stage, seed: int) -> Driven:
-    """The episode of a seed.
+    """The episode of a seed, in a fresh child.
 
-    Start and noise are what the environment draws after `reset(seed=seed)`. A time-out
-    may be the machine's doing, so it is tried once more, alone.
+    Start and noise are what the environment draws after `reset(seed=seed)`.
     """
-    with stage.turns.beside():
-        driven = _drive(stage, seed)
-    if driven.rollout.outcome != "error" or not driven.rollout.timed_out:
-        return driven
-    with stage.turns.alone():
-        return _drive(stage, seed)
-
-
-def _drive(stage: Stage, seed: int) -> Driven:
     env = stage.task.make_env(**stage.disturbance.env_options())
     record = Record(env, None, stage.task.nominal.horizon, seed=seed)
     name = f"seed {seed}"
@@ -161,7 +149,6 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
         job.tier,
         job.limits,
         nursery,
-        Turns(WORKERS),
     )
     counts, tier, fault = [0, 0], job.tier, None
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
@@ -181,17 +168,39 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
 
 def _in_order(stage: Stage, job: SeededJob) -> Generator[tuple[SeededEpisode, str]]:
     """Episodes and their tiers, several at a time; closing waits for the last."""
-
-    def run(seed: int) -> tuple[SeededEpisode, str]:
-        driven = drive_seed(stage, seed)
-        return figures(driven, seed, stage.task), driven.tier
-
     seeds = range(job.first_seed, job.first_seed + job.episodes)
-    with ThreadPoolExecutor(max_workers=WORKERS) as pool:
+    turns = Turns(SIZE)
+    with (
+        closing(Crew(partial(_driven, stage), stage.nursery.close)) as crew,
+        ThreadPoolExecutor(max_workers=SIZE) as pool,
+    ):
         try:
-            yield from pool.map(run, seeds)
+            yield from pool.map(partial(_in_turn, crew, turns), seeds)
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _driven(stage: Stage, seed: int) -> tuple[SeededEpisode, str, bool]:
+    """What is kept of an episode, its tier, and whether it took too long."""
+    driven = drive_seed(stage, seed)
+    rollout = driven.rollout
+    late = rollout.outcome == "error" and rollout.timed_out
+    return figures(driven, seed, stage.task), driven.tier, late
+
+
+def _in_turn(
+    crew: Crew[[int], tuple[SeededEpisode, str, bool]], turns: Turns, seed: int
+) -> tuple[SeededEpisode, str]:
+    """An episode and its tier.
+
+    A time-out may be the machine's doing, so it is tried once more, alone.
+    """
+    with turns.beside():
+        episode, tier, late = crew.do(seed)
+    if late:
+        with turns.alone():
+            episode, tier, _ = crew.do(seed)
+    return episode, tier
 
 
 def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:

@@ -27,7 +27,7 @@ from tdac_agent.sandbox.launch import (
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
 from tdac_agent.sandbox.process import Child, EpisodeEnv
 from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
-from tdac_agent.sandbox.zygote import Zygote
+from tdac_agent.sandbox.zygote import NoRoomError, Zygote
 
 __all__ = [
     "MAX_SOURCE_BYTES",
@@ -44,6 +44,7 @@ __all__ = [
     "EpisodeEnv",
     "Handle",
     "Limits",
+    "NoRoomError",
     "SandboxError",
     "Tier",
     "TierStatus",

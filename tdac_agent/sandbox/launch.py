@@ -85,6 +85,7 @@ def fork_child(zygote: Zygote, tier: Tier, limits: Limits) -> Child:
 
     Raises:
         SandboxError: It did not start, or the tier's promise does not hold.
+        NoRoomError: The zygote has had all the children it can have.
     """
     child = Child(tier.name, limits, zygote.fork(limits))
     try:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import multiprocessing
 import os
 import shutil
 import signal
@@ -18,7 +19,6 @@ import struct
 import subprocess
 import sys
 import tempfile
-import threading
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -66,11 +66,16 @@ class Forked:
     reap: Callable[[], Reaped]
 
 
+class NoRoomError(Exception):
+    """A zygote has had all the children it can have."""
+
+
 class Zygote:
     """Forks as many children as it has folders for; ends with the last of them.
 
     Where the kernel cannot keep the files of its children from one another, it has
-    one child only.
+    one child only. Forks of the process that made it may use it as well, and share
+    its folders; only that process ends it.
 
     Args:
         tier: Name of the tier.
@@ -87,34 +92,39 @@ class Zygote:
         self.scratch_bytes = limits.scratch_bytes
         separate = tier == "namespaces" or landlock.is_offered()
         slots = slots if separate and tier != "rlimits" else 1
-        self._lock = threading.Lock()
-        self._alive = 0
+        context = multiprocessing.get_context("fork")
+        self._lock = context.Lock()
+        # How many folders were given away, and how many children live.
+        self._given, self._alive = context.RawValue("i", 0), context.RawValue("i", 0)
         self.parent = Path(tempfile.mkdtemp(prefix="tdac-child-")).resolve()
         self.site = self.parent / "site"
         # A file of the zygote's that no child may read.
         self.witness = self.parent / "witness"
         try:
             self._furnish()
-            self._free = [PrivateFolder(self.parent) for _ in range(slots)]
+            self._folders = [PrivateFolder(self.parent) for _ in range(slots)]
             self._process, self._link, self._output, lifeline = self._start()
         except BaseException:
             shutil.rmtree(self.parent, ignore_errors=True)
             raise
         ends = (self._process, self._link, self._output, lifeline, self.parent)
-        self._end = weakref.finalize(self, _end, *ends)
+        self._end = weakref.finalize(self, _end, os.getpid(), *ends)
 
     @property
     def slots(self) -> int:
         """How many further children it can have."""
-        return len(self._free)
+        return len(self._folders) - int(self._given.value)
 
     def fork(self, limits: Limits) -> Forked:
         """A new child that waits for its setup frame.
 
         Raises:
             SandboxError: The zygote did not start, or has ended.
+            NoRoomError: Another process got the last folder.
         """
         with self._lock, contextlib.ExitStack() as theirs, contextlib.ExitStack() as us:
+            if not self.slots:
+                raise NoRoomError
             inner, outer = _pipes(theirs, us)
             message = [REQUEST.pack(FORK, 0)]
             self._link.settimeout(limits.start_seconds)
@@ -128,18 +138,24 @@ class Zygote:
                 raise SandboxError(f"{self.tier}: cannot fork a child: {text}")
             _tie(inner[3], pid)
             us.pop_all()
-            folder = self._free.pop()
-            self._alive += 1
+            folder = self._folders[self._given.value]
+            self._given.value += 1
+            self._alive.value += 1
         write, read, printed, lifeline = outer
         frame, most = limits.frame_bytes, limits.output_bytes
         channel = Channel(write, read, printed, frame, most)
         return Forked(pid, folder, channel, lifeline, lambda: self._reap(number))
 
+    @property
+    def ended(self) -> bool:
+        """Whether it has ended, as far as this process knows."""
+        return not self._end.alive
+
     def close(self) -> None:
         """Have no further children; end now or with the last one."""
         with self._lock:
-            self._free = []
-            if not self._alive:
+            self._given.value = len(self._folders)
+            if not self._alive.value:
                 self._end()
 
     def _reap(self, number: int) -> Reaped:
@@ -153,8 +169,8 @@ class Zygote:
                 reaped = status, cpu, peak * (1 if sys.platform == "darwin" else 1024)
             except OSError:
                 reaped = lost
-            self._alive -= 1
-            if not self._alive and not self._free:
+            self._alive.value -= 1
+            if not self._alive.value and not self.slots:
                 self._end()
         return reaped
 
@@ -200,7 +216,7 @@ class Zygote:
             command += [str(control.fileno()), str(lifeline)]
             command += [str(INNER.parent), str(self.site)]
             if self.tier == "bubblewrap":
-                scratch = [str(folder.scratch) for folder in self._free]
+                scratch = [str(folder.scratch) for folder in self._folders]
                 wrapper = bubblewrap_command(
                     self.parent, scratch, lifeline, self.scratch_bytes
                 )
@@ -241,13 +257,16 @@ def _pipes(
 
 
 def _end(
+    owner: int,
     process: subprocess.Popen[bytes],
     link: socket.socket,
     output: int,
     lifeline: int,
     parent: Path,
 ) -> None:
-    """Kills a zygote, and with it what is left of its children."""
+    """Kills a zygote, and with it what is left of its children; its owner alone may."""
+    if os.getpid() != owner:
+        return
     link.close()
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)

@@ -1,0 +1,106 @@
+"""Processes that work side by side, each with a Python of its own.
+
+Threads of one process take turns in running Python, and an episode is mostly Python.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import queue
+import signal
+import sys
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any, Generic, ParamSpec, TypeVar
+
+from tdac_agent.errors import Fault
+
+SIZE = max(2, os.cpu_count() or 2)
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class Crew(Generic[P, T]):
+    """Forked from this process, which should have a single thread then.
+
+    Args:
+        work: What a member does when asked. Arguments and results are pickled; all
+            else it refers to is as it was at the fork.
+        end: What a member does last of all.
+        size: Number of members.
+    """
+
+    def __init__(
+        self, work: Callable[P, T], end: Callable[[], None], size: int = SIZE
+    ) -> None:
+        context = multiprocessing.get_context("fork")
+        self._ends: list[Connection] = []
+        self._idle: queue.SimpleQueue[Connection] = queue.SimpleQueue()
+        self._members = []
+        for _ in range(size):
+            ours, theirs = context.Pipe()
+            self._ends.append(ours)
+            member = context.Process(
+                target=_serve, args=(work, end, theirs, self._ends), daemon=True
+            )
+            member.start()
+            theirs.close()
+            self._members.append(member)
+            self._idle.put(ours)
+
+    def do(self, *args: P.args, **kwargs: P.kwargs) -> T:
+        """Has an idle member work, and waits for it; several threads may ask at once.
+
+        Raises:
+            Fault: The member has died.
+            Exception: Whatever the work raised.
+        """
+        member = self._idle.get()
+        try:
+            member.send((args, kwargs))
+            result, error = member.recv()
+        except (EOFError, OSError):
+            raise Fault("a process of the judge has died") from None
+        finally:
+            self._idle.put(member)
+        if error is not None:
+            raise error
+        return result  # type: ignore[no-any-return]
+
+    def close(self) -> None:
+        """Ends the members; none may be at work."""
+        for end in self._ends:
+            end.close()
+        for member in self._members:
+            member.join()
+
+
+def end_with_parent() -> None:
+    """Lets the kernel kill this process when the one that forked it ends (Linux)."""
+    if sys.platform == "linux":
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+
+
+def _serve(
+    work: Callable[..., Any],
+    end: Callable[[], None],
+    judge: Connection,
+    ends_of_judge: list[Connection],
+) -> None:
+    end_with_parent()
+    # The others' ends, too: a member ends when the judge has closed its own.
+    for other in ends_of_judge:
+        other.close()
+    with contextlib.suppress(EOFError, KeyboardInterrupt):
+        while True:
+            args, kwargs = judge.recv()
+            try:
+                judge.send((work(*args, **kwargs), None))
+            except Exception as error:
+                judge.send((None, error))
+    end()
