@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import weakref
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
@@ -28,6 +29,23 @@ class EpisodeEnv(Protocol):
         Raises:
             EnvRefusalError: The controller sees a RuntimeError with this message.
         """
+
+
+class ProgramWorld(Protocol):
+    """What a program of its own is given, on the judge's side."""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended, so that the program should end, too."""
+
+    def reset(self) -> Any:
+        """Return what the program is told at the beginning."""
+
+    def step(self, action: Any) -> Any:
+        """Return the answer to a request; raises as that of `EpisodeEnv`."""
+
+
+Answering = EpisodeEnv | ProgramWorld
 
 
 class Child:
@@ -159,26 +177,70 @@ class Child:
             max_steps: Passed on.
             timeout: Seconds that the controller itself may take in all.
         """
-        phase = "run_episode"
+        return self._answer(Kind.RUN_EPISODE, max_steps, "run_episode", env, timeout)
+
+    def run_program(
+        self, world: ProgramWorld, arguments: list[str], timeout: float, grace: float
+    ) -> Any:
+        """Run the controller's file as a program that asks `world` for each step.
+
+        A package `controller`, which connects the two, has to be in its folder.
+
+        Args:
+            world: Answers the program's requests, here, in this process.
+            arguments: Of its command line.
+            timeout: Seconds that the program itself may take in all.
+            grace: Seconds that it may take after the world has ended.
+        """
+        return self._answer(
+            Kind.RUN_PROGRAM,
+            arguments,
+            "the run",
+            world,
+            timeout,
+            lambda: grace if world.is_over else timeout,
+        )
+
+    def _answer(
+        self,
+        kind: Kind,
+        value: Any,
+        phase: str,
+        env: Answering,
+        timeout: float,
+        most: Callable[[], float] | None = None,
+    ) -> Any:
+        """Have the controller do something, and answer what it asks meanwhile.
+
+        Args:
+            kind: What it is to do.
+            value: Sent with it.
+            phase: Name of it.
+            env: Answers.
+            timeout: Seconds that the controller itself may take in all.
+            most: Bound, from now on, on the seconds that are left.
+        """
         now = time.monotonic()
-        self._talk.send(Kind.RUN_EPISODE, max_steps, phase, now + timeout, timeout)
+        self._talk.send(kind, value, phase, now + timeout, timeout)
         left = timeout
         while True:
             start = time.monotonic()
-            kind, value = self._talk.receive(phase, start + left, timeout)
+            asked, value = self._talk.receive(phase, start + left, timeout)
             left -= time.monotonic() - start
-            if kind == Kind.VALUE:
+            if asked == Kind.VALUE:
                 return value
-            if kind not in {Kind.ENV_RESET, Kind.ENV_STEP}:
+            if asked not in {Kind.ENV_RESET, Kind.ENV_STEP}:
                 self._talk.breach("an answer that was not due", phase)
             try:
-                answer = env.reset() if kind == Kind.ENV_RESET else env.step(value)
+                answer = env.reset() if asked == Kind.ENV_RESET else env.step(value)
                 reply: tuple[Kind, Any] = (Kind.ENV_REPLY, answer)
             except EnvRefusalError as error:
                 reply = (Kind.ENV_REFUSAL, str(error))
             except BaseException:
                 self.close()
                 raise
+            if most is not None:
+                left = min(left, most())
             self._talk.send(*reply, phase, time.monotonic() + left, timeout)
 
 

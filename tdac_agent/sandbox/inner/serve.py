@@ -11,6 +11,7 @@ from .describe import FILE_NAME, describe, type_name
 from .encode import encode
 from .layout import Layout
 from .link import Link
+from .program import run_program
 from .wire import Handle, Kind, WireError
 
 MAX_HANDLES = 10_000
@@ -72,6 +73,8 @@ class Server:
             return self._module.run_episode(Env(self), value)
         if kind == Kind.LOAD:
             return self._load()
+        if kind == Kind.RUN_PROGRAM:
+            return run_program(self._read_source(), value, Env(self))
         raise WireError(f"not a request: {kind}")
 
     def _use(self, kind: int, owner: object, name: str | None, *rest: Any) -> Any:
@@ -88,10 +91,14 @@ class Server:
         holder = self._module if owner is None else owner
         return holder if name is None else getattr(holder, name)
 
-    def _load(self) -> dict[str, str]:
+    def _read_source(self) -> bytes:
         with open(FILE_NAME, "rb") as file:
             source = file.read()
         self._source = source.decode("utf-8", "replace")
+        return source
+
+    def _load(self) -> dict[str, str]:
+        source = self._read_source()
         code = compile(source, FILE_NAME, "exec", dont_inherit=True)
         self._module.__file__ = FILE_NAME
         sys.modules["controller"] = self._module

@@ -46,6 +46,7 @@ class Kind(IntEnum):
     ENV_REPLY = 8
     ENV_REFUSAL = 9
     CALL_EACH = 10
+    RUN_PROGRAM = 11
     VALUE = 32
     ERROR = 33
     ENV_RESET = 34

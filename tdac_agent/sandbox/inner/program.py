@@ -1,0 +1,53 @@
+"""Run a whole program, such as a Webots controller, whose steps are the judge's."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import shutil
+import sys
+from types import ModuleType
+from typing import Any
+
+from .describe import FILE_NAME
+
+PACKAGE = "controller"
+
+
+def run_program(source: bytes, arguments: list[str], world: Any) -> int | str | None:
+    """Run a file as `__main__`; return what it gave to `sys.exit`, if it did.
+
+    It finds itself, with all files beside it, in a folder where it may write.
+
+    Args:
+        source: Of the program.
+        arguments: Those of `sys.argv` after the first.
+        world: Handed to the package `controller`, which is beside the program.
+    """
+    folder = os.path.join(os.environ["TMPDIR"], "program")
+    _copy(os.getcwd(), folder)
+    os.chdir(folder)
+    sys.path[0] = folder
+    sys.argv[1:] = arguments
+    importlib.import_module(PACKAGE).connect(world)
+    main = ModuleType("__main__")
+    main.__file__ = FILE_NAME
+    sys.modules["__main__"] = main
+    code = compile(source, FILE_NAME, "exec", dont_inherit=True)
+    try:
+        exec(code, main.__dict__)
+    except SystemExit as ended:
+        status = ended.code
+        return status if status is None or type(status) is int else str(status)[:200]
+    return None
+
+
+def _copy(source: str, target: str) -> None:
+    """Copy a folder, contents only: a sandboxed process may not set rights."""
+    os.mkdir(target)
+    for entry in os.scandir(source):
+        copy = os.path.join(target, entry.name)
+        if entry.is_dir():
+            _copy(entry.path, copy)
+        else:
+            shutil.copyfile(entry.path, copy)
