@@ -1,4 +1,4 @@
-"""The command line: `tdac map | world | synth | verify | play | check-suite | doctor`.
+"""The command line: `tdac map | world | synth | verify | play | webots | …`.
 
 Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastructure,
 4 budget, 130 interrupted.
@@ -31,6 +31,7 @@ from tdac_agent.commands.options import (
     Tier,
     WheelSlip,
 )
+from tdac_agent.commands.webots_flags import webots_app
 
 app = typer.Typer(
     name="tdac",
@@ -45,6 +46,7 @@ app = typer.Typer(
         "`controller.py`, with no key and no network."
     ),
 )
+app.add_typer(webots_app, name="webots")
 
 
 @app.callback(invoke_without_command=True)

@@ -1,0 +1,114 @@
+"""`tdac webots run`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from tdac_agent.commands.flags import check_finite, check_tier
+from tdac_agent.webots_run import WebotsReport, WebotsRun, frames, run_controller
+from tdac_envs.errors import TaskError
+from tdac_envs.video import SUFFIXES, write_video
+from tdac_envs.webots.stage import Stage, open_stage
+from tdac_envs.worlds import world_file
+
+STRIDE = 2
+
+
+def run(
+    controller: Path,
+    world: str,
+    steps: int | None,
+    goal: tuple[float, float] | None,
+    ignore: tuple[str, ...],
+    webots_sensors: bool,
+    video: Path | None,
+    tier: str,
+    as_json: bool,
+) -> int:
+    """Runs a controller and prints what it did; 0 if it passed."""
+    check_tier(tier)
+    check_finite(goal=goal)
+    if video is not None and video.suffix.lower() not in SUFFIXES:
+        raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
+    stage = open_stage(world_file(world), goal, ignore)
+    env = stage.make_env(steps=steps, webots_sensors=webots_sensors)
+    done = run_controller(controller, stage, env, tier=tier)
+    if as_json:
+        record = {"schema_version": 1, **asdict(done.report)}
+        sys.stdout.write(json.dumps(record, indent=2) + "\n")
+    else:
+        _show(done.report, Console())
+    if video is not None:
+        _film(done, stage, steps, webots_sensors, video)
+        if not as_json:
+            print(f"wrote {video} (twice real time)")
+    return 0 if done.report.passed else 1
+
+
+def _film(
+    done: WebotsRun, stage: Stage, steps: int | None, webots_sensors: bool, video: Path
+) -> None:
+    """The same run again, with a picture of every second step."""
+    env = stage.make_env(
+        steps=steps, webots_sensors=webots_sensors, render_mode="rgb_array"
+    )
+    write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
+
+
+def _show(report: WebotsReport, console: Console) -> None:
+    if report.sandbox == "rlimits":
+        console.print(
+            "[yellow]warning: sandbox tier rlimits: files and network are not closed "
+            "to the controller[/]"
+        )
+    if report.output.strip():
+        console.print("[cyan]the controller printed[/]")
+        console.print(Text(report.output.rstrip()), soft_wrap=True)
+    if report.error is not None:
+        console.print("[red]the controller failed[/]")
+        console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)
+    console.print(_table(report))
+    colour, word = ("green", "passed") if report.passed else ("red", "not passed")
+    why = f": {escape(report.why_not)}" if report.why_not else ""
+    console.print(
+        f"[bold {colour}]{word}[/]{why}  ({escape(report.controller)} in "
+        f"{escape(report.world)}, sandbox {report.sandbox}; not run in Webots itself)",
+        soft_wrap=True,
+    )
+
+
+def _table(report: WebotsReport) -> Table:
+    table = Table(
+        title="The run as the environment recorded it", title_justify="left",
+        show_header=False,
+    )  # fmt: skip
+    table.add_row("outcome", report.outcome)
+    table.add_row("steps", f"{report.steps} ({report.time:.2f} s)")
+    contact = report.first_contact
+    where = "" if contact is None else f", the first at {_at(*contact[1:])}"
+    step = "" if contact is None else f" in step {contact[0]}"
+    table.add_row("steps with a contact", f"{report.collisions}{where}{step}")
+    if report.goal is None:
+        table.add_row("goal", "none in this world")
+    else:
+        table.add_row("goal", _at(*report.goal))
+        table.add_row("way left", f"{report.d_min:.3f} m of {report.d0:.3f} m")
+        table.add_row("straight left", f"{report.d_min_euclidean:.3f} m")
+    table.add_row("driven", f"{report.way:.3f} m")
+    for name, (x, y, heading) in (("start", report.start), ("end", report.end)):
+        table.add_row(name, f"{_at(x, y)}, heading {heading:.3f} rad")
+    if report.left_out:
+        table.add_row("ignored", ", ".join(map(escape, report.left_out)))
+    return table
+
+
+def _at(x: float, y: float) -> str:
+    return f"({x:.3f}, {y:.3f})"

@@ -1,0 +1,63 @@
+"""The commands `tdac webots …` and `tdac export …`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from tdac_agent.commands.options import Json, Tier
+
+webots_app = typer.Typer(
+    no_args_is_help=True, help="Run Webots controllers in worlds of Webots."
+)
+export_app = typer.Typer(no_args_is_help=True, help="Take a controller elsewhere.")
+
+
+@webots_app.command(
+    "run", epilog="Example: `tdac webots run my_controller.py maze.wbt --steps 4000`"
+)
+def webots_run(
+    controller: Annotated[Path, typer.Argument(help="The controller's file.")],
+    world: Annotated[str, typer.Argument(help="A `.wbt` file, or a bundled world.")],
+    steps: Annotated[
+        Optional[int],  # noqa: UP045 - typer reads it at run time
+        typer.Option(
+            min=1, help="Steps of the world at most.  [default: as the env's horizon]"
+        ),
+    ] = None,
+    goal: Annotated[
+        Optional[tuple[float, float]],  # noqa: UP045
+        typer.Option("--goal", metavar="X Y", help="m.  [default: the world's GOAL]"),
+    ] = None,
+    ignore: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(help="Name or type of a node that may be missing; repeatable."),
+    ] = None,
+    webots_sensors: Annotated[
+        bool,
+        typer.Option(
+            "--webots-sensors",
+            help="Sensors with Webots' noise and materials; the goal's mark is seen.",
+        ),
+    ] = False,
+    video: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Write .mp4 or .gif."),
+    ] = None,
+    tier: Tier = "auto",
+    as_json: Json = False,
+) -> None:
+    """Run a Webots controller as it is, judged by the environment.
+
+    Exit 0: it reached the goal (if there is one) and touched nothing.
+    """
+    from tdac_agent.commands import webots
+
+    raise typer.Exit(
+        webots.run(
+            controller, world, steps, goal, tuple(ignore or ()), webots_sensors, video,
+            tier, as_json,
+        )
+    )  # fmt: skip
