@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 ALLOWED_IMPORTS = frozenset(
     [
@@ -45,7 +46,59 @@ CONSTANTS_2D = (
     "STOP_DIST",
     "SLOW_DIST",
 )
+CONSTANTS_EPUCK = (
+    "WORLD_FILE",
+    "TIME_STEP",
+    "MAX_WHEEL_SPEED",
+    "SENSOR_RANGE",
+    "GOAL_TOLERANCE",
+)
+CONSTANTS_EPUCK = (
+    "WORLD_FILE",
+    "TIME_STEP",
+    "MAX_WHEEL_SPEED",
+    "SENSOR_RANGE",
+    "GOAL_TOLERANCE",
+)
 MAX_SOURCE_BYTES = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What a file of the profile `paper` must define at its top level.
+
+    Attributes:
+        constants: Assigned names.
+        functions: Plain functions.
+        classes: Classes.
+    """
+
+    constants: tuple[str, ...]
+    functions: tuple[str, ...]
+    classes: tuple[str, ...] = ()
+
+
+NAMES = {
+    "map2d": Names(
+        CONSTANTS_2D,
+        ("nearest_free", "plan_path", "run_episode", "main"),
+        ("OccMap2D",),
+    ),
+    "epuck": Names(
+        CONSTANTS_EPUCK,
+        (
+            *("parse_world", "build_grid", "astar", "compute_wheel_speeds"),
+            *("run_episode", "main"),
+        ),
+    ),
+}
+"""By the shipped suite that asks for them."""
+
+
+def time_step(dt: float) -> int | float:
+    """The constant `TIME_STEP`: a duration in ms, an int where it is a whole number."""
+    milliseconds = round(1e3 * dt, 6)
+    return int(milliseconds) if milliseconds.is_integer() else milliseconds
 
 
 def top_level_names(tree: ast.Module) -> dict[str, ast.stmt]:

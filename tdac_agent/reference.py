@@ -8,7 +8,7 @@ fractional step; nothing of it is shared with `builtin`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from tdac_envs.grid import BoolGrid, body_free
 from tdac_envs.kernels import first_contact, wrap_angle
 from tdac_envs.plan import Path, descend, distance_field
 from tdac_envs.task2d import Map2DTask
+
+Point = tuple[float, float]
 
 # Room beyond the body that is tried for the path, px, widest first. The last but one
 # keeps a float32 action clear of a corner that the path would graze at exactly 0.
@@ -35,7 +37,7 @@ class Reference:
 
     def __init__(self, task: Map2DTask) -> None:
         self.task = task
-        self._waypoints: list[tuple[float, float]] = []
+        self._waypoints: list[Point] = []
 
     def reset(self, pose: Sequence[float]) -> None:
         """Plans from a pose (x, y, heading), px and rad."""
@@ -80,29 +82,39 @@ def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
     return ends
 
 
-def pull(task: Map2DTask, path: Path, safe: float = _SAFE) -> list[tuple[float, float]]:
+def pull(task: Map2DTask, path: Path, safe: float = _SAFE) -> list[Point]:
     """Corners of the path after every shortcut that keeps the disc clear.
-
-    A shortcut is looked for by doubling and halving the number of path points that
-    it skips, so a long path costs n log n contact tests.
 
     Args:
         task: Gives the map and the body.
         path: Shape (n, 2), px.
         safe: Room that a shortcut keeps beyond the body, px.
     """
+    return taut(path, lambda begin, end: _free(task, begin, end, safe))
+
+
+def taut(path: Path, is_free: Callable[[Point, Point], bool]) -> list[Point]:
+    """Corners of a path after every shortcut.
+
+    A shortcut is looked for by doubling and halving the number of path points that
+    it skips, so a long path costs n log n contact tests.
+
+    Args:
+        path: Shape (n, 2).
+        is_free: Whether a shortcut may lead straight from one point to another.
+    """
     points = [(float(x), float(y)) for x, y in path]
     corners, at = points[:1], 0
     while at < len(points) - 1:
         reach = 1
-        while at + 2 * reach < len(points) and _free(
-            task, points[at], points[at + 2 * reach], safe
+        while at + 2 * reach < len(points) and is_free(
+            points[at], points[at + 2 * reach]
         ):
             reach *= 2
         stride = reach
         while stride >= 1:
             beyond = at + reach + stride
-            if beyond < len(points) and _free(task, points[at], points[beyond], safe):
+            if beyond < len(points) and is_free(points[at], points[beyond]):
                 reach += stride
             stride //= 2
         at += reach
@@ -110,9 +122,7 @@ def pull(task: Map2DTask, path: Path, safe: float = _SAFE) -> list[tuple[float, 
     return corners
 
 
-def _free(
-    task: Map2DTask, begin: tuple[float, float], end: tuple[float, float], safe: float
-) -> bool:
+def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
     """Whether the body, grown by `safe` px, gets straight from one point to another."""
     terrain = task.terrain
     length = math.dist(begin, end)
@@ -135,7 +145,7 @@ def _free(
     return True
 
 
-def _roomy(task: Map2DTask, start: tuple[float, float], margin: float) -> BoolGrid:
+def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:
     """Pixels with room for the body and `margin` px, less of it near both ends."""
     clear, radius = task.terrain.clear, task.robot.radius
     free = body_free(clear, radius + margin)

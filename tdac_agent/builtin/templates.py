@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 
 from tdac_agent.builtin.parameters import EPuckParameters, Parameters, Tuned
+from tdac_agent.contract import time_step
 from tdac_envs.params import RobotParams
 
 if TYPE_CHECKING:
@@ -36,16 +37,10 @@ def render_epuck(parameters: EPuckParameters, task: EPuckTask) -> str:
     return _render(
         "controller_epuck.py.j2",
         parameters,
-        time_step=milliseconds(task.dt),
+        time_step=time_step(task.dt),
         max_wheel_speed=task.max_wheel_speed,
         goal_tolerance=task.goal_tolerance,
     )
-
-
-def milliseconds(dt: float) -> int | float:
-    """A duration in ms; an int where it is a whole number."""
-    time = round(1e3 * dt, 6)
-    return int(time) if time == int(time) else time
 
 
 def _render(template: str, parameters: Tuned, **context: Any) -> str:

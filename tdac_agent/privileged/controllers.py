@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from tdac_agent.contract import time_step
 from tdac_agent.judge import JITTERS
-from tdac_agent.reference import oracle_path, pull
+from tdac_agent.reference import Point, oracle_path, pull
+from tdac_agent.setting import Nominal
 from tdac_agent.starts import spread_starts
 from tdac_envs.task2d import Map2DTask
 
-Point = tuple[float, float]
+if TYPE_CHECKING:
+    from tdac_envs.epuck.task import EPuckTask
 
 REFERENCE, DO_NOTHING, SLOW = "reference", "do-nothing", "slow"
 POLICIES = {
@@ -55,7 +59,7 @@ SAFE = 0.02
 
 
 def privileged_controller(
-    task: Map2DTask, ways: Sequence[Sequence[Point]], name: str = REFERENCE
+    task: Nominal, ways: Sequence[Sequence[Point]], name: str = REFERENCE
 ) -> str:
     """Source of a controller that knows the oracle's path from each start of a test.
 
@@ -64,7 +68,27 @@ def privileged_controller(
         ways: From `reference_ways`.
         name: One of `POLICIES`.
     """
-    size = max(task.terrain.grid.cells.shape)
+    if isinstance(task, Map2DTask):
+        size = max(task.terrain.grid.cells.shape)
+        facts = {"robot": task.robot, "dt": task.dt}
+        return _render("controller_map2d.py.j2", name, ways, float(size), facts)
+    world = _epuck(task)
+    size = max(map(abs, world.ground.bounds))
+    facts = {
+        "time_step": time_step(world.dt),
+        "max_wheel_speed": world.max_wheel_speed,
+        "goal_tolerance": world.goal_tolerance,
+    }
+    return _render("controller_epuck.py.j2", name, ways, size, facts)
+
+
+def _render(
+    template: str,
+    name: str,
+    ways: Sequence[Sequence[Point]],
+    size: float,
+    facts: dict[str, Any],
+) -> str:
     environment = Environment(
         loader=PackageLoader("tdac_agent", "privileged"),
         undefined=StrictUndefined,
@@ -73,24 +97,37 @@ def privileged_controller(
         keep_trailing_newline=True,
         autoescape=False,
     )
-    return environment.get_template("controller_map2d.py.j2").render(
-        robot=task.robot,
-        dt=task.dt,
+    return environment.get_template(template).render(
         spacing=float(np.spacing(np.float32(size))),
         ways=ways,
         policy=POLICIES[name],
+        **facts,
     )
 
 
-def reference_ways(task: Map2DTask, seed: int) -> list[list[Point]]:
-    """The points to drive to from each start of a verification with this seed, px."""
+def reference_ways(task: Nominal, seed: int) -> list[list[Point]]:
+    """The points to drive to from each start of a verification with this seed."""
     starts = (task.start, *spread_starts(task, seed, JITTERS))
     return [reference_way(task, start.x, start.y) for start in starts]
 
 
-def reference_way(task: Map2DTask, x: float, y: float) -> list[Point]:
-    """The oracle's path from (x, y) to the goal, pulled taut, px; ends included."""
-    return without_flat_points(pull(task, oracle_path(task, x, y), SAFE))
+def reference_way(task: Nominal, x: float, y: float) -> list[Point]:
+    """The oracle's path from (x, y) to the goal, pulled taut; ends included."""
+    if isinstance(task, Map2DTask):
+        path = pull(task, oracle_path(task, x, y), SAFE)
+    else:
+        from tdac_agent.reference_epuck import epuck_way
+
+        path = epuck_way(_epuck(task), x, y)
+    return without_flat_points(path)
+
+
+def _epuck(task: Nominal) -> EPuckTask:
+    from tdac_envs.epuck.task import EPuckTask
+
+    if not isinstance(task, EPuckTask):
+        raise TypeError(f"expected an EPuckTask, got {type(task).__name__}")
+    return task
 
 
 def without_flat_points(points: Sequence[Point]) -> list[Point]:
