@@ -113,7 +113,7 @@ class EPuckParameters:
         0.0, 0.0, 0.06, "m", "free length ahead below which it slows down"
     )
     blocked: float = _tunable(
-        1000.0, 300.0, 4000.0, "", "reading of ps0 or ps7 at which it does not drive on"
+        1000.0, 300.0, 1900.0, "", "reading of ps0 or ps7 at which it does not drive on"
     )
     turn_gain: float = _tunable(
         0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
