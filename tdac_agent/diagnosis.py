@@ -12,7 +12,7 @@ from tdac_agent.motion import forward, saturated
 from tdac_agent.report import Cause, Diagnosis
 from tdac_agent.setting import Nominal
 from tdac_agent.stall import PROGRESS, percent
-from tdac_agent.surroundings import Surroundings, surroundings_of
+from tdac_agent.surroundings import Surroundings, rollout_on_screen, surroundings_of
 from tdac_agent.touch import side_of, where_on_the_wall
 from tdac_agent.trajectory import Rollout, Trajectory
 from tdac_agent.units import Units
@@ -46,7 +46,7 @@ def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
         text = "A start that is held out failed; nothing more is told of it."
         return Diagnosis(cause="held out", text=text)
     around = surroundings_of(task)
-    return _on_screen(around.units.rollout(rollout), around)
+    return _on_screen(rollout_on_screen(rollout, around.units), around)
 
 
 def _on_screen(rollout: Rollout, around: Surroundings) -> Diagnosis:

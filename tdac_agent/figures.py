@@ -13,7 +13,7 @@ from tdac_agent.course import way_from
 from tdac_agent.files import write_atomic
 from tdac_agent.report import Diagnosis, Episode, Report
 from tdac_agent.setting import Nominal
-from tdac_agent.surroundings import surroundings_of
+from tdac_agent.surroundings import surroundings_of, trajectory_on_screen
 from tdac_agent.task import Task
 from tdac_agent.task_map2d import map_setting
 from tdac_agent.trajectory import Trajectory
@@ -108,7 +108,7 @@ def event_of(
 ) -> Event:
     """What a picture of a failed episode shows; its outcome where no cause is known."""
     around = surroundings_of(task)
-    units, shown = around.units, around.units.trajectory(trajectory)
+    units, shown = around.units, trajectory_on_screen(trajectory, around.units)
     end = Pose(*shown.poses[-1].tolist())
     held_out = " (held out)" if episode.held_out else ""
     title = f"{episode.name}{held_out}: {episode.outcome}"

@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.grid import BoolGrid
 from tdac_envs.plan import distance_field
+
+if TYPE_CHECKING:
+    from tdac_agent.world_oracle import WorldCase
+    from tdac_envs.world import World
 
 Point = tuple[int, int]
 
@@ -106,6 +111,12 @@ class Oracle:
             cases.append(self._random_case(seed, occ, free_ends=bool(seed % 4)))
         detours = (self._random_case(s, self.grid(s, 30, 22, 0.3)) for s in DETOURS)
         return [*cases, *detours]
+
+    def world_cases(self, world: World) -> list[WorldCase]:
+        """The file of a world, and of copies that are moved, turned and fuller."""
+        from tdac_agent.world_oracle import world_cases
+
+        return world_cases(world)
 
     def _random_case(
         self, seed: int, occ: BoolGrid, *, free_ends: bool = True

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_agent.units import Units
 from tdac_envs.plan import Path as Way
 from tdac_envs.task2d import Pose
 
@@ -121,6 +122,10 @@ class Setting(Protocol):
     @property
     def original(self) -> Original | None:
         """Map image or world, where there is a file."""
+
+    @property
+    def units(self) -> Units:
+        """Of places and lengths."""
 
     @property
     def suite(self) -> str:

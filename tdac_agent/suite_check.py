@@ -24,7 +24,7 @@ from tdac_agent.suite_proof import SuiteCheck, row_of, verdict_on_suite
 from tdac_agent.task import Task
 from tdac_agent.task_file import Profile
 from tdac_agent.task_map2d import map_setting
-from tdac_agent.verification import SHIPPED_SUITE, verify
+from tdac_agent.verification import verify
 from tdac_agent.warm import WarmJudge
 
 REPEATS = 5
@@ -38,7 +38,7 @@ def check_suite(
     *,
     profile: Profile | None = None,
     suite: Path | None = None,
-    shipped: Path = SHIPPED_SUITE,
+    shipped: Path | None = None,
     tier: str = "auto",
     seed: int = 0,
     repeats: int = REPEATS,
@@ -52,7 +52,7 @@ def check_suite(
         task: What the controllers must do.
         profile: `policy` or `paper`; the task's own by default.
         suite: Folder with further tests; the task's own by default.
-        shipped: Folder of the shipped tests, or of others in their place.
+        shipped: Folder of tests in the place of the shipped ones.
         tier: Sandbox tier, `auto` for the best one here.
         seed: Of the jittered starts.
         repeats: Verifications of each controller, which must agree. Of the slow one

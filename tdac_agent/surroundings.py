@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from tdac_agent.setting import Nominal
 from tdac_agent.touch import Touch
-from tdac_agent.trajectory import Trajectory
+from tdac_agent.trajectory import Rollout, Trajectory
 from tdac_agent.units import Points, Units
 from tdac_envs.plan import Path
 from tdac_envs.task2d import Map2DTask, Pose
@@ -67,3 +68,24 @@ def first_beyond(path: Path, x: float, y: float, far: float) -> Point:
     distant = np.hypot(path[:, 0] - x, path[:, 1] - y) >= far
     to_x, to_y = path[int(np.argmax(distant)) if distant.any() else -1].tolist()
     return to_x, to_y
+
+
+def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:
+    """A trajectory in units of the screen."""
+    return replace(
+        trajectory,
+        poses=units.on_screen(trajectory.poses),
+        path_distances=trajectory.path_distances * units.scale,
+    )
+
+
+def rollout_on_screen(rollout: Rollout, units: Units) -> Rollout:
+    """An episode in units of the screen."""
+    (goal,) = units.on_screen([rollout.goal])
+    return replace(
+        rollout,
+        trajectory=trajectory_on_screen(rollout.trajectory, units),
+        goal=(float(goal[0]), float(goal[1])),
+        radius=rollout.radius * units.scale,
+        tolerance=rollout.tolerance * units.scale,
+    )

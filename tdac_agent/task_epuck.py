@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tdac_agent.flat_world import flat_world
 from tdac_agent.setting import Original
 from tdac_agent.task_file import TaskFile
+from tdac_agent.units import METRES, Units
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
@@ -85,6 +86,11 @@ class EPuckSetting:
     def original(self) -> Original | None:
         """The world as it was given."""
         return Original(f"original{self.file.suffix}", self.file)
+
+    @property
+    def units(self) -> Units:
+        """Metres."""
+        return METRES
 
     @property
     def suite(self) -> str:

@@ -10,6 +10,7 @@ import cv2
 
 from tdac_agent.setting import Original, Setting
 from tdac_agent.task_file import RobotSpec, TaskFile
+from tdac_agent.units import PIXELS, Units
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.map2d import Map2DEnv
@@ -45,6 +46,11 @@ class Map2DSetting:
         if self.image is None:
             return None
         return Original(f"map{self.image.suffix}", self.image)
+
+    @property
+    def units(self) -> Units:
+        """Pixels."""
+        return PIXELS
 
     @property
     def suite(self) -> str:

@@ -6,12 +6,10 @@ right is positive, in lengths of which the robot drives about four in a step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from tdac_agent.trajectory import Rollout, Trajectory
 
 Points = NDArray[np.float64]
 
@@ -43,25 +41,6 @@ class Units:
         if self.up:
             rows[:, 1:] *= -1.0
         return rows
-
-    def trajectory(self, trajectory: Trajectory) -> Trajectory:
-        """A trajectory on the screen."""
-        return replace(
-            trajectory,
-            poses=self.on_screen(trajectory.poses),
-            path_distances=trajectory.path_distances * self.scale,
-        )
-
-    def rollout(self, rollout: Rollout) -> Rollout:
-        """An episode on the screen."""
-        (goal,) = self.on_screen([rollout.goal])
-        return replace(
-            rollout,
-            trajectory=self.trajectory(rollout.trajectory),
-            goal=(float(goal[0]), float(goal[1])),
-            radius=rollout.radius * self.scale,
-            tolerance=rollout.tolerance * self.scale,
-        )
 
     def place_of(self, x: float, y: float) -> tuple[float, float]:
         """A place on the screen in the environment."""

@@ -22,7 +22,9 @@ from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Trajectory
 from tdac_agent.warm import WarmJudge
 
-SHIPPED_SUITE = Path(__file__).parent / "suites" / "map2d"
+SHIPPED_SUITES = Path(__file__).parent / "suites"
+SHIPPED_SUITE = SHIPPED_SUITES / "map2d"
+EVERY_TASK = SHIPPED_SUITES / "every_task.py"
 DEADLINE_SECONDS = 900.0
 MAX_FILE_BYTES = 64 << 20
 
@@ -34,7 +36,7 @@ def verify(
     profile: Profile | None = None,
     paper: bool = False,
     suite: Path | None = None,
-    shipped: Path = SHIPPED_SUITE,
+    shipped: Path | None = None,
     tier: str = "auto",
     seed: int = 0,
     limits: Limits | None = None,
@@ -50,7 +52,7 @@ def verify(
         paper: Nominal start only, as in the paper.
         suite: Folder with further tests beside the shipped ones; the task's own by
             default.
-        shipped: Folder of the shipped tests, or of others in their place.
+        shipped: Folder of tests in the place of the shipped ones.
         tier: Sandbox tier, `auto` for the best one here.
         seed: Of the jittered starts.
         limits: Of the controller's processes; `cpu_seconds` is for all of them.
@@ -67,7 +69,7 @@ def verify(
     """
     began = time.monotonic()
     source = read_source(controller)
-    suites = {SHIPPED: _suite_folder(shipped)}
+    suites = {SHIPPED: _suite_folder(shipped or SHIPPED_SUITES / task.setting.suite)}
     extra = suite or task.suite
     if extra is not None:
         suites[OWN] = _suite_folder(extra)
@@ -174,6 +176,7 @@ def _provenance(
     task: Task, source: bytes, job: Job, suites: dict[str, Path], findings: Findings
 ) -> Provenance:
     hashes = {name: _suite_hash(folder) for name, folder in suites.items()}
+    hashes[SHIPPED][EVERY_TASK.name] = sha256_of(EVERY_TASK.read_bytes())
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
         suite=" + ".join(folder.name for folder in suites.values()),

@@ -6,6 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tdac_agent.suites.every_task import check_path
+
 pytestmark = pytest.mark.paper
 
 
@@ -143,22 +145,7 @@ def test_plan_path(controller, oracle):
     for case in oracle.plan_cases():
         own = controller.call("OccMap2D", case.occ)
         path = controller.call("plan_path", own, case.start, case.goal, 1)
-        assert isinstance(path, list), (
-            f"{case.name}: a {type(path).__name__}, not a list"
-        )
-        if math.isinf(case.length):
-            assert path == [], f"{case.name}: {len(path)} points, expected []"
-            continue
-        assert path, f"{case.name}: [], but a path of {case.length:.1f} px exists"
-        assert all(map(is_int_pair, path)), f"{case.name}: points must be (int, int)"
-        ends = (path[0], path[-1])
-        assert ends == (case.start, case.goal), f"{case.name}: runs {ends}"
-        error = oracle.path_error(case.occ, path)
-        assert error is None, f"{case.name}: {error}"
-        length = oracle.path_length(path)
-        assert length <= 1.1 * case.length + 1e-6, (
-            f"{case.name}: {length:.1f} px long, the shortest is {case.length:.1f} px"
-        )
+        check_path(oracle, case, path, is_int_pair)
     for cell in (2, 3):
         check_larger_steps(controller, oracle, cell)
 

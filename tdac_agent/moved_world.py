@@ -1,0 +1,107 @@
+"""A world moved and turned as a whole, and its file in another order."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tdac_envs.footprint import Disc, Footprint, Polygon, Rectangle
+from tdac_envs.world import Arena, Obstacle, Part, World
+
+Point = tuple[float, float]
+_FIRST = ("WorldInfo", "Viewpoint")
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A turn about the origin, counter-clockwise, then a shift.
+
+    Attributes:
+        angle: rad.
+        x: m.
+        y: m.
+    """
+
+    angle: float
+    x: float
+    y: float
+
+    def point(self, x: float, y: float) -> Point:
+        """Where a point gets to."""
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        return cos * x - sin * y + self.x, sin * x + cos * y + self.y
+
+    def shape(self, shape: Footprint) -> Footprint:
+        """Where a footprint gets to."""
+        if isinstance(shape, Polygon):
+            return Polygon.around([self.point(x, y) for x, y in shape.points])
+        return self.arena_floor(shape)
+
+    def arena_floor(self, shape: Disc | Rectangle) -> Disc | Rectangle:
+        """Where a floor gets to."""
+        x, y = self.point(shape.x, shape.y)
+        if isinstance(shape, Disc):
+            return replace(shape, x=x, y=y)
+        return replace(shape, x=x, y=y, yaw=shape.yaw + self.angle)
+
+    def part(self, part: Part) -> Part:
+        """Where a prism gets to."""
+        return replace(part, shape=self.shape(part.shape))
+
+    def obstacle(self, thing: Obstacle) -> Obstacle:
+        """Where a thing gets to."""
+        x, y = self.point(thing.x, thing.y)
+        solid = tuple(map(self.part, thing.solid))
+        visible = tuple(map(self.part, thing.visible))
+        return replace(thing, x=x, y=y, solid=solid, visible=visible)
+
+    def arena(self, arena: Arena) -> Arena:
+        """Where an arena gets to."""
+        return replace(arena, inside=self.arena_floor(arena.inside))
+
+    def world(self, world: World) -> World:
+        """A whole world elsewhere."""
+        robots = []
+        for robot in world.robots:
+            x, y = self.point(robot.x, robot.y)
+            heading = robot.heading + self.angle
+            robots.append(replace(robot, x=x, y=y, heading=heading))
+        return replace(
+            world,
+            robots=tuple(robots),
+            goal=None if world.goal is None else self.point(*world.goal),
+            arenas=tuple(map(self.arena, world.arenas)),
+            obstacles=tuple(map(self.obstacle, world.obstacles)),
+        )
+
+
+def reordered(text: str, random: np.random.Generator) -> str:
+    """A world file with its nodes in another order, and names for those without.
+
+    Args:
+        text: From `write_world`, which begins each node at the beginning of a line.
+        random: Gives the order.
+    """
+    head, *nodes = text.split("\n\n")[0:1] + _nodes(text)
+    first = [node for node in nodes if node.startswith(_FIRST)]
+    others = [node for node in nodes if not node.startswith(_FIRST)]
+    named = [
+        f"DEF THING_{number} {node}" if node.startswith("Solid ") else node
+        for number, node in enumerate(others)
+    ]
+    shuffled = [named[k] for k in random.permutation(len(named))]
+    externs = [line for line in text.splitlines() if line.startswith("EXTERNPROTO")]
+    return "\n".join([head, "", *externs, "", *first, *shuffled]) + "\n"
+
+
+def _nodes(text: str) -> list[str]:
+    """The nodes at the top of a file that `write_world` wrote."""
+    nodes: list[list[str]] = []
+    for line in text.splitlines():
+        if line.endswith("{") and not line.startswith(" "):
+            nodes.append([])
+        if nodes:
+            nodes[-1].append(line)
+    return ["\n".join(node) for node in nodes]
