@@ -1,0 +1,120 @@
+"""`tdac webots run`: exit codes, JSON, a film, one clear line for each mistake."""
+
+import json
+from pathlib import Path
+
+import cv2
+import pytest
+from worlds_for_controllers import BLOCKED, NO_GOAL, OPEN
+
+CONTROLLERS = Path(__file__).parent / "controllers"
+
+
+@pytest.fixture
+def there(tmp_path):
+    """A folder with worlds."""
+    for name, text in {"open": OPEN, "blocked": BLOCKED, "bare": NO_GOAL}.items():
+        (tmp_path / f"{name}.wbt").write_text(text)
+    return tmp_path
+
+
+def record(answer):
+    code, out, _ = answer
+    return code, json.loads(out)
+
+
+def test_reached(tdac, there):
+    """Exit 0; the record says where, when and how."""
+    code, run = record(
+        tdac("webots", "run", CONTROLLERS / "module_loop.py", there / "open.wbt",
+             "--json")
+    )  # fmt: skip
+    assert code == 0
+    assert run["schema_version"] == 1
+    assert (run["passed"], run["outcome"], run["why_not"]) == (True, "reached", "")
+    assert run["goal"] == [0.4, 0.0]
+    assert run["world"] == "open.wbt"
+    assert run["d0"] == pytest.approx(0.8, abs=0.01)
+    assert run["d_min_euclidean"] <= 0.02
+    assert run["time"] == pytest.approx(0.032 * run["steps"])
+
+
+def test_not_reached(tdac, there):
+    """Exit 1, and a table that names the reason."""
+    code, out, _ = tdac(
+        "webots", "run", CONTROLLERS / "module_loop.py", there / "open.wbt",
+        "--steps", 20,
+    )  # fmt: skip
+    assert code == 1
+    assert "not passed: the goal was not reached (out of time)" in out
+    assert "not run in Webots itself" in out
+
+
+def test_without_a_goal_or_with_another(tdac, there):
+    """A world without one is driven in; --goal sets one."""
+    words = ["webots", "run", CONTROLLERS / "wall_follower.py", there / "bare.wbt"]
+    code, run = record(tdac(*words, "--steps", 60, "--json"))
+    assert (code, run["goal"], run["passed"]) == (0, None, True)
+    code, run = record(tdac(*words, "--steps", 60, "--json", "--goal", 0.5, 0.3))
+    assert (code, run["goal"], run["passed"]) == (1, [0.5, 0.3], False)
+
+
+def test_bundled_world(tdac):
+    """A world can be named."""
+    code, run = record(
+        tdac("webots", "run", CONTROLLERS / "main_style.py", "arena", "--json")
+    )
+    assert (code, run["outcome"]) == (1, "controller ended")
+    assert run["world"] == "arena.wbt"
+
+
+def test_film(tdac, there):
+    """The film has a picture of every second step and of the last."""
+    film = there / "run.mp4"
+    code, _, _ = tdac(
+        "webots", "run", CONTROLLERS / "module_loop.py", there / "open.wbt",
+        "--steps", 21, "--video", film,
+    )  # fmt: skip
+    assert code == 1
+    frames = cv2.VideoCapture(str(film))
+    assert int(frames.get(cv2.CAP_PROP_FRAME_COUNT)) == 12
+
+
+def test_a_controller_that_fails(tdac, there):
+    """Exit 1, with its own lines."""
+    (there / "mine").mkdir()
+    broken = there / "mine" / "broken.py"
+    broken.write_text(
+        "from controller import Robot\nRobot().getDevice('x').enable(1)\n"
+    )
+    code, out, _ = tdac("webots", "run", broken, there / "open.wbt")
+    assert code == 1
+    assert "AttributeError at the run (line 2)" in out
+    assert 'Device "x" was not found on robot "e-puck"' in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nothing.py", "open.wbt"], "cannot read the controller 'nothing.py'"),
+        (["good.py", "nowhere.wbt"], "nowhere.wbt: no such file"),
+        (["good.py", "arens"], "did you mean 'arena'?"),
+        (["good.py", "open.wbt", "--video", "x.avi"], "expected .mp4 or .gif"),
+        (["good.py", "open.wbt", "--tier", "magic"], "unknown sandbox tier"),
+        (["good.py", "open.wbt", "--goal", "nan", "0"], "expected --goal to be finite"),
+        (["good.py", "open.wbt", "--goal", "9", "9"], "goal"),
+        (["good.py", "empty.wbt"], "empty.wbt: there is no e-puck in it"),
+        (["good.py", "open.wbt", "--ignore", "X"], "no node called 'X' to ignore"),
+        (["good.py"], "Missing argument"),
+        (["good.py", "open.wbt", "--steps", "0"], "--steps"),
+    ],
+)
+def test_usage(tdac, words, said):
+    """Exit 2 and one line that says what to do."""
+    Path("open.wbt").write_text(OPEN)
+    Path("empty.wbt").write_text("#VRML_SIM R2025a utf8\n")
+    Path("good.py").write_text("pass\n")
+    code, out, err = tdac("webots", "run", *words)
+    assert code == 2, (out, err)
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
