@@ -61,7 +61,7 @@ def drive(env, act, start=None, steps=None, name="nominal", held_out=False) -> R
         outcome=record.outcome,
         trajectory=record.trajectory(),
         goal=task.goal,
-        radius=task.robot.radius,
+        radius=task.body_radius,
         tolerance=task.goal_tolerance,
     )
 
@@ -83,6 +83,11 @@ def import_controller(source, env, folder, monkeypatch):
         method="given",
     ).save(folder / "params.json")
     shutil.copy(tdac_envs.sensors.__file__, folder / "sensors.py")
+    return import_from(folder, source, monkeypatch)
+
+
+def import_from(folder, source, monkeypatch):
+    """The module of a controller in a working folder that is filled."""
     (folder / "controller.py").write_text(source)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "sensors", raising=False)
