@@ -18,6 +18,7 @@ from tdac_agent.commands.options import (
     Delay,
     Goal,
     Heading,
+    Ignore,
     Json,
     MapOption,
     Metres,
@@ -30,6 +31,8 @@ from tdac_agent.commands.options import (
     TaskOption,
     Tier,
     WheelSlip,
+    WorldOption,
+    with_heading,
 )
 from tdac_agent.commands.webots_flags import webots_app
 
@@ -111,6 +114,8 @@ def world_command(
 def synth(
     task: TaskOption = None,
     map_image: MapOption = None,
+    world: WorldOption = None,
+    ignore: Ignore = None,
     start: Start = None,
     goal: Goal = None,
     heading: Heading = None,
@@ -149,8 +154,8 @@ def synth(
     from tdac_agent.commands import synth as command
 
     spec = _flags(
-        task, map_image, start, goal, heading, robot_radius, robot_image, snap, metres,
-        instructions,
+        task, map_image, world, ignore, start, goal, heading, robot_radius, robot_image,
+        snap, metres, instructions,
     )  # fmt: skip
     raise typer.Exit(
         command.run(spec, from_, k, j, learner, optimizer, out, seed, as_json)
@@ -165,6 +170,8 @@ def verify(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
     task: TaskOption = None,
     map_image: MapOption = None,
+    world: WorldOption = None,
+    ignore: Ignore = None,
     start: Start = None,
     goal: Goal = None,
     heading: Heading = None,
@@ -236,8 +243,9 @@ def verify(
     from tdac_agent.commands.robust_flags import DisturbanceFlags, RobustFlags
 
     spec = _flags(
-        task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
-    )
+        task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
+        metres, None,
+    )  # fmt: skip
     disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
     wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
     raise typer.Exit(
@@ -265,6 +273,8 @@ def play(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
     task: TaskOption = None,
     map_image: MapOption = None,
+    world: WorldOption = None,
+    ignore: Ignore = None,
     start: Start = None,
     goal: Goal = None,
     heading: Heading = None,
@@ -300,8 +310,9 @@ def play(
     from tdac_agent.commands.robust_flags import DisturbanceFlags
 
     spec = _flags(
-        task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
-    )
+        task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
+        metres, None,
+    )  # fmt: skip
     disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
     raise typer.Exit(
         command.run(controller, spec, video, episode, seed, disturbed, tier)
@@ -315,6 +326,8 @@ def play(
 def check_suite(
     task: TaskOption = None,
     map_image: MapOption = None,
+    world: WorldOption = None,
+    ignore: Ignore = None,
     start: Start = None,
     goal: Goal = None,
     heading: Heading = None,
@@ -337,8 +350,9 @@ def check_suite(
     from tdac_agent.commands import check_suite as command
 
     spec = _flags(
-        task, map_image, start, goal, heading, robot_radius, None, snap, metres, None
-    )
+        task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
+        metres, None,
+    )  # fmt: skip
     raise typer.Exit(command.run(spec, profile, suite, tier, seed, repeats, as_json))
 
 
@@ -353,6 +367,8 @@ def doctor(as_json: Json = False) -> None:
 def _flags(
     task: str | None,
     map_image: str | None,
+    world: str | None,
+    ignore: list[str] | None,
     start: tuple[float, float] | None,
     goal: tuple[float, float] | None,
     heading: float | None,
@@ -367,6 +383,8 @@ def _flags(
     return TaskFlags(
         task=task,
         map_image=map_image,
+        world=world,
+        ignore=tuple(ignore or ()),
         start=start,
         goal=goal,
         heading=heading,
@@ -383,7 +401,8 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
-        code = app(prog_name="tdac", standalone_mode=False)
+        words = with_heading(sys.argv[1:])
+        code = app(words, prog_name="tdac", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Exception as error:

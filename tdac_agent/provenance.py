@@ -32,6 +32,8 @@ def origin(
     return {
         "task": task.name,
         "task_sha256": task.sha256(),
+        "unit": task.setting.units.place,
+        "left_out": task.setting.left_out,
         "map_sha256": task.setting.world_sha256(),
         "params_sha256": sha256_of(task.params.model_dump_json().encode()),
         "sensors_sha256": sha256_of((workdir / "sensors.py").read_bytes()),

@@ -6,6 +6,8 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from tdac_agent.units import Place
+
 Group = Literal["static", "unit", "end to end", "user", "judge"]
 GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
 Cause = Literal[
@@ -93,7 +95,11 @@ class Provenance(_Record):
 
     task: str
     task_sha256: str
-    map_sha256: str
+    unit: Place = Field("px", description="Of places and lengths.")
+    left_out: tuple[str, ...] = Field(
+        (), description="Nodes of the world that may be solid and were ignored."
+    )
+    map_sha256: str = Field(description="Of the map or the world.")
     params_sha256: str
     sensors_sha256: str
     controller_sha256: str

@@ -13,6 +13,7 @@ from tdac_agent.disturbance import Disturbance
 from tdac_agent.seeded import SeededEpisode
 from tdac_agent.sequential import Characteristics, Decision, SequentialTest
 from tdac_agent.trajectory import Outcome
+from tdac_agent.units import Place
 
 WORST = 20
 CONFIDENCE = 0.95
@@ -27,7 +28,11 @@ class RobustProvenance(_Record):
 
     task: str
     task_sha256: str
-    map_sha256: str
+    unit: Place = Field("px", description="Of places and lengths.")
+    left_out: tuple[str, ...] = Field(
+        (), description="Nodes of the world that may be solid and were ignored."
+    )
+    map_sha256: str = Field(description="Of the map or the world.")
     params_sha256: str
     sensors_sha256: str
     controller_sha256: str

@@ -45,7 +45,7 @@ class SeededJob(BaseModel):
 
 
 class SeededEpisode(BaseModel):
-    """Figures of one disturbed episode; distances in px.
+    """Figures of one disturbed episode; distances in px, of the e-puck in m.
 
     `cause`, `step`, `x`, `y` and `side` are the diagnosis of a failure.
     """
@@ -206,7 +206,7 @@ def _in_turn(
 def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:
     """What is kept of an episode; its trajectory is not."""
     rollout, failure = driven.rollout, {}
-    distances = rollout.distances()
+    distances, digits = rollout.distances(), task.setting.units.digits
     if not rollout.reached or rollout.collisions:
         found = diagnose(rollout, task.nominal)
         failure = found.model_dump(include={"cause", "step", "x", "y", "side"})
@@ -215,8 +215,8 @@ def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:
         outcome=rollout.outcome,
         steps=rollout.trajectory.steps,
         collisions=rollout.collisions,
-        d0=round(float(distances[0]), 2),
-        d_min=round(float(distances.min()), 2),
+        d0=round(float(distances[0]), digits),
+        d_min=round(float(distances.min()), digits),
         error=rollout.error,
         cpu_seconds=round(driven.cpu_seconds, 3),
         **failure,

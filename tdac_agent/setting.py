@@ -135,6 +135,9 @@ class Setting(Protocol):
     def left_out(self) -> tuple[str, ...]:
         """Nodes that may be solid and are ignored, in words."""
 
+    def remarks(self) -> list[str]:
+        """How map or world was read, in lines."""
+
     def env_kwargs(self) -> dict[str, Any]:
         """Arguments that make the environment."""
 

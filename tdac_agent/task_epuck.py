@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -96,6 +97,14 @@ class EPuckSetting:
     def suite(self) -> str:
         """Table II."""
         return "epuck"
+
+    def remarks(self) -> list[str]:
+        """What stands in the world."""
+        world = self.nominal.ground.world
+        kinds = Counter(t.kind for t in world.obstacles if t.solid)
+        counted = [f"{count} {kind}" for kind, count in kinds.most_common()]
+        floors = [arena.kind for arena in world.arenas]
+        return [f"world {self.file.name}: {', '.join(floors + counted)}"]
 
     def env_kwargs(self) -> dict[str, Any]:
         """Arguments that make this task's environment; see `EPuckEnv`."""

@@ -62,6 +62,13 @@ class Map2DSetting:
         """Nothing: a map is all there is."""
         return ()
 
+    def remarks(self) -> list[str]:
+        """How the image was read."""
+        params = self.params
+        if params.method == "given":
+            return []
+        return [f"map: {params.polarity} obstacles, {params.method}"]
+
     def env_kwargs(self) -> dict[str, Any]:
         """Arguments that make this task's environment; see `Map2DEnv`."""
         nominal, robot = self.nominal, self.nominal.robot

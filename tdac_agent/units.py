@@ -7,11 +7,13 @@ right is positive, in lengths of which the robot drives about four in a step.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Points = NDArray[np.float64]
+Place = Literal["px", "m"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,7 @@ class Units:
         digits: Of figures that are kept.
     """
 
-    place: str
+    place: Place
     length: str
     scale: float
     up: bool
@@ -54,6 +56,15 @@ class Units:
         """A place in the environment, rounded."""
         x, y = self.place_of(x, y)
         return round(x, self.digits), round(y, self.digits)
+
+    def told(self, length: float) -> str:
+        """A length in the environment's unit, in words."""
+        return f"{length * self.scale:.0f} {self.length}"
+
+    def told_place(self, x: float, y: float) -> str:
+        """A place in the environment, in words."""
+        d = self.decimals - 1
+        return f"({x:z.{d}f}, {y:z.{d}f})"
 
     def heading_of(self, heading: float) -> float:
         """A heading on the screen in the environment."""
@@ -86,3 +97,5 @@ class Units:
 
 PIXELS = Units("px", "px", 1.0, up=False, decimals=1, digits=2)
 METRES = Units("m", "mm", 1000.0, up=True, decimals=3, digits=4)
+UNITS: dict[str, Units] = {units.place: units for units in (PIXELS, METRES)}
+"""By the unit of places, which reports name."""

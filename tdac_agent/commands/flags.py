@@ -10,7 +10,7 @@ import numpy as np
 
 from tdac_agent.sandbox import TIERS
 from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import TaskFile, checked
+from tdac_agent.task_file import EPUCK, TaskFile, checked
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.image import load_image
@@ -18,6 +18,10 @@ from tdac_envs.maps import bundled_map, bundled_maps
 from tdac_envs.metric import resolution_of, to_pixels
 
 Point = tuple[float, float]
+SAID_BY_A_TASK = (
+    *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
+)
+MEANT_FOR_MAPS = ("map_image", "robot_radius", "robot_image", "snap", "metres")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +30,8 @@ class TaskFlags:
 
     task: str | None = None
     map_image: str | None = None
+    world: str | None = None
+    ignore: tuple[str, ...] = ()
     start: tuple[float, float] | None = None
     goal: tuple[float, float] | None = None
     heading: float | None = None
@@ -44,12 +50,12 @@ class TaskFlags:
         words = []
         for name in (f.name for f in fields(self)):
             value = getattr(self, name)
-            if value is None or value is False:
+            if value is None or value is False or name == "ignore":
                 continue
             values = value if isinstance(value, tuple) else (value,)
             given = [] if value is True else map(as_word, values)
             words += [flag("map" if name == "map_image" else name), *given]
-        return words
+        return words + [word for name in self.ignore for word in ("--ignore", name)]
 
     def load(self, default: str = "maze") -> Task:
         """The task that the flags ask for.
@@ -60,8 +66,12 @@ class TaskFlags:
         heading = None if self.heading is None else (self.heading,)
         check_finite(start=self.start, goal=self.goal, heading=heading)
         if self.task is not None:
-            self._refuse_with_task()
+            self._refuse("--task already says it all", SAID_BY_A_TASK)
             return load_task(self.task)
+        if self.world is not None:
+            self._refuse("--world is for an e-puck", MEANT_FOR_MAPS)
+            return load_task(self._world_spec(self.world), base=Path())
+        self._refuse("only a --world has nodes to ignore", ("ignore",))
         source = self.map_image or default
         own = source not in bundled_maps()
         if own and (self.start is None or self.goal is None):
@@ -71,12 +81,32 @@ class TaskFlags:
             )
         return load_task(self._spec(source), base=Path())
 
-    def _refuse_with_task(self) -> None:
-        names = ("map_image", "start", "goal", "heading", "robot_radius")
-        given = [name for name in names if getattr(self, name) is not None]
+    def _refuse(self, why: str, names: tuple[str, ...]) -> None:
+        """Refuses flags that mean nothing here.
+
+        Raises:
+            TaskError: One of them is given.
+        """
+        given = [name for name in names if getattr(self, name) not in (None, (), False)]
         if given:
             flags = ", ".join(flag(name.replace("_image", "")) for name in given)
-            raise TaskError(f"--task already says it all: leave out {flags}")
+            raise TaskError(f"{why}: leave out {flags}")
+
+    def _world_spec(self, world: str) -> TaskFile:
+        start: tuple[float, ...] | None = self.start
+        if self.heading is not None:
+            if start is None:
+                raise TaskError("--heading needs --start X Y")
+            start = (*start, self.heading)
+        given = {
+            "env": EPUCK,
+            "world": world,
+            "ignore": self.ignore,
+            "start": start,
+            "goal": self.goal,
+            "instructions": _text(self.instructions),
+        }
+        return checked(given, "the flags")
 
     def _spec(self, source: str) -> TaskFile:
         start: tuple[float, ...] | None = self.start

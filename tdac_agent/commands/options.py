@@ -10,20 +10,38 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a tabl
 TaskOption = Annotated[
     Optional[str],  # noqa: UP045 - typer reads it at run time
     typer.Option(
-        "--task", help="Bundled name, task.yaml, or run folder.  [default: maze]"
+        "--task",
+        help="Bundled name (`maze`, `epuck`, …), task.yaml, or run folder.  "
+        "[default: maze]",
     ),
 ]
 MapOption = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option("--map", help="Map image, ROS map.yaml, MovingAI .map, or bundled."),
 ]
+WorldOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--world", help="Webots world of an e-puck: a .wbt file, or bundled."),
+]
+Ignore = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--ignore",
+        metavar="NAME",
+        help="Name or type of a node of the world that may be missing; repeatable.",
+    ),
+]
 Start = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
-    typer.Option("--start", metavar="X Y", help="Start, px."),
+    typer.Option(
+        "--start",
+        metavar="X Y [YAW]",
+        help="Start: px on a map, m in a world; its third number is as --heading.",
+    ),
 ]
 Goal = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
-    typer.Option("--goal", metavar="X Y", help="Goal, px."),
+    typer.Option("--goal", metavar="X Y", help="Goal: px on a map, m in a world."),
 ]
 Radius = Annotated[
     Optional[float],  # noqa: UP045
@@ -31,7 +49,9 @@ Radius = Annotated[
 ]
 Heading = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--heading", help="Start heading, rad, from +x towards +y (down)."),
+    typer.Option(
+        "--heading", help="Start heading, rad, from +x towards +y (down on a map)."
+    ),
 ]
 Snap = Annotated[
     bool, typer.Option("--snap", help="Move start and goal to the nearest free place.")
@@ -77,3 +97,20 @@ Delay = Annotated[
         rich_help_panel=DISTURBED,
     ),
 ]
+
+
+def with_heading(words: list[str]) -> list[str]:
+    """A command line in which `--start X Y YAW` is `--start X Y --heading YAW`."""
+    for at, word in enumerate(words):
+        if word == "--start" and len(words) > at + 3 and _is_number(words[at + 3]):
+            rest = with_heading(words[at + 3 :])
+            return [*words[: at + 3], "--heading", *rest]
+    return words
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.report import Report
+from tdac_agent.units import UNITS
 from tdac_agent.verification import nominal_first
 
 
@@ -23,7 +24,9 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
     """
     verdict, about = report.verdict, report.provenance
     for warning in about.warnings:
-        console.print(f"[yellow]warning: {warning}[/]")
+        console.print(f"[yellow]warning: {escape(warning)}[/]")
+    for node in about.left_out:
+        console.print(f"[yellow]left out of the world: {escape(node)}[/]")
     tests: dict[str, list[str]] = {}
     for failure in report.failures:
         tests.setdefault(failure.message, []).append(failure.test)
@@ -56,8 +59,10 @@ def _show_files(out: Path, console: Console) -> None:
 
 def episode_table(report: Report) -> Table:
     """The judged episodes, a row each."""
+    units = UNITS[report.provenance.unit]
     table = Table(
-        title="Episodes as the environment recorded them (px)", title_justify="left"
+        title=f"Episodes as the environment recorded them ({units.length})",
+        title_justify="left",
     )
     table.add_column("start")
     table.add_column("outcome")
@@ -71,8 +76,12 @@ def episode_table(report: Report) -> Table:
             f"[{colour}]{episode.outcome}[/]",
             str(episode.steps),
             str(episode.collisions),
-            f"{episode.d_min:.0f} of {episode.d0:.0f}",
-            f"{episode.d_min_euclidean:.0f} of {episode.d0_euclidean:.0f}",
+            _of(units.scale, episode.d_min, episode.d0),
+            _of(units.scale, episode.d_min_euclidean, episode.d0_euclidean),
             f"{episode.call_ms_mean:.2f}",
         )
     return table
+
+
+def _of(scale: float, left: float, whole: float) -> str:
+    return f"{scale * left:.0f} of {scale * whole:.0f}"

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from tdac_agent.robust_report import Interval, RobustReport, SequentialResult
 from tdac_agent.seeded import SeededEpisode
+from tdac_agent.units import UNITS, Units
 
 LEAST, MOST, ERRORS = 5, 10, 3
 REACHED = "reached"
@@ -60,7 +61,8 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
 def worst_table(report: RobustReport) -> Table:
     """The worst seeds: every failure up to a number, then the slowest successes."""
     first, failures = report.provenance.first_seed, len(report.failed_seeds)
-    seeds = f"the seeds {first} to {first + report.episodes - 1} (px)"
+    units = UNITS[report.provenance.unit]
+    seeds = f"the seeds {first} to {first + report.episodes - 1} ({units.length})"
     title = f"Worst of {seeds}" if failures else f"No failure; the slowest of {seeds}"
     if failures > MOST:
         title += f", {failures - MOST} further failures"
@@ -70,21 +72,27 @@ def worst_table(report: RobustReport) -> Table:
     for name in ("steps", "path left", *(("from step", "at") if failures else ())):
         table.add_column(name, justify="right")
     for episode in report.worst[: max(LEAST, min(failures, MOST))]:
-        table.add_row(*_row(episode)[: len(table.columns)])
+        table.add_row(*_row(episode, units)[: len(table.columns)])
     return table
 
 
-def _row(episode: SeededEpisode) -> list[str]:
+def _row(episode: SeededEpisode, units: Units) -> list[str]:
     cause = episode.side if episode.outcome == "collision" else episode.cause
     more = "" if cause in (None, episode.outcome) else f", {cause}"
     return [
         str(episode.seed),
         f"[{'green' if episode.success else 'red'}]{episode.outcome}{more}[/]",
         str(episode.steps),
-        f"{episode.d_min:.0f} of {episode.d0:.0f}",
+        f"{units.scale * episode.d_min:.0f} of {units.scale * episode.d0:.0f}",
         "" if episode.step is None else str(episode.step),
-        "" if episode.x is None else f"({episode.x:.0f}, {episode.y:.0f})",
+        _place(episode, units),
     ]
+
+
+def _place(episode: SeededEpisode, units: Units) -> str:
+    if episode.x is None or episode.y is None:
+        return ""
+    return units.told_place(episode.x, episode.y)
 
 
 def _errors(report: RobustReport) -> list[str]:

@@ -18,7 +18,6 @@ from tdac_agent.errors import ControllerFileError
 from tdac_agent.records import Run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
-from tdac_agent.task_map2d import map_setting
 from tdac_agent.verification import read_source
 
 
@@ -97,7 +96,7 @@ def run(
     """Synthesises and prints; returns the exit code."""
     console = Console(stderr=as_json)
     source = None if start_from is None else read_text(start_from)
-    with console.status("preprocessing the map …"):
+    with console.status("preparing the task …"):
         task = flags.load()
     folder = out if out is not None else _next_folder(task.name)
     try:
@@ -138,22 +137,22 @@ def read_text(path: Path) -> str:
 
 
 def _heading(task: Task, learner: str) -> str:
-    nominal = task.nominal
+    nominal, units = task.nominal, task.setting.units
+    radius = units.scale * nominal.body_radius
     model = " (a tuned template, no language model)" if learner == "builtin" else ""
     return (
-        f"task [bold]{escape(task.name)}[/]: {nominal.shortest:.0f} px for a disc of "
-        f"{nominal.body_radius:g} px, at most {nominal.horizon} steps; learner "
+        f"task [bold]{escape(task.name)}[/]: {units.told(nominal.shortest)} for a disc "
+        f"of {radius:g} {units.length}, at most {nominal.horizon} steps; learner "
         f"[bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
     )
 
 
 def _remarks(task: Task) -> list[str]:
-    """How the map was read, and what a person should look at."""
-    params = map_setting(task.setting).params
-    lines = [f"\nmap: {params.polarity} obstacles, {escape(params.method)}"]
-    if params.method == "given":
-        lines = []
-    return lines + [f"\n[yellow]note: {escape(note)}[/]" for note in params.notes]
+    """How map or world was read, and what a person should look at."""
+    setting = task.setting
+    lines = [f"\n{escape(line)}" for line in setting.remarks()]
+    notes = [*setting.params.notes, *(f"left out: {name}" for name in setting.left_out)]
+    return lines + [f"\n[yellow]note: {escape(note)}[/]" for note in notes]
 
 
 def _next_folder(name: str) -> Path:

@@ -90,8 +90,8 @@ def test_build_grid(controller, cases, inflation):
         size = case.resolution()
         grid = controller.call("build_grid", world, size, inflation)
         occ, origin = checked_grid(grid, case.name)
-        # A cell may be taken for what it is at its centre, or anywhere in it.
-        margin = 1.5 * size + 1e-6
+        # What counts is a cell's centre, which may be half a diagonal away.
+        margin = 0.75 * size + 1e-3
         wrong = [
             (point, occupied)
             for point, occupied in case.samples(inflation, margin)
