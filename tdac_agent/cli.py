@@ -34,7 +34,7 @@ from tdac_agent.commands.options import (
     WorldOption,
     with_heading,
 )
-from tdac_agent.commands.webots_flags import webots_app
+from tdac_agent.commands.webots_flags import export_app, webots_app
 
 app = typer.Typer(
     name="tdac",
@@ -50,6 +50,7 @@ app = typer.Typer(
     ),
 )
 app.add_typer(webots_app, name="webots")
+app.add_typer(export_app, name="export")
 
 
 @app.callback(invoke_without_command=True)

@@ -61,3 +61,21 @@ def webots_run(
             tier, as_json,
         )
     )  # fmt: skip
+
+
+@export_app.command(
+    "webots", epilog="Example: `tdac export webots runs/epuck-1 --out my_project`"
+)
+def export_webots(
+    run: Annotated[Path, typer.Argument(help="Folder of a verified run.")],
+    out: Annotated[Path, typer.Option(help="Folder to write, new or empty.")],
+    tier: Tier = "auto",
+) -> None:
+    """Write a Webots project with a verified e-puck controller.
+
+    The controller is not changed; an adapter beside it gives it what it observes. It
+    is then driven once here. Nothing is run in Webots itself.
+    """
+    from tdac_agent.commands import export
+
+    raise typer.Exit(export.run(run, out, tier))

@@ -23,12 +23,17 @@ _FOLDERS = {
 _FROM_ABOVE = "-0.57735 0.57735 0.57735 2.0944"
 
 
-def write_world(world: World) -> str:
+def write_world(world: World, *, supervisor: bool = False) -> str:
     """The text of a `.wbt` file; `read_world` gives an equal world.
 
     Every obstacle is a Solid at the top of the file. One with a single piece has that
     as its boundingObject; of several pieces each stands in a Pose. What is not
     modelled is named in comments only.
+
+    Args:
+        world: The world.
+        supervisor: Whether the e-puck that is driven is one, and so may ask where it
+            is; the reader does not mind.
     """
     externs = ["TexturedBackground", "TexturedBackgroundLight"]
     externs += dict.fromkeys(arena.kind for arena in world.arenas)
@@ -40,7 +45,7 @@ def write_world(world: World) -> str:
         _block("Viewpoint", [f"orientation {_FROM_ABOVE}", _position(world)]),
         "TexturedBackground {\n}\nTexturedBackgroundLight {\n}",
         *map(_arena, world.arenas),
-        *map(_robot, world.robots),
+        *(_robot(r, supervisor and k == 0) for k, r in enumerate(world.robots)),
     ]
     if world.goal is not None and not _is_marked(world):
         blocks.append(_block("DEF GOAL Pose", [_translation(*world.goal, 0.0)]))
@@ -85,9 +90,10 @@ def _arena(arena: Arena) -> str:
     return _block(arena.kind, lines)
 
 
-def _robot(robot: EPuck) -> str:
+def _robot(robot: EPuck, supervisor: bool) -> str:
     lines = [_translation(robot.x, robot.y, robot.z), _turn(robot.heading)]
     lines += [f"name {_quoted(robot.name)}", f"controller {_quoted(robot.controller)}"]
+    lines += ["supervisor TRUE"] if supervisor else []
     return _block("E-puck", [*lines, f'version "{robot.version}"'])
 
 

@@ -1,0 +1,36 @@
+"""`tdac export webots`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from tdac_agent.commands.flags import check_tier
+from tdac_agent.deploy.webots import Project, export_webots
+from tdac_agent.webots_run import WebotsReport, run_controller
+from tdac_envs.webots.stage import open_stage
+
+
+def run(run_folder: Path, out: Path, tier: str) -> int:
+    """Writes the project and drives it once, here; 0 if it reaches the goal."""
+    check_tier(tier)
+    project = export_webots(run_folder, out)
+    stage = open_stage(project.world)
+    done = run_controller(project.controller, stage, stage.make_env(), tier=tier)
+    _show(project, done.report, Console())
+    return 0 if done.report.passed else 1
+
+
+def _show(project: Project, report: WebotsReport, console: Console) -> None:
+    for path in (project.world, project.controller):
+        console.print(f"wrote {escape(str(path))}", soft_wrap=True)
+    if report.passed:
+        words = f"[bold green]reached[/] the goal after {report.steps} steps"
+    else:
+        words = f"[bold red]not passed[/]: {escape(report.why_not)}"
+    before = project.verified_steps
+    verified = "" if before is None else f" (verified: {before})"
+    console.print(f"driven here, as a Webots controller: {words}{verified}")
+    console.print("[yellow]not run in Webots itself[/]")

@@ -1,0 +1,1 @@
+"""Verified controllers where they are to run: a project of Webots."""
