@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 
 from tdac_agent.course import way_from
 from tdac_agent.files import write_atomic
+from tdac_agent.pictures import pictures_of
 from tdac_agent.report import Diagnosis, Episode, Report
 from tdac_agent.setting import Nominal
 from tdac_agent.surroundings import surroundings_of, trajectory_on_screen
 from tdac_agent.task import Task
-from tdac_agent.task_map2d import map_setting
 from tdac_agent.trajectory import Trajectory
 from tdac_envs.canvas import Image
-from tdac_envs.closeup import Background, Event, run_picture
-from tdac_envs.render import trajectory_picture
+from tdac_envs.closeup import Event, run_picture
 from tdac_envs.task2d import Pose
 
 MAX_FACT = 240
@@ -32,25 +31,18 @@ def draw_trajectories(
     outcomes: dict[str, str],
     path: Path,
 ) -> None:
-    """Writes a PNG of the map with each trajectory.
+    """Writes a PNG of the map or the world with each trajectory.
 
     Args:
-        task: Whose map.
+        task: Whose map or world.
         trajectories: By episode name.
         outcomes: By episode name.
         path: The file.
     """
-    nominal = map_setting(task.setting).nominal
-    picture = trajectory_picture(
-        nominal.terrain.grid.cells,
+    picture = pictures_of(task.setting).trajectories(
         [trajectory.poses for trajectory in trajectories.values()],
-        nominal.start,
-        nominal.goal,
-        goal_tolerance=nominal.goal_tolerance,
-        radius=nominal.robot.radius,
-        path=nominal.path_from(nominal.start),
-        outcomes=[outcomes.get(name, "") for name in trajectories],
-        labels=list(trajectories),
+        [outcomes.get(name, "") for name in trajectories],
+        list(trajectories),
     )
     _write(picture, path)
 
@@ -61,13 +53,12 @@ def draw_failures(
     """Writes a PNG for each episode that failed, `NAME.png`; returns the files.
 
     Args:
-        task: Whose map.
+        task: Whose map or world.
         report: What failed, and why.
         trajectories: By episode name; one that is missing gives no picture.
         folder: Where to; it must exist.
     """
     background, files = None, []
-    nominal = map_setting(task.setting).nominal
     for episode in report.episodes:
         trajectory = trajectories.get(episode.name)
         # A file may hold another run of that start, one driven by `run_episode`.
@@ -75,9 +66,9 @@ def draw_failures(
             continue
         if episode.outcome in ("reached", "not run"):
             continue
-        background = background or Background.of(nominal)
+        background = background or pictures_of(task.setting).backdrop()
         diagnosis = _diagnosis_of(report, episode)
-        event = event_of(nominal, trajectory, episode, diagnosis)
+        event = event_of(task.nominal, trajectory, episode, diagnosis)
         picture = run_picture(background, trajectory.poses, event)
         files.append(folder / f"{file_stem(episode.name)}.png")
         _write(picture, files[-1])

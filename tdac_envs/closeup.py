@@ -6,6 +6,7 @@ import itertools
 import math
 import textwrap
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -43,9 +44,72 @@ _WORTH = 1.5
 _SMALLEST_BODY = 4.0
 
 
+class Window(NamedTuple):
+    """A square part of a picture: its least x and y, and its side, as places are."""
+
+    x: float
+    y: float
+    side: float
+
+
+class Chart(Protocol):
+    """A canvas, and where on it a place is."""
+
+    @property
+    def canvas(self) -> Canvas:
+        """To draw on."""
+
+    @property
+    def scale(self) -> float:
+        """Frame px in a unit of length."""
+
+    def at(self, points: Points) -> Points:
+        """Places, shape (n, 2), in coordinates of the canvas."""
+
+    def turned(self, heading: float) -> float:
+        """A heading on the canvas, where y points down."""
+
+
+class Backdrop(Protocol):
+    """What the pictures of all runs of a task have in common."""
+
+    @property
+    def radius(self) -> float:
+        """Of the body."""
+
+    def whole(self) -> Chart:
+        """All of it, with start, goal and shortest path, to draw on."""
+
+    def window(self, middle: Points, extent: float) -> Window:
+        """A part of it around a place, which is at least so wide."""
+
+    def close_up(self, window: Window) -> Chart:
+        """That part, `CLOSE_UP` px wide."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapChart:
+    """A canvas whose coordinates are those of the map."""
+
+    canvas: Canvas
+
+    @property
+    def scale(self) -> float:
+        """Frame px in a map px."""
+        return self.canvas.scale
+
+    def at(self, points: Points) -> Points:
+        """The same places."""
+        return points
+
+    def turned(self, heading: float) -> float:
+        """The same heading."""
+        return heading
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Background:
-    """What the pictures of all runs of a task have in common."""
+    """The backdrop of runs on a map."""
 
     task: Map2DTask
     canvas: Canvas
@@ -67,6 +131,30 @@ class Background:
         task = self.task
         draw_task(canvas, task.start, task.goal, task.goal_tolerance, path)
 
+    @property
+    def radius(self) -> float:
+        """Of the body, px."""
+        return self.task.robot.radius
+
+    def whole(self) -> MapChart:
+        """The map."""
+        return MapChart(self.canvas.copy())
+
+    def window(self, middle: Points, extent: float) -> Window:
+        """Whole pixels."""
+        side = max(math.ceil(extent), 8)
+        x, y = (np.floor(middle - side / 2.0 + 0.5) - 0.5).tolist()
+        return Window(x, y, side)
+
+    def close_up(self, window: Window) -> MapChart:
+        """A part of the map, enlarged."""
+        x, y, side = (math.ceil(value) for value in window)
+        cells = _part(self.task.terrain.grid.cells, x, y, side)
+        scale = CLOSE_UP / side
+        canvas = Canvas(cells, 0, scale=scale, origin=(x, y), narrowest=CLOSE_UP)
+        self.draw_task(canvas, _inside(self.path, x, y, side))
+        return MapChart(canvas)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Event:
@@ -75,7 +163,7 @@ class Event:
     Attributes:
         title: First line of the caption, ASCII.
         facts: Further lines; long ones are wrapped.
-        where: Shape (n, 2): places that the close-up must hold, px.
+        where: Shape (n, 2): places that the close-up must hold.
         contact: Point of a wall that the body touched.
         way: Shape (m, 2): the way that should have been taken from the end.
     """
@@ -87,7 +175,7 @@ class Event:
     way: Points | None = None
 
 
-def run_picture(background: Background, poses: Points, event: Event) -> Image:
+def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
     """The picture of a run, uint8 RGB.
 
     Args:
@@ -95,15 +183,15 @@ def run_picture(background: Background, poses: Points, event: Event) -> Image:
         poses: Shape (T + 1, 3): x, y, heading.
         event: What is to be seen.
     """
-    canvas, radius = background.canvas.copy(), background.task.robot.radius
-    window = _window(event, poses, radius, canvas.scale)
-    if window is None:
-        _draw_run(canvas, poses, event, radius, way=True)
-        column = _column(event, None)
-    else:
-        _draw_run(canvas, poses, event, radius, way=False)
-        _draw_window(canvas, *window)
-        column = _column(event, _close_up(background, poses, event, window))
+    chart, radius = background.whole(), background.radius
+    canvas = chart.canvas
+    window = _window(background, event, poses, chart.scale)
+    _draw_run(chart, poses, event, radius, way=window is None)
+    close = None
+    if window is not None:
+        _draw_window(chart, window)
+        close = _close_up(background.close_up(window), poses, event, radius)
+    column = _column(event, close)
     columns = canvas.image.shape[1]
     rows = max(canvas.strip_top, column.shape[0])
     picture = blank(rows, columns + COLUMN, PAPER)
@@ -113,25 +201,26 @@ def run_picture(background: Background, poses: Points, event: Event) -> Image:
 
 
 def _draw_run(
-    canvas: Canvas, poses: Points, event: Event, radius: float, *, way: bool
+    chart: Chart, poses: Points, event: Event, radius: float, *, way: bool
 ) -> None:
     """Trail, body at the end, the contact, and perhaps the way from there."""
+    canvas, places = chart.canvas, chart.at(poses[:, :2])
     if way and event.way is not None:
-        canvas.line(event.way, GREEN, 2, 0.9, dash=6)
-    body = max(radius * canvas.scale, _SMALLEST_BODY)
-    canvas.disc(poses[0, :2], 4, FREE)
-    canvas.disc(poses[0, :2], 4, EARLY, width=2)
-    _draw_trail(canvas, poses[:, :2])
-    x, y, heading = poses[-1]
+        canvas.line(chart.at(event.way), GREEN, 2, 0.9, dash=6)
+    body = max(radius * chart.scale, _SMALLEST_BODY)
+    canvas.disc(places[0], 4, FREE)
+    canvas.disc(places[0], 4, EARLY, width=2)
+    _draw_trail(canvas, places)
+    x, y = places[-1]
     canvas.disc((x, y), body, TRAIL, 0.35)
     canvas.disc((x, y), body, TRAIL, width=2)
-    turns = heading + np.array([0.0, 2.6, -2.6])
+    turns = chart.turned(float(poses[-1, 2])) + np.array([0.0, 2.6, -2.6])
     nose = np.column_stack([np.cos(turns), np.sin(turns)]) * 0.6 * body / canvas.scale
     canvas.polygon(np.add(nose, (x, y)), TRAIL)
     if event.contact is not None:
-        size = max(0.3 * body, 6.0)
-        canvas.disc(event.contact, size, FREE, 0.9, 5)
-        canvas.disc(event.contact, size, EVENT, width=3)
+        size, contact = max(0.3 * body, 6.0), chart.at(np.array([event.contact]))
+        canvas.disc(contact, size, FREE, 0.9, 5)
+        canvas.disc(contact, size, EVENT, width=3)
 
 
 def _draw_trail(canvas: Canvas, places: Points) -> None:
@@ -146,42 +235,32 @@ def _draw_trail(canvas: Canvas, places: Points) -> None:
 
 
 def _window(
-    event: Event, poses: Points, radius: float, scale: float
-) -> tuple[int, int, int] | None:
-    """First column, first row and size of the part to enlarge, map px.
-
-    None where the map itself shows as much.
-    """
+    background: Backdrop, event: Event, poses: Points, scale: float
+) -> Window | None:
+    """The part to enlarge; None where the picture itself shows as much."""
     for where in (event.where, poses[-1:, :2]):
         low, high = where.min(axis=0), where.max(axis=0)
-        extent = float((high - low).max()) + 2.0 * _AROUND * radius
-        side = max(math.ceil(extent), 8)
-        if CLOSE_UP / side >= _WORTH * scale:
-            x, y = np.floor((low + high - side) / 2.0 + 0.5).astype(int).tolist()
-            return x, y, side
+        extent = float((high - low).max()) + 2.0 * _AROUND * background.radius
+        window = background.window((low + high) / 2.0, extent)
+        if CLOSE_UP / window.side >= _WORTH * scale:
+            return window
     return None
 
 
-def _draw_window(canvas: Canvas, x: int, y: int, side: int) -> None:
+def _draw_window(chart: Chart, window: Window) -> None:
+    x, y, side = window
     corners = np.array([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
-    at = corners + np.array([x - 0.5, y - 0.5])
+    at = chart.at(corners + np.array([x, y]))
     for colour, width in ((FREE, 4), (EVENT, 2)):
         # Not in one go: a closed line has no farthest point.
-        canvas.line(at[:3], colour, width)
-        canvas.line(at[2:], colour, width)
+        chart.canvas.line(at[:3], colour, width)
+        chart.canvas.line(at[2:], colour, width)
 
 
-def _close_up(
-    background: Background, poses: Points, event: Event, window: tuple[int, int, int]
-) -> Image:
-    """The part of the map around the event, enlarged and framed."""
-    x, y, side = window
-    task = background.task
-    cells = _part(task.terrain.grid.cells, x, y, side)
-    canvas = Canvas(cells, 0, scale=CLOSE_UP / side, origin=(x, y), narrowest=CLOSE_UP)
-    background.draw_task(canvas, _inside(background.path, x, y, side))
-    _draw_run(canvas, poses, event, task.robot.radius, way=True)
-    close = canvas.image[: canvas.strip_top]
+def _close_up(chart: Chart, poses: Points, event: Event, radius: float) -> Image:
+    """The part around the event with the run, framed."""
+    _draw_run(chart, poses, event, radius, way=True)
+    close = chart.canvas.image[: chart.canvas.strip_top]
     cv2.rectangle(close, (0, 0), (close.shape[1] - 1, close.shape[0] - 1), EVENT, 2)
     return close
 

@@ -169,21 +169,39 @@ def trajectory_picture(
     """
     runs = [np.asarray(run, np.float64).reshape(-1, 3) for run in trajectories]
     ends = [*outcomes, *[""] * (len(runs) - len(outcomes))]
-    colours = [_RUN_COLOURS[k % len(_RUN_COLOURS)] for k in range(len(runs))]
-    entries = [(GREY, "shortest path")] if len(np.asarray(path)) > 1 else []
-    for k, (colour, end) in enumerate(zip(colours, ends, strict=True)):
-        name = labels[k] if k < len(labels) else f"run {k + 1}"
-        entries.append((colour, f"{name}: {end}" if end else name))
-    rows = _legend_rows(entries, Canvas.frame_width(cells))
-    canvas = Canvas(cells, strip=10 + _ROW * len(rows))
+    legend = Legend.of(
+        ends, labels, path=len(np.asarray(path)) > 1, width=Canvas.frame_width(cells)
+    )
+    canvas = Canvas(cells, strip=legend.height)
     draw_task(canvas, start, goal, goal_tolerance, path)
-    body = max(radius * canvas.scale, SMALLEST_BODY)
-    for run, colour in zip(runs, colours, strict=True):
-        _draw_run(canvas, run, colour, body)
-    for run, end in zip(runs, ends, strict=True):
-        draw_outcome(canvas, run[-1, :2], body, end)
-    _write_legend(canvas, rows)
+    draw_runs(canvas, runs, ends, max(radius * canvas.scale, SMALLEST_BODY))
+    legend.write(canvas)
     return canvas.image
+
+
+def draw_runs(
+    canvas: Canvas,
+    runs: Sequence[NDArray[np.float64]],
+    outcomes: Sequence[str],
+    body: float,
+) -> None:
+    """Draws trajectories, each in its colour, and marks how they ended.
+
+    Args:
+        canvas: Where to draw.
+        runs: Each of shape (T + 1, 3), x, y and heading, as the canvas has them.
+        outcomes: One for each.
+        body: Radius of the body, frame px.
+    """
+    for number, run in enumerate(runs):
+        _draw_run(canvas, run, run_colour(number), body)
+    for run, end in zip(runs, outcomes, strict=True):
+        draw_outcome(canvas, run[-1, :2], body, end)
+
+
+def run_colour(number: int) -> Colour:
+    """Colour of a trajectory among others."""
+    return _RUN_COLOURS[number % len(_RUN_COLOURS)]
 
 
 def _draw_run(
@@ -198,6 +216,39 @@ def _draw_run(
     canvas.line(run[:, :2], colour, 2, 0.9)
     canvas.disc(run[-1, :2], body, colour, 0.25)
     canvas.disc(run[-1, :2], body, colour, 1.0, 1)
+
+
+class Legend(NamedTuple):
+    """What the lines of trajectories mean: rows of (x, colour, text)."""
+
+    rows: list[list[tuple[int, Colour, str]]]
+
+    @classmethod
+    def of(
+        cls, outcomes: Sequence[str], labels: Sequence[str], *, path: bool, width: int
+    ) -> Legend:
+        """The legend of some trajectories.
+
+        Args:
+            outcomes: One for each; may be empty.
+            labels: Their names, as far as they have one.
+            path: Whether the shortest path is drawn, too.
+            width: Columns that there are.
+        """
+        entries = [(GREY, "shortest path")] if path else []
+        for k, end in enumerate(outcomes):
+            name = labels[k] if k < len(labels) else f"run {k + 1}"
+            entries.append((run_colour(k), f"{name}: {end}" if end else name))
+        return cls(_legend_rows(entries, width))
+
+    @property
+    def height(self) -> int:
+        """Rows that it takes, frame px."""
+        return 10 + _ROW * len(self.rows)
+
+    def write(self, canvas: Canvas) -> None:
+        """Writes it into the strip."""
+        _write_legend(canvas, self.rows)
 
 
 def _legend_rows(

@@ -8,7 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tdac_envs.bodies import BODY_RADIUS, at_body_height, bodies, floor_under
-from tdac_envs.canvas import FREE, GREEN, GREY, INK, RED, WALL, Canvas, Colour, Image
+from tdac_envs.canvas import (
+    FREE,
+    GREEN,
+    GREY,
+    INK,
+    NARROWEST,
+    RED,
+    WALL,
+    Canvas,
+    Colour,
+    Image,
+)
 from tdac_envs.footprint import Disc, Footprint, Rectangle
 from tdac_envs.marks import draw_disc
 from tdac_envs.world import EPuck, Obstacle, World
@@ -40,21 +51,33 @@ class View:
 
     Args:
         bounds: (left, low, right, high) of what is to be seen, m.
+        strip: Height of the strip for text, px.
+        side: Longest side of the world in the picture, px.
+        margin: Around it, as a share of its longest side.
 
     Attributes:
         canvas: To draw on, in canvas coordinates.
         scale: px per m.
     """
 
-    def __init__(self, bounds: tuple[float, float, float, float]) -> None:
+    def __init__(
+        self,
+        bounds: tuple[float, float, float, float],
+        *,
+        strip: int = _STRIP,
+        side: int = SIDE,
+        margin: float = _MARGIN,
+    ) -> None:
         left, low, right, high = bounds
-        pad = _MARGIN * max(right - left, high - low)
+        pad = margin * max(right - left, high - low)
         self._left, self._low = left - pad, low - pad
         self._right, self._high = right + pad, high + pad
         size = np.array([self._high - self._low, self._right - self._left])
-        self.scale = float(SIDE / size.max())
+        self.scale = float(side / size.max())
         rows, columns = np.maximum(np.rint(size * self.scale), 40).astype(int).tolist()
-        self.canvas = Canvas(np.zeros((rows, columns), np.bool_), _STRIP)
+        narrowest = min(side, NARROWEST)
+        cells = np.zeros((rows, columns), np.bool_)
+        self.canvas = Canvas(cells, strip, scale=1.0, narrowest=narrowest)
         self.canvas.image[: self.canvas.strip_top] = OUTSIDE
 
     def at(self, points: ArrayLike) -> NDArray[np.float64]:

@@ -5,11 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.robust_flags import DisturbanceFlags, refuse_without
@@ -18,14 +14,13 @@ from tdac_agent.disturbance import Disturbance
 from tdac_agent.errors import Fault
 from tdac_agent.judge import JITTERS, Judge
 from tdac_agent.nursery import Nursery
+from tdac_agent.pictures import pictures_of
 from tdac_agent.sandbox import Limits, SandboxError
 from tdac_agent.seeded import Driven, Stage, drive_seed
 from tdac_agent.task import Task, write_workdir
-from tdac_agent.task_map2d import map_setting
 from tdac_agent.trajectory import Rollout
 from tdac_agent.verification import read_source
 from tdac_envs.errors import TaskError
-from tdac_envs.render import Scene, Status
 from tdac_envs.video import write_video
 from tdac_envs.window import Window
 
@@ -59,7 +54,7 @@ def run(
     else:
         driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
         rollout = driven.rollout
-    picked = frames(task, rollout)
+    picked = pictures_of(task.setting).frames(rollout, STRIDE)
     rate = 1.0 / (task.nominal.dt * STRIDE)
     if video is not None:
         write_video(picked, video, fps=2 * rate)
@@ -100,34 +95,6 @@ def drive_disturbed(
             raise Fault(f"the sandbox failed: {error}") from error
         finally:
             nursery.close()
-
-
-def frames(task: Task, rollout: Rollout) -> Iterator[NDArray[np.uint8]]:
-    """A frame for every second step, and the last one."""
-    setting, trajectory = map_setting(task.setting), rollout.trajectory
-    nominal = setting.nominal
-    start = trajectory.poses[0]
-    scene = Scene(
-        nominal.terrain.grid.cells,
-        start.tolist(),
-        nominal.goal,
-        goal_tolerance=nominal.goal_tolerance,
-        robot=nominal.robot,
-        path=nominal.path_from(nominal.start),
-        robot_image=setting.robot_image,
-    )
-    last = trajectory.steps
-    gaps = rollout.distances("euclidean")
-    for step in [*range(0, last, STRIDE), last]:
-        status = Status(
-            step,
-            nominal.horizon,
-            float(gaps[step]),
-            rollout.outcome if step == last else "",
-        )
-        trail = trajectory.poses[: step + 1, :2]
-        pose = trajectory.poses[step].tolist()
-        yield scene.frame(pose, trajectory.ranges[step], trail, status)
 
 
 def has_display() -> bool:

@@ -60,14 +60,7 @@ class EPuckScene:
             if not (movable and any(thing is one for one in pushable))
         ]
         draw_things(view, ground.world, still)
-        view.canvas.line(view.at(task.path_from(task.start)), GREY, 2, 0.75, dash=7)
-        start = view.at(task.start[:2])
-        view.canvas.disc(start, 5, FREE)
-        view.canvas.disc(start, 5, GREY, width=2)
-        ring = max(task.goal_tolerance * view.scale, 7.0)
-        for width, alpha in ((-1, 0.16), (2, 1.0)):
-            view.canvas.disc(view.at(task.goal), ring, GREEN, alpha, width)
-        view.canvas.disc(view.at(task.goal), 3.0, GREEN)
+        draw_wish(view, task)
         for robot in ground.world.robots[1:]:
             self._draw_other(robot)
         view.scale_bar()
@@ -126,6 +119,18 @@ class EPuckScene:
     def _draw_other(self, robot: EPuck) -> None:
         radius = max(BODY_RADIUS * self._view.scale, SMALLEST_BODY)
         _draw_epuck(self._view, robot.pose, radius, _OTHER)
+
+
+def draw_wish(view: View, task: EPuckTask) -> None:
+    """Draws the shortest path, the start and the goal."""
+    view.canvas.line(view.at(task.path_from(task.start)), GREY, 2, 0.75, dash=7)
+    start = view.at(task.start[:2])
+    view.canvas.disc(start, 5, FREE)
+    view.canvas.disc(start, 5, GREY, width=2)
+    ring = max(task.goal_tolerance * view.scale, 7.0)
+    for width, alpha in ((-1, 0.16), (2, 1.0)):
+        view.canvas.disc(view.at(task.goal), ring, GREEN, alpha, width)
+    view.canvas.disc(view.at(task.goal), 3.0, GREEN)
 
 
 def level(reading: float) -> float:

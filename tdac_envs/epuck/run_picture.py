@@ -1,0 +1,137 @@
+"""Pictures of whole runs of an e-puck, x to the right and y up."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.canvas import Canvas, Image
+from tdac_envs.closeup import CLOSE_UP, Window
+from tdac_envs.epuck.ground import Bounds
+from tdac_envs.epuck.picture import SMALLEST_BODY, draw_wish
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.render import Legend, draw_runs
+from tdac_envs.world_picture import SIDE, View, draw_things
+
+Points = NDArray[np.float64]
+# Columns on the right of the strip that the scale takes.
+_SCALE = 170
+
+
+def trajectory_picture(
+    task: EPuckTask,
+    trajectories: Sequence[ArrayLike],
+    *,
+    outcomes: Sequence[str] = (),
+    labels: Sequence[str] = (),
+) -> Image:
+    """The world with one or more trajectories and a legend, uint8 RGB.
+
+    Args:
+        task: Whose world, start and goal.
+        trajectories: Each of shape (T + 1, 3): x, y, heading.
+        outcomes: How each ended; sets the mark at its end.
+        labels: A name for each.
+    """
+    ends = [*outcomes, *[""] * (len(trajectories) - len(outcomes))]
+    width = _columns(task.ground.bounds) - _SCALE
+    legend = Legend.of(ends, labels, path=True, width=width)
+    view = task_view(task, task.ground.bounds, strip=max(legend.height, 46))
+    view.scale_bar()
+    chart = WorldChart(view)
+    runs = [chart.poses(np.asarray(run, np.float64)) for run in trajectories]
+    body = max(BODY_RADIUS * view.scale, SMALLEST_BODY)
+    draw_runs(view.canvas, runs, ends, body)
+    legend.write(view.canvas)
+    return view.canvas.image
+
+
+def _columns(bounds: Bounds) -> int:
+    return int(View(bounds).canvas.image.shape[1])
+
+
+def task_view(
+    task: EPuckTask,
+    bounds: Bounds,
+    *,
+    strip: int,
+    side: int = SIDE,
+    margin: float = 0.05,
+) -> View:
+    """A world with start, goal and shortest path; arguments as for `View`."""
+    ground = task.ground
+    view = View(bounds, strip=strip, side=side, margin=margin)
+    things = [thing for thing in ground.things if not thing.is_goal or thing.solid]
+    draw_things(view, ground.world, things)
+    draw_wish(view, task)
+    return view
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldChart:
+    """A view as a chart; see `tdac_envs.closeup.Chart`."""
+
+    view: View
+
+    @property
+    def canvas(self) -> Canvas:
+        """To draw on."""
+        return self.view.canvas
+
+    @property
+    def scale(self) -> float:
+        """Frame px in a metre."""
+        return self.view.scale
+
+    def at(self, points: Points) -> Points:
+        """Places on the canvas."""
+        return self.view.at(points)
+
+    def turned(self, heading: float) -> float:
+        """The canvas' y points down."""
+        return -heading
+
+    def poses(self, poses: Points) -> Points:
+        """Poses on the canvas, shape (n, 3)."""
+        return np.column_stack([self.at(poses[:, :2]), -poses[:, 2]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldBackground:
+    """The backdrop of runs in a world; see `tdac_envs.closeup.Backdrop`."""
+
+    task: EPuckTask
+    view: View
+
+    @classmethod
+    def of(cls, task: EPuckTask) -> WorldBackground:
+        """The world with start, goal and shortest path."""
+        return cls(task, task_view(task, task.ground.bounds, strip=0))
+
+    @property
+    def radius(self) -> float:
+        """Of the body, m."""
+        return BODY_RADIUS
+
+    def whole(self) -> WorldChart:
+        """All of the world."""
+        view = copy.copy(self.view)
+        view.canvas = self.view.canvas.copy()
+        return WorldChart(view)
+
+    def window(self, middle: Points, extent: float) -> Window:
+        """A square around a place."""
+        x, y = (middle - extent / 2.0).tolist()
+        return Window(x, y, extent)
+
+    def close_up(self, window: Window) -> WorldChart:
+        """A part of the world, enlarged."""
+        x, y, side = window
+        bounds = (x, y, x + side, y + side)
+        view = task_view(self.task, bounds, strip=0, side=CLOSE_UP, margin=0.0)
+        return WorldChart(view)
