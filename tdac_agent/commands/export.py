@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from tdac_agent.commands.flags import check_tier
-from tdac_agent.deploy.webots import Project, export_webots
+from tdac_agent.deploy.webots import SPARE, Project, export_webots
 from tdac_agent.webots_run import WebotsReport, run_controller
 from tdac_envs.webots.stage import open_stage
 
@@ -18,7 +18,9 @@ def run(run_folder: Path, out: Path, tier: str) -> int:
     check_tier(tier)
     project = export_webots(run_folder, out)
     stage = open_stage(project.world)
-    done = run_controller(project.controller, stage, stage.make_env(), tier=tier)
+    steps = project.horizon + SPARE
+    env = stage.make_env(steps=steps, goal_tolerance=project.tolerance)
+    done = run_controller(project.controller, stage, env, tier=tier)
     _show(project, done.report, Console())
     return 0 if done.report.passed else 1
 
@@ -32,5 +34,6 @@ def _show(project: Project, report: WebotsReport, console: Console) -> None:
         words = f"[bold red]not passed[/]: {escape(report.why_not)}"
     before = project.verified_steps
     verified = "" if before is None else f" (verified: {before})"
-    console.print(f"driven here, as a Webots controller: {words}{verified}")
+    told = f"driven here, as a Webots controller: {words}{verified}"
+    console.print(told, soft_wrap=True)
     console.print("[yellow]not run in Webots itself[/]")

@@ -6,6 +6,7 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -14,9 +15,11 @@ from rich.text import Text
 
 from tdac_agent.commands.flags import check_finite, check_tier
 from tdac_agent.webots_run import WebotsReport, WebotsRun, frames, run_controller
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.epuck.task import TOLERANCE
 from tdac_envs.errors import TaskError
 from tdac_envs.video import SUFFIXES, write_video
-from tdac_envs.webots.stage import Stage, open_stage
+from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds import world_file
 
 STRIDE = 2
@@ -27,6 +30,7 @@ def run(
     world: str,
     steps: int | None,
     goal: tuple[float, float] | None,
+    tolerance: float | None,
     ignore: tuple[str, ...],
     webots_sensors: bool,
     video: Path | None,
@@ -39,27 +43,26 @@ def run(
     if video is not None and video.suffix.lower() not in SUFFIXES:
         raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
     stage = open_stage(world_file(world), goal, ignore)
-    env = stage.make_env(steps=steps, webots_sensors=webots_sensors)
-    done = run_controller(controller, stage, env, tier=tier)
+    options: dict[str, Any] = {
+        "steps": steps,
+        "goal_tolerance": TOLERANCE if tolerance is None else tolerance,
+        "webots_sensors": webots_sensors,
+    }
+    done = run_controller(controller, stage, stage.make_env(**options), tier=tier)
     if as_json:
         record = {"schema_version": 1, **asdict(done.report)}
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
     else:
         _show(done.report, Console())
     if video is not None:
-        _film(done, stage, steps, webots_sensors, video)
+        _film(done, stage.make_env(**options, render_mode="rgb_array"), video)
         if not as_json:
             print(f"wrote {video} (twice real time)")
     return 0 if done.report.passed else 1
 
 
-def _film(
-    done: WebotsRun, stage: Stage, steps: int | None, webots_sensors: bool, video: Path
-) -> None:
+def _film(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
     """The same run again, with a picture of every second step."""
-    env = stage.make_env(
-        steps=steps, webots_sensors=webots_sensors, render_mode="rgb_array"
-    )
     write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
 
 

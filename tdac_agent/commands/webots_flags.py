@@ -31,6 +31,10 @@ def webots_run(
         Optional[tuple[float, float]],  # noqa: UP045
         typer.Option("--goal", metavar="X Y", help="m.  [default: the world's GOAL]"),
     ] = None,
+    tolerance: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(help="How near to the goal is there, m.  [default: 0.02]"),
+    ] = None,
     ignore: Annotated[
         Optional[list[str]],  # noqa: UP045
         typer.Option(help="Name or type of a node that may be missing; repeatable."),
@@ -57,8 +61,8 @@ def webots_run(
 
     raise typer.Exit(
         webots.run(
-            controller, world, steps, goal, tuple(ignore or ()), webots_sensors, video,
-            tier, as_json,
+            controller, world, steps, goal, tolerance, tuple(ignore or ()),
+            webots_sensors, video, tier, as_json,
         )
     )  # fmt: skip
 

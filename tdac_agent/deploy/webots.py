@@ -11,12 +11,16 @@ from tdac_agent.errors import RunError
 from tdac_agent.files import write_atomic
 from tdac_agent.records import load_run
 from tdac_agent.report import Report
-from tdac_agent.task import Task, load_task, write_workdir
+from tdac_agent.task import Task, load_task
+from tdac_agent.task_epuck import WORLD_FILE
 from tdac_agent.task_file import EPUCK
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.wbt.writer import write_world
 
 POLICY = "tdac_policy.py"
+WORKING_FILES = ("params.json", "sensors.py", WORLD_FILE)
+SPARE = 2
+"""Steps that the adapter takes beside those of the controller."""
 ADAPTER = Path(__file__).with_name("adapter.py")
 
 
@@ -28,12 +32,16 @@ class Project:
         folder: Of all of it.
         world: The `.wbt` file.
         controller: What Webots starts.
+        tolerance: How near to the goal is at the goal, m.
+        horizon: Steps that the controller has.
         verified_steps: Steps to the goal when it was verified, if a report says so.
     """
 
     folder: Path
     world: Path
     controller: Path
+    tolerance: float
+    horizon: int
     verified_steps: int | None
 
 
@@ -58,6 +66,7 @@ def export_webots(run_folder: Path, out: Path) -> Project:
     if task.spec.env != EPUCK or not isinstance(task.nominal, EPuckTask):
         raise RunError(f"{run_folder} is about {task.spec.env}; Webots needs {EPUCK}")
     source = _read(run.controller)
+    beside = {file: _read(run_folder / file) for file in WORKING_FILES}
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise RunError(f"{out} is in use; give a new or an empty folder")
     name = project_name(task.name)
@@ -65,13 +74,16 @@ def export_webots(run_folder: Path, out: Path) -> Project:
         out,
         out / "worlds" / f"{name}.wbt",
         out / "controllers" / name / f"{name}.py",
+        task.nominal.goal_tolerance,
+        task.nominal.horizon,
         _verified_steps(run_folder),
     )
     folder = project.controller.parent
     for new in (folder, project.world.parent):
         new.mkdir(parents=True)
-    write_workdir(folder, task)
     write_atomic(folder / POLICY, source)
+    for file, content in beside.items():
+        write_atomic(folder / file, content)
     write_atomic(project.controller, ADAPTER.read_bytes())
     write_atomic(project.world, _world(task.nominal, name))
     write_atomic(out / "README.md", _readme(task, name, source, project))
@@ -113,21 +125,25 @@ def _verified_steps(run_folder: Path) -> int | None:
 def _readme(task: Task, name: str, source: bytes, project: Project) -> str:
     digest = hashlib.sha256(source).hexdigest()
     steps = project.verified_steps
-    verified = "" if steps is None else f" There it took {steps} steps to the goal."
+    verified = "" if steps is None else f"\nThere it took {steps} steps to the goal."
     return f"""\
 # {task.name}: an e-puck controller for Webots
 
 **Not run in Webots itself.** The controller was verified in tdac's own model of this
-world (`TDAC-EPuck-v0`).{verified} Webots' sensors have noise, its boxes are darker than
-the model's, and its physics is another: watch it before you rely on it.
+world (`TDAC-EPuck-v0`).{verified}
+In Webots the sensors have noise, boxes of wood are darker than in the model, and the
+physics is another: watch it before you rely on it.
 
 - `worlds/{name}.wbt`: open it in Webots R2025a. The robot is a supervisor, so that it
   can ask where it is.
-- `controllers/{name}/{name}.py`: the adapter that Webots starts. It needs numpy in the
-  Python that Webots uses.
-- `controllers/{name}/{POLICY}`: the verified file, byte for byte; SHA-256
-  `{digest}`.
-- the other files there are those that it was verified with.
+- `controllers/{name}/{name}.py`: the adapter.
+  Webots starts it; the Python that Webots uses needs numpy.
+- `controllers/{name}/{POLICY}`: the verified file, byte for byte.
+  SHA-256 `{digest}`
+- The other files there are those that it was verified with.
 
-Without Webots: `tdac webots run controllers/{name}/{name}.py worlds/{name}.wbt`
+Without Webots:
+
+    tdac webots run controllers/{name}/{name}.py worlds/{name}.wbt \\
+        --tolerance {project.tolerance:g} --steps {project.horizon + SPARE}
 """
