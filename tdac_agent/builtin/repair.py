@@ -132,7 +132,8 @@ def write_rules(
 
 def _say(kind: type[Tuned], verb: str, name: str, relation: str, value: float) -> str:
     unit = about(kind, name)["unit"]
-    return f"{verb} {name.upper()} {relation} {value:g} {unit}".rstrip()
+    number = f"{value:.5f}".rstrip("0").rstrip(".")
+    return f"{verb} {name.upper()} {relation} {number} {unit}".rstrip()
 
 
 _RULE = re.compile(r"^(set|keep) ([A-Z_]+) ([=<>]) (\d+(?:\.\d+)?)\b")
