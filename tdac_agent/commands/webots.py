@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -23,6 +24,7 @@ from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds import world_file
 
 STRIDE = 2
+_STEERING = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
 
 
 def run(
@@ -66,6 +68,14 @@ def _film(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
     write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
 
 
+def printable(text: str) -> str:
+    """A text without what would steer a terminal."""
+    return "".join(
+        c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}"
+        for c in _STEERING.sub("", text)
+    )
+
+
 def _show(report: WebotsReport, console: Console) -> None:
     if report.sandbox == "rlimits":
         console.print(
@@ -74,7 +84,7 @@ def _show(report: WebotsReport, console: Console) -> None:
         )
     if report.output.strip():
         console.print("[cyan]the controller printed[/]")
-        console.print(Text(report.output.rstrip()), soft_wrap=True)
+        console.print(Text(printable(report.output.rstrip())), soft_wrap=True)
     if report.error is not None:
         console.print("[red]the controller failed[/]")
         console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)

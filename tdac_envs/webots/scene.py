@@ -111,6 +111,13 @@ class Scene:
         """Number of one of the file's nodes."""
         return self._numbers[id(node)]
 
+    def has(self, number: int, field: str) -> bool:
+        """Whether there is such a node, with such a field if it is not empty."""
+        if not 0 <= number < len(self.nodes):
+            return False
+        names = [name for name, _, _ in self.nodes[number].fields]
+        return not field or field in names
+
     def may_write(self, number: int, field: str) -> bool:
         """Whether a field may change in a judged run: nothing moves by it."""
         return self.nodes[number].base in _FREE_NODES or field in _FREE_FIELDS

@@ -20,6 +20,12 @@ Outcome = Literal["reached", "out of time", "teleport", "quit"]
 Pose = tuple[float, float, float]
 
 LONGEST_STEP = 1_000_000_000
+CHANGES = (
+    "value", "setMF", "removeMF", "removeSF", "setVelocity", "resetPhysics", "remove",
+    "loadState", "addForce", "addForceWithOffset", "addTorque", "setJointPosition",
+    "simulationReset", "simulationResetPhysics", "worldReload", "worldLoad",
+)  # fmt: skip
+"""Calls of a supervisor that change the world."""
 PATIENCE = 3
 """Requests that are answered after the end; a controller should leave at the first."""
 
@@ -198,7 +204,7 @@ class StepServer:
             self._enable(device, value)
             return
         if device not in self._motors:
-            raise RequestError(f"no device {device!r} for {what!r}")
+            raise RequestError(f"no device {device:.40} for {what:.40}")
         motor = self._motors[device]
         if what == "pid":
             motor.pid = (_real(value[0]), _real(value[1]), _real(value[2]))
@@ -211,11 +217,11 @@ class StepServer:
             if warning is not None:
                 self._warn(f'WARNING: "{device}": {warning}')
         else:
-            raise RequestError(f"no command {what!r}")
+            raise RequestError(f"no command {what:.40}")
 
     def _enable(self, device: str, period: Any) -> None:
         if type(period) is not int or period < 0:
-            raise RequestError(f"a sampling period of {period!r}")
+            raise RequestError("a sampling period that is none")
         if device.startswith("ls"):
             self._warn(
                 f"tdac: light is not modelled here; ls0 to ls7 read {DARK:g}, as in "
@@ -227,14 +233,17 @@ class StepServer:
             self._sampling.pop(device, None)
 
     def _note_event(self, call: str, node: int | None, field_name: str) -> None:
-        scene = self._stage.scene
+        """Judges what a supervisor does; most of it ends the run."""
         if call == "simulationQuit":
             self.log.outcome = "quit"
             return
+        if call not in CHANGES:
+            raise RequestError("no such call")
         what = f"{call}()"
         if node is not None:
-            if not 0 <= node < len(scene.nodes):
-                raise RequestError(f"no node {node}")
+            scene = self._stage.scene
+            if not scene.has(node, field_name):
+                raise RequestError("no such node or field")
             if field_name and scene.may_write(node, field_name):
                 return
             target = scene.describe(node)
@@ -354,7 +363,7 @@ def _real(value: Any, *, infinite: bool = False) -> float:
         RequestError: It is none, or not finite where it has to be.
     """
     if type(value) not in (int, float) or math.isnan(value):
-        raise RequestError(f"expected a number, got {value!r:.40}")
+        raise RequestError("expected a number")
     if not infinite and math.isinf(value):
         raise RequestError("expected a finite number")
     return float(value)

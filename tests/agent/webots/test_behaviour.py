@@ -62,6 +62,19 @@ class TestDevices:
         )
         assert out == ["36 36 left wheel motor True", "True True"]
 
+    def test_devices_made_by_their_classes(self, printed):
+        """The old way: by name, a sensor with its period."""
+        out = printed(
+            "from controller import GPS\n"
+            's = DistanceSensor("ps0", 32); g = GPS("gps")\n'
+            "g.sampling_period = 32\n"
+            'print(Motor("left wheel motor") is left, s.sampling_period)\n'
+            "robot.step(32); print(s.value > 67, g.values[2] > 0.04)\n"
+            'print(Motor("nose").getVelocity())\n'
+        )
+        assert out[:2] == ["True 32", "True True"]
+        assert out[2:] == ['Device "nose" was not found on robot "e-puck"', "nan"]
+
     def test_deprecated_getters(self, printed):
         """They work, with the warning, each time."""
         out = printed('print(robot.getMotor("left wheel motor") is left)\n')
@@ -572,6 +585,7 @@ class TestFolder:
             "       (32, [('ps0', 'enable', 1.5)], None),\n"
             "       (32, [('nose', 'enable', 32)], None),\n"
             "       (0, [], ('value', 10**9, 'translation')),\n"
+            "       (0, [], ('value', 1, 'wings')), (0, [], ('fly', 1, '')),\n"
             "       (0, [], 'simulationQuit'),\n"
             "       (10**12, [], None), object()]\n"
             "for request in bad:\n"
@@ -583,10 +597,23 @@ class TestFolder:
         )
         report = drive(code, OPEN).report
         assert report.error is None, report.error
-        assert report.output.count("refused") == 15
+        assert report.output.count("refused") == 17
         assert "taken" not in report.output
         assert report.steps == 1
         assert report.teleport is None
+
+    def test_other_files_and_sockets_are_closed(self, drive):
+        """It is in the same sandbox as every controller."""
+        code = (
+            "import os, socket\n"
+            "for what in (lambda: open('/etc/passwd'), socket.socket, os.fork):\n"
+            "    try:\n        what(); print('open')\n"
+            "    except OSError:\n        print('closed')\n"
+        )
+        run = drive(code, OPEN)
+        if run.report.sandbox == "rlimits":
+            pytest.skip("rlimits promises nothing")
+        assert run.report.output == "closed\nclosed\nclosed\n"
 
     def test_processor_time_is_bounded(self, drive, quick):
         """A controller that only computes is ended, and has failed."""

@@ -93,6 +93,21 @@ def test_a_controller_that_fails(tdac, there):
     assert 'Device "x" was not found on robot "e-puck"' in out
 
 
+def test_what_it_prints_does_not_steer_the_terminal(tdac, there):
+    """Colours and cursor movements are taken out, other control characters shown."""
+    (there / "mine").mkdir()
+    bold = there / "mine" / "bold.py"
+    bold.write_text(
+        "from controller import AnsiCodes\n"
+        "print(AnsiCodes.RED_FOREGROUND + 'red' + AnsiCodes.RESET)\n"
+        "print('\\x1b[2J\\x1b[1;1Hpassed\\x1b]0;title\\x07', end='')\n"
+    )
+    code, out, _ = tdac("webots", "run", bold, there / "open.wbt")
+    assert code == 1
+    assert "\nred\npassed\ufffd]0;title\ufffd\n" in out
+    assert not set(out) & {"\x1b", "\x07"}
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
