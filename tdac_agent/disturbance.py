@@ -20,7 +20,8 @@ class Disturbance:
 
     Attributes:
         range_noise: Standard deviation of each range, relative to it. The table of the
-            e-puck's sensors in Webots has 0.2 to 4.9 %, on average 2.4 %.
+            e-puck's sensors in Webots has 0.2 to 4.9 %, on average 2.4 %; of an
+            e-puck it is that average.
         wheel_slip: Standard deviation of each wheel's speed in each step, relative to
             it. Enki's e-puck and Khepera draw it within 5 % either way: 2.9 %.
         motor_lag: Time constant of the wheel speeds, s. The robot has none: its wheels

@@ -118,7 +118,7 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
 
     Start and noise are what the environment draws after `reset(seed=seed)`.
     """
-    env = stage.task.make_env(**stage.disturbance.env_options())
+    env = stage.task.disturbed_env(stage.disturbance)
     record = Record(env, None, stage.task.nominal.horizon, seed=seed)
     name = f"seed {seed}"
     child = stage.nursery.take(stage.tier, stage.limits)

@@ -144,6 +144,9 @@ class Setting(Protocol):
     def make_env(self, **options: Any) -> JudgedEnv:
         """The environment; options as for its class."""
 
+    def noise(self, relative: float) -> dict[str, float]:
+        """Option of the environment for a relative noise of its distance sensors."""
+
     def facts(self) -> dict[str, Any]:
         """What decides an episode, as JSON; map or world by its hash."""
 

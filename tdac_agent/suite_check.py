@@ -23,7 +23,6 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.suite_proof import SuiteCheck, row_of, verdict_on_suite
 from tdac_agent.task import Task
 from tdac_agent.task_file import Profile
-from tdac_agent.task_map2d import map_setting
 from tdac_agent.verification import verify
 from tdac_agent.warm import WarmJudge
 
@@ -79,11 +78,10 @@ def check_suite(
             seed=seed,
             judge=warm,
         )
-        nominal = map_setting(task.setting).nominal
-        ways = reference_ways(nominal, seed)
+        ways = reference_ways(task.nominal, seed)
         reports: dict[str, list[Report]] = {}
         for name in (REFERENCE, *bad):
-            source = privileged_controller(nominal, ways, name)
+            source = privileged_controller(task.nominal, ways, name)
             full = partial(ask, source, profile=profile)
             short = partial(
                 ask, source, profile="policy", paper=True, limits=SLOW_LIMITS

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tdac_agent.reference import taut
 from tdac_agent.setting import Nominal
 from tdac_agent.surroundings import first_beyond
 from tdac_agent.touch import Touch
@@ -96,30 +97,15 @@ class WorldSurroundings:
 
     def pull(self, path: Path) -> list[Point]:
         """Corners of a path after every shortcut that the body can take."""
-        places = [METRES.place_of(x, y) for x, y in path.tolist()]
-        corners, at = [0], 0
-        while at < len(places) - 1:
-            reach = 1
-            while at + 2 * reach < len(places) and self._free(places, at, 2 * reach):
-                reach *= 2
-            stride = reach
-            while stride >= 1:
-                beyond = reach + stride
-                if at + beyond < len(places) and self._free(places, at, beyond):
-                    reach = beyond
-                stride //= 2
-            at += reach
-            corners.append(at)
-        return [(x, y) for x, y in path[corners].tolist()]
+        return taut(path, self._free)
 
-    def _free(self, places: list[Point], at: int, reach: int) -> bool:
-        """Whether the body gets straight from one place of a path to a later one."""
-        begin, end = places[at], places[at + reach]
-        solid = self.task.ground.solid
-        heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
+    def _free(self, begin: Point, end: Point) -> bool:
+        """Whether the body gets straight from one place to another."""
+        (x, y), (to_x, to_y) = METRES.place_of(*begin), METRES.place_of(*end)
+        solid, heading = self.task.ground.solid, math.atan2(to_y - y, to_x - x)
         touch = first_touch(
-            solid.points, solid.first, solid.extent, *begin, heading,
-            math.dist(begin, end), 0.0, BODY_RADIUS,
+            solid.points, solid.first, solid.extent, x, y, heading,
+            math.hypot(to_x - x, to_y - y), 0.0, BODY_RADIUS,
         )  # fmt: skip
         return touch > 1.0
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from tdac_agent.disturbance import Disturbance
 from tdac_agent.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.task_file import (
     EPUCK,
@@ -63,6 +64,12 @@ class Task:
     def make_env(self, **options: Any) -> JudgedEnv:
         """The environment of this task; options as for its class."""
         return self.setting.make_env(**options)
+
+    def disturbed_env(self, disturbance: Disturbance) -> JudgedEnv:
+        """The environment of this task, disturbed."""
+        options = disturbance.env_options()
+        noise = self.setting.noise(options.pop("range_noise"))
+        return self.make_env(**options, **noise)
 
     def sha256(self) -> str:
         """Hash of everything that decides an episode."""

@@ -18,7 +18,7 @@ from tdac_agent.units import METRES, Units
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
-from tdac_envs.epuck.infrared import PLACES, RANGE
+from tdac_envs.epuck.infrared import PLACES, RANGE, TABLE
 from tdac_envs.epuck.kernels import AXLE, WHEEL_RADIUS
 from tdac_envs.epuck.source import open_world
 from tdac_envs.epuck.task import TOLERANCE, EPuckTask, make_task
@@ -29,6 +29,7 @@ from tdac_envs.world import Unmodelled, World, check_modelled
 from tdac_envs.worlds import bundled_worlds, world_file
 
 WORLD_FILE = "world.wbt"
+_MEAN_NOISE = float(TABLE[:, 2].mean())
 _AZIMUTHS: tuple[float, ...] = tuple(PLACES[:, 2].tolist())
 
 
@@ -122,6 +123,10 @@ class EPuckSetting:
     def make_env(self, **options: Any) -> EPuckEnv:
         """The environment of this task; options as for `EPuckEnv`."""
         return EPuckEnv(**{**self.env_kwargs(), **options})
+
+    def noise(self, relative: float) -> dict[str, float]:
+        """The published noise, which depends on the distance, with this mean."""
+        return {"sensor_noise": relative / _MEAN_NOISE}
 
     def facts(self) -> dict[str, Any]:
         """The arguments, the world by its hash, and what is missing in it."""

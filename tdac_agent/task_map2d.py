@@ -91,6 +91,10 @@ class Map2DSetting:
         """The environment of this task; options as for `Map2DEnv`."""
         return Map2DEnv(**{**self.env_kwargs(), **options})
 
+    def noise(self, relative: float) -> dict[str, float]:
+        """Each range has it."""
+        return {"range_noise": relative}
+
     def facts(self) -> dict[str, Any]:
         """The arguments, the map by its hash."""
         return {**self.env_kwargs(), "map": self.world_sha256()}

@@ -5,6 +5,8 @@ heading in radians from +x towards +y, so a robot of heading 0 looks right and a
 positive turn goes clockwise on the screen. Arrays are indexed [y, x]. Pixel (i, j)
 is the square [i - 1/2, i + 1/2) x [j - 1/2, j + 1/2); everything outside the map is
 occupied. File names without a folder are looked up beside this file.
+
+Of an e-puck in a world (`world.wbt`), only `HERE`, `load_params` and `show` are of use.
 """
 
 import json
@@ -224,9 +226,8 @@ def show(
     except ImportError:
         raise SystemExit("show() needs the simulator: pip install tdac") from None
     mode = "human" if _has_window() else "rgb_array"
-    env: Any = gymnasium.make(
-        "tdac_envs:TDAC-Map2D-v0", map=str(HERE), render_mode=mode
-    )
+    name, arguments = _environment()
+    env: Any = gymnasium.make(f"tdac_envs:{name}", render_mode=mode, **arguments)
     outcome: list[str] = []
     frames = _episode(env, policy, reset, outcome)
     try:
@@ -241,6 +242,19 @@ def show(
     finally:
         env.close()
     print(outcome[0])
+
+
+def _environment() -> tuple[str, dict[str, Any]]:
+    """Name and arguments of the environment of this folder's task."""
+    if not (HERE / "world.wbt").exists():
+        return "TDAC-Map2D-v0", {"map": str(HERE)}
+    params = load_params()
+    same = ("goal", "goal_tolerance", "dt", "horizon")
+    return "TDAC-EPuck-v0", {
+        "world": str(HERE / "world.wbt"),
+        "start": [*params["start"], params["heading"]],
+        **{key: params[key] for key in same},
+    }
 
 
 def _has_window() -> bool:
