@@ -30,9 +30,11 @@ from tdac_agent.oracle import Oracle
 from tdac_agent.provider import Request
 from tdac_agent.report import Diagnosis, Failure, Report
 from tdac_agent.rules import add_rules, parse_rules
+from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
 from tdac_agent.task_file import EPUCK as EPUCK_ENV
 from tdac_agent.task_file import TaskFile
+from tdac_agent.verification import verify
 from tdac_agent.world_oracle import occupied_at
 from tdac_envs import write_world
 from tdac_envs.footprint import Disc
@@ -324,3 +326,34 @@ def test_unsolvable_says_so(module):
     walls = module.Walls(world)
     with pytest.raises(ValueError, match=r"does not get from \(-0.6, 0.0\) to \(0.6"):
         module.plan(world, walls, (-0.6, 0.0), (0.6, 0.0))
+
+
+SYNTHESES = [
+    pytest.param(name, marks=[] if name == "crates" else [pytest.mark.slow])
+    for name in WORLDS
+]
+
+
+@pytest.mark.parametrize("name", SYNTHESES)
+def test_it_is_verified(name, tmp_path):
+    """Every world ends with a controller that passes the whole suite."""
+    task = world_task(name) or pytest.skip("the paper's world is not here")
+    run = synthesize(task, out=tmp_path / "run", iterations=3)
+    assert run.verified
+    source = (tmp_path / "run" / "controller.py").read_text()
+    assert read_parameters(source, EPuckParameters) is not None
+
+
+def test_a_collision_is_repaired(crates, tmp_path):
+    """A margin that is given up on purpose comes back from the report's diagnosis."""
+    careless = render_epuck(EPuckParameters(), crates.nominal)
+    careless = careless.replace("BODY_RADIUS = 0.037", "BODY_RADIUS = 0.034")
+    report = verify(careless, crates, paper=True)
+    causes = {failure.diagnosis.cause for failure in report.failures}
+    assert causes == {"collision"}
+    text = careless.replace("BODY_RADIUS = 0.034", "BODY_RADIUS = 0.037")
+    builtin = builtin_for(crates.setting)
+    reply = builtin.complete(Request("edit", "", controller=text, report=report))
+    after = read_parameters(extract_source(reply.text), EPuckParameters)
+    assert after.inflation_margin == 0.002
+    assert any("test_no_collisions -> inflation_margin" in n for n in reply.notes)
