@@ -77,7 +77,9 @@ class WorldCase:
             outside = beyond is not None and not beyond.contains(x, y)
             if outside or _gap(solid, x, y) <= inflation - margin:
                 yield (x, y), True
-            elif arena is not None and not arena.inside.contains(x, y):
+            elif arena is not None and not _well_inside(
+                arena, x, y, inflation + margin
+            ):
                 continue
             elif _gap(unsure, x, y) >= inflation + margin:
                 yield (x, y), False
@@ -116,6 +118,18 @@ def _with_wall(arena: Arena, margin: float) -> Disc | Rectangle:
         return replace(shape, radius=reach)
     length, width = shape.length + 2 * edge, shape.width + 2 * edge
     return replace(shape, length=length, width=width)
+
+
+def _well_inside(arena: Arena, x: float, y: float, room: float) -> bool:
+    """Whether a point is on the floor, and in a round one so far from its circle.
+
+    The flat pieces of a round wall lie outside the circle: who takes the circle for the
+    wall is right, too.
+    """
+    shape = arena.inside
+    if isinstance(shape, Disc):
+        return math.hypot(x - shape.x, y - shape.y) <= shape.radius - room
+    return shape.contains(x, y)
 
 
 def world_cases(world: World) -> list[WorldCase]:
@@ -172,7 +186,7 @@ def _shapes(random: np.random.Generator) -> Iterator[tuple[str, list[Part]]]:
         ("Rock", Polygon.around(0.09 * unit)),
     ):
         yield kind, [Part(shape, 0.0, high)]
-    pipe = ring(0.0, 0.0, 0.05, 0.07, 8)
+    pipe = ring(0.0, 0.0, 0.04, 0.09, 8)
     yield "SolidPipe", [Part(piece, 0.0, high) for piece in pipe]
 
 

@@ -197,8 +197,7 @@ def test_distances_are_those_of_the_environment(seed, module, tmp_path):
     for x, y in random.uniform((left, low), (right, high), (200, 2)).tolist():
         room = ground.gap(x, y)
         if room > 1e-3 and module.room_in(world["arena"], x, y) > 0.0:
-            # The walls of a round arena have flat pieces, up to 2 mm behind its disc.
-            assert walls.gap((x, y), (x, y)) == pytest.approx(room, abs=2e-3)
+            assert walls.gap((x, y), (x, y)) == pytest.approx(room, abs=1e-7)
             compared += 1
     assert compared > 20
 
