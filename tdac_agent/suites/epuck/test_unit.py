@@ -141,6 +141,8 @@ def test_astar_on_this_world(controller, oracle, cases):
             (math.floor((x - x0) / size), math.floor((y - y0) / size))
             for x, y in (case.start[:2], case.goal)
         ]
+        inside = all(0 <= x < occ.shape[1] and 0 <= y < occ.shape[0] for x, y in ends)
+        assert inside, f"start and goal are cells {ends} of {occ.shape[::-1]}"
         best = oracle.shortest_length(occ, *ends)
         path = controller.call("astar", occ, *ends)
         assert isinstance(path, list), f"a {type(path).__name__}, not a list"
