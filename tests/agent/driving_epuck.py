@@ -47,7 +47,7 @@ def random_world(random) -> World:
     for number in range(random.integers(4, 25)):
         at, z = place(), random.choice([0.0, 0.0, 0.0, 0.1, -0.2])
         part = Part(random_shape(random, *at), z, z + 0.1)
-        mass = 0.1 if z == 0.0 and random.random() < 0.1 else None
+        mass = 0.1 if z >= 0.0 and random.random() < 0.2 else None
         things.append(
             Obstacle(f"thing {number}", "Solid", *at, (part,), (part,), mass=mass)
         )
