@@ -25,7 +25,9 @@ from tdac_agent.sandbox import (
 )
 from tdac_agent.verification import read_source
 from tdac_envs.epuck.env import EPuckEnv
-from tdac_envs.webots.server import Log, RequestError, RunEnded, StepServer, way_of
+from tdac_envs.webots.log import Log, way_of
+from tdac_envs.webots.requests import RequestError
+from tdac_envs.webots.server import RunEnded, StepServer
 from tdac_envs.webots.stage import Stage
 
 PACKAGE = Path(tdac_envs.webots.__file__).parent / "controller"

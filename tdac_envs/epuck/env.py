@@ -302,6 +302,13 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
         """The true pose, shape (3,): x, y (m), heading (rad)."""
         return self._state[:3].copy()
 
+    def things(self) -> NDArray[np.float64]:
+        """Centre (m) and turn since the start (rad) of what can be pushed, (k, 3)."""
+        if self._pushes:
+            return self._things[:, :3].copy()
+        centres = self.task.ground.centres
+        return np.column_stack([centres, np.zeros(len(centres))])
+
     def close(self) -> None:
         """Closes the window, if there is one."""
         if self._window is not None:

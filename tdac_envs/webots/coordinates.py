@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tdac_envs.errors import WorldError
+from tdac_envs.wbt.fields import children
 from tdac_envs.wbt.frames import Frame, Matrix, axis_angle
+from tdac_envs.wbt.geometry import GROUPS
+from tdac_envs.wbt.placing import placed
+from tdac_envs.wbt.robots import is_epuck
+from tdac_envs.wbt.tree import Node
+
+Found = tuple[Node, Frame]
+
+_HOLDING = (*GROUPS, "Solid")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,3 +82,21 @@ class FileFrame:
         """The direction of north as the robot sees it: +y, or +x where y is up."""
         ahead = (0.0, 1.0, 0.0) if abs(self.world[2, 2]) > 0.5 else (1.0, 0.0, 0.0)
         return [float(value) for value in self.rotation(heading).T @ ahead]
+
+
+def walk_frames(nodes: Iterable[Node], frame: Frame) -> Iterator[Found]:
+    """Nodes that have a place, each with its own frame, outer ones first."""
+    for node in nodes:
+        holds = node.kind in _HOLDING
+        if node.kind == "Group":
+            own = frame
+        elif "translation" in node.fields or is_epuck(node) or holds:
+            try:
+                own = placed(node, frame, scaled=holds)
+            except WorldError:  # an unknown node may mean something else by these
+                continue
+        else:
+            continue
+        yield node, own
+        if holds:
+            yield from walk_frames(children(node), own)

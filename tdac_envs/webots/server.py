@@ -3,79 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tdac_envs.epuck.env import EPuckEnv, Observation
-from tdac_envs.webots.devices import DARK, ENCODER_STEP, WHEELS
+from tdac_envs.webots.devices import DARK, WHEELS
+from tdac_envs.webots.log import Log
 from tdac_envs.webots.motors import MotorState
+from tdac_envs.webots.requests import CHANGES, RequestError, checked, real
+from tdac_envs.webots.sampling import Sampler
 from tdac_envs.webots.stage import Stage
 
-Outcome = Literal["reached", "out of time", "teleport", "quit"]
-Pose = tuple[float, float, float]
-
-LONGEST_STEP = 1_000_000_000
-CHANGES = (
-    "value", "setMF", "removeMF", "removeSF", "setVelocity", "resetPhysics", "remove",
-    "loadState", "addForce", "addForceWithOffset", "addTorque", "setJointPosition",
-    "simulationReset", "simulationResetPhysics", "worldReload", "worldLoad",
-)  # fmt: skip
-"""Calls of a supervisor that change the world."""
 PATIENCE = 3
 """Requests that are answered after the end; a controller should leave at the first."""
 
 
-class RequestError(Exception):
-    """A request that the `controller` package never sends."""
-
-
 class RunEnded(Exception):
     """The controller goes on although the simulation has ended."""
-
-
-@dataclass(slots=True)
-class Log:
-    """What happened.
-
-    Attributes:
-        poses: x, y, heading; the start included.
-        actions: Wheel speeds as fractions, shape (2,), float32.
-        path_distances: Shortest way left to the goal, m.
-        distances: Straight to the goal, m.
-        collisions: Steps with a contact.
-        first_contact: Step, x and y of the first.
-        outcome: How the simulation ended; None while it goes on.
-        teleport: What a supervisor did that it may not do.
-    """
-
-    poses: list[Pose] = field(default_factory=list)
-    actions: list[NDArray[np.float32]] = field(default_factory=list)
-    path_distances: list[float] = field(default_factory=list)
-    distances: list[float] = field(default_factory=list)
-    collisions: int = 0
-    first_contact: tuple[int, float, float] | None = None
-    outcome: Outcome | None = None
-    teleport: str | None = None
-
-    @property
-    def steps(self) -> int:
-        """Steps of the world so far."""
-        return len(self.actions)
-
-    def note(self, env: EPuckEnv, info: dict[str, Any]) -> None:
-        """Writes a moment down."""
-        x, y, heading = env.pose().tolist()
-        self.poses.append((x, y, heading))
-        self.path_distances.append(info["path_distance"])
-        self.distances.append(info["distance_to_goal"])
-        self.collisions = info["collisions"]
-        if info["collision"] and self.first_contact is None:
-            self.first_contact = (self.steps, x, y)
 
 
 class StepServer:
@@ -94,10 +39,7 @@ class StepServer:
         self._observation: Observation = {}
         limit = stage.world.robot.max_wheel_speed
         self._motors = {name: MotorState(limit) for name, _ in WHEELS}
-        self._readers = self._make_readers()
-        # Sampling period and time of the last sample, ms.
-        self._sampling: dict[str, tuple[int, float]] = {}
-        self._fresh: dict[str, Any] = {}
+        self._sampler = Sampler(stage)
         self._warnings: list[str] = []
         self._warned: set[str] = set()
         self._late = 0
@@ -127,7 +69,7 @@ class StepServer:
             RequestError: It is none.
             RunEnded: The controller does not leave.
         """
-        duration, commands, event = _checked(action)
+        duration, commands, event = checked(action)
         if self.is_over:
             self._late += 1
             if self._late > PATIENCE:
@@ -168,26 +110,18 @@ class StepServer:
             self.log.outcome = "reached"
         elif truncated or self.log.steps >= self._env.task.horizon:
             self.log.outcome = "out of time"
-        self._sample()
-
-    def _sample(self) -> None:
-        now = self._now()
-        for name, (period, last) in self._sampling.items():
-            if now - last >= period - 1e-6:
-                self._sampling[name] = (period, now)
-                self._fresh[name] = self._readers[name]()
+        self._sampler.sample(self._now(), self._observation, self.log.poses[-1])
 
     def _now(self) -> float:
         """Simulated, ms."""
         return self.log.steps * self._basic
 
     def _answer(self) -> dict[str, Any]:
-        fresh, self._fresh = self._fresh, {}
         warnings, self._warnings = self._warnings, []
         return {
             "over": self.is_over,
             "time": self._now() / 1e3,
-            "values": fresh,
+            "values": self._sampler.take(),
             "velocity": self._velocity() if self._tells_truth else [0.0] * 6,
             "places": self._places() if self._stage.is_supervisor else {},
             "warnings": warnings,
@@ -200,20 +134,20 @@ class StepServer:
         return self._stage.is_supervisor or sees
 
     def _command(self, device: str, what: str, value: Any) -> None:
-        if what == "enable" and device in self._readers:
+        if what == "enable" and device in self._sampler:
             self._enable(device, value)
             return
         if device not in self._motors:
             raise RequestError(f"no device {device:.40} for {what:.40}")
         motor = self._motors[device]
         if what == "pid":
-            motor.pid = (_real(value[0]), _real(value[1]), _real(value[2]))
+            motor.pid = (real(value[0]), real(value[1]), real(value[2]))
         elif what == "position":
-            motor.set_position(_real(value, infinite=True))
+            motor.set_position(real(value, infinite=True))
         elif what == "acceleration":
-            motor.acceleration = _real(value, infinite=True)
+            motor.acceleration = real(value, infinite=True)
         elif what == "velocity":
-            warning = motor.set_velocity(_real(value, infinite=True))
+            warning = motor.set_velocity(real(value, infinite=True))
             if warning is not None:
                 self._warn(f'WARNING: "{device}": {warning}')
         else:
@@ -227,10 +161,7 @@ class StepServer:
                 f"tdac: light is not modelled here; ls0 to ls7 read {DARK:g}, as in "
                 "the dark"
             )
-        if period:
-            self._sampling[device] = (period, self._now())
-        else:
-            self._sampling.pop(device, None)
+        self._sampler.enable(device, period, self._now())
 
     def _note_event(self, call: str, node: int | None, field_name: str) -> None:
         """Judges what a supervisor does; most of it ends the run."""
@@ -275,95 +206,13 @@ class StepServer:
         if self.log.steps == 0:
             return {}
         x, y, heading = self.log.poses[-1]
-        frame = self._stage.frame
-        number = self._stage.scene.number(self._stage.robot)
-        return {number: (frame.point(x, y), frame.axis_angle(heading))}
-
-    def _make_readers(self) -> dict[str, Callable[[], Any]]:
-        """How each sensor gets its value."""
-        readers: dict[str, Callable[[], Any]] = {}
-        for k in range(8):
-            readers[f"ps{k}"] = partial(self._observed, "ps", k)
-            readers[f"ls{k}"] = partial(float, DARK)
-        for k, (_, sensor) in enumerate(WHEELS):
-            readers[sensor] = partial(self._encoder, k)
-        for device in self._stage.devices:
-            if device.kind == "GPS":
-                readers[device.name] = partial(self._position, device.offset)
-            elif device.kind == "Compass":
-                readers[device.name] = self._north
-            elif device.kind == "InertialUnit":
-                readers[device.name] = self._attitude
-            elif device.name.startswith("gs"):
-                readers[device.name] = partial(
-                    self._observed, "ground", int(device.name[2])
-                )
-        return readers
-
-    def _observed(self, key: str, index: int) -> float:
-        return float(self._observation[key][index])
-
-    def _north(self) -> list[float]:
-        return self._stage.frame.north(self.log.poses[-1][2])
-
-    def _attitude(self) -> list[float]:
-        return self._stage.frame.attitude(self.log.poses[-1][2])
-
-    def _encoder(self, wheel: int) -> float:
-        angle = float(self._observation["wheel_positions"][wheel])
-        return ENCODER_STEP * round(angle / ENCODER_STEP)
-
-    def _position(self, offset: tuple[float, float, float]) -> list[float]:
-        x, y, heading = self.log.poses[-1]
-        frame = self._stage.frame
-        at = np.add(frame.point(x, y), frame.rotation(heading) @ offset)
-        return [float(value) for value in at]
-
-
-def way_of(log: Log) -> float:
-    """Length of what the robot drove, m."""
-    places = np.array(log.poses)[:, :2]
-    return float(np.hypot(*np.diff(places, axis=0).T).sum())
-
-
-def _checked(request: Any) -> tuple[int, list[Any], Any]:
-    """A request whose form is right; its values are checked where they are used.
-
-    Raises:
-        RequestError: It is not.
-    """
-    match request:
-        case (int() as duration, list() as commands, None) if _may_last(duration):
-            event = None
-        case (int() as duration, list() as commands, event) if _may_last(duration):
-            match event:
-                case (str(), int() | None, str()):
-                    pass
-                case _:
-                    raise RequestError("an event of another form")
-        case _:
-            raise RequestError("a request of another form")
-    for command in commands:
-        match command:
-            case (str(), str(), int() | float()) | (str(), "pid", [_, _, _]):
-                pass
-            case _:
-                raise RequestError("a command of another form")
-    return duration, commands, event
-
-
-def _may_last(duration: int) -> bool:
-    return type(duration) is int and 0 <= duration <= LONGEST_STEP
-
-
-def _real(value: Any, *, infinite: bool = False) -> float:
-    """A number.
-
-    Raises:
-        RequestError: It is none, or not finite where it has to be.
-    """
-    if type(value) not in (int, float) or math.isnan(value):
-        raise RequestError("expected a number")
-    if not infinite and math.isinf(value):
-        raise RequestError("expected a finite number")
-    return float(value)
+        frame, scene = self._stage.frame, self._stage.scene
+        number = scene.number(self._stage.robot)
+        places = {number: (frame.point(x, y), frame.axis_angle(heading))}
+        if self._stage.movables:
+            things = self._env.things().tolist()
+            for thing, at in zip(self._stage.movables, things, strict=True):
+                place = None if thing is None else thing.place(*at)
+                if thing is not None and place is not None:
+                    places[scene.number(thing.node)] = place
+        return places

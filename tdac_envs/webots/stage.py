@@ -15,19 +15,16 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.paths import entry, field_to
 from tdac_envs.errors import WorldError
-from tdac_envs.wbt.fields import children, flag, text
+from tdac_envs.wbt.fields import flag, text
 from tdac_envs.wbt.frames import Frame
-from tdac_envs.wbt.geometry import GROUPS
-from tdac_envs.wbt.placing import placed
 from tdac_envs.wbt.reader import frame_of, read_text, read_world, with_goal
 from tdac_envs.wbt.robots import is_epuck
 from tdac_envs.wbt.tree import Node, parse
-from tdac_envs.webots.coordinates import FileFrame
+from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
 from tdac_envs.webots.devices import DeviceFacts, find_devices
+from tdac_envs.webots.movable import Movable, find_movables
 from tdac_envs.webots.scene import Scene
 from tdac_envs.world import World, check_modelled
-
-Found = tuple[Node, Frame]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +40,7 @@ class Stage:
         scene: The file's nodes.
         robot: The robot's node.
         frame: How the file says where it is.
+        movables: Things that can be pushed, as the environment numbers them.
         devices: Of the robot.
         absent: Names of its devices that are not modelled.
     """
@@ -55,6 +53,7 @@ class Stage:
     scene: Scene
     robot: Node
     frame: FileFrame
+    movables: tuple[Movable | None, ...]
     devices: tuple[DeviceFacts, ...]
     absent: tuple[str, ...]
 
@@ -147,30 +146,28 @@ def open_stage(
     frame = FileFrame.of(top, own, world.robot.heading)
     scene = Scene(document.nodes)
     return Stage(
-        path.name, content, world, has_goal, names, scene, robot, frame, devices, absent
+        name=path.name,
+        text=content,
+        world=world,
+        has_goal=has_goal,
+        left_out=names,
+        scene=scene,
+        robot=robot,
+        frame=frame,
+        movables=find_movables(Ground.of(world), document.nodes, top),
+        devices=devices,
+        absent=absent,
     )
 
 
 def _find_robot(nodes: Iterable[Node], top: Frame, name: str) -> Found:
-    found = _search(nodes, top)
-    if found is None:
-        raise WorldError(
-            f"{name}: the e-puck is within a node that is no Group, Pose or Solid"
-        )
-    return found
-
-
-def _search(nodes: Iterable[Node], frame: Frame) -> Found | None:
     """The first e-puck and its frame, as the reader finds it."""
-    for node in nodes:
+    for node, own in walk_frames(nodes, top):
         if is_epuck(node):
-            return node, placed(node, frame)
-        if node.kind in GROUPS or node.kind == "Solid":
-            inner = frame if node.kind == "Group" else placed(node, frame, scaled=True)
-            found = _search(children(node), inner)
-            if found is not None:
-                return found
-    return None
+            return node, own
+    raise WorldError(
+        f"{name}: the e-puck is within a node that is no Group, Pose or Solid"
+    )
 
 
 def _farthest(world: World) -> tuple[float, float]:

@@ -475,6 +475,30 @@ class TestSupervisor:
         assert (seen[3], seen[7], seen[11]) == pytest.approx((*off, 0.05), abs=1e-6)
         assert seen[12:] == [0, 0, 0, 1]
 
+    def test_things_that_are_pushed(self, drive):
+        """A supervisor sees them where they are now: ahead of the hull, as pushed."""
+        world = BLOCKED.replace("0 0 1 0.3", "0 0 1 0").replace(
+            'name "box"', 'name "box"\n  mass 0.02'
+        )
+        code = (
+            f"{BEGIN}{FREE}left.setVelocity(4.0); right.setVelocity(4.0)\n"
+            'me, box = robot.getSelf(), robot.getFromDef("BOX")\n'
+            "at = box.getField('translation')\n"
+            "print([at.getSFVec3f(), box.getPosition()])\n"
+            "robot.step(6400)\n"
+            "print([at.getSFVec3f(), box.getPosition(), box.getOrientation()[0], "
+            "me.getPosition()])\n"
+        )
+        report = drive(code, world, steps=400, goal=(0.6, 0.3)).report
+        first, last = map(eval, report.output.splitlines())
+        assert first == [[0.0, 0.0, 0.05]] * 2
+        field, place, cos, robot = last
+        assert field == place
+        assert place[0] - 0.05 == pytest.approx(robot[0] + 0.037, abs=2e-3)
+        assert place[0] > 0.05
+        assert cos == pytest.approx(1.0, abs=0.02)
+        assert report.collisions > 0
+
     @pytest.mark.parametrize(
         ("field", "call", "said"),
         [

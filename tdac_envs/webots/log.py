@@ -1,0 +1,60 @@
+"""What happened in a run of a Webots controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.epuck.env import EPuckEnv
+
+Outcome = Literal["reached", "out of time", "teleport", "quit"]
+Pose = tuple[float, float, float]
+
+
+@dataclass(slots=True)
+class Log:
+    """What happened.
+
+    Attributes:
+        poses: x, y, heading; the start included.
+        actions: Wheel speeds as fractions, shape (2,), float32.
+        path_distances: Shortest way left to the goal, m.
+        distances: Straight to the goal, m.
+        collisions: Steps with a contact.
+        first_contact: Step, x and y of the first.
+        outcome: How the simulation ended; None while it goes on.
+        teleport: What a supervisor did that it may not do.
+    """
+
+    poses: list[Pose] = field(default_factory=list)
+    actions: list[NDArray[np.float32]] = field(default_factory=list)
+    path_distances: list[float] = field(default_factory=list)
+    distances: list[float] = field(default_factory=list)
+    collisions: int = 0
+    first_contact: tuple[int, float, float] | None = None
+    outcome: Outcome | None = None
+    teleport: str | None = None
+
+    @property
+    def steps(self) -> int:
+        """Steps of the world so far."""
+        return len(self.actions)
+
+    def note(self, env: EPuckEnv, info: dict[str, Any]) -> None:
+        """Writes a moment down."""
+        x, y, heading = env.pose().tolist()
+        self.poses.append((x, y, heading))
+        self.path_distances.append(info["path_distance"])
+        self.distances.append(info["distance_to_goal"])
+        self.collisions = info["collisions"]
+        if info["collision"] and self.first_contact is None:
+            self.first_contact = (self.steps, x, y)
+
+
+def way_of(log: Log) -> float:
+    """Length of what the robot drove, m."""
+    places = np.array(log.poses)[:, :2]
+    return float(np.hypot(*np.diff(places, axis=0).T).sum())

@@ -1,0 +1,92 @@
+"""Things that a robot can push, and the nodes that stand for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from tdac_envs.epuck.ground import Ground
+from tdac_envs.wbt.found import name_of
+from tdac_envs.wbt.frames import Frame
+from tdac_envs.wbt.tree import Node
+from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
+
+Point = tuple[float, float]
+Place = tuple[list[float], list[float]]
+
+# A world is kept to 1e-9 m.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Movable:
+    """A thing that can be pushed.
+
+    Attributes:
+        node: Its node.
+        frame: How the file says where it is.
+        centre: Of the thing at the start, m.
+        origin: Of the node as seen from there, m.
+    """
+
+    node: Node
+    frame: FileFrame
+    centre: Point
+    origin: Point
+
+    def place(self, x: float, y: float, turn: float) -> Place | None:
+        """Translation and rotation, or None where it has not moved.
+
+        Args:
+            x: Of its centre, m.
+            y: Of its centre, m.
+            turn: Since the start, rad.
+        """
+        if (x, y) == self.centre and turn == 0.0:
+            return None
+        cos, sin = math.cos(turn), math.sin(turn)
+        ahead, left = self.origin
+        at = self.frame.point(
+            x + cos * ahead - sin * left, y + sin * ahead + cos * left
+        )
+        return at, self.frame.axis_angle(turn)
+
+
+def find_movables(
+    ground: Ground, nodes: Iterable[Node], top: Frame
+) -> tuple[Movable | None, ...]:
+    """The nodes of what can be pushed, in the environment's order.
+
+    Args:
+        ground: Of the world.
+        nodes: Those at the top of the file.
+        top: Their frame.
+
+    Returns:
+        None stands for a thing whose node was not found.
+    """
+    pushable = [t for t in ground.things if t.mass is not None and t.solid]
+    if not pushable:
+        return ()
+    all_nodes = list(walk_frames(nodes, top))
+    found: list[Movable | None] = []
+    for thing, middle in zip(pushable, ground.centres.tolist(), strict=True):
+        match = _match(all_nodes, thing.name, (thing.x, thing.y))
+        if match is None:
+            found.append(None)
+            continue
+        node, own = match
+        centre = (middle[0], middle[1])
+        origin = (thing.x - centre[0], thing.y - centre[1])
+        found.append(Movable(node, FileFrame.of(top, own, 0.0), centre, origin))
+    return tuple(found)
+
+
+def _match(nodes: list[Found], name: str, at: Point) -> Found | None:
+    for node, own in nodes:
+        x, y, _ = own.origin.tolist()
+        near = abs(x - at[0]) < _SAME and abs(y - at[1]) < _SAME
+        if near and name_of(node) == name:
+            return node, own
+    return None

@@ -1,0 +1,95 @@
+"""When sensors sample, and what they then read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from tdac_envs.epuck.env import Observation
+from tdac_envs.webots.devices import DARK, ENCODER_STEP, WHEELS, Offset
+from tdac_envs.webots.log import Pose
+from tdac_envs.webots.stage import Stage
+
+Reader = Callable[[], Any]
+
+
+class Sampler:
+    """The sensors of a robot; each samples once its period is over.
+
+    Args:
+        stage: World and robot.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._frame = stage.frame
+        self._observation: Observation = {}
+        self._pose: Pose = (0.0, 0.0, 0.0)
+        self._readers = self._make_readers(stage)
+        # Sampling period and time of the last sample, ms.
+        self._sampling: dict[str, tuple[int, float]] = {}
+        self._fresh: dict[str, Any] = {}
+
+    def __contains__(self, sensor: str) -> bool:
+        return sensor in self._readers
+
+    def enable(self, sensor: str, period: int, now: float) -> None:
+        """Samples every `period` from now on; 0 is never. Times in ms."""
+        if period:
+            self._sampling[sensor] = (period, now)
+        else:
+            self._sampling.pop(sensor, None)
+
+    def sample(self, now: float, observation: Observation, pose: Pose) -> None:
+        """Reads what is due."""
+        self._observation, self._pose = observation, pose
+        for name, (period, last) in self._sampling.items():
+            if now - last >= period - 1e-6:
+                self._sampling[name] = (period, now)
+                self._fresh[name] = self._readers[name]()
+
+    def take(self) -> dict[str, Any]:
+        """The samples since the last time, by sensor; of several the last."""
+        fresh, self._fresh = self._fresh, {}
+        return fresh
+
+    def _make_readers(self, stage: Stage) -> dict[str, Reader]:
+        readers: dict[str, Reader] = {}
+        for k in range(8):
+            readers[f"ps{k}"] = partial(self._observed, "ps", k)
+            readers[f"ls{k}"] = partial(float, DARK)
+        for k, (_, sensor) in enumerate(WHEELS):
+            readers[sensor] = partial(self._encoder, k)
+        for device in stage.devices:
+            if device.kind == "GPS":
+                readers[device.name] = partial(self._position, device.offset)
+            elif device.kind == "Compass":
+                readers[device.name] = self._north
+            elif device.kind == "InertialUnit":
+                readers[device.name] = self._attitude
+            elif device.name.startswith("gs"):
+                readers[device.name] = partial(
+                    self._observed, "ground", int(device.name[2])
+                )
+        return readers
+
+    def _observed(self, key: str, index: int) -> float:
+        return float(self._observation[key][index])
+
+    def _encoder(self, wheel: int) -> float:
+        angle = self._observed("wheel_positions", wheel)
+        return ENCODER_STEP * round(angle / ENCODER_STEP)
+
+    def _north(self) -> list[float]:
+        return self._frame.north(self._pose[2])
+
+    def _attitude(self) -> list[float]:
+        return self._frame.attitude(self._pose[2])
+
+    def _position(self, offset: Offset) -> list[float]:
+        x, y, heading = self._pose
+        frame = self._frame
+        at = np.add(frame.point(x, y), frame.rotation(heading) @ offset)
+        return [float(value) for value in at]
