@@ -131,8 +131,9 @@ def _readme(task: Task, name: str, source: bytes, project: Project) -> str:
 
 **Not run in Webots itself.** The controller was verified in tdac's own model of this
 world (`TDAC-EPuck-v0`).{verified}
-In Webots the sensors have noise, boxes of wood are darker than in the model, and the
-physics is another: watch it before you rely on it.
+In Webots the sensors have noise and see a mark of the goal that stands up, boxes of
+wood are darker than in the model, and the physics is another: watch it before you rely
+on it.
 
 - `worlds/{name}.wbt`: open it in Webots R2025a. The robot is a supervisor, so that it
   can ask where it is.

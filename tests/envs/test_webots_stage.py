@@ -9,6 +9,7 @@ from tdac_envs import bundled_worlds
 from tdac_envs.errors import WorldError
 from tdac_envs.wbt.fields import numbers
 from tdac_envs.wbt.frames import axis_angle
+from tdac_envs.webots.controller import Robot
 from tdac_envs.webots.motors import MotorState
 from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds import world_file
@@ -95,6 +96,12 @@ def test_there_has_to_be_a_robot(tmp_path):
     file.write_text("#VRML_SIM R2025a utf8\n")
     with pytest.raises(WorldError, match="there is no e-puck in it"):
         open_stage(file)
+
+
+def test_the_package_needs_a_simulation():
+    """Outside of a run a robot says how to get one."""
+    with pytest.raises(RuntimeError, match="run this controller with `tdac"):
+        Robot()
 
 
 class TestMotor:

@@ -400,9 +400,9 @@ class TestSupervisor:
         """A DEF name, and a field, that is not there."""
         out = printed(
             'print(robot.getFromDef("NOBODY"), robot.getSelf().getField("wings"), '
-            "robot.getFromId(10**6))\n"
+            "robot.getFromId(10**6), robot.getFromDef('E-puck'))\n"
         )
-        assert out == ["None None None"]
+        assert out == ["None None None None"]
 
     def test_root_has_the_nodes_in_their_order(self, printed):
         """Types, base types, DEF names and parents as the file has them."""

@@ -212,6 +212,17 @@ def test_command(tdac, verified):
     assert Path("project/worlds/tdac_my_open_world.wbt").is_file()
 
 
+def test_the_whole_way(tdac):
+    """What `tdac synth` has verified drives as a Webots project; ± 5 % of the steps."""
+    assert tdac("synth", "--task", "epuck-crates", "--out", "run")[0] == 0
+    code, out, _ = tdac("export", "webots", "run", "--out", "project")
+    assert code == 0
+    found = re.search(r"the goal after (\d+) steps \(verified: (\d+)\)", out)
+    assert found is not None, out
+    here, verified = map(int, found.groups())
+    assert abs(here - verified) <= 0.05 * verified
+
+
 def test_command_with_a_controller_that_does_not_get_there(tdac, verified):
     """Exit 1: what drives here is the exported file."""
     (verified / "controller.py").write_text("def policy(obs):\n    return 0.1, -0.1\n")

@@ -108,6 +108,27 @@ def test_what_it_prints_does_not_steer_the_terminal(tdac, there):
     assert not set(out) & {"\x1b", "\x07"}
 
 
+def test_without_a_sandbox(tdac, there, monkeypatch):
+    """Exit 3: nothing is said about the controller."""
+    monkeypatch.setenv("PATH", "")
+    code, out, err = tdac(
+        "webots", "run", CONTROLLERS / "keyboard.py", there / "open.wbt",
+        "--tier", "bubblewrap",
+    )  # fmt: skip
+    assert (code, out) == (3, "")
+    assert err.startswith("infrastructure fault: the sandbox failed: bubblewrap")
+
+
+def test_another_tolerance(tdac, there):
+    """A goal is reached earlier where farther away is near enough."""
+    words = ["webots", "run", CONTROLLERS / "module_loop.py", there / "open.wbt"]
+    _, near = record(tdac(*words, "--json"))
+    code, far = record(tdac(*words, "--json", "--tolerance", 0.1))
+    assert code == 0
+    assert 0.08 < far["d_min_euclidean"] <= 0.1
+    assert far["steps"] < near["steps"]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
