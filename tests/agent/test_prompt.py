@@ -177,12 +177,16 @@ def test_rules_are_in_the_block(small_task):
 
 
 @pytest.mark.parametrize("kind", ["edit", "summarise"])
-def test_repair_prompts_hide_the_held_out_starts(small_task, prompt, kind, warm):
+@pytest.mark.parametrize("name", ["small_task", "epuck_task"])
+def test_repair_prompts_hide_the_held_out_starts(name, kind, warm, request):
     """They hold the source and the failures, and no figure of a held-out start."""
+    task = request.getfixturevalue(name)
+    prompt = generate_prompt(task, ())
     source = "X = '{{ 1 }}'\n\n\ndef policy(obs):\n    return 0.6, 0.5\n"
-    report = verify(source, small_task, profile="policy", judge=warm)
+    report = verify(source, task, profile="policy", judge=warm)
     text = repair_prompt(kind, prompt, source, report)
     assert source.strip() in text
     assert text.startswith(prompt)
     assert "jitter 3" not in text
     assert "test_no_collisions" in text
+    assert "What happened: nominal: collision in step" in text
