@@ -27,6 +27,7 @@ class Connection:
         time: Simulated, s.
         values: Last samples, by device; those of sensors that have none are missing.
         velocity: Of the robot: three of motion (m/s), three of rotation (rad/s).
+        motors: Those that were made, by name.
         places: Translation and rotation in the world of nodes that move, by number.
     """
 
@@ -37,6 +38,7 @@ class Connection:
         self.values: dict[str, Any] = {}
         self.velocity: list[float] = [0.0] * 6
         self.places: dict[int, tuple[list[float], list[float]]] = {}
+        self.motors: dict[str, object] = {}
         self._world: World | None = None
         self._commands: list[tuple[str, str, Any]] = []
 

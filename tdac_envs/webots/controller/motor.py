@@ -21,10 +21,10 @@ class Motor(Device):
 
     def __new__(cls, name: str) -> Motor:
         """The one motor of that name: both of two objects know what was set."""
-        made: dict[str, Motor] = connection.__dict__.setdefault("motors", {})
-        if name not in made:
-            made[name] = super().__new__(cls)
-        return made[name]
+        motor = connection.motors.get(name)
+        if not isinstance(motor, Motor):
+            motor = connection.motors[name] = super().__new__(cls)
+        return motor
 
     def __init__(self, name: str) -> None:
         if "name" in self.__dict__:

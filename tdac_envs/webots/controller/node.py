@@ -28,6 +28,8 @@ _NAMES = (
     "WORLD_INFO", "ZOOM", "MICROPHONE", "RADIO",
 )  # fmt: skip
 
+_NUMBERS = {name.replace("_", ""): number for number, name in enumerate(_NAMES)}
+
 
 class Node:
     """A node.
@@ -77,13 +79,7 @@ class Node:
     @property
     def type(self) -> int:
         """See `getType`."""
-        name = "".join(
-            f"_{c}" if c.isupper() and k else c
-            for k, c in enumerate(self.base_type_name)
-        ).upper()
-        known = {"G_P_S": "GPS", "L_E_D": "LED", "P_B_R_APPEARANCE": "PBR_APPEARANCE"}
-        name = known.get(name, name)
-        return _NAMES.index(name) if name in _NAMES else 0
+        return _NUMBERS.get(self.base_type_name.upper(), self.NO_NODE)
 
     @property
     def type_name(self) -> str:

@@ -159,7 +159,8 @@ class PositionSensor(_Scalar):
 
         return Motor(self._facts["motor"]) if self._facts else None
 
-    getBrake = property(lambda _: lambda: None)
+    def getBrake(self) -> None:
+        """None: there is none."""
 
     @property
     def motor(self) -> Any:

@@ -413,7 +413,9 @@ class TestSupervisor:
             "for n in nodes])\n"
             "print(nodes[3].getType() == Node.ROBOT, nodes[4].getType() == Node.SOLID, "
             "nodes[4].getParentNode().getType() == Node.GROUP, "
-            "robot.getFromId(nodes[4].getId()) == nodes[4], nodes[3].isProto())\n",
+            "robot.getFromId(nodes[4].getId()) == nodes[4], nodes[3].isProto(), "
+            "nodes[0].getType() == Node.WORLD_INFO, [n.getType() for n in (nodes[3], "
+            "nodes[4], robot.getRoot())] == [34, 80, 14])\n",
             BLOCKED,
         )
         assert eval(out[0]) == [
@@ -424,7 +426,7 @@ class TestSupervisor:
             ("Solid", "Solid", "GOAL"),
             ("WoodenBox", "Solid", "BOX"),
         ]
-        assert out[1] == "True True True True True"
+        assert out[1] == "True True True True True True True"
 
     def test_fields(self, printed):
         """Types and values of what is written, and of what is not."""

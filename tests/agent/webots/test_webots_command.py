@@ -7,6 +7,8 @@ import cv2
 import pytest
 from worlds_for_controllers import BLOCKED, NO_GOAL, OPEN
 
+from tdac_agent.sandbox import TIERS, available_tiers
+
 CONTROLLERS = Path(__file__).parent / "controllers"
 
 
@@ -117,6 +119,21 @@ def test_without_a_sandbox(tdac, there, monkeypatch):
     )  # fmt: skip
     assert (code, out) == (3, "")
     assert err.startswith("infrastructure fault: the sandbox failed: bubblewrap")
+
+
+@pytest.mark.parametrize("tier", [tier.name for tier in TIERS])
+def test_every_sandbox(tdac, there, tier):
+    """A run is the same in each tier that works here."""
+    if not any(
+        status.works for status in available_tiers() if status.tier.name == tier
+    ):
+        pytest.skip(f"{tier} does not work here")
+    code, run = record(
+        tdac("webots", "run", CONTROLLERS / "odometry.py", there / "open.wbt",
+             "--steps", 30, "--tier", tier, "--json")
+    )  # fmt: skip
+    assert (code, run["sandbox"], run["steps"]) == (1, tier, 30)
+    assert len(run["output"].splitlines()) == 29
 
 
 def test_another_tolerance(tdac, there):
