@@ -114,7 +114,7 @@ class Oracle:
 
     def world_cases(self, world: World) -> list[WorldCase]:
         """The file of a world, and of copies that are moved, turned and fuller."""
-        from tdac_agent.world_oracle import world_cases
+        from tdac_agent.world_copies import world_cases
 
         return world_cases(world)
 

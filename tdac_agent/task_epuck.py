@@ -7,19 +7,16 @@ import json
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
-
+from tdac_agent.epuck_params import EPuckParams, params_of
 from tdac_agent.flat_world import flat_world
 from tdac_agent.setting import Original
 from tdac_agent.task_file import TaskFile
 from tdac_agent.units import METRES, Units
-from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
-from tdac_envs.epuck.infrared import PLACES, RANGE, TABLE
-from tdac_envs.epuck.kernels import AXLE, WHEEL_RADIUS
+from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.source import open_world
 from tdac_envs.epuck.task import TOLERANCE, EPuckTask, make_task
 from tdac_envs.errors import TaskError
@@ -30,40 +27,6 @@ from tdac_envs.worlds import bundled_worlds, world_file
 
 WORLD_FILE = "world.wbt"
 _MEAN_NOISE = float(TABLE[:, 2].mean())
-_AZIMUTHS: tuple[float, ...] = tuple(PLACES[:, 2].tolist())
-
-
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class EPuckRobot(_Record):
-    """The e-puck's measures."""
-
-    radius: float = Field(BODY_RADIUS, description="Of the body, m.")
-    wheel_radius: float = Field(WHEEL_RADIUS, description="m")
-    axle_length: float = Field(AXLE, description="m")
-    max_wheel_speed: float = Field(description="rad/s")
-    sensor_range: float = Field(RANGE, description="Of ps0 to ps7, m.")
-    sensor_azimuths: tuple[float, ...] = Field(
-        _AZIMUTHS, description="Of ps0 to ps7 from the heading, rad, left positive."
-    )
-
-
-class EPuckParams(_Record):
-    """Contents of `params.json`; metres, headings counter-clockwise from +x, rad."""
-
-    schema_version: Literal[1] = 1
-    source: str = Field(description="File name of the world.")
-    source_sha256: str = Field(description="Of the flat world file.")
-    start: tuple[float, float]
-    heading: float
-    goal: tuple[float, float]
-    goal_tolerance: float
-    dt: float = Field(description="Duration of a step, s.")
-    horizon: int = Field(description="Steps.")
-    robot: EPuckRobot
-    notes: tuple[str, ...] = Field((), description="What the reader supposed.")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,25 +157,8 @@ def _setting(
     )
     text = write_world(flat)
     digest = hashlib.sha256(text.encode()).hexdigest()
-    params = _params(nominal, file.name, digest, world.notes)
+    params = params_of(nominal, file.name, digest, world.notes)
     return EPuckSetting(params, nominal, text, file, left_out)
-
-
-def _params(
-    task: EPuckTask, source: str, digest: str, notes: tuple[str, ...]
-) -> EPuckParams:
-    return EPuckParams(
-        source=source,
-        source_sha256=digest,
-        start=task.start[:2],
-        heading=task.start.heading,
-        goal=task.goal,
-        goal_tolerance=task.goal_tolerance,
-        dt=task.dt,
-        horizon=task.horizon,
-        robot=EPuckRobot(max_wheel_speed=task.max_wheel_speed),
-        notes=notes,
-    )
 
 
 def _in_words(node: Unmodelled) -> str:

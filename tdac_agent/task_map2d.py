@@ -126,14 +126,10 @@ class Map2DSetting:
 
 
 def map_setting(setting: Setting) -> Map2DSetting:
-    """The setting, which must be a map.
-
-    Raises:
-        TaskError: It is a world.
-    """
-    if isinstance(setting, Map2DSetting):
-        return setting
-    raise TaskError("this is not there yet for TDAC-EPuck-v0")
+    """The setting, which must be a map's."""
+    if not isinstance(setting, Map2DSetting):
+        raise TypeError(f"expected a Map2DSetting, got {type(setting).__name__}")
+    return setting
 
 
 def open_map(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:

@@ -20,10 +20,11 @@ class Trajectory:
     """Poses and actions of an episode of T steps.
 
     Attributes:
-        poses: Shape (T + 1, 3), float64: x, y (px), heading (rad), start included.
+        poses: Shape (T + 1, 3), float64: x, y (px or m), heading (rad), start included.
         actions: Shape (T, 2), float32: left and right wheel, fractions as applied.
-        path_distances: Shape (T + 1,), float64: shortest free path left, px.
-        ranges: Shape (T + 1, n_rays), float32, px, as the controller saw them.
+        path_distances: Shape (T + 1,), float64: shortest free path left, px or m.
+        ranges: Shape (T + 1, n), float32: what the distance sensors read, as the
+            controller saw it; px, or the readings of ps0 to ps7.
         collisions: Number of steps with a contact.
         dt: Duration of a step, s.
     """
@@ -107,9 +108,9 @@ class Rollout:
             it ran for fewer steps than the horizon on purpose, `not run` where an
             earlier failure made it pointless.
         trajectory: The judge's record.
-        goal: (x, y), px.
-        radius: Body radius, px.
-        tolerance: Goal tolerance, px.
+        goal: (x, y), px or m.
+        radius: Body radius, px or m.
+        tolerance: Goal tolerance, px or m.
         error: What the controller did wrong, in one line, for `error` and `not run`.
         call_ms: Mean and 99th percentile of the time of a policy call, ms.
         returned: What `run_episode` returned, for an episode driven by it.
@@ -139,7 +140,7 @@ class Rollout:
         return self.trajectory.collisions
 
     def distances(self, kind: str = "geodesic") -> NDArray[np.float64]:
-        """Distance to the goal before each step and at the end, px.
+        """Distance to the goal before each step and at the end, px or m.
 
         Args:
             kind: `geodesic` (shortest free path) or `euclidean`.

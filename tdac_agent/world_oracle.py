@@ -9,21 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.moved_world import Motion, reordered
 from tdac_envs.bodies import at_body_height, bodies, floor_under
 from tdac_envs.epuck.contact import nearest_gap
 from tdac_envs.epuck.prisms import Owned, Prisms
-from tdac_envs.footprint import Disc, Polygon, Rectangle, ring
-from tdac_envs.wbt.writer import write_world
-from tdac_envs.world import Arena, Obstacle, Part, World
+from tdac_envs.footprint import Disc, Rectangle
+from tdac_envs.world import Arena, Part, World
 
 Point = tuple[float, float]
 POINTS = 400
-# Beside the e-puck's own, a round angle in which everything is askew.
-ANGLES = (2.3, -0.7, 1.1)
 _AROUND = 0.05
-_KEEP_OFF = 0.12
-_TRIES = 400
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,21 +61,21 @@ class WorldCase:
             margin: Points this near to a boundary are left out, m.
         """
         floor, things = floor_under(self.world), bodies(self.world)
-        solid = _prisms(p for t in things for p in at_body_height(t.solid, floor))
+        solid = prisms_of(p for t in things for p in at_body_height(t.solid, floor))
         # Marks of the goal are not there; other things of other heights may be.
         all_of = [t for t in things if not t.is_goal]
-        unsure = _prisms(part for t in all_of for part in (*t.solid, *t.visible))
+        unsure = prisms_of(part for t in all_of for part in (*t.solid, *t.visible))
         arena = self._walled()
         beyond = None if arena is None else _with_wall(arena, margin)
         for x, y in self._points(solid):
             outside = beyond is not None and not beyond.contains(x, y)
-            if outside or _gap(solid, x, y) <= inflation - margin:
+            if outside or gap_to(solid, x, y) <= inflation - margin:
                 yield (x, y), True
             elif arena is not None and not _well_inside(
                 arena, x, y, inflation + margin
             ):
                 continue
-            elif _gap(unsure, x, y) >= inflation + margin:
+            elif gap_to(unsure, x, y) >= inflation + margin:
                 yield (x, y), False
 
     def _points(self, solid: Prisms) -> list[Point]:
@@ -132,90 +126,13 @@ def _well_inside(arena: Arena, x: float, y: float, room: float) -> bool:
     return shape.contains(x, y)
 
 
-def world_cases(world: World) -> list[WorldCase]:
-    """A world as it is, and copies: moved, turned, renamed, reordered, with more in it.
-
-    Args:
-        world: Of a task, flat.
-    """
-    cases = [WorldCase("this world", write_world(world), world)]
-    for number, angle in enumerate(ANGLES):
-        random = np.random.default_rng(100 + number)
-        shift = random.uniform(-1.5, 1.5, 2).tolist()
-        copy = Motion(angle, *shift).world(_renamed(_fuller(world, random)))
-        text = reordered(write_world(copy), random)
-        cases.append(WorldCase(f"a copy turned by {angle} rad", text, copy))
-    return cases
-
-
-def _renamed(world: World) -> World:
-    """Other names for the robot and everything but the goal."""
-    robots = tuple(replace(robot, name="driver") for robot in world.robots)
-    things = tuple(
-        thing if thing.is_goal else replace(thing, name=f"thing {number}")
-        for number, thing in enumerate(world.obstacles)
-    )
-    return replace(world, robots=robots, obstacles=things)
-
-
-def _fuller(world: World, random: np.random.Generator) -> World:
-    """The world with a further obstacle of each kind of shape, off start and goal."""
-    more: list[Obstacle] = []
-    for kind, parts in _shapes(random):
-        place = _free_place(world, more, parts, random)
-        if place is not None:
-            moved = Motion(0.0, *place)
-            solid = tuple(map(moved.part, parts))
-            more.append(Obstacle("", kind, *place, solid=solid, visible=solid))
-    return replace(world, obstacles=(*world.obstacles, *more))
-
-
-def _shapes(random: np.random.Generator) -> Iterator[tuple[str, list[Part]]]:
-    """Kinds of obstacles, each about the origin."""
-    yaw = random.uniform(-1.5, 1.5, 4)
-    wide, long = random.uniform(0.06, 0.12, 2)
-    corners = np.sort(random.uniform(0.0, 2.0 * math.pi, 9))
-    unit = np.column_stack([np.cos(corners), np.sin(corners)])
-    high = 0.12
-    for kind, shape in (
-        ("WoodenBox", Rectangle(0.0, 0.0, yaw[0], 2 * long, wide)),
-        ("CardboardBox", Rectangle(0.0, 0.0, yaw[1], long, long)),
-        ("SolidBox", Rectangle(0.0, 0.0, yaw[2], 0.3, 0.05)),
-        ("Wall", Rectangle(0.0, 0.0, yaw[3], 0.25, 0.02)),
-        ("OilBarrel", Disc(0.0, 0.0, 0.07)),
-        ("Rock", Polygon.around(0.09 * unit)),
-    ):
-        yield kind, [Part(shape, 0.0, high)]
-    pipe = ring(0.0, 0.0, 0.04, 0.09, 8)
-    yield "SolidPipe", [Part(piece, 0.0, high) for piece in pipe]
-
-
-def _free_place(
-    world: World,
-    more: Iterable[Obstacle],
-    parts: Iterable[Part],
-    random: np.random.Generator,
-) -> Point | None:
-    """A place where parts may be put: in the arena, off start, goal and each other."""
-    reach = float(_prisms(parts).extent[:, :3].max()) + _AROUND
-    taken = _prisms(p for t in (*bodies(world), *more) for p in t.solid)
-    ends = [world.robot.pose[:2], world.goal or (0.0, 0.0)]
-    floors = [arena.inside.bounds for arena in world.arenas]
-    left, low, right, high = floors[0] if floors else (-1.0, -1.0, 1.0, 1.0)
-    for _ in range(_TRIES):
-        x, y = random.uniform((left, low), (right, high)).tolist()
-        inside = world.arena is None or world.arena.inside.contains(x, y)
-        far = all(math.dist((x, y), end) > reach + _KEEP_OFF for end in ends)
-        if inside and far and _gap(taken, x, y) > 0.5 * reach:
-            return x, y
-    return None
-
-
-def _prisms(parts: Iterable[Part]) -> Prisms:
+def prisms_of(parts: Iterable[Part]) -> Prisms:
+    """Parts as arrays."""
     return Prisms.of(map(Owned, parts))
 
 
-def _gap(prisms: Prisms, x: float, y: float) -> float:
+def gap_to(prisms: Prisms, x: float, y: float) -> float:
+    """Distance from a point to the nearest part, m; negative within one."""
     return float(nearest_gap(prisms.points, prisms.first, prisms.extent, x, y))
 
 

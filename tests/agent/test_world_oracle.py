@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from tdac_agent.moved_world import Motion, reordered
 from tdac_agent.task import load_task
-from tdac_agent.world_oracle import ANGLES, occupied_at, world_cases
+from tdac_agent.world_copies import ANGLES, world_cases
+from tdac_agent.world_oracle import occupied_at
 from tdac_envs import bundled_worlds, load_world, read_world
 from tdac_envs.bodies import at_body_height, bodies, floor_under
 from tdac_envs.epuck.ground import Ground
