@@ -162,11 +162,15 @@ class Judge:
             for number in range(1, JITTERS + 1):
                 self._submit((f"jitter {number}", None, "policy"))
 
-    def close(self) -> None:
-        """Waits for the episodes under way and ends the children."""
+    def settle(self) -> None:
+        """Waits for the episodes under way; after this all costs are known."""
         self._pool.shutdown(cancel_futures=True)
-        self._crew.close()
         self._end_unit()
+
+    def close(self) -> None:
+        """Settles, and ends what is left."""
+        self.settle()
+        self._crew.close()
         if self._owns_nursery:
             self._nursery.close()
 

@@ -6,34 +6,39 @@ runs here, only in the sandboxed children that the judge starts.
 
 from __future__ import annotations
 
+import contextlib
+import gc
+import io
 import os
+import select
 import sys
+import tempfile
 import traceback
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NoReturn
 
 import cv2
 import numpy as np
 import pytest
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import TypeAdapter
 
 from tdac_agent.crew import end_with_parent
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.files import write_atomic
+from tdac_agent.jobs import Findings, Job
 from tdac_agent.judge import Judge
 from tdac_agent.nursery import Nursery
 from tdac_agent.report import Episode
-from tdac_agent.sandbox import Limits
 from tdac_agent.seeded import SeededJob, judge_seeds
 from tdac_agent.suite_plugin import JudgePlugin, rollout_key
 from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Rollout
 from tdac_envs.map2d import Map2DEnv
 
-NO_JOB = 77
-# Threads drive episodes beside the tests: none of them should wait for another long.
-SWITCH_SECONDS = 2e-4
+# Exit codes of a worker; a suite may well end it with another one.
+NO_JOB, DID_JOB = 77, 78
+DONE = b"done"
 # Some of these cost a verification more than its tests do.
 UNUSED_PLUGINS = (
     "cacheprovider",
@@ -47,81 +52,77 @@ UNUSED_PLUGINS = (
 )
 
 
-class Job(BaseModel):
-    """What the judge's process is to do; all paths are absolute."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    task: Path
-    controller: Path
-    suites: list[Path] = Field(description="In the order in which they run.")
-    profile: Profile
-    paper: bool
-    tier: str
-    seed: int
-    limits: Limits
-    out: Path
-
-
-class Findings(BaseModel):
-    """What the judge's process found, beside pytest's own report log."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    expected: list[str]
-    episodes: list[Episode]
-    diagnoses: dict[str, str]
-    tier: str
-    child_cpu_seconds: float
-    fault: str | None
-
-
-def serve() -> None:
+def serve(*, rehearse: bool = True) -> None:
     """Forks one worker after another until there is no further job.
 
-    For each worker, prints its process id and, when it has ended, its exit code.
+    Says of each worker its process id, and that its job is done. The worker itself
+    says so, and clears up afterwards; one that could not is spoken for.
+
+    Args:
+        rehearse: Whether there is time before the first job.
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
-    sys.setswitchinterval(SWITCH_SECONDS)
+    nursery = Nursery()
     _warm_up()
+    if rehearse:
+        _rehearse()
+        gc.collect()
+    # What is alive now stays shared with the workers.
+    gc.freeze()
     more = True
     while more:
         worker = os.fork()
         if worker == 0:
-            work()
-        _say(worker)
+            work(nursery)
+        _say(b"worker %d" % worker)
         code = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
+        nursery.kill()
         more = code != NO_JOB
-        _say(code)
+        if more:
+            nursery = Nursery()
+        if code != DID_JOB:
+            _say(DONE)
 
 
-def _say(number: int) -> None:
-    os.write(1, b"%d\n" % number)
+def _say(word: bytes, descriptor: int = 1) -> None:
+    os.write(descriptor, word + b"\n")
 
 
-def work() -> NoReturn:
-    """Starts children, waits for a job on standard input, does it and ends."""
+def work(nursery: Nursery) -> NoReturn:
+    """Prepares children, waits for a job on standard input, does it and ends."""
     os.setpgid(0, 0)
     end_with_parent()
-    nursery = Nursery()
+    while not _is_readable(0) and nursery.prepare():
+        continue
     request = _read_line(0)
-    code = NO_JOB
+    code, answers = NO_JOB, os.dup(1)
     try:
-        if request:
-            with (Path(request).parent / "output.txt").open("wb") as output:
-                os.dup2(output.fileno(), 1)
-                os.dup2(output.fileno(), 2)
-            code = 1
-            do_job(Path(request), nursery)
-            code = 0
+        with contextlib.ExitStack() as later:
+            later.callback(nursery.close)
+            if request:
+                with (Path(request).parent / "output.txt").open("wb") as output:
+                    os.dup2(output.fileno(), 1)
+                    os.dup2(output.fileno(), 2)
+                code = 1
+                do_job(Path(request), nursery, later)
+                code = DID_JOB
+                _flush()
+                _say(DONE, answers)
     except BaseException:
         traceback.print_exc()
     finally:
-        nursery.close()
-        sys.stdout.flush()
-        sys.stderr.flush()
+        _flush()
         os._exit(code)
+
+
+def _flush() -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+
+
+def _is_readable(descriptor: int) -> bool:
+    return bool(select.select([descriptor], [], [], 0.0)[0])
 
 
 def _read_line(descriptor: int) -> str:
@@ -144,18 +145,27 @@ def _warm_up() -> None:
     env.nominal.path_from(env.nominal.start)
 
 
-def do_job(request: Path, nursery: Nursery) -> None:
-    """Does a job of either kind, in its folder."""
+def _rehearse() -> None:
+    """Has pytest load what it needs for a suite."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "test_nothing.py").write_text("def test_nothing(): pass\n")
+        with contextlib.redirect_stdout(io.StringIO()):
+            pytest.main(_arguments([folder], folder / "report.jsonl"))
+
+
+def do_job(request: Path, nursery: Nursery, later: contextlib.ExitStack) -> None:
+    """Does a job of either kind, in its folder; `later` is to be closed after it."""
     jobs = TypeAdapter[Job | SeededJob](Job | SeededJob)
     job = jobs.validate_json(request.read_text(encoding="utf-8"))
     os.chdir(request.parent)
     if isinstance(job, Job):
-        judge_suite(job, nursery)
+        judge_suite(job, nursery, later)
     else:
         judge_seeds(job, nursery)
 
 
-def judge_suite(job: Job, nursery: Nursery) -> None:
+def judge_suite(job: Job, nursery: Nursery, later: contextlib.ExitStack) -> None:
     """Runs a suite as asked, and writes the findings."""
     task = load_task(job.task)
     judge = Judge(
@@ -167,33 +177,33 @@ def judge_suite(job: Job, nursery: Nursery) -> None:
         limits=job.limits,
         nursery=nursery,
     )
+    later.callback(judge.close)
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
     judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")
-    try:
-        pytest.main(_arguments(job), plugins=[plugin])
-    finally:
-        judge.close()
-    (job.out / "trajectories").mkdir(exist_ok=True)
-    for rollout in judge.rollouts.values():
-        if rollout.returned is None and rollout.trajectory.steps:
-            name = rollout.name.replace(" ", "_")
-            rollout.trajectory.save(job.out / "trajectories" / f"{name}.npz")
-    write_atomic(
-        job.out / "findings.json", _findings(task, judge, plugin).model_dump_json()
-    )
+    pytest.main(_arguments(job.suites, job.out / "report.jsonl"), plugins=[plugin])
+    judge.settle()
+    folder = job.out / "trajectories"
+    folder.mkdir(exist_ok=True)
+    with ThreadPoolExecutor() as pool:  # most of it is compression
+        for rollout in judge.rollouts.values():
+            if rollout.returned is None and rollout.trajectory.steps:
+                name = rollout.name.replace(" ", "_")
+                pool.submit(rollout.trajectory.save, folder / f"{name}.npz")
+        findings = _findings(task, judge, plugin).model_dump_json()
+    write_atomic(job.out / "findings.json", findings)
 
 
-def _arguments(job: Job) -> list[str]:
-    root = job.suites[0].parent
+def _arguments(suites: list[Path], log: Path) -> list[str]:
+    root = suites[0].parent
     return [
-        *(str(folder) for folder in job.suites),
+        *(str(folder) for folder in suites),
         f"--rootdir={root}",
         f"--confcutdir={root}",
         "-c",
         os.devnull,
         "-p",
         "pytest_reportlog.plugin",
-        f"--report-log={job.out / 'report.jsonl'}",
+        f"--report-log={log}",
         *(word for name in UNUSED_PLUGINS for word in ("-p", f"no:{name}")),
         "--import-mode=importlib",
         "--assert=plain",

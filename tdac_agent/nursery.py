@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import threading
 
 from tdac_agent.sandbox import (
@@ -17,9 +19,14 @@ from tdac_agent.sandbox import (
     start_zygote,
 )
 
+# As many children as the verification of a good controller takes.
+READY = 10
+
 
 class Nursery:
     """Keeps a zygote ready that forks children, each for one use.
+
+    Forks of the process that made it may use it, too: what is ready is shared.
 
     Args:
         ahead: Whether to start one for the best tier at once, and the next one when
@@ -33,6 +40,10 @@ class Nursery:
         self._zygotes: list[Zygote] = []
         # Without room, but perhaps with children, which another process may have.
         self._full: list[Zygote] = []
+        self._ready: list[Child] = []
+        context = multiprocessing.get_context("fork")
+        self._taken = context.Value("i", 0)
+        self._owner = os.getpid()
         if ahead:
             self._start_likely()
 
@@ -42,6 +53,9 @@ class Nursery:
         Raises:
             SandboxError: The tier does not work here.
         """
+        child = self._ready_child(tier, limits)
+        if child is not None:
+            return child
         with self._lock:
             if tier != "auto":
                 return self._child(find_tier(tier), limits)
@@ -49,12 +63,45 @@ class Nursery:
                 return self._child(self._best, limits)
             return self._first_child(limits)
 
+    def prepare(self) -> bool:
+        """Has one more child ready for the usual limits; False where it has enough.
+
+        The process that has them ready is the one that ends those nobody takes. It
+        does so before it forks.
+        """
+        self._owner = os.getpid()
+        if len(self._ready) >= READY:
+            return False
+        try:
+            self._ready.append(self._first_child(Limits()))
+        except SandboxError:
+            return False
+        return True
+
+    def _ready_child(self, tier: str, limits: Limits) -> Child | None:
+        if not self._ready or limits != Limits():
+            return None
+        if tier not in ("auto", self._ready[0].tier):
+            return None
+        with self._taken.get_lock():
+            number = self._taken.value
+            self._taken.value += 1
+        return self._ready[number] if number < len(self._ready) else None
+
     def close(self) -> None:
         """Has no further children; ends the zygotes that have none."""
+        if os.getpid() == self._owner:
+            for child in self._ready[self._taken.value :]:
+                child.close()
         with self._lock:
             for zygote in self._zygotes + self._full:
                 zygote.close()
             self._zygotes, self._full = [], []
+
+    def kill(self) -> None:
+        """Ends all; the processes that used it have ended, whatever they were at."""
+        for zygote in self._zygotes + self._full:
+            zygote.kill()
 
     def _first_child(self, limits: Limits) -> Child:
         """One of the best tier that turns out to work."""

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import BaseModel, BeforeValidator, Field, StrictInt, ValidationError
 
 from tdac_agent.errors import Fault
-from tdac_agent.judging import Findings
+from tdac_agent.jobs import Findings
 from tdac_agent.report import Diagnosis, Failure, Verdict, group_of
 from tdac_agent.suite_plugin import MAX_MESSAGE, test_id
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.figures import draw_failures
 from tdac_agent.files import write_atomic
-from tdac_agent.judging import Findings, Job
+from tdac_agent.jobs import Findings, Job
 from tdac_agent.provenance import origin, sha256_of
 from tdac_agent.report import Provenance, Report
 from tdac_agent.report_log import read_findings, read_outcomes, verdict_of

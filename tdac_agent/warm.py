@@ -80,7 +80,7 @@ class WarmJudge:
         Raises:
             Fault: The judge did not start, or the job took too long.
         """
-        worker = int(self._line(START_SECONDS))
+        worker = self._worker()
         try:
             os.write(self._server.requests, f"{request}\n".encode())
             self._line(seconds, meanwhile)
@@ -90,6 +90,13 @@ class WarmJudge:
                 os.killpg(worker, signal.SIGKILL)
             self._line(FAREWELL_SECONDS)
             raise
+
+    def _worker(self) -> int:
+        """Process id of the one that waits for a job."""
+        line = b""
+        while not line.startswith(b"worker "):
+            line = self._line(START_SECONDS)
+        return int(line.split()[1])
 
     def close(self) -> None:
         """Ends the server; its worker ends with it, and the children with that."""
@@ -175,8 +182,6 @@ def _fork_server(environment: dict[str, str], folder: str, log: int) -> _Server:
     """A server that has what this process has imported."""
     import cv2
 
-    from tdac_agent.judging import serve
-
     (theirs_in, requests), (answers, theirs_out) = os.pipe(), os.pipe()
     # OpenCV's threads would not survive the fork, and the child would wait for them.
     threads = cv2.getNumThreads()
@@ -193,7 +198,9 @@ def _fork_server(environment: dict[str, str], folder: str, log: int) -> _Server:
             os.environ.update(environment)
             tempfile.tempdir = None
             os.chdir(folder)
-            serve()
+            from tdac_agent.judging import serve
+
+            serve(rehearse=False)
         finally:
             os._exit(1)
     cv2.setNumThreads(threads)

@@ -40,7 +40,7 @@ BOOT = (
 )
 # No `-I`: it would ignore PYTHONHASHSEED. The environment below is all there is.
 OPTIONS = ("-s", "-S", "-P", "-B", "-u", "-X", "utf8")
-SLOTS = 12
+SLOTS = 16
 KEPT_OUTPUT = 4000
 REAP_SECONDS = 10.0
 
@@ -157,6 +157,10 @@ class Zygote:
             self._given.value = len(self._folders)
             if not self._alive.value:
                 self._end()
+
+    def kill(self) -> None:
+        """End now, with all children; nobody else may use it any more."""
+        self._end()
 
     def _reap(self, number: int) -> Reaped:
         """Waits for a child that was killed; its id is nobody else's until then."""

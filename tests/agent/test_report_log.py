@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tdac_agent.errors import Fault
 from tdac_agent.files import write_atomic
-from tdac_agent.judging import Findings, Job
+from tdac_agent.jobs import Findings, Job
 from tdac_agent.report_log import (
     NOT_RUN,
     TORN,

@@ -481,7 +481,7 @@ def test_an_interrupt_leaves_nothing(good, no_traces):
         os.sched_yield()
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert err.decode().strip().splitlines()[-1] == "interrupted"
     assert re.search(r"episodes had reached the goal; no rate", out.decode())
 

@@ -1,0 +1,40 @@
+"""What the judge's process is asked for, and what it answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_agent.report import Episode
+from tdac_agent.sandbox import Limits
+from tdac_agent.task_file import Profile
+
+
+class Job(BaseModel):
+    """What the judge's process is to do; all paths are absolute."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    task: Path
+    controller: Path
+    suites: list[Path] = Field(description="In the order in which they run.")
+    profile: Profile
+    paper: bool
+    tier: str
+    seed: int
+    limits: Limits
+    out: Path
+
+
+class Findings(BaseModel):
+    """What the judge's process found, beside pytest's own report log."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    expected: list[str]
+    episodes: list[Episode]
+    diagnoses: dict[str, str]
+    tier: str
+    child_cpu_seconds: float
+    fault: str | None
