@@ -26,9 +26,10 @@ _PLACED = {
     "Compass": ("compass", 39),
     "InertialUnit": ("inertial unit", 46),
 }
-_ALWAYS_ABSENT = (
-    "camera", "accelerometer", "gyro", "emitter", "receiver", "speaker",
-)  # fmt: skip
+_MUTE = (("Camera", 38), ("Emitter", 43), ("Receiver", 56), ("Speaker", 59))
+GYRO_SCALE = 100000.0 / 13.3158
+"""Reading of the gyro at 1 rad/s."""
+_FASTEST, _HARDEST = 13.3158, 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +66,7 @@ def find_devices(
         max_velocity: Of the motors, rad/s.
     """
     devices = [*_standard(max_velocity), *_ground(robot)]
-    absent = list(_ALWAYS_ABSENT)
-    if text(robot, "version") == "2":
-        absent.append("tof")
+    absent = ["tof"] if text(robot, "version") == "2" else []
     for node, offset in _added(robot):
         name, number = _PLACED.get(node.kind, ("", 0))
         called = text(node, "name", name)
@@ -90,7 +89,11 @@ def _standard(max_velocity: float) -> list[DeviceFacts]:
     light = {"table": _LIGHT_TABLE}
     devices += [DeviceFacts(f"ls{k}", "LightSensor", 49, light) for k in range(8)]
     devices += [DeviceFacts(f"led{k}", "LED", 47, {}) for k in range(10)]
-    return devices
+    force = [-_HARDEST, -_HARDEST, 0.003, _HARDEST, _HARDEST, 0.003]
+    devices.append(DeviceFacts("accelerometer", "Accelerometer", 35, {"table": force}))
+    turn = [-_FASTEST, -100000.0, 0.003, _FASTEST, 100000.0, 0.003]
+    devices.append(DeviceFacts("gyro", "Gyro", 45, {"table": turn}))
+    return devices + [DeviceFacts(kind.lower(), kind, n, {}) for kind, n in _MUTE]
 
 
 def _ground(robot: Node) -> list[DeviceFacts]:

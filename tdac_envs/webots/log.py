@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -58,3 +60,18 @@ def way_of(log: Log) -> float:
     """Length of what the robot drove, m."""
     places = np.array(log.poses)[:, :2]
     return float(np.hypot(*np.diff(places, axis=0).T).sum())
+
+
+def velocity(poses: Sequence[Pose], dt: float) -> tuple[float, float]:
+    """Mean velocity in the last step, m/s; 0 before the first."""
+    if len(poses) < 2:
+        return 0.0, 0.0
+    (x, y, _), (before_x, before_y, _) = poses[-1], poses[-2]
+    return (x - before_x) / dt, (y - before_y) / dt
+
+
+def turn_rate(poses: Sequence[Pose], dt: float) -> float:
+    """Mean rate of turn in the last step, rad/s; 0 before the first."""
+    if len(poses) < 2:
+        return 0.0
+    return math.remainder(poses[-1][2] - poses[-2][2], 2.0 * math.pi) / dt

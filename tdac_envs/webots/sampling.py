@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from tdac_envs.epuck.env import Observation
-from tdac_envs.webots.devices import DARK, ENCODER_STEP, WHEELS, Offset
-from tdac_envs.webots.log import Pose
+from tdac_envs.webots.devices import DARK, ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
+from tdac_envs.webots.log import Pose, turn_rate, velocity
 from tdac_envs.webots.stage import Stage
 
+GRAVITY = 9.81
 Reader = Callable[[], Any]
 
 
@@ -26,7 +27,8 @@ class Sampler:
     def __init__(self, stage: Stage) -> None:
         self._frame = stage.frame
         self._observation: Observation = {}
-        self._pose: Pose = (0.0, 0.0, 0.0)
+        self._poses: list[Pose] = []
+        self._dt = stage.world.time_step / 1e3
         self._readers = self._make_readers(stage)
         # Sampling period and time of the last sample, ms.
         self._sampling: dict[str, tuple[int, float]] = {}
@@ -42,9 +44,15 @@ class Sampler:
         else:
             self._sampling.pop(sensor, None)
 
-    def sample(self, now: float, observation: Observation, pose: Pose) -> None:
-        """Reads what is due."""
-        self._observation, self._pose = observation, pose
+    def sample(self, now: float, observation: Observation, poses: list[Pose]) -> None:
+        """Reads what is due.
+
+        Args:
+            now: ms.
+            observation: Of the environment.
+            poses: At all steps so far, the start included.
+        """
+        self._observation, self._poses = observation, poses
         for name, (period, last) in self._sampling.items():
             if now - last >= period - 1e-6:
                 self._sampling[name] = (period, now)
@@ -62,6 +70,8 @@ class Sampler:
             readers[f"ls{k}"] = partial(float, DARK)
         for k, (_, sensor) in enumerate(WHEELS):
             readers[sensor] = partial(self._encoder, k)
+        readers["accelerometer"] = self._acceleration
+        readers["gyro"] = self._turning
         for device in stage.devices:
             if device.kind == "GPS":
                 readers[device.name] = partial(self._position, device.offset)
@@ -83,13 +93,30 @@ class Sampler:
         return ENCODER_STEP * round(angle / ENCODER_STEP)
 
     def _north(self) -> list[float]:
-        return self._frame.north(self._pose[2])
+        return self._frame.north(self._poses[-1][2])
 
     def _attitude(self) -> list[float]:
-        return self._frame.attitude(self._pose[2])
+        return self._frame.attitude(self._poses[-1][2])
+
+    def _turning(self) -> list[float]:
+        """Rates of turn about the robot's axes, as its gyro says them."""
+        rate = GYRO_SCALE * turn_rate(self._poses, self._dt)
+        up = self._frame.vector(0.0, 0.0, rate)
+        return self._seen(up, 100000.0)
+
+    def _acceleration(self) -> list[float]:
+        """Along the robot's axes, m/s²; what holds it against gravity included."""
+        now = velocity(self._poses, self._dt)
+        before = velocity(self._poses[-3:-1], self._dt)
+        x, y = ((a - b) / self._dt for a, b in zip(now, before, strict=True))
+        return self._seen(self._frame.vector(x, y, GRAVITY), 100.0)
+
+    def _seen(self, vector: list[float], most: float) -> list[float]:
+        turn = self._frame.rotation(self._poses[-1][2])
+        return [float(value) for value in np.clip(turn.T @ vector, -most, most)]
 
     def _position(self, offset: Offset) -> list[float]:
-        x, y, heading = self._pose
+        x, y, heading = self._poses[-1]
         frame = self._frame
         at = np.add(frame.point(x, y), frame.rotation(heading) @ offset)
         return [float(value) for value in at]

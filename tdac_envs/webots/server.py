@@ -9,7 +9,7 @@ import numpy as np
 
 from tdac_envs.epuck.env import EPuckEnv, Observation
 from tdac_envs.webots.devices import DARK, WHEELS
-from tdac_envs.webots.log import Log
+from tdac_envs.webots.log import Log, turn_rate, velocity
 from tdac_envs.webots.motors import MotorState
 from tdac_envs.webots.requests import CHANGES, RequestError, checked, real
 from tdac_envs.webots.sampling import Sampler
@@ -110,7 +110,7 @@ class StepServer:
             self.log.outcome = "reached"
         elif truncated or self.log.steps >= self._env.task.horizon:
             self.log.outcome = "out of time"
-        self._sampler.sample(self._now(), self._observation, self.log.poses[-1])
+        self._sampler.sample(self._now(), self._observation, self.log.poses)
 
     def _now(self) -> float:
         """Simulated, ms."""
@@ -192,14 +192,9 @@ class StepServer:
 
     def _velocity(self) -> list[float]:
         """Of the robot, from its last step, in the file's coordinates."""
-        if self.log.steps == 0:
-            return [0.0] * 6
-        dt = self._env.task.dt
-        (x, y, h), (u, v, g) = self.log.poses[-1], self.log.poses[-2]
-        turn = math.remainder(h - g, 2.0 * math.pi) / dt
-        frame = self._stage.frame
-        motion = frame.vector((x - u) / dt, (y - v) / dt)
-        return [*motion, *frame.vector(0.0, 0.0, turn)]
+        dt, frame, poses = self._env.task.dt, self._stage.frame, self.log.poses
+        motion = frame.vector(*velocity(poses, dt))
+        return [*motion, *frame.vector(0.0, 0.0, turn_rate(poses, dt))]
 
     def _places(self) -> dict[int, tuple[list[float], list[float]]]:
         """Where the nodes are that move; empty before the first step."""

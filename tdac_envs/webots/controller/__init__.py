@@ -7,7 +7,6 @@ what Webots does, as far as that is known.
 """
 
 from .absent import (
-    Accelerometer,
     Altimeter,
     Brake,
     Camera,
@@ -15,7 +14,6 @@ from .absent import (
     Connector,
     Display,
     Emitter,
-    Gyro,
     Lidar,
     LidarPoint,
     Pen,
@@ -39,8 +37,10 @@ from .node import Node
 from .robot import Robot
 from .sensors import (
     GPS,
+    Accelerometer,
     Compass,
     DistanceSensor,
+    Gyro,
     InertialUnit,
     LightSensor,
     PositionSensor,

@@ -1,12 +1,127 @@
-"""Devices that no robot has here: their names can be imported, and that is all."""
+"""Devices that have no model here.
+
+Those that every e-puck has are there and give nothing, which is said once; of the
+others there is the name, so that it can be imported.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
+from .connection import c_int
 from .device import Device
+from .messages import once, unsupported
 
 
-class Accelerometer(Device):
-    """Not modelled."""
+class _Mute(Device):
+    """A device that never gives anything."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self._period = 0
+
+    def enable(self, p: int) -> None:
+        """Says once that nothing will come."""
+        once(f"tdac: {self.name} is not modelled here; it gives nothing")
+        self._period = c_int(p)
+
+    def disable(self) -> None:
+        """Switches it off."""
+        self._period = 0
+
+    def getSamplingPeriod(self) -> int:
+        """As given to `enable`, ms."""
+        return self._period
+
+
+class Camera(_Mute):
+    """A camera whose first image never comes."""
+
+    def getWidth(self) -> int:
+        """Of an image that would come, pixels."""
+        return 52
+
+    def getHeight(self) -> int:
+        """Of an image that would come, pixels."""
+        return 39
+
+    def getFov(self) -> float:
+        """Field of view, rad."""
+        return 0.84
+
+    def getNear(self) -> float:
+        """Distance of the near plane, m."""
+        return 0.0055
+
+    def hasRecognition(self) -> bool:
+        """False."""
+        return False
+
+    getImage: Any = unsupported("Camera.getImage")
+    getImageArray: Any = unsupported("Camera.getImageArray")
+    saveImage: Any = unsupported("Camera.saveImage", -1)
+    recognitionEnable: Any = unsupported("Camera.recognitionEnable")
+    recognitionDisable: Any = unsupported("Camera.recognitionDisable")
+    getRecognitionObjects: Any = unsupported("Camera.getRecognitionObjects", ())
+    getRecognitionNumberOfObjects: Any = unsupported(
+        "Camera.getRecognitionNumberOfObjects", 0
+    )
+
+
+class Emitter(_Mute):
+    """Nobody hears it."""
+
+    CHANNEL_BROADCAST = -1
+    _channel = 1
+
+    def getChannel(self) -> int:
+        """As set."""
+        return self._channel
+
+    def setChannel(self, channel: int) -> None:
+        """Sets the channel."""
+        self._channel = c_int(channel)
+
+    send: Any = unsupported("Emitter.send", 1)
+    setRange: Any = unsupported("Emitter.setRange")
+    getRange: Any = unsupported("Emitter.getRange", -1.0)
+    getBufferSize: Any = unsupported("Emitter.getBufferSize", -1)
+
+
+class Receiver(_Mute):
+    """Nobody speaks to it: its queue is empty."""
+
+    CHANNEL_BROADCAST = -1
+    _channel = 1
+
+    def getQueueLength(self) -> int:
+        """0."""
+        return 0
+
+    def getChannel(self) -> int:
+        """As set."""
+        return self._channel
+
+    def setChannel(self, channel: int) -> None:
+        """Sets the channel."""
+        self._channel = c_int(channel)
+
+    nextPacket: Any = unsupported("Receiver.nextPacket")
+    getString: Any = unsupported("Receiver.getString")
+    getBytes: Any = unsupported("Receiver.getBytes")
+    getData: Any = unsupported("Receiver.getData")
+    getDataSize: Any = unsupported("Receiver.getDataSize", -1)
+
+
+class Speaker(Device):
+    """Nobody hears it."""
+
+    playSound: Any = unsupported("Speaker.playSound")
+    stop: Any = unsupported("Speaker.stop")
+    speak: Any = unsupported("Speaker.speak")
+    setLanguage: Any = unsupported("Speaker.setLanguage", False)
+    isSoundPlaying: Any = unsupported("Speaker.isSoundPlaying", False)
+    isSpeaking: Any = unsupported("Speaker.isSpeaking", False)
 
 
 class Altimeter(Device):
@@ -14,10 +129,6 @@ class Altimeter(Device):
 
 
 class Brake(Device):
-    """Not modelled."""
-
-
-class Camera(Device):
     """Not modelled."""
 
 
@@ -30,14 +141,6 @@ class Connector(Device):
 
 
 class Display(Device):
-    """Not modelled."""
-
-
-class Emitter(Device):
-    """Not modelled."""
-
-
-class Gyro(Device):
     """Not modelled."""
 
 
@@ -65,15 +168,7 @@ class RangeFinder(Device):
     """Not modelled."""
 
 
-class Receiver(Device):
-    """Not modelled."""
-
-
 class Skin(Device):
-    """Not modelled."""
-
-
-class Speaker(Device):
     """Not modelled."""
 
 

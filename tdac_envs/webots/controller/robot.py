@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from . import led, motor, sensors
+from . import absent, led, motor, sensors
 from .connection import c_int, connection
 from .device import Device
 from .input import Joystick, Keyboard, Mouse
@@ -19,6 +19,12 @@ _KINDS: dict[str, type[Device]] = {
     "GPS": sensors.GPS,
     "Compass": sensors.Compass,
     "InertialUnit": sensors.InertialUnit,
+    "Accelerometer": sensors.Accelerometer,
+    "Gyro": sensors.Gyro,
+    "Camera": absent.Camera,
+    "Emitter": absent.Emitter,
+    "Receiver": absent.Receiver,
+    "Speaker": absent.Speaker,
     "LED": led.LED,
 }
 

@@ -209,6 +209,27 @@ class GPS(_Vector):
         return connection.velocity[:3] if sampled else [math.nan] * 3
 
 
+class Accelerometer(_Vector):
+    """How it is accelerated, m/s²; at rest against gravity."""
+
+    _c_name = "accelerometer"
+
+    def getLookupTable(self) -> list[float]:
+        """See `lookup_table`."""
+        return self.lookup_table
+
+    @property
+    def lookup_table(self) -> list[float]:
+        """Input, reading, relative noise; again and again."""
+        return list(self._facts.get("table", ()))
+
+
+class Gyro(Accelerometer):
+    """How fast it turns, by its table: 100000 is 13.3 rad/s."""
+
+    _c_name = "gyro"
+
+
 class Compass(_Vector):
     """Where north is, seen from the robot."""
 

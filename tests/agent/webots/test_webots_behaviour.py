@@ -40,15 +40,34 @@ class TestDevices:
         out = printed('print(robot.getDevice("nose"))\n')
         assert out == ['Device "nose" was not found on robot "e-puck"', "None"]
 
-    @pytest.mark.parametrize("name", ["camera", "accelerometer", "speaker"])
-    def test_device_without_a_model(self, printed, name):
+    def test_device_without_a_model(self, printed):
         """It is missing like an unknown one; why, is said once."""
-        out = printed(f"print([robot.getDevice({name!r}) for _ in range(3)])\n")
-        assert (
-            out[0] == f'tdac: the device "{name}" is not modelled here; it is missing'
-        )
-        assert out[1:4] == [f'Device "{name}" was not found on robot "e-puck"'] * 3
+        world = OPEN.replace("supervisor TRUE", 'supervisor TRUE version "2"')
+        out = printed('print([robot.getDevice("tof") for _ in range(3)])\n', world)
+        assert out[0] == 'tdac: the device "tof" is not modelled here; it is missing'
+        assert out[1:4] == ['Device "tof" was not found on robot "e-puck"'] * 3
         assert out[4:] == ["[None, None, None]"]
+
+    def test_devices_that_give_nothing(self, printed):
+        """Camera, radio and speaker are there and mute, each said once."""
+        out = printed(
+            'camera, radio = robot.getDevice("camera"), robot.getDevice("receiver")\n'
+            "camera.enable(64); radio.enable(64); radio.enable(32)\n"
+            "for _ in range(3):\n"
+            "    robot.step(32); image = camera.getImage()\n"
+            'robot.getDevice("emitter").send("hello")\n'
+            'robot.getDevice("speaker").speak("hello", 1.0)\n'
+            "print(image, camera.getWidth(), camera.getHeight(), "
+            "radio.getQueueLength(), camera.getSamplingPeriod())\n"
+        )
+        assert out == [
+            "tdac: camera is not modelled here; it gives nothing",
+            "tdac: receiver is not modelled here; it gives nothing",
+            "tdac: Camera.getImage() is not supported here; it has no effect",
+            "tdac: Emitter.send() is not supported here; it has no effect",
+            "tdac: Speaker.speak() is not supported here; it has no effect",
+            "None 52 39 0 64",
+        ]
 
     def test_all_devices_can_be_counted(self, printed):
         """By index, in one order, with their names and types."""
@@ -60,7 +79,7 @@ class TestDevices:
             "print(left.getNodeType() == Node.ROTATIONAL_MOTOR, "
             'robot.getDevice("ps0").getNodeType() == Node.DISTANCE_SENSOR)\n'
         )
-        assert out == ["36 36 left wheel motor True", "True True"]
+        assert out == ["42 42 left wheel motor True", "True True"]
 
     def test_devices_made_by_their_classes(self, printed):
         """The old way: by name, a sensor with its period."""
@@ -338,6 +357,28 @@ class TestSensors:
         )
         assert [line.startswith("tdac: light") for line in out] == [True, False]
         assert out[-1] == "4095.0 4095.0"
+
+    def test_accelerometer_and_gyro(self, drive):
+        """Gravity at rest, the change of the velocity, and the rate of turn."""
+        code = (
+            f"{BEGIN}{FREE}"
+            "a, g = robot.getDevice('accelerometer'), robot.getDevice('gyro')\n"
+            "a.enable(32); g.enable(32); robot.step(32)\n"
+            "print([a.getValues(), g.getValues(), g.getLookupTable()[3:5]])\n"
+            "left.setAcceleration(10.0); right.setAcceleration(10.0)\n"
+            "left.setVelocity(6.0); right.setVelocity(6.0); robot.step(160)\n"
+            "print([a.getValues(), g.getValues()])\n"
+            "left.setAcceleration(-1); left.setVelocity(-6.0); robot.step(1600)\n"
+            "print([a.getValues(), g.getValues()])\n"
+        )
+        lines = drive(code, OPEN).report.output.splitlines()
+        rest, ahead, turning = map(eval, lines)
+        assert rest == [[0.0, 0.0, 9.81], [0.0, 0.0, 0.0], [13.3158, 100000.0]]
+        assert ahead[0] == pytest.approx([0.2, 0.0, 9.81], abs=1e-3)
+        assert ahead[1] == pytest.approx([0.0, 0.0, 0.0], abs=1.0)
+        rate = turning[1][2] * 13.3158 / 100000.0
+        assert rate == pytest.approx(12.0 * 0.02 / 0.052, rel=1e-3)
+        assert turning[0][2] == pytest.approx(9.81)
 
     def test_where_it_is_in_a_z_up_world(self, drive):
         """GPS (on its turret), inertial unit and compass agree with the judge."""
