@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import sys
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -13,7 +17,7 @@ from tdac_agent.webots_run import WebotsReport, run_controller
 from tdac_envs.webots.stage import open_stage
 
 
-def run(run_folder: Path, out: Path, tier: str) -> int:
+def run(run_folder: Path, out: Path, tier: str, as_json: bool) -> int:
     """Writes the project and drives it once, here; 0 if it reaches the goal."""
     check_tier(tier)
     project = export_webots(run_folder, out)
@@ -21,8 +25,22 @@ def run(run_folder: Path, out: Path, tier: str) -> int:
     steps = project.horizon + SPARE
     env = stage.make_env(steps=steps, goal_tolerance=project.tolerance)
     done = run_controller(project.controller, stage, env, tier=tier)
-    _show(project, done.report, Console())
+    if as_json:
+        sys.stdout.write(json.dumps(_record(project, done.report), indent=2) + "\n")
+    else:
+        _show(project, done.report, Console())
     return 0 if done.report.passed else 1
+
+
+def _record(project: Project, report: WebotsReport) -> dict[str, Any]:
+    return {
+        "schema_version": 1,
+        "world": str(project.world),
+        "controller": str(project.controller),
+        "verified_steps": project.verified_steps,
+        "run_in_webots": False,
+        "driven_here": asdict(report),
+    }
 
 
 def _show(project: Project, report: WebotsReport, console: Console) -> None:

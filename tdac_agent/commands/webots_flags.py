@@ -74,6 +74,7 @@ def export_webots(
     run: Annotated[Path, typer.Argument(help="Folder of a verified run.")],
     out: Annotated[Path, typer.Option(help="Folder to write, new or empty.")],
     tier: Tier = "auto",
+    as_json: Json = False,
 ) -> None:
     """Write a Webots project with a verified e-puck controller.
 
@@ -82,4 +83,4 @@ def export_webots(
     """
     from tdac_agent.commands import export
 
-    raise typer.Exit(export.run(run, out, tier))
+    raise typer.Exit(export.run(run, out, tier, as_json))

@@ -85,7 +85,7 @@ class StepServer:
     def _advance(self, duration: int) -> None:
         """Takes as many steps as `duration` needs: the last one may go beyond it."""
         count = math.ceil(duration / self._basic - 1e-9)
-        if duration % self._basic:
+        if abs(count * self._basic - duration) > 1e-6:
             self._warn(
                 f"WARNING: The time step used by controller ({duration} ms) is not a "
                 f"multiple of WorldInfo.basicTimeStep ({self._basic:g} ms)!"

@@ -43,10 +43,14 @@ class TestDevices:
     def test_device_without_a_model(self, printed):
         """It is missing like an unknown one; why, is said once."""
         world = OPEN.replace("supervisor TRUE", 'supervisor TRUE version "2"')
-        out = printed('print([robot.getDevice("tof") for _ in range(3)])\n', world)
+        out = printed(
+            'print([robot.getDevice("tof") for _ in range(3)], '
+            "left.getMaxVelocity())\n",
+            world,
+        )
         assert out[0] == 'tdac: the device "tof" is not modelled here; it is missing'
         assert out[1:4] == ['Device "tof" was not found on robot "e-puck"'] * 3
-        assert out[4:] == ["[None, None, None]"]
+        assert out[4:] == ["[None, None, None] 7.536"]
 
     def test_devices_that_give_nothing(self, printed):
         """Camera, radio and speaker are there and mute, each said once."""
@@ -145,6 +149,13 @@ class TestSteps:
         assert run.report.output.splitlines()[-1] == f"0 {0.032 * steps}"
         warned = "is not a multiple of WorldInfo.basicTimeStep" in run.report.output
         assert warned == (call in ("50", "1", "2000"))
+
+    def test_a_basic_step_that_is_no_whole_number(self, drive):
+        """Multiples of 0.1 ms are taken for what they are."""
+        world = OPEN.replace("basicTimeStep 32", "basicTimeStep 0.1")
+        run = drive(f"{BEGIN}robot.step(3); print(robot.step())\n", world, steps=99)
+        assert run.log.steps == 30
+        assert run.report.output == "0\n"
 
     def test_a_float_is_no_duration(self, drive):
         """As in Webots, `step(32.0)` and `enable(32.0)` raise."""

@@ -154,24 +154,30 @@ def test_the_world_is_the_one_of_the_task(verified, tmp_path):
     assert declared == {*protos, "TexturedBackgroundLight"}
 
 
-def test_bare_interpreter_with_a_stub(verified, tmp_path):
-    """With nothing of tdac on its path it drives just as it did when verified."""
-    project = export_webots(verified, tmp_path / "out")
-    elsewhere = tmp_path / "elsewhere"
+def drive_bare(project, folder):
+    """Runs the adapter with the stub and nothing else on its path; what it prints."""
+    elsewhere = folder / "elsewhere"
     shutil.copytree(project.folder, elsewhere)
     adapter = elsewhere / project.controller.relative_to(project.folder)
     environment = {"PYTHONPATH": str(STUB), "PATH": os.environ["PATH"]}
     done = subprocess.run(
         [sys.executable, adapter],
         env=environment,
-        cwd=tmp_path,
+        cwd=folder,
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    assert done.stdout == f"reached the goal after {steps_in_env(verified)} steps\n"
+    return done.stdout
+
+
+def test_bare_interpreter_with_a_stub(verified, tmp_path):
+    """With nothing of tdac on its path it drives just as it did when verified."""
+    project = export_webots(verified, tmp_path / "out")
+    printed = drive_bare(project, tmp_path)
+    assert printed == f"reached the goal after {steps_in_env(verified)} steps\n"
 
 
 def test_here_it_takes_as_many_steps(verified, tmp_path):
@@ -185,7 +191,7 @@ def test_here_it_takes_as_many_steps(verified, tmp_path):
 
 @pytest.mark.parametrize("world", ["arena", "corridor", "crates"])
 def test_builtin_controllers_of_bundled_worlds(tmp_path, world):
-    """A controller of the built-in learner reaches the goal in as many steps ± 5 %."""
+    """A controller of the built-in learner takes as many steps ± 5 %, also bare."""
     spec = {"schema": 1, "env": "TDAC-EPuck-v0", "world": world, "name": world}
     source = render_epuck(EPuckParameters(), load_task_of(spec, tmp_path).nominal)
     folder = make_run(tmp_path / "run", spec, source)
@@ -195,6 +201,11 @@ def test_builtin_controllers_of_bundled_worlds(tmp_path, world):
     assert report.passed, report
     wanted = steps_in_env(folder)
     assert abs(report.steps - wanted) <= 0.05 * wanted
+    found = re.fullmatch(
+        r"reached the goal after (\d+) steps\n", drive_bare(project, tmp_path)
+    )
+    assert found is not None
+    assert abs(int(found[1]) - wanted) <= 0.05 * wanted
 
 
 def load_task_of(spec, tmp_path):
@@ -210,6 +221,17 @@ def test_command(tdac, verified):
     assert "driven here, as a Webots controller: reached the goal after" in out
     assert "not run in Webots itself" in out
     assert Path("project/worlds/tdac_my_open_world.wbt").is_file()
+
+
+def test_json(tdac, verified):
+    """The record names the files, and how the project drove here."""
+    code, out, _ = tdac("export", "webots", verified, "--out", "project", "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert record["run_in_webots"] is False
+    assert record["driven_here"]["outcome"] == "reached"
+    assert Path(record["controller"]).is_file()
+    assert Path(record["world"]).is_file()
 
 
 def test_the_whole_way(tdac):
