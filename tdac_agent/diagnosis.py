@@ -85,7 +85,7 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
     assert touch is not None
     side, share = side_of(touch.bearing), saturated(trajectory)
     towards = pose.heading + (math.pi if speed < 0.0 else 0.0)
-    corner = where_on_the_wall(touch, towards)
+    corner = where_on_the_wall(touch, towards, units)
     error, course = _course(rollout, around)
     text = (
         f"collision in step {trajectory.steps} "
@@ -105,7 +105,7 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
         trajectory.steps,
         side=side,
         wall=units.kept_place(*touch.wall),
-        corner=touch.corner,
+        corner=None if touch.corner is None else units.kept_place(*touch.corner),
         thing=touch.thing,
         heading_error=error,
         saturated=round(share, 3),

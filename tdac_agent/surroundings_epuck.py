@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,8 @@ Point = tuple[float, float]
 FENCE = "fence around the world"
 # A sensor that is farther off the bearing than this does not look there, rad.
 _OFF = 0.3
+# A blunter corner is none to the body.
+BLUNTEST = math.radians(135.0)
 
 
 def world_surroundings(task: Nominal) -> WorldSurroundings:
@@ -61,18 +64,20 @@ class WorldSurroundings:
     def touch(self, pose: Pose, reach: float) -> Touch | None:
         """The nearest thing, by its name."""
         x, y = METRES.place_of(pose.x, pose.y)
-        name, gap, (away_x, away_y) = _nearest(self.task, x, y)
+        near = _nearest(self.task, x, y)
+        gap, (away_x, away_y) = near.gap, near.away
         if gap * METRES.scale > reach:
             return None
-        wall = METRES.on_screen([(x - gap * away_x, y - gap * away_y)])[0].tolist()
+        wall = (x - gap * away_x, y - gap * away_y)
         bearing = math.atan2(away_y, -away_x) - pose.heading
+        corner = _nearest_corner(near.outline, wall)
         return Touch(
-            wall=(wall[0], wall[1]),
+            wall=_on_screen(wall),
             bearing=math.remainder(bearing, 2.0 * math.pi),
             gap=max(gap * METRES.scale - self.radius, 0.0),
-            border=name == FENCE,
-            corner=None,
-            thing=name,
+            border=near.name == FENCE,
+            corner=None if corner is None else _on_screen(corner),
+            thing=near.name,
         )
 
     def seen(self, touch: Touch, trajectory: Trajectory) -> str:
@@ -127,29 +132,62 @@ class WorldSurroundings:
         return {name: (u, v) for name, (u, v) in zip(places, screen, strict=True)}
 
 
-def _nearest(task: EPuckTask, x: float, y: float) -> tuple[str, float, Point]:
-    """Name of the nearest thing, its distance, and the unit vector away from it."""
-    ground = task.ground
-    best: tuple[str, float, Point] = ("", math.inf, (1.0, 0.0))
-    things = [
-        (_name(thing), at_body_height(thing.solid, ground.floor))
-        for thing in ground.things
-    ]
-    for name, parts in things:
+class _Near(NamedTuple):
+    """What is nearest to a point.
+
+    Attributes:
+        name: Of the thing.
+        gap: Distance to it, m.
+        away: Unit vector that leads away from it.
+        outline: Its vertices, shape (n, 2), counter-clockwise; empty where they are
+            not those of the thing, which has several parts, or it has none.
+    """
+
+    name: str
+    gap: float
+    away: Point
+    outline: Points
+
+
+def _nearest(task: EPuckTask, x: float, y: float) -> _Near:
+    ground, none = task.ground, np.empty((0, 2))
+    found = []
+    for thing in ground.things:
+        parts = at_body_height(thing.solid, ground.floor)
         prisms = Prisms.of(map(Owned, parts))
         for part in range(len(parts)):
             gap, *away = part_gap(
                 prisms.points, prisms.first, prisms.extent, part, x, y
             )
-            if gap < best[1]:
-                best = (name, float(gap), (float(away[0]), float(away[1])))
+            outline = prisms.outline(part) if len(parts) == 1 else none
+            way = (float(away[0]), float(away[1]))
+            found.append(_Near(_name(thing), float(gap), way, outline))
     left, low, right, high = ground.bounds
-    sides = [(x - left, (1.0, 0.0)), (right - x, (-1.0, 0.0))]
-    sides += [(y - low, (0.0, 1.0)), (high - y, (0.0, -1.0))]
-    for gap, way in sides:
-        if gap < best[1]:
-            best = (FENCE, gap, way)
-    return best
+    found += [
+        _Near(FENCE, x - left, (1.0, 0.0), none),
+        _Near(FENCE, right - x, (-1.0, 0.0), none),
+        _Near(FENCE, y - low, (0.0, 1.0), none),
+        _Near(FENCE, high - y, (0.0, -1.0), none),
+    ]
+    return min(found, key=lambda near: near.gap)
+
+
+def _nearest_corner(outline: Points, point: Point) -> Point | None:
+    """The nearest sharp corner of an outline within a body radius of a point."""
+    if len(outline) < 3:
+        return None
+    back, ahead = np.roll(outline, 1, axis=0) - outline, np.roll(outline, -1, axis=0)
+    ahead = ahead - outline
+    cosine = (back * ahead).sum(axis=1) / np.hypot(*back.T) / np.hypot(*ahead.T)
+    sharp = outline[cosine > math.cos(BLUNTEST)].tolist()
+    near = [(math.dist(at, point), (at[0], at[1])) for at in sharp]
+    distance, corner = min(near, default=(math.inf, (0.0, 0.0)))
+    return corner if distance <= BODY_RADIUS else None
+
+
+def _on_screen(place: Point) -> Point:
+    x, y = METRES.on_screen([place])[0].tolist()
+    return x, y
 
 
 def _name(thing: Obstacle) -> str:

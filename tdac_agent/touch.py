@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_agent.units import PIXELS, Units
 from tdac_envs.task2d import Map2DTask, Pose
 
 Point = tuple[float, float]
@@ -83,12 +84,13 @@ def side_of(bearing: float) -> str:
     return _SIDES[round(bearing / (math.pi / 4.0)) % 8]
 
 
-def where_on_the_wall(touch: Touch, towards: float) -> str:
+def where_on_the_wall(touch: Touch, towards: float, units: Units = PIXELS) -> str:
     """How a touched point lies to the nearest corner.
 
     Args:
         touch: What was touched.
         towards: Direction of the motion, rad.
+        units: Of the places.
 
     Returns:
         `3.1 px past the corner at (319.5, 87.5)`; empty with no corner near.
@@ -98,13 +100,12 @@ def where_on_the_wall(touch: Touch, towards: float) -> str:
     off_x, off_y = touch.wall[0] - touch.corner[0], touch.wall[1] - touch.corner[1]
     distance = math.hypot(off_x, off_y)
     along = off_x * math.cos(towards) + off_y * math.sin(towards)
-    place = f"the corner at ({touch.corner[0]:.1f}, {touch.corner[1]:.1f})"
+    place = f"the corner at {units.point(*touch.corner)}"
     if distance < 1.0:
         return f"at {place}"
     word = "past" if along > 0.5 * distance else "before"
-    return (
-        f"{distance:.1f} px {word if abs(along) > 0.5 * distance else 'beside'} {place}"
-    )
+    side = word if abs(along) > 0.5 * distance else "beside"
+    return f"{distance:.1f} {units.length} {side} {place}"
 
 
 def nearest_corner(task: Map2DTask, point: Point, reach: float) -> Point | None:

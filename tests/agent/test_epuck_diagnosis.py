@@ -98,6 +98,20 @@ def test_figures_of_a_collision():
     assert "A wheel was at its limit in 100 % of the steps" in found.text
 
 
+def test_a_corner_is_told():
+    """Of a box the corner that was hit is named, of a post there is none."""
+    box = Rectangle(0.4, 0.13, 0.0, 0.2, 0.2)
+    _, found = judged(env_with(box), always(1.0, 1.0))
+    assert found.corner == (0.3, 0.03)
+    assert "at the corner at (0.300, 0.030)" in found.text
+    _, found = judged(env_with(Disc(0.3, 0.05, 0.04)), always(1.0, 1.0))
+    assert found.corner is None
+    turned = Rectangle(0.3, 0.0, math.pi / 4, 0.1, 0.1)
+    _, found = judged(env_with(turned, start=(0.0, 0.03, 0.0)), always(1.0, 1.0))
+    assert found.corner == pytest.approx((0.3 - 0.1 * math.sqrt(0.5), 0.0), abs=1e-3)
+    assert re.search(r"\d mm (past|before|beside) the corner", found.text)
+
+
 def test_headings_and_turns_are_as_in_the_world():
     """A goal to the left is told as left, and so is the course to it."""
     env = env_with(Disc(0.3, 0.0, 0.05), goal=(0.3, 0.5))
