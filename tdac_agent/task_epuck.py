@@ -123,7 +123,7 @@ def open_epuck(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
 
     Raises:
         WorldError: The world cannot be read, or has nodes that are not modelled.
-        TaskError: The task cannot be done, or there is no goal.
+        TaskError: The task cannot be done, or there is no goal or no start.
     """
     bundled = spec.world in bundled_worlds()
     file = world_file(spec.world if bundled else str(base / spec.world))
@@ -133,6 +133,11 @@ def open_epuck(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
         raise TaskError(
             f"{world.source} names no goal: give one, --goal X Y in metres "
             "(`goal: [X, Y]` in a task.yaml)"
+        )
+    if spec.start is None and not world.robots:
+        raise TaskError(
+            f"{world.source} has no e-puck in it: give its place, --start X Y YAW in "
+            "metres and rad (`start: [X, Y, YAW]` in a task.yaml)"
         )
     left_out = spec.left_out or tuple(map(_in_words, ignored))
     setting = _setting(world, file, spec, left_out)

@@ -233,6 +233,15 @@ def test_a_world_without_a_goal_asks_for_one(tmp_path):
     assert in_file(tmp_path, bare, goal=(0.6, 0.0)).nominal.goal == (0.6, 0.0)
 
 
+def test_a_world_without_an_e_puck_asks_for_its_place(tmp_path):
+    """The message says how to give it, and then it is a task."""
+    with pytest.raises(TaskError, match=r"w\.wbt has no e-puck in it: .*--start X Y"):
+        in_file(tmp_path, room(robots=()))
+    task = in_file(tmp_path, room(robots=()), start=(-0.6, 0.0, 0.3))
+    assert task.nominal.start == (-0.6, 0.0, 0.3)
+    assert write_world(task.nominal.ground.world).count("\nE-puck {") == 1
+
+
 def test_range_noise_is_the_mean_of_the_published_one():
     """A relative noise is that of the sensors' table, on the average over it."""
     env = load_task("epuck").disturbed_env(Disturbance(range_noise=0.05))
