@@ -71,6 +71,11 @@ class Crew(Generic[P, T]):
             raise error
         return result  # type: ignore[no-any-return]
 
+    @property
+    def members(self) -> list[int]:
+        """Process ids."""
+        return [member.pid or 0 for member in self._members]
+
     def close(self) -> None:
         """Ends the members; none may be at work."""
         for end in self._ends:

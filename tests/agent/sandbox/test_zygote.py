@@ -2,9 +2,12 @@
 
 import os
 import signal
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
+from tdac_agent.crew import Crew
 from tdac_agent.nursery import Nursery
 from tdac_agent.sandbox import (
     ControllerError,
@@ -14,6 +17,7 @@ from tdac_agent.sandbox import (
     fork_child,
     start_zygote,
 )
+from tdac_agent.sandbox.zygote import SLOTS
 
 WRITER = """
 import os
@@ -121,8 +125,8 @@ def test_a_zygote_that_was_killed_is_a_fault_of_the_sandbox():
 
 def test_a_nursery_has_more_children_than_a_zygote_has_places(tier):
     nursery = Nursery(ahead=False)
-    children = [nursery.take(tier, Limits()) for _ in range(14)]
-    assert len({child.folder.root for child in children}) == 14
+    children = [nursery.take(tier, Limits()) for _ in range(SLOTS + 2)]
+    assert len({child.folder.root for child in children}) == SLOTS + 2
     for child in children:
         child.close()
     nursery.close()
@@ -133,3 +137,38 @@ def test_a_nursery_that_was_not_used_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     Nursery().close()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_processes_share_a_nursery(tier):
+    """No two of them get the same child, be it ready or not; each ends its own."""
+    nursery = Nursery(ahead=False)
+    if tier == find_tier("auto").name:
+        assert nursery.prepare()
+        assert nursery.prepare()
+
+    def use(number):
+        with nursery.take(tier, Limits()) as child:
+            child.furnish(None, f"NUMBER = {number}")
+            child.load()
+            return child.get("NUMBER"), str(child.folder.root)
+
+    crew = Crew(use, nursery.close, 2)
+    with ThreadPoolExecutor(2) as pool:
+        results = list(pool.map(crew.do, range(SLOTS + 4)))
+    crew.close()
+    assert [number for number, _ in results] == list(range(SLOTS + 4))
+    assert len({root for _, root in results}) == SLOTS + 4
+    nursery.close()
+    assert not any(Path(root).parent.exists() for _, root in results)
+
+
+def test_children_that_were_ready_and_not_wanted_end():
+    """Closing ends them; usual limits alone are what they are ready for."""
+    nursery = Nursery(ahead=False)
+    assert nursery.prepare()
+    child = nursery.take("auto", Limits(memory_bytes=2 << 30))
+    child.close()
+    unwanted = nursery._ready[0]
+    nursery.close()
+    with pytest.raises(SandboxError):
+        unwanted.load()
