@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from tdac_agent.errors import Fault
+from tdac_agent.calls import ask
 from tdac_agent.extract import extract_source
 from tdac_agent.prompt import generate_prompt, repair_prompt
-from tdac_agent.provider import Kind, Provider, ProviderFault, Reply, Request
+from tdac_agent.provider import MAX_OUTPUT_TOKENS, Kind, Provider, Reply, Request
 from tdac_agent.records import Recorder
 from tdac_agent.report import Report
-from tdac_agent.rules import RepairRule, add_rules, parse_rules
+from tdac_agent.retry import RetryPolicy
+from tdac_agent.rules import BEGIN, RepairRule, add_rules, parse_rules
 from tdac_agent.task import Task
 
-MAX_RETRIES = 3
 MAX_ASKS = 3
 
 
@@ -35,6 +35,7 @@ class Dialogue:
         optimizer: Edits them and writes rules.
         recorder: Keeps every question and answer.
         rules: Rules in force.
+        retry: How patiently a model is asked.
     """
 
     task: Task
@@ -42,12 +43,17 @@ class Dialogue:
     optimizer: Provider
     recorder: Recorder
     rules: tuple[RepairRule, ...] = ()
+    retry: RetryPolicy = field(default_factory=RetryPolicy)
 
     def generate(self, k: int) -> Candidate:
         """A new controller under the rules in force."""
         prompt = generate_prompt(self.task, self.rules)
         request = Request(
-            "generate", prompt, rules=self._texts(), sample=self._at(k, 0)
+            "generate",
+            prompt,
+            rules=self._texts(),
+            sample=self._at(k, 0),
+            stable=_stable(prompt),
         )
         return self._code(self.learner, request)
 
@@ -69,10 +75,16 @@ class Dialogue:
     ) -> Request:
         prompt = generate_prompt(self.task, self.rules)
         question = repair_prompt(kind, prompt, source, report)
-        return Request(kind, question, source, report, self._texts(), sample)
+        stable = _stable(question)
+        return Request(
+            kind, question, source, report, self._texts(), sample, stable=stable
+        )
 
     def _code(self, model: Provider, request: Request) -> Candidate:
-        """Asks until a whole answer holds code; a refused one is asked again twice."""
+        """Asks until a whole answer holds code; a refused one is asked again twice.
+
+        A truncated one is never used, and asked for again with more room.
+        """
         notes: tuple[str, ...] = ()
         for _ in range(MAX_ASKS):
             reply = self._ask(model, request)
@@ -80,24 +92,20 @@ class Dialogue:
             source = extract_source(reply.text) if reply.stop == "end" else None
             if source is not None:
                 return Candidate(source, notes)
+            if reply.stop == "length":
+                request = replace(request, max_tokens=2 * MAX_OUTPUT_TOKENS)
         return Candidate(None, notes)
 
     def _ask(self, model: Provider, request: Request) -> Reply:
-        """Asks; an infrastructure fault uses up no iteration, three stop the run."""
-        self.recorder.asked(request)
-        for attempt in range(1, MAX_RETRIES + 1):
-            try:
-                reply = model.complete(request)
-            except ProviderFault as error:
-                self.recorder.event("call.fault", attempt=attempt, reason=str(error))
-                reason = str(error)
-            else:
-                self.recorder.answered(request, reply)
-                return reply
-        raise Fault(f"{model.name} failed {MAX_RETRIES} times: {reason}")
+        return ask(model, request, self.recorder, self.retry)
 
     def _texts(self) -> tuple[str, ...]:
         return tuple(rule.text for rule in self.rules)
 
     def _at(self, k: int, j: int) -> tuple[int, int, int]:
         return (self.recorder.run.seed, k, j)
+
+
+def _stable(prompt: str) -> int:
+    """How much of a prompt is the same in all of a run: all before its rules."""
+    return max(0, prompt.find(BEGIN))

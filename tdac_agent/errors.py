@@ -13,5 +13,9 @@ class ControllerFileError(TdacError):
     """A controller file cannot be read."""
 
 
+class ProviderError(TdacError):
+    """A model cannot be chosen as it was: unknown, incomplete, no key, no package."""
+
+
 class Fault(Exception):
     """Neither pass nor fail: the sandbox, the suite or a provider is broken."""

@@ -8,6 +8,11 @@ from typing import Literal, Protocol
 from tdac_agent.report import Report
 
 Kind = Literal["generate", "edit", "summarise"]
+Role = Literal["learner", "optimizer"]
+
+MAX_OUTPUT_TOKENS = 16_000
+"""Of an answer, thinking included; after a truncated one there may be twice as many."""
+ANSWER_SECONDS = 900.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +26,10 @@ class Request:
         report: What failed, for `edit` and `summarise`.
         rules: Text of each rule in force.
         sample: (run, k, j), so that repeated questions stay different samples.
+        stable: So many characters at the beginning of the prompt are the same in all
+            questions of a run; a provider may have them cached.
+        max_tokens: That an answer may have.
+        seconds: That an answer may take.
     """
 
     kind: Kind
@@ -29,6 +38,20 @@ class Request:
     report: Report | None = None
     rules: tuple[str, ...] = ()
     sample: tuple[int, int, int] = (0, 0, 0)
+    stable: int = 0
+    max_tokens: int = MAX_OUTPUT_TOKENS
+    seconds: float = ANSWER_SECONDS
+
+    @property
+    def role(self) -> Role:
+        """Who is asked: the Learner (LLM1) generates, the Optimizer (LLM2) repairs."""
+        return "learner" if self.kind == "generate" else "optimizer"
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The prompt as its stable beginning and the rest; no part is empty."""
+        halves = (self.prompt[: self.stable], self.prompt[self.stable :])
+        return tuple(part for part in halves if part)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +61,12 @@ class Reply:
     Attributes:
         text: As it came.
         stop: `end` for a whole answer, `length` for a truncated one, `refusal`.
-        tokens_in: Tokens of the prompt, 0 where no model was asked.
-        tokens_out: Tokens of the answer.
+        tokens_in: Tokens of the prompt, cached ones included; 0 where not reported.
+        tokens_out: Tokens of the answer, thinking included; 0 where not reported.
+        tokens_cached: Of `tokens_in`, those read from a cache.
+        tokens_written: Of `tokens_in`, those written to a cache.
+        model: As the provider reports it, if it does.
+        request_id: By which the vendor knows the call, if there is one.
         notes: What the provider wants in the journal, e.g. which test changed what.
     """
 
@@ -47,6 +74,10 @@ class Reply:
     stop: Literal["end", "length", "refusal"] = "end"
     tokens_in: int = 0
     tokens_out: int = 0
+    tokens_cached: int = 0
+    tokens_written: int = 0
+    model: str | None = None
+    request_id: str | None = None
     notes: tuple[str, ...] = field(default=())
 
 
@@ -54,7 +85,7 @@ class Provider(Protocol):
     """Answers requests; both Learner and Optimizer are providers.
 
     Attributes:
-        name: For people and records.
+        name: For people and records; holds no key.
         paid: Whether an answer costs money (or much else); before the first such
             call of a run the suite has to prove itself.
     """
@@ -63,7 +94,10 @@ class Provider(Protocol):
     paid: bool
 
     def complete(self, request: Request) -> Reply:
-        """Answers one request.
+        """Answers one request, once: whether it is asked again is for the caller.
+
+        A truncated or refused answer is a `Reply`, since it is paid for; its `stop`
+        says what it is. An answer without a reason why it stopped is a fault.
 
         Raises:
             ProviderFault: The provider cannot be reached or is broken; neither pass
@@ -73,4 +107,27 @@ class Provider(Protocol):
 
 
 class ProviderFault(Exception):
-    """An infrastructure fault of a provider."""
+    """An infrastructure fault of a provider that may be gone the next time."""
+
+    kind = "transient"
+
+
+class RateLimited(ProviderFault):
+    """Too many requests or tokens for now.
+
+    Args:
+        message: One line.
+        retry_after: Seconds after which the provider wants to be asked again.
+    """
+
+    kind = "rate limit"
+
+    def __init__(self, message: str, retry_after: float | None = None) -> None:
+        super().__init__(message)
+        self.retry_after = retry_after
+
+
+class PermanentFault(ProviderFault):
+    """Asking again does not help: no access, no credit, no such model, too long."""
+
+    kind = "permanent"

@@ -17,6 +17,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.files import append_line, write_atomic
 from tdac_agent.provider import Reply, Request
 from tdac_agent.report import Report
+from tdac_agent.retry import Missed
 from tdac_agent.rules import RepairRule
 from tdac_agent.task import Task, portable_task_file, write_workdir
 
@@ -57,6 +58,9 @@ class Run(BaseModel):
     attempts: list[Attempt] = []
     tokens_in: int = 0
     tokens_out: int = 0
+    tokens_cached: int = Field(0, description="Of tokens_in, read from a cache.")
+    models: tuple[str, ...] = Field((), description="As the providers report them.")
+    base_url: str | None = None
     started: str
     seconds: float = 0.0
 
@@ -125,12 +129,27 @@ class Recorder:
         if self.on_event is not None:
             self.on_event(record)
 
-    def asked(self, request: Request) -> None:
-        """Keeps a prompt before it is sent."""
+    def asked(self, request: Request, model: str) -> None:
+        """Keeps a prompt before it is sent to a model."""
         _, k, j = request.sample
         path = self._folder(k, j) / f"{request.kind}.prompt.md"
         write_atomic(path, request.prompt)
-        self.event("call.intent", kind=request.kind, k=k, j=j)
+        self.event("call.intent", kind=request.kind, k=k, j=j, model=model)
+
+    def missed(self, request: Request, miss: Missed) -> None:
+        """Keeps a fault, and whether the question is put again."""
+        _, k, j = request.sample
+        wait = None if miss.wait is None else round(miss.wait, 3)
+        self.event(
+            "call.fault",
+            kind=request.kind,
+            k=k,
+            j=j,
+            attempt=miss.attempt,
+            fault=miss.fault.kind,
+            reason=str(miss.fault),
+            wait=wait,
+        )
 
     def answered(self, request: Request, reply: Reply) -> None:
         """Keeps an answer as it came, beside earlier ones to the same prompt."""
@@ -143,6 +162,9 @@ class Recorder:
         write_atomic(path, reply.text)
         self.run.tokens_in += reply.tokens_in
         self.run.tokens_out += reply.tokens_out
+        self.run.tokens_cached += reply.tokens_cached
+        if reply.model is not None and reply.model not in self.run.models:
+            self.run.models = (*self.run.models, reply.model)
         self.event(
             "call.reply",
             kind=request.kind,
@@ -151,6 +173,10 @@ class Recorder:
             stop=reply.stop,
             tokens_in=reply.tokens_in,
             tokens_out=reply.tokens_out,
+            tokens_cached=reply.tokens_cached,
+            tokens_written=reply.tokens_written,
+            model=reply.model,
+            request_id=reply.request_id,
             notes=list(reply.notes),
         )
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from pathlib import Path
 
-from tdac_agent.builtin import builtin_for
 from tdac_agent.dialogue import Candidate, Dialogue
 from tdac_agent.errors import RunError
 from tdac_agent.figures import draw_trajectories
 from tdac_agent.files import write_atomic
 from tdac_agent.provider import Provider
+from tdac_agent.providers import choose_models
 from tdac_agent.records import Event, Recorder, Run
 from tdac_agent.report import Report
+from tdac_agent.retry import RetryPolicy
 from tdac_agent.suite_check import prove_suite
 from tdac_agent.task import Task
 from tdac_agent.verification import load_trajectories, verify
 from tdac_agent.warm import WarmJudge
-from tdac_envs.errors import TaskError
 
 
 def synthesize(
@@ -30,19 +30,24 @@ def synthesize(
     patience: int = 1,
     seed: int = 0,
     start_from: str | None = None,
+    base_url: str | None = None,
+    retry: RetryPolicy | None = None,
     on_event: Event | None = None,
 ) -> Run:
     """Writes, tests and repairs controllers until one is verified.
 
     Args:
         task: What the controller must do.
-        learner: LLM1 of the paper, writes controllers; a name or a provider.
+        learner: LLM1 of the paper, writes controllers: a provider, or its name as in
+            `anthropic:MODEL` (docs/models.md).
         optimizer: LLM2, edits code and writes rules; the learner by default.
         out: New or empty folder for the run.
         iterations: K.
         patience: J, edits per iteration.
         seed: Of the jittered starts.
         start_from: Source of a controller to begin with instead of a generated one.
+        base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
+        retry: How patiently a model is asked after faults.
         on_event: Called with each journal record, if given.
 
     Returns:
@@ -50,12 +55,24 @@ def synthesize(
 
     Raises:
         RunError: The folder cannot be used.
+        ProviderError: A model cannot be chosen so, e.g. without its key.
         Fault: Sandbox, suite or provider broken; the run's record says so, too.
     """
-    first = _provider(learner, task)
-    second = first if optimizer is None else _provider(optimizer, task)
-    recorder = _recorder(task, out, first, second, iterations, patience, seed, on_event)
-    dialogue = Dialogue(task, first, second, recorder)
+    first, second = choose_models(learner, optimizer, task.setting, base_url)
+    run = Run(
+        folder=out,
+        task=task.name,
+        task_sha256=task.sha256(),
+        learner=first.name,
+        optimizer=second.name,
+        base_url=base_url,
+        iterations=iterations,
+        patience=patience,
+        seed=seed,
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+    recorder = _recorder(task, run, on_event)
+    dialogue = Dialogue(task, first, second, recorder, retry=retry or RetryPolicy())
     given = Candidate(start_from) if start_from is not None else None
     judge = WarmJudge()
     try:
@@ -122,39 +139,13 @@ def _deliver(
     return recorder.run
 
 
-def _provider(given: str | Provider, task: Task) -> Provider:
-    if not isinstance(given, str):
-        return given
-    if given != "builtin":
-        raise TaskError(f"unknown learner {given!r}; available: 'builtin' (no model)")
-    return builtin_for(task.setting)
-
-
-def _recorder(
-    task: Task,
-    out: Path,
-    learner: Provider,
-    optimizer: Provider,
-    iterations: int,
-    patience: int,
-    seed: int,
-    on_event: Event | None,
-) -> Recorder:
+def _recorder(task: Task, run: Run, on_event: Event | None) -> Recorder:
+    """The recorder of a run, its folder made."""
+    out = run.folder
     try:
         out.mkdir(parents=True, exist_ok=True)
         if any(out.iterdir()):
             raise RunError(f"the folder {out} is not empty; give a new one with --out")
-        run = Run(
-            folder=out,
-            task=task.name,
-            task_sha256=task.sha256(),
-            learner=learner.name,
-            optimizer=optimizer.name,
-            iterations=iterations,
-            patience=patience,
-            seed=seed,
-            started=datetime.now(UTC).isoformat(timespec="seconds"),
-        )
         recorder = Recorder(run, on_event)
         recorder.start(task)
     except OSError as error:

@@ -9,14 +9,15 @@ import sys
 import pytest
 from small import write_small_task
 
-from tdac_agent.errors import Fault, RunError
-from tdac_agent.provider import ProviderFault, Reply
+from tdac_agent.errors import Fault, ProviderError, RunError
+from tdac_agent.provider import PermanentFault, ProviderFault, Reply
 from tdac_agent.records import load_run
+from tdac_agent.retry import RetryPolicy
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
 from tdac_agent.verification import verify
-from tdac_envs.errors import TaskError
 
+AT_ONCE = RetryPolicy(first_wait=0.0)
 NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
@@ -137,21 +138,46 @@ def test_invalid_answers_are_asked_again_twice(policy_task, good_source, out, re
 def test_faults_use_up_no_iteration(policy_task, good_source, out):
     """A provider that cannot be reached is asked again; the second answer counts."""
     learner = Script(ProviderFault("503"), ProviderFault("503"), code(good_source))
-    run = synthesize(policy_task, learner, out=out, iterations=1)
+    run = synthesize(policy_task, learner, out=out, iterations=1, retry=AT_ONCE)
     assert run.tau == 1
     faults = [r for r in journal(out) if r["event"] == "call.fault"]
     assert [fault["attempt"] for fault in faults] == [1, 2]
+    assert {fault["fault"] for fault in faults} == {"transient"}
 
 
-def test_three_faults_stop_the_run(policy_task, out):
+def test_four_faults_stop_the_run(policy_task, out):
     """The run is neither verified nor failed, and its record says why."""
-    learner = Script(*[ProviderFault("no route to host")] * 3)
-    with pytest.raises(Fault, match="script failed 3 times: no route to host"):
-        synthesize(policy_task, learner, out=out)
+    learner = Script(*[ProviderFault("no route to host")] * 4)
+    expected = r"script: transient fault: no route to host \(asked 4 times\)"
+    with pytest.raises(Fault, match=expected):
+        synthesize(policy_task, learner, out=out, retry=AT_ONCE)
+    assert learner.answers == []
     run = load_run(out)
     assert run.status == "fault"
     assert run.attempts == []
     assert "no route" in journal(out)[-1]["reason"]
+
+
+def test_a_permanent_fault_keeps_what_there_is(policy_task, out):
+    """It is not asked again; the candidate before it stays on record."""
+    learner = Script(code(NOTHING), PermanentFault("401 no such key"))
+    with pytest.raises(Fault, match="permanent fault: 401 no such key$"):
+        synthesize(policy_task, learner, out=out)
+    run = load_run(out)
+    assert run.status == "fault"
+    assert [(a.k, a.j, a.passed) for a in run.attempts] == [(1, 0, False)]
+    assert (out / "iterations/k01/j0/generate.reply.md").is_file()
+    assert (out / "iterations/k01/j1/edit.prompt.md").is_file()
+
+
+def test_a_truncated_answer_gets_more_room(policy_task, good_source, out):
+    """It is never used, even where the code in it is whole, and asked for again."""
+    cut = Reply(f"```python\n{good_source}```", stop="length")
+    learner = Script(cut, code(good_source))
+    run = synthesize(policy_task, learner, out=out)
+    assert run.tau == 1
+    first, second = (request.max_tokens for request in learner.requests)
+    assert second == 2 * first
 
 
 def test_it_gives_up_after_k_iterations(policy_task, out):
@@ -204,7 +230,7 @@ def test_builtin_needs_no_model(policy_task, out):
 
 def test_an_unknown_learner(policy_task, out):
     """The name is refused before anything is written."""
-    with pytest.raises(TaskError, match="unknown learner 'gpt'"):
+    with pytest.raises(ProviderError, match="unknown model 'gpt'; known: builtin, "):
         synthesize(policy_task, "gpt", out=out)
     assert not out.exists()
 

@@ -1,0 +1,138 @@
+"""From a string such as `anthropic:MODEL` to the provider that it names."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from pkgutil import resolve_name
+from urllib.parse import urlsplit
+
+from tdac_agent.errors import ProviderError
+from tdac_agent.provider import Provider
+from tdac_agent.setting import Setting
+
+GROUP = "tdac.providers"
+# Each is imported only when it is chosen: so are the packages that it needs.
+OWN = {
+    "builtin": "tdac_agent.providers.local:make_builtin",
+    "anthropic": "tdac_agent.providers.anthropic_api:make",
+    "openai": "tdac_agent.providers.openai_api:make",
+    "command": "tdac_agent.providers.command:make",
+    "manual": "tdac_agent.providers.manual:make",
+    "replay": "tdac_agent.providers.replay:make",
+}
+FORMS = (
+    "builtin, anthropic:MODEL, openai:MODEL, command:PROGRAM, manual:DIR, replay:RUN"
+)
+OFFLINE = frozenset({"builtin", "command", "manual", "replay"})
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a provider may need besides its own words.
+
+    Attributes:
+        setting: The task's, for providers that know the environments.
+        base_url: Where its models are served, if not where they usually are.
+    """
+
+    setting: Setting
+    base_url: str | None = None
+
+
+Make = Callable[[str, Options], Provider]
+"""What an entry point of the group `tdac.providers` is: the words after the colon and
+the options in, a provider out; it raises `ProviderError` where that is not possible."""
+
+
+def choose_models(
+    learner: str | Provider,
+    optimizer: str | Provider | None,
+    setting: Setting,
+    base_url: str | None = None,
+) -> tuple[Provider, Provider]:
+    """The Learner and the Optimizer; one and the same where they are named so.
+
+    Args:
+        learner: A provider, or its name.
+        optimizer: The same; None for the learner.
+        setting: The task's.
+        base_url: Of the models that are served somewhere.
+
+    Raises:
+        ProviderError: A name is unknown, or something is missing that it needs.
+    """
+    named = [name for name in (learner, optimizer) if isinstance(name, str)]
+    if base_url is not None:
+        _check_url(base_url, named)
+    options = Options(setting, base_url)
+    first = choose_model(learner, options) if isinstance(learner, str) else learner
+    if optimizer is None or optimizer == learner:
+        return first, first
+    if isinstance(optimizer, str):
+        return first, choose_model(optimizer, options)
+    return first, optimizer
+
+
+def choose_model(name: str, options: Options) -> Provider:
+    """The provider that a name such as `anthropic:MODEL` stands for.
+
+    Raises:
+        ProviderError: The name is unknown, or something is missing that it needs.
+    """
+    kind, _, words = name.partition(":")
+    if kind in OWN:
+        make: Make = resolve_name(OWN[kind])
+        return make(words, options)
+    others = {point.name: point for point in entry_points(group=GROUP)}
+    if kind in others:
+        return _load(others[kind])(words, options)
+    near = difflib.get_close_matches(kind, [*OWN, *others], n=1)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    also = "".join(f", {other}:…" for other in sorted(others))
+    raise ProviderError(f"unknown model {name!r}{hint}; known: {FORMS}{also}")
+
+
+def _load(point: EntryPoint) -> Make:
+    try:
+        make: Make = point.load()
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise ProviderError(
+            f"the provider {point.name!r} ({point.value}) cannot be loaded: {reason}"
+        ) from error
+    return make
+
+
+def _check_url(url: str, named: list[str]) -> None:
+    """Refuses an address that cannot be meant, or may hold a secret.
+
+    Raises:
+        ProviderError: With what to do instead.
+    """
+    try:
+        parts = urlsplit(url)
+        usable = parts.scheme in {"http", "https"} and bool(parts.hostname)
+        secret = parts.username is not None or bool(parts.query)
+    except ValueError:
+        usable = secret = False
+    if secret:
+        raise ProviderError(
+            "the base URL must hold no user, password or query: it is kept with the run"
+        )
+    if not usable:
+        raise ProviderError(
+            f"the base URL {url!r} is none; expected one like http://localhost:8000/v1"
+        )
+    kinds = {name.partition(":")[0] for name in named} - OFFLINE
+    if not kinds:
+        raise ProviderError(
+            "--base-url is for anthropic:MODEL and openai:MODEL; no such model is used"
+        )
+    if len(kinds) > 1:
+        raise ProviderError(
+            f"--base-url cannot be for {' and '.join(sorted(kinds))} at once; set "
+            "ANTHROPIC_BASE_URL or OPENAI_BASE_URL for one of them"
+        )

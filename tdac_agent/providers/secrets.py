@@ -1,0 +1,46 @@
+"""Keys are read from the environment, and leave it only in a request's header."""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+
+from tdac_agent.errors import ProviderError
+from tdac_agent.warm import SECRET
+
+SHORTEST_SECRET = 8
+LONGEST_LINE = 300
+
+
+def read_key(variable: str, vendor: str) -> str:
+    """The key in an environment variable.
+
+    Raises:
+        ProviderError: There is none.
+    """
+    key = os.environ.get(variable, "").strip()
+    if not key:
+        raise ProviderError(
+            f"no key for {vendor}: set the environment variable {variable}"
+        )
+    if not key.isascii() or not key.isprintable() or " " in key:
+        raise ProviderError(f"the value of {variable} is no key: it has odd characters")
+    return key
+
+
+def without_secrets(text: str) -> str:
+    """A text in which no value of a variable that looks like a key is left."""
+    for name, value in os.environ.items():
+        secret = value.strip()
+        if SECRET.search(name) and len(secret) >= SHORTEST_SECRET:
+            text = text.replace(secret, f"[{name}]")
+    return text
+
+
+def one_line(text: str) -> str:
+    """A text from elsewhere as one short line, for messages and records."""
+    line = without_secrets(" ".join(text.split()))
+    line = "".join(c for c in line if unicodedata.category(c)[0] != "C")
+    kept = re.sub(r"\s+", " ", line).strip()
+    return kept if len(kept) <= LONGEST_LINE else f"{kept[: LONGEST_LINE - 1]}…"
