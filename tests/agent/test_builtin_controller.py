@@ -149,6 +149,14 @@ def test_clearance_is_exact(module, seed):
     )
 
 
+def test_a_goal_behind_a_wall_is_said_to_be_out_of_reach(module):
+    """The wave that does not get to the start ends, on every lattice."""
+    occ = np.zeros((200, 300), np.bool_)
+    occ[:, 150] = True
+    with pytest.raises(ValueError, match="does not get from"):
+        module.Roadmap(occ, (40.0, 100.0), (250.0, 100.0))
+
+
 def test_run_episode(tmp_path, monkeypatch):
     """What `run_episode` returns is what the environment did."""
     env = Map2DEnv(np.zeros((90, 140), bool), (20, 20, 0), (110, 70), robot_radius=8)
