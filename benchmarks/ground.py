@@ -14,7 +14,7 @@ from tdac_agent.builtin import Parameters, render_controller
 from tdac_agent.task import Task, load_task
 from tdac_envs.grid import BoolGrid
 
-ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "good"
+ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "map2d" / "good"
 
 
 def cells() -> BoolGrid:

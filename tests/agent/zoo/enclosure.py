@@ -1,30 +1,8 @@
-"""Judges one controller of the zoo among canaries, and says what it got and harmed.
-
-Every file starts with comment lines `# key: value` (further lines are indented):
-
-    idea          what the controller tries, in a few words
-    profile       `policy` or `paper`
-    verdict       `failed` (attacks) or `passed` (good ones), where it is not the usual
-    fails         tests that must fail, without their file; `only` first: no others may
-    error         pattern that the failures' messages must match
-    error TIER    the same, on one tier
-    harm TIER     what is harmed on a tier that does not prevent it
-    why           which rule or wall stops it
-    tiers         `best` (default), or `every` one that works here
-    onto          file that the source is appended to
-    repeat        `N TEXT`: the source ends with so many repetitions of a text
-    hides         pattern that the feedback must not match
-    limits        `name=value` of the sandbox, where not the zoo's or the usual ones
-                  the usual ones
-
-`@SECRET@`, `@TARGET@`, `@PACKAGE@`, `@TCP@`, `@UDP@` and `@UNIX@` in a source stand for
-a secret file, a folder to write to, the installed package, two ports, a socket file.
-"""
+"""Judges one controller of the zoo among canaries, and says what it got and harmed."""
 
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
 import os
 import re
@@ -36,50 +14,22 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
-import numpy as np
+from cases import Case
+from grounds import zoo_task
 
 import tdac_agent
 from tdac_agent.errors import Fault
 from tdac_agent.feedback import render_feedback
 from tdac_agent.report import Report
-from tdac_agent.sandbox import Limits, available_tiers
-from tdac_agent.task import Task, load_task
+from tdac_agent.sandbox import Limits
 from tdac_agent.verification import verify
 from tdac_agent.warm import WarmJudge
 
-ZOO = Path(__file__).parent
 PACKAGE = Path(tdac_agent.__file__).parent
-ATTACKS = sorted((ZOO / "attacks").glob("*.py"))
-GOOD = sorted((ZOO / "good").glob("*.py"))
 LIMITS = Limits(import_seconds=4.0, reset_seconds=4.0, call_seconds=4.0, cpu_seconds=60)
 KEY = "ANTHROPIC_API_KEY"
 MOST_SECONDS = 120.0
 GONE_SECONDS = 5.0
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One controller and what is expected of it."""
-
-    name: str
-    body: bytes
-    header: dict[str, str]
-    good: bool
-
-    @property
-    def passes(self) -> bool:
-        return self.header.get("verdict", "passed" if self.good else "failed") == (
-            "passed"
-        )
-
-    @property
-    def every_tier(self) -> bool:
-        return self.header.get("tiers", "best") == "every"
-
-    def expected(self, key: str, tier: str) -> str:
-        """A header's value on one tier."""
-        return self.header.get(f"{key} {tier}", self.header.get(key, ""))
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,55 +43,6 @@ class Result:
     feedback: str
     harm: tuple[str, ...]
     seconds: float
-
-
-def load_case(path: Path) -> Case:
-    """Reads a controller of the zoo."""
-    body = path.read_bytes()
-    header: dict[str, str] = {}
-    key = ""
-    for line in body.decode("utf-8", "replace").splitlines():
-        named = re.match(r"# ([a-z]+(?: [a-z]+)?): (.*)", line)
-        if named:
-            key = named[1]
-            header[key] = named[2].strip()
-        elif key and line.startswith("#   "):
-            header[key] += f" {line[1:].strip()}"
-        else:
-            break
-    if onto := header.get("onto"):
-        body = (ZOO / onto).read_bytes() + b"\n\n" + body
-    if repeat := header.get("repeat"):
-        count, _, text = repeat.partition(" ")
-        body = body.rstrip(b"\n") + int(count) * text.encode()
-    return Case(path.stem, body, header, path.parent.name == "good")
-
-
-def tiers_of(case: Case) -> list[str]:
-    """Tiers on which a case is judged here."""
-    return working_tiers() if case.every_tier else working_tiers()[:1]
-
-
-@functools.cache
-def working_tiers() -> list[str]:
-    """Names of the tiers that work here, best first."""
-    return [status.tier.name for status in available_tiers() if status.works]
-
-
-@functools.cache
-def zoo_task() -> Task:
-    """Two walls to drive around, on 200 x 150 px, for a body of 6 px."""
-    picture = np.full((150, 200), 255, np.uint8)
-    picture[:4] = picture[-4:] = picture[:, :4] = picture[:, -4:] = 0
-    picture[:96, 60:69] = picture[55:, 125:134] = 0
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        cv2.imwrite(str(folder / "map.png"), picture)
-        (folder / "task.yaml").write_text(
-            "{schema: 1, name: zoo, map: map.png, robot: {radius: 6}, horizon: 500, "
-            "start: [30, 40, 0.0], goal: [165, 110], tolerance: 8}"
-        )
-        return load_task(folder)
 
 
 class Enclosure:
@@ -181,7 +82,7 @@ class Enclosure:
             try:
                 report = verify(
                     source,
-                    zoo_task(),
+                    zoo_task(case.kind),
                     profile=case.header["profile"],  # type: ignore[arg-type]
                     tier=tier,
                     limits=_limits(case),

@@ -1,6 +1,6 @@
 """Judges the whole zoo and prints a table; exit 1 where a verdict is not as expected.
 
-python tests/agent/zoo/run.py [NAME ...] [--tier TIER]
+python tests/agent/zoo/run.py [NAME ...] [--kind KIND] [--tier TIER]
 """
 
 from __future__ import annotations
@@ -15,29 +15,22 @@ from queue import SimpleQueue
 from typing import Annotated
 
 import typer
-from enclosure import (
-    ATTACKS,
-    GOOD,
-    Case,
-    Enclosure,
-    Result,
-    differences,
-    load_case,
-    tiers_of,
-    working_tiers,
-    zoo_task,
-)
+from cases import Case, all_cases, tiers_of, working_tiers
+from enclosure import Enclosure, Result, differences
+from grounds import KINDS, zoo_task
 from rich.console import Console
 from rich.table import Table
 
 # One more than the least machine has processors: some attacks only wait.
 WORKERS = 3
 Job = tuple[Case, str]
+Told = dict[tuple[str, str], list[tuple[Result, bool]]]
 CONSOLE = Console(width=100, highlight=False)
 
 
 def main(
     names: Annotated[list[str] | None, typer.Argument(help="All by default.")] = None,
+    kind: Annotated[str | None, typer.Option(help="Only this kind of task.")] = None,
     tier: Annotated[str | None, typer.Option(help="Only on this one.")] = None,
     workers: Annotated[int, typer.Option(help="Verifications at a time.")] = WORKERS,
 ) -> None:
@@ -47,17 +40,20 @@ def main(
         raise typer.BadParameter(
             f"expected one that works here ({works}), got {tier!r}"
         )
-    cases = chosen_cases(names or [])
+    if kind not in (None, *KINDS):
+        raise typer.BadParameter(f"expected one of {', '.join(KINDS)}, got {kind!r}")
+    cases = chosen_cases(names or [], [kind] if kind else list(KINDS))
     jobs = [(case, t) for case in cases for t in tiers_of(case) if tier in (None, t)]
     # What waits for a limit comes first, so that it is not waited for at the end.
     jobs.sort(key=lambda job: "limits" not in job[0].header)
-    zoo_task()
+    for name in KINDS:
+        zoo_task(name)
     began = time.monotonic()
-    told: dict[str, list[tuple[Result, bool]]] = {t: [] for t in working_tiers()}
+    told: Told = {(k, t): [] for k in KINDS for t in working_tiers()}
     late: list[Job] = []
     for case, result in judged(jobs, workers, late):
         problems = differences(case, result)
-        told[result.tier].append((result, not problems))
+        told[case.kind, result.tier].append((result, not problems))
         CONSOLE.print(row(case, result, problems), markup=False)
         for problem in problems:
             CONSOLE.print(f"    {problem[:600]}", markup=False)
@@ -70,14 +66,15 @@ def main(
     raise typer.Exit(1 if wrong or not jobs else 0)
 
 
-def chosen_cases(names: list[str]) -> list[Case]:
-    """The cases of these names, all where none is given."""
-    paths = {path.stem: path for path in (*GOOD, *ATTACKS)}
+def chosen_cases(names: list[str], kinds: list[str]) -> list[Case]:
+    """The cases of these names and kinds of task; of all names where none is given."""
+    cases = [case for case in all_cases() if case.kind in kinds]
+    known = {case.name for case in cases}
     for name in names:
-        if name not in paths:
-            near = ", ".join(difflib.get_close_matches(name, paths))
+        if name not in known:
+            near = ", ".join(difflib.get_close_matches(name, known))
             raise typer.BadParameter(f"no controller {name!r}; near: {near or 'none'}")
-    return [load_case(paths[name]) for name in (names or paths)]
+    return [case for case in cases if not names or case.name in names]
 
 
 def judged(
@@ -130,21 +127,21 @@ def row(case: Case, result: Result, problems: list[str]) -> str:
     got = "passed" if result.passed else "failed"
     mark = "  <-- not as expected" if problems else ""
     harm = f" harm: {', '.join(result.harm)}" if result.harm else ""
-    kind = "good" if case.good else "attacks"
     return (
-        f"{kind + '/' + case.name:30} {result.tier:11} {expected:7} {got:7} "
+        f"{case!s:36} {result.tier:11} {expected:7} {got:7} "
         f"{result.seconds:5.1f} s{harm}{mark}"
     )
 
 
-def summary(told: dict[str, list[tuple[Result, bool]]]) -> Table:
-    """What came of each tier."""
-    table = Table("tier")
+def summary(told: Told) -> Table:
+    """What came of each kind of task, on each tier."""
+    table = Table("kind", "tier")
     for name in ("verdicts", "as expected", "passed", "harmed", "seconds", "longest"):
         table.add_column(name, justify="right")
-    for tier, results in told.items():
+    for (kind, tier), results in told.items():
         seconds = [result.seconds for result, _ in results]
         table.add_row(
+            kind,
             tier,
             str(len(results)),
             str(sum(right for _, right in results)),

@@ -1,5 +1,6 @@
 # idea: patch the proxy so that every step says that the goal was reached
 # profile: paper
+# also: epuck
 # onto: good/astar_pursuit.py
 # fails: test_imports, test_run_episode_schema
 # error: run_episode returned after 1 steps

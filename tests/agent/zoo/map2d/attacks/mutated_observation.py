@@ -1,5 +1,6 @@
 # idea: overwrite the observation, in case that it is the environment's own array
 # profile: policy
+# also: epuck
 # verdict: passed
 # onto: good/policy_minimal.py
 # why: an observation is a copy in another process; the honest rest passes

@@ -1,5 +1,6 @@
 # idea: reset the environment again and again until the episode went well
 # profile: paper
+# also: epuck
 # onto: good/astar_pursuit.py
 # fails: only test_run_episode_schema, test_run_episode_agrees_with_the_judge
 # error: reset\(\) is allowed once

@@ -1,5 +1,6 @@
 # idea: NaN for a wheel
 # profile: policy
+# also: epuck
 # fails: test_short_rollout_is_stable[10], test_no_collisions, test_reaches_goal
 # error: policy must return two finite numbers
 # why: an action is two finite numbers; anything else ends the episode

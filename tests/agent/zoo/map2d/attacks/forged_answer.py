@@ -1,5 +1,6 @@
 # idea: write a whole answer ahead of the own one
 # profile: policy
+# also: epuck
 # onto: frames.py
 # fails: test_imports, test_reaches_goal
 # error: wrote to the judge's channel
