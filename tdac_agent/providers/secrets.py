@@ -13,20 +13,20 @@ SHORTEST_SECRET = 8
 LONGEST_LINE = 300
 
 
-def read_key(variable: str, vendor: str) -> str:
-    """The key in an environment variable.
+def read_key(variable: str, vendor: str, *, needed: bool) -> str:
+    """The key in an environment variable; a word in its place where none is needed.
 
     Raises:
         ProviderError: There is none.
     """
     key = os.environ.get(variable, "").strip()
-    if not key:
+    if not key and needed:
         raise ProviderError(
             f"no key for {vendor}: set the environment variable {variable}"
         )
     if not key.isascii() or not key.isprintable() or " " in key:
         raise ProviderError(f"the value of {variable} is no key: it has odd characters")
-    return key
+    return key or "none"
 
 
 def without_secrets(text: str) -> str:

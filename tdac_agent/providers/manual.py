@@ -1,0 +1,87 @@
+"""`manual:DIR`: a person, or anything else that reads and writes files."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+import time
+from pathlib import Path
+
+from tdac_agent.errors import ProviderError
+from tdac_agent.files import write_atomic
+from tdac_agent.provider import PermanentFault, Reply, Request
+from tdac_agent.providers.choice import Options
+
+POLL_SECONDS = 0.5
+
+
+def make(words: str, options: Options) -> Manual:
+    """A folder in which somebody answers.
+
+    Raises:
+        ProviderError: It is not named, or cannot be made.
+    """
+    del options
+    if not words:
+        raise ProviderError("which folder? As in manual:questions")
+    folder = Path(words)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ProviderError(f"cannot make {folder}: {error.strerror}") from error
+    return Manual(folder)
+
+
+class Manual:
+    """A provider; see `Provider`. It waits for `NNN.reply.md` without end.
+
+    A question that is already in the folder, and was not put since this provider was
+    made, keeps its number: a run that is started again finds what was answered before.
+
+    Args:
+        folder: Where questions are put.
+        poll: Seconds between two looks for an answer.
+    """
+
+    paid = True
+
+    def __init__(self, folder: Path, poll: float = POLL_SECONDS) -> None:
+        self.name = f"manual:{folder}"
+        self._folder = folder
+        self._poll = poll
+        self._put: set[int] = set()
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`."""
+        try:
+            number = self._number(request.prompt)
+            self._put.add(number)
+            return Reply(self._wait(number))
+        except OSError as error:
+            raise PermanentFault(f"{error.filename}: {error.strerror}") from None
+
+    def _number(self, prompt: str) -> int:
+        """The number of a question; it is written down where it is a new one."""
+        question = prompt.encode("utf-8", "surrogatepass")
+        for number in itertools.count(1):
+            path = self._folder / f"{number:03}.prompt.md"
+            if not path.exists():
+                write_atomic(path, question)
+                return number
+            if number not in self._put and path.read_bytes() == question:
+                return number
+        raise AssertionError("unreachable")
+
+    def _wait(self, number: int) -> str:
+        """The text of an answer, once it is there and no longer grows."""
+        path = self._folder / f"{number:03}.reply.md"
+        question = self._folder / f"{number:03}.prompt.md"
+        before = None
+        if not path.exists():
+            print(f"waiting: answer {question} in {path}", file=sys.stderr)
+        while True:
+            now = path.read_bytes() if path.exists() else b""
+            if now.strip() and now == before:
+                return now.decode("utf-8", "replace")
+            before = now
+            time.sleep(self._poll)
