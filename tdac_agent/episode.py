@@ -16,8 +16,9 @@ from tdac_agent.sandbox import (
     ControllerTimeout,
     EnvRefusalError,
 )
-from tdac_agent.setting import JudgedEnv, Observation
+from tdac_agent.setting import JudgedEnv
 from tdac_agent.trajectory import Outcome, Rollout, Trajectory
+from tdac_envs.driven import Observation
 from tdac_envs.task2d import Pose
 
 # A policy is cut off when its mean call is this many times too slow.

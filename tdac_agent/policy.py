@@ -13,7 +13,7 @@ from tdac_agent.episode import as_wheels, wrong_action
 from tdac_agent.sandbox import Child, start
 from tdac_agent.task import Task, write_workdir
 from tdac_agent.verification import read_source
-from tdac_envs.map2d import Observation
+from tdac_envs.driven import Observation
 
 
 class Policy:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -19,14 +17,13 @@ from tdac_envs.arguments import (
     not_negative,
     one_of,
     positive,
-    wheel_command,
     whole_number,
 )
+from tdac_envs.driven import DrivenEnv, Observation, Outcome
 from tdac_envs.errors import TaskError
 from tdac_envs.kernels import GOAL_X, GOAL_Y, drive, sense
 from tdac_envs.params import RobotParams
-from tdac_envs.render import Scene, Status, ending
-from tdac_envs.rewards import RewardWeights, step_reward
+from tdac_envs.render import Scene, Status
 from tdac_envs.source2d import MapSource, prepare
 from tdac_envs.task2d import (
     Map2DTask,
@@ -38,14 +35,10 @@ from tdac_envs.task2d import (
     random_task,
 )
 
-if TYPE_CHECKING:
-    from tdac_envs.window import Window
-
-Observation = dict[str, NDArray[np.float32]]
 VARIATIONS = ("nominal", "jitter", "random")
 
 
-class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
+class Map2DEnv(DrivenEnv):
     """A disc-shaped robot drives over a map image to a goal and touches nothing.
 
     ## Description
@@ -119,6 +112,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
     * v0: first version.
     """
 
+    title = "TDAC-Map2D-v0"
     metadata: dict[str, Any] = {  # noqa: RUF012 - as declared by gym.Env
         "render_modes": ["rgb_array", "human"],
         "render_fps": 20,
@@ -150,9 +144,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         snap: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        one_of("on_collision", on_collision, ("terminate", "block"))
         one_of("variation", variation, VARIATIONS)
-        one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         prepared = prepare(
             map, start, goal, heading=heading, robot_radius=robot_radius, snap=snap
         )
@@ -178,31 +170,28 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         )
         self.params = params
         self.task = self.nominal
-        self.on_collision = on_collision
+        super().__init__(
+            on_collision=on_collision,
+            wheel_slip=wheel_slip,
+            motor_lag=motor_lag,
+            delay=delay,
+            full_step=robot.max_wheel_speed * self.nominal.dt,
+            dt=self.nominal.dt,
+            render_mode=render_mode,
+        )
         self.variation = variation
         self.range_noise = not_negative("range_noise", range_noise)
-        self.wheel_slip = not_negative("wheel_slip", wheel_slip)
-        self.motor_lag = not_negative("motor_lag", motor_lag)
-        self.delay = whole_number("delay", delay, 0)
-        self.weights = RewardWeights()
-        self.render_mode = render_mode
-        fps = max(round(1.0 / self.nominal.dt), 1)
-        self.metadata = {**self.metadata, "render_fps": fps}
         space = observation_space(self.nominal)
         self.observation_space = space  # type: ignore[assignment]
-        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self._fixed_horizon = horizon is not None
-        self._full_step = robot.max_wheel_speed * self.nominal.dt
         self._constants = _constants(self.nominal, self.motor_lag)
         self._state = np.zeros(4)
         self._pose = np.zeros(3, np.float32)
         self._wheel_speeds = np.zeros(2, np.float32)
         self._ranges = np.zeros(robot.n_rays, np.float32)
-        self._command = np.array([0.0, 0.0, 1.0, 1.0])
         self._outcome = np.zeros(5)
         self._drive: Callable[[], None] | None = None
         self._scene: Scene | None = None
-        self._window: Window | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -220,11 +209,7 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._state[:] = *task.start, task.shortest
         self._goal = np.array(task.goal, np.float32)
         self._wheel_speeds[:] = 0.0
-        self._queue = deque([(0.0, 0.0)] * self.delay)
-        self._steps = self._collisions = self._clipped = 0
-        self._remaining = task.shortest
-        self._trail = [task.start[:2]]
-        self._status = ""
+        self._begin(task.start[:2], task.shortest, task.horizon)
         self._scene = None
         terrain = task.terrain
         sense(
@@ -242,62 +227,19 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
             self.render()
         return self._observation(), info
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Applies wheel speeds for one `dt`.
-
-        Raises:
-            ValueError: The action is not two finite numbers.
-        """
-        self._command[0], self._command[1] = self._wanted(action)
-        if self.wheel_slip:
-            self._command[2:] = self.np_random.normal(1.0, self.wheel_slip, 2)
-        if self._drive is None:
-            self._drive = self._bound()
-        self._drive()
-        touched, arrived, remaining, gap, room = self._outcome.tolist()
-        collided, reached = touched == 1.0, arrived == 1.0
-        task = self.task
-        self._steps += 1
-        self._collisions += collided
-        progress = (self._remaining - remaining) / self._full_step
-        self._remaining = remaining
-        terminated = reached or (collided and self.on_collision == "terminate")
-        truncated = not terminated and self._steps >= task.horizon
-        if self.render_mode is not None:
-            self._note(reached, collided, truncated)
-        reward = step_reward(self.weights, progress, reached, collided)
-        info = self._info(reached, collided, gap, room)
-        return self._observation(), reward, terminated, truncated, info
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """The current frame, uint8 (height, width, 3), or None in a window."""
-        if self.render_mode is None:
-            gym.logger.warn("render() needs gym.make(..., render_mode='rgb_array')")
-            return None
-        frame = self._frame()
-        if self.render_mode == "rgb_array":
-            return frame
-        if self._window is None:
-            from tdac_envs.window import Window
-
-            self._window = Window("TDAC-Map2D-v0", self.metadata["render_fps"])
-        self._window.show(frame)
-        return None
-
     def pose(self) -> NDArray[np.float64]:
         """The true pose, shape (3,): x, y (px), heading (rad)."""
         return self._state[:3].copy()
 
-    def close(self) -> None:
-        """Closes the window, if there is one."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
-
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_drive": None}
+
+    def _moved(self) -> Outcome:
+        if self._drive is None:
+            self._drive = self._bound()
+        self._drive()
+        touched, arrived, remaining, gap, room = self._outcome.tolist()
+        return touched == 1.0, arrived == 1.0, remaining, gap, room
 
     def _bound(self) -> Callable[[], None]:
         """`drive` on this environment's own arrays."""
@@ -340,15 +282,6 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
         steps = default_horizon(drawn.shortest, drawn.robot, drawn.dt)
         return replace(drawn, horizon=steps)
 
-    def _wanted(self, action: Any) -> tuple[float, float]:
-        """The wheel speeds of an action, clipped and delayed."""
-        wheels, clipped = wheel_command(action)
-        self._clipped += clipped
-        if self.delay:
-            self._queue.append(wheels)
-            wheels = self._queue.popleft()
-        return wheels
-
     def _observation(self) -> Observation:
         ranges = self._ranges.copy()
         if self.range_noise:
@@ -361,25 +294,6 @@ class Map2DEnv(gym.Env[Observation, NDArray[np.float32]]):
             "wheel_speeds": self._wheel_speeds.copy(),
             "ranges": ranges,
         }
-
-    def _info(
-        self, reached: bool, collided: bool, gap: float, room: float
-    ) -> dict[str, Any]:
-        return {
-            "is_success": reached,
-            "collision": collided,
-            "collisions": self._collisions,
-            "clipped": self._clipped,
-            "distance_to_goal": gap,
-            "path_distance": self._remaining,
-            "clearance": room,
-        }
-
-    def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
-        self._trail.append((float(self._state[0]), float(self._state[1])))
-        self._status = ending(reached, collided, truncated) or self._status
-        if self.render_mode == "human":
-            self.render()
 
     def _frame(self) -> NDArray[np.uint8]:
         task = self.task

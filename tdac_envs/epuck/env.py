@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -18,10 +16,9 @@ from tdac_envs.arguments import (
     finite_numbers,
     not_negative,
     one_of,
-    wheel_command,
-    whole_number,
 )
 from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.driven import DrivenEnv, Observation, Outcome
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, sense_ground
@@ -34,19 +31,16 @@ from tdac_envs.epuck.task import (
     make_task,
     random_task,
 )
-from tdac_envs.render import Status, ending
-from tdac_envs.rewards import RewardWeights, step_reward
+from tdac_envs.render import Status
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
-    from tdac_envs.window import Window
 
-Observation = dict[str, NDArray[np.float32]]
 VARIATIONS = ("nominal", "jitter", "random")
 _MOST_TURNED = 1e4
 
 
-class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
+class EPuckEnv(DrivenEnv):
     """An e-puck drives through a Webots world to a goal and touches nothing.
 
     ## Description
@@ -129,6 +123,7 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
     * v0: first version.
     """
 
+    title = "TDAC-EPuck-v0"
     metadata: dict[str, Any] = {  # noqa: RUF012 - as declared by gym.Env
         "render_modes": ["rgb_array", "human"],
         "render_fps": 31,
@@ -159,10 +154,8 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
         compass: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        one_of("on_collision", on_collision, ("terminate", "block"))
         one_of("variation", variation, VARIATIONS)
         one_of("reflectance", reflectance, ("ideal", "webots"))
-        one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         opened = open_world(world, start, goal, ignore)
         assert opened.goal is not None
         robot = opened.robot
@@ -179,23 +172,23 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
             horizon=horizon,
         )
         self.task = self.nominal
-        self.on_collision = on_collision
+        super().__init__(
+            on_collision=on_collision,
+            wheel_slip=wheel_slip,
+            motor_lag=motor_lag,
+            delay=delay,
+            full_step=self.nominal.full_step,
+            dt=self.nominal.dt,
+            render_mode=render_mode,
+        )
         self.variation = variation
         self.sensor_noise = not_negative("sensor_noise", sensor_noise)
-        self.wheel_slip = not_negative("wheel_slip", wheel_slip)
-        self.motor_lag = not_negative("motor_lag", motor_lag)
-        self.delay = whole_number("delay", delay, 0)
         self.ground_sensors = bool(ground_sensors)
         self.gps, self.compass = bool(gps), bool(compass)
-        self.weights = RewardWeights()
-        self.render_mode = render_mode
-        fps = max(round(1.0 / self.nominal.dt), 1)
-        self.metadata = {**self.metadata, "render_fps": fps}
         space = observation_space(
             self.nominal, ground=self.ground_sensors, gps=self.gps, compass=self.compass
         )
         self.observation_space = space  # type: ignore[assignment]
-        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self._fixed_horizon = horizon is not None
         self._visible = ground.visible(reflectance == "webots", bool(goal_visible))
         self._pushes = on_collision == "block" and len(ground.masses) > 0
@@ -210,13 +203,11 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._wheel_speeds = np.zeros(2, np.float32)
         self._readings = np.zeros(N_SENSORS, np.float32)
         self._hits = np.zeros((N_SENSORS, 3))
-        self._command = np.array([0.0, 0.0, 1.0, 1.0])
         self._outcome = np.zeros(7)
         self._drive: Callable[[], None]
         self._observe: Callable[[], None]
         self._is_bound = False
         self._scene: EPuckScene | None = None
-        self._window: Window | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -238,11 +229,7 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
             self._things[:] = 0.0
             self._things[:, :2] = task.ground.centres
             self._carry()
-        self._queue = deque([(0.0, 0.0)] * self.delay)
-        self._steps = self._collisions = self._clipped = 0
-        self._remaining = task.shortest
-        self._trail = [task.start[:2]]
-        self._status = ""
+        self._begin(task.start[:2], task.shortest, task.horizon)
         self._scene = None
         self._bind()
         self._observe()
@@ -251,52 +238,6 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
         if self.render_mode == "human":
             self.render()
         return self._observation(), info
-
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Applies wheel speeds for one `dt`.
-
-        Raises:
-            ValueError: The action is not two finite numbers.
-        """
-        self._command[0], self._command[1] = self._wanted(action)
-        if self.wheel_slip:
-            self._command[2:] = self.np_random.normal(1.0, self.wheel_slip, 2)
-        if not self._is_bound:
-            self._bind()
-        if not (self._pushes and self._pushed()):
-            self._drive()
-        self._observe()
-        touched, arrived, remaining, gap, room, *_ = self._outcome.tolist()
-        collided, reached = touched == 1.0, arrived == 1.0
-        task = self.task
-        self._steps += 1
-        self._collisions += collided
-        progress = (self._remaining - remaining) / task.full_step
-        self._remaining = remaining
-        terminated = reached or (collided and self.on_collision == "terminate")
-        truncated = not terminated and self._steps >= task.horizon
-        if self.render_mode is not None:
-            self._note(reached, collided, truncated)
-        reward = step_reward(self.weights, progress, reached, collided)
-        info = self._info(reached, collided, gap, room)
-        return self._observation(), reward, terminated, truncated, info
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """The current frame, uint8 (height, width, 3), or None in a window."""
-        if self.render_mode is None:
-            gym.logger.warn("render() needs gym.make(..., render_mode='rgb_array')")
-            return None
-        frame = self._frame()
-        if self.render_mode == "rgb_array":
-            return frame
-        if self._window is None:
-            from tdac_envs.window import Window
-
-            self._window = Window("TDAC-EPuck-v0", self.metadata["render_fps"])
-        self._window.show(frame)
-        return None
 
     def pose(self) -> NDArray[np.float64]:
         """The true pose, shape (3,): x, y (m), heading (rad)."""
@@ -309,15 +250,18 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
         centres = self.task.ground.centres
         return np.column_stack([centres, np.zeros(len(centres))])
 
-    def close(self) -> None:
-        """Closes the window, if there is one."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
-
     def __getstate__(self) -> dict[str, Any]:
         bound = {"_drive": None, "_observe": None, "_is_bound": False}
         return {**self.__dict__, **bound, "_scene": None}
+
+    def _moved(self) -> Outcome:
+        if not self._is_bound:
+            self._bind()
+        if not (self._pushes and self._pushed()):
+            self._drive()
+        self._observe()
+        touched, arrived, remaining, gap, room, *_ = self._outcome.tolist()
+        return touched == 1.0, arrived == 1.0, remaining, gap, room
 
     def _bind(self) -> None:
         """Ties the kernels to this environment's own arrays."""
@@ -386,15 +330,6 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
             return drawn
         return replace(drawn, horizon=default_horizon(drawn))
 
-    def _wanted(self, action: Any) -> tuple[float, float]:
-        """The wheel speeds of an action, clipped and delayed."""
-        wheels, clipped = wheel_command(action)
-        self._clipped += clipped
-        if self.delay:
-            self._queue.append(wheels)
-            wheels = self._queue.popleft()
-        return wheels
-
     def _observation(self) -> Observation:
         turned = np.clip(self._state[4:], -_MOST_TURNED, _MOST_TURNED)
         observation = {
@@ -430,25 +365,6 @@ class EPuckEnv(gym.Env[Observation, NDArray[np.float32]]):
             seen.points, seen.first, seen.extent, floor, self._state, readings, spreads
         )
         return self._noisy(readings, spreads)
-
-    def _info(
-        self, reached: bool, collided: bool, gap: float, room: float
-    ) -> dict[str, Any]:
-        return {
-            "is_success": reached,
-            "collision": collided,
-            "collisions": self._collisions,
-            "clipped": self._clipped,
-            "distance_to_goal": gap,
-            "path_distance": self._remaining,
-            "clearance": room,
-        }
-
-    def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
-        self._trail.append((float(self._state[0]), float(self._state[1])))
-        self._status = ending(reached, collided, truncated)
-        if self.render_mode == "human":
-            self.render()
 
     def _frame(self) -> NDArray[np.uint8]:
         from tdac_envs.epuck.picture import EPuckScene
