@@ -15,14 +15,17 @@ from typing import Annotated, Any, Literal, NoReturn, Optional
 import typer
 
 from tdac_agent.commands.options import (
+    BaseUrl,
     Delay,
     Goal,
     Heading,
     Ignore,
     Json,
+    Learner,
     MapOption,
     Metres,
     MotorLag,
+    Optimizer,
     Profile,
     Radius,
     RangeNoise,
@@ -110,7 +113,8 @@ def world_command(
 
 @app.command(
     epilog="Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 "
-    "--goal 178 386 --robot-radius 12`"
+    "--goal 178 386 --robot-radius 12`; "
+    "`tdac synth --learner anthropic:claude-sonnet-5-5`"
 )
 def synth(
     task: TaskOption = None,
@@ -137,13 +141,9 @@ def synth(
     ] = None,
     k: Annotated[int, typer.Option("-K", min=1, help="Iterations at most.")] = 20,
     j: Annotated[int, typer.Option("-J", min=0, help="Edits per iteration.")] = 1,
-    learner: Annotated[
-        str, typer.Option(help="Who writes: `builtin` is a template, no model.")
-    ] = "builtin",
-    optimizer: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(help="Who repairs.  [default: the learner]"),
-    ] = None,
+    learner: Learner = "builtin",
+    optimizer: Optimizer = None,
+    base_url: BaseUrl = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--out", help="Run folder.  [default: runs/TASK-N]"),
@@ -159,7 +159,7 @@ def synth(
         snap, metres, instructions,
     )  # fmt: skip
     raise typer.Exit(
-        command.run(spec, from_, k, j, learner, optimizer, out, seed, as_json)
+        command.run(spec, from_, k, j, learner, optimizer, base_url, out, seed, as_json)
     )
 
 

@@ -68,6 +68,34 @@ Profile = Annotated[
     Optional[Literal["policy", "paper"]],  # noqa: UP045
     typer.Option(help="What the file must define.  [default: the task's own]"),
 ]
+MODELS = "Models"
+Learner = Annotated[
+    str,
+    typer.Option(
+        metavar="MODEL",
+        help="Who writes: `builtin` (a template, no model), `anthropic:MODEL`, "
+        "`openai:MODEL`, `command:PROGRAM`, `manual:DIR` or `replay:RUN`.",
+        rich_help_panel=MODELS,
+    ),
+]
+Optimizer = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        metavar="MODEL",
+        help="Who edits what failed and writes rules.  [default: the learner]",
+        rich_help_panel=MODELS,
+    ),
+]
+BaseUrl = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--base-url",
+        metavar="URL",
+        help="Server of the `openai:` or `anthropic:` models: vLLM, Ollama, LM Studio, "
+        "as in http://localhost:8000/v1.",
+        rich_help_panel=MODELS,
+    ),
+]
 DISTURBED = "Disturbance of --robust, and of play --seed"
 RangeNoise = Annotated[
     Optional[float],  # noqa: UP045

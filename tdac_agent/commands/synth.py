@@ -14,7 +14,7 @@ from rich.spinner import Spinner
 from rich.table import Table
 
 from tdac_agent.commands.flags import TaskFlags
-from tdac_agent.errors import ControllerFileError
+from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.records import Run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
@@ -59,7 +59,11 @@ class Progress:
             verb = {"generate": "writing", "edit": "editing"}.get(
                 record["kind"], "writing rules from the failures of"
             )
-            self._spinner.update(text=f"{at}  {verb} controller.py")
+            self._spinner.update(
+                text=f"{at}  {verb} controller.py: {escape(record['model'])}"
+            )
+        elif kind == "call.fault":
+            self._print_fault(at, record)
         elif kind == "call.reply":
             for note in record["notes"]:
                 self._console.print(f"  [dim]{at}  {escape(note)}[/]")
@@ -67,6 +71,12 @@ class Progress:
             self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
         elif kind == "verify.end":
             self._print_attempt(at, record)
+
+    def _print_fault(self, at: str, record: dict[str, Any]) -> None:
+        wait = record["wait"]
+        then = "given up" if wait is None else f"asking again in {wait:.0f} s"
+        told = f"{record['fault']} fault: {record['reason']}; {then}"
+        self._console.print(f"  [yellow]{at}  {escape(told)}[/]")
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         if record["passed"]:
@@ -89,6 +99,7 @@ def run(
     j: int,
     learner: str,
     optimizer: str | None,
+    base_url: str | None,
     out: Path | None,
     seed: int,
     as_json: bool,
@@ -100,7 +111,7 @@ def run(
         task = flags.load()
     folder = out if out is not None else _next_folder(task.name)
     try:
-        with Progress(console, _heading(task, learner)) as progress:
+        with Progress(console, _heading(task, learner, optimizer)) as progress:
             result = synthesize(
                 task,
                 learner,
@@ -110,10 +121,14 @@ def run(
                 patience=j,
                 seed=seed,
                 start_from=source,
+                base_url=base_url,
                 on_event=progress,
             )
     except KeyboardInterrupt:
-        console.print(f"interrupted; the run so far is in {folder}")
+        console.print(f"interrupted; the run so far is in {folder}", soft_wrap=True)
+        raise
+    except Fault:
+        console.print(f"the run so far is in {folder}", soft_wrap=True)
         raise
     if as_json:
         sys.stdout.write(result.model_dump_json(indent=2) + "\n")
@@ -136,10 +151,12 @@ def read_text(path: Path) -> str:
         ) from error
 
 
-def _heading(task: Task, learner: str) -> str:
+def _heading(task: Task, learner: str, optimizer: str | None) -> str:
     nominal, units = task.nominal, task.setting.units
     radius = units.scale * nominal.body_radius
     model = " (a tuned template, no language model)" if learner == "builtin" else ""
+    if optimizer not in (None, learner):
+        model += f", optimizer [bold]{escape(str(optimizer))}[/]"
     return (
         f"task [bold]{escape(task.name)}[/]: {units.told(nominal.shortest)} for a disc "
         f"of {radius:g} {units.length}, at most {nominal.horizon} steps; learner "

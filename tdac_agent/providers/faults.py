@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -60,29 +59,25 @@ def _told(body: object) -> tuple[set[str], str]:
 
 
 def _message(
-    error: Exception,
-    status: int,
-    words: set[str],
-    told: str,
-    headers: Headers,
+    error: Exception, status: int, words: set[str], told: str, headers: Headers
 ) -> str:
     """One line: status, words, message, and by what name the vendor knows the call."""
     number = "" if status == 200 else str(status)
-    kind = type(error).__name__
-    if isinstance(error, json.JSONDecodeError):
-        told = "the answer is no JSON"
-    elif not (words or number):
-        told = told or f"{kind}: {error or 'no details'}{_cause(error)}"
-    parts = [number, " ".join(sorted(words)), told or (kind if number else "")]
+    if not (words or number):
+        told = told or _plain(error)
+    parts = [number, " ".join(sorted(words)), told or type(error).__name__]
+    line = ": ".join(part for part in parts if part)
     request_id = headers.get("request-id") or headers.get("x-request-id")
-    name = f" (request {request_id})" if request_id else ""
-    return one_line(": ".join(part for part in parts if part)) + one_line(name)
+    return one_line(f"{line} (request {request_id})" if request_id else line)
 
 
-def _cause(error: Exception) -> str:
-    """What lies behind `Connection error.`, say."""
-    cause = error.__cause__
-    return "" if cause is None or not str(cause) else f" ({cause})"
+def _plain(error: Exception) -> str:
+    """An error that is not of the server's making: the innermost reason is the best."""
+    reason = error
+    while isinstance(reason.__cause__, Exception) and str(reason.__cause__):
+        reason = reason.__cause__
+    name, text = type(error).__name__, str(reason)
+    return f"{name}: {text}" if text else name
 
 
 def retry_after(headers: Headers, now: datetime | None = None) -> float | None:
@@ -137,10 +132,5 @@ def as_faults(known: tuple[type[Exception], ...]) -> Generator[None]:
     except known as error:
         raise fault_of(error) from None
     except malformed as error:
-        raise fault_of(_malformed(error)) from None
-
-
-def _malformed(error: Exception) -> Exception:
-    if isinstance(error, json.JSONDecodeError):
-        return error
-    return ValueError(f"malformed answer ({type(error).__name__}: {error})")
+        reason = one_line(f"malformed answer ({type(error).__name__}: {error})")
+        raise ProviderFault(reason) from None
