@@ -6,16 +6,21 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from tdac_agent.calls import ask
-from tdac_agent.extract import extract_source
-from tdac_agent.prompt import generate_prompt, repair_prompt
+from tdac_agent.extract import Answer, read_answer
+from tdac_agent.feedback import tell_attempt
+from tdac_agent.prompt import FULL, PromptTemplate, generate_prompt, repair_prompt
 from tdac_agent.provider import MAX_OUTPUT_TOKENS, Kind, Provider, Reply, Request
 from tdac_agent.records import Recorder
 from tdac_agent.report import Report
 from tdac_agent.retry import RetryPolicy
-from tdac_agent.rules import BEGIN, RepairRule, add_rules, parse_rules
+from tdac_agent.rule_answer import RuleAnswerError, apply, parse_operations
+from tdac_agent.rules import BEGIN, RuleBook
 from tdac_agent.task import Task
 
 MAX_ASKS = 3
+MAX_EARLIER = 12
+_AGAIN = "\n## Your last answer could not be used\nThe reason: "
+_ENDED = {"length": "it was cut off at its end", "refusal": "it was refused"}
 
 
 class Candidate(NamedTuple):
@@ -34,26 +39,30 @@ class Dialogue:
         learner: Generates controllers.
         optimizer: Edits them and writes rules.
         recorder: Keeps every question and answer.
-        rules: Rules in force.
+        book: Rules of this run, in force and ended.
         retry: How patiently a model is asked.
+        template: Of the question for a new controller.
+        earlier: The attempts so far, a line each.
     """
 
     task: Task
     learner: Provider
     optimizer: Provider
     recorder: Recorder
-    rules: tuple[RepairRule, ...] = ()
+    book: RuleBook = field(default_factory=RuleBook)
     retry: RetryPolicy = field(default_factory=RetryPolicy)
+    template: PromptTemplate = FULL
+    earlier: tuple[str, ...] = ()
+    _failed: int = 0
 
     def generate(self, k: int) -> Candidate:
         """A new controller under the rules in force."""
-        prompt = generate_prompt(self.task, self.rules)
         request = Request(
             "generate",
-            prompt,
+            self._question(),
             rules=self._texts(),
             sample=self._at(k, 0),
-            stable=_stable(prompt),
+            stable=_stable(self._question()),
         )
         return self._code(self.learner, request)
 
@@ -63,18 +72,51 @@ class Dialogue:
         return self._code(self.optimizer, request)
 
     def summarise(self, k: int, j: int, source: str, report: Report) -> None:
-        """Adds what is to be learnt from a failure to the rules."""
+        """Has the rules changed by what is to be learnt from a failure.
+
+        An answer that is malformed is asked for again twice; then the rules stay.
+        """
         request = self._repair("summarise", source, report, self._at(k, j))
-        reply = self._ask(self.optimizer, request)
         evidence = tuple(failure.test for failure in report.failures)
-        self.rules = add_rules(self.rules, parse_rules(reply.text), k, evidence)
-        self.recorder.rules(k, self.rules)
+        for _ in range(MAX_ASKS):
+            reply = self._ask(self.optimizer, request)
+            try:
+                if reply.stop != "end":
+                    raise RuleAnswerError(_ENDED[reply.stop])
+                operations = parse_operations(reply.text)
+            except RuleAnswerError as error:
+                request = _again(request, reply, str(error))
+                continue
+            self.book, notes = apply(self.book, operations, k, evidence)
+            self.recorder.rules(k, self.book, notes)
+            return
+        self.recorder.rules(k, self.book, ("no usable answer: the rules stay",))
+
+    def saw(self, k: int, j: int, report: Report) -> None:
+        """Remembers what came of candidate (k, j), and of the rules behind it."""
+        failed = tuple(failure.test for failure in report.failures)
+        if j == 0 and self.book.in_force:
+            self.book = self.book.observed(failed, self._failed)
+            self.recorder.rules(k, self.book)
+        self._failed = len(failed)
+        if failed:
+            self.earlier = (*self.earlier, tell_attempt(k, j, report))
+
+    def _question(self) -> str:
+        return generate_prompt(self.task, self.book.in_force, self.template)
 
     def _repair(
         self, kind: Kind, source: str, report: Report, sample: tuple[int, int, int]
     ) -> Request:
-        prompt = generate_prompt(self.task, self.rules)
-        question = repair_prompt(kind, prompt, source, report)
+        question = repair_prompt(
+            kind,
+            self._question(),
+            source,
+            report,
+            # The last one is what the question is about.
+            earlier=self.earlier[:-1][-MAX_EARLIER:],
+            rules=self.book.in_force,
+        )
         stable = _stable(question)
         return Request(
             kind, question, source, report, self._texts(), sample, stable=stable
@@ -83,24 +125,24 @@ class Dialogue:
     def _code(self, model: Provider, request: Request) -> Candidate:
         """Asks until a whole answer holds code; a refused one is asked again twice.
 
-        A truncated one is never used, and asked for again with more room.
+        The question is then put with what was wrong; a truncated answer is never used,
+        and asked for again with more room.
         """
         notes: tuple[str, ...] = ()
         for _ in range(MAX_ASKS):
             reply = self._ask(model, request)
             notes = reply.notes
-            source = extract_source(reply.text) if reply.stop == "end" else None
-            if source is not None:
-                return Candidate(source, notes)
-            if reply.stop == "length":
-                request = replace(request, max_tokens=2 * MAX_OUTPUT_TOKENS)
+            answer = _file_in(reply)
+            if answer.source is not None:
+                return Candidate(answer.source, notes)
+            request = _again(request, reply, answer.problem)
         return Candidate(None, notes)
 
     def _ask(self, model: Provider, request: Request) -> Reply:
         return ask(model, request, self.recorder, self.retry)
 
     def _texts(self) -> tuple[str, ...]:
-        return tuple(rule.text for rule in self.rules)
+        return tuple(rule.text for rule in self.book.in_force)
 
     def _at(self, k: int, j: int) -> tuple[int, int, int]:
         return (self.recorder.run.seed, k, j)
@@ -109,3 +151,18 @@ class Dialogue:
 def _stable(prompt: str) -> int:
     """How much of a prompt is the same in all of a run: all before its rules."""
     return max(0, prompt.find(BEGIN))
+
+
+def _file_in(reply: Reply) -> Answer:
+    """The file in a reply; there is none in a truncated or refused one."""
+    if reply.stop != "end":
+        return Answer(None, _ENDED[reply.stop])
+    return read_answer(reply.text, must_define="policy")
+
+
+def _again(request: Request, reply: Reply, problem: str) -> Request:
+    """The same question with what was wrong with the answer; the last word only."""
+    first = request.prompt.partition(_AGAIN)[0]
+    prompt = f"{first}{_AGAIN}{problem}. Give the whole answer anew.\n"
+    room = 2 * MAX_OUTPUT_TOKENS if reply.stop == "length" else request.max_tokens
+    return replace(request, prompt=prompt, max_tokens=room)

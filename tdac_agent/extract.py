@@ -44,20 +44,111 @@ class _Block(NamedTuple):
     source: str | None
 
 
+class Answer(NamedTuple):
+    """The file in an answer, or what is wrong with the answer, for its writer."""
+
+    source: str | None
+    problem: str = ""
+
+
 def extract_source(text: str) -> str | None:
-    """The longest fenced block of Python, or None.
+    """The fenced block of Python with the largest syntax tree, or None.
 
     A fence inside a string of the file does not cut it as long as the longer reading
     still parses. Of a truncated or broken file nothing is used, nor an example that
-    stands in it or beside it: such an answer is to be asked for again.
+    stands in it or beside it: such an answer is to be asked for again. So is one with
+    two files, of which nobody says which is meant.
+    """
+    return read_answer(text).source
+
+
+def read_answer(text: str, must_define: str | None = None) -> Answer:
+    """The file in an answer; see `extract_source`.
+
+    Args:
+        text: The answer.
+        must_define: Name of a function without which a block is not the whole file.
     """
     lines = text.replace("\r\n", "\n").split("\n")
-    blocks = _blocks(lines, _fences(lines))
-    good = [block for block in blocks if block.source is not None]
-    best = max(good, key=lambda block: block.length, default=None)
+    fences = _fences(lines)
+    blocks = _blocks(lines, fences)
+    sizes = {block: _tree_size(block.source) for block in blocks if block.source}
+    best = max(sizes, key=lambda block: (sizes[block], block.length), default=None)
     if best is None or any(_overshadows(block, best) for block in blocks):
-        return None
-    return best.source
+        return Answer(None, _what_is_wrong(lines, fences, blocks))
+    if any(_rivals(block, best, sizes) for block in sizes):
+        return Answer(None, "it has two blocks that may be the file; give only one")
+    source = best.source or ""
+    if must_define is not None and must_define not in _functions(source):
+        wanted = f"has no `def {must_define}` at its top level, so it is not the file"
+        return Answer(None, f"its block of Python {wanted}")
+    return Answer(source)
+
+
+def fenced_blocks(text: str, languages: frozenset[str]) -> list[str]:
+    """Texts of the fenced blocks in some languages, up to the next closing fence."""
+    lines = text.replace("\r\n", "\n").split("\n")
+    found: list[str] = []
+    opening: _Fence | None = None
+    for fence in _fences(lines):
+        if opening is None:
+            opening = fence
+        elif fence.closes(opening):
+            if opening.language in languages:
+                found.append("\n".join(lines[opening.line + 1 : fence.line]))
+            opening = None
+    return found
+
+
+def _tree_size(source: str) -> int:
+    """Nodes of a syntax tree."""
+    with warnings.catch_warnings(action="ignore"):
+        return sum(1 for _ in ast.walk(ast.parse(source)))
+
+
+def _functions(source: str) -> set[str]:
+    """Names of the functions at the top level."""
+    with warnings.catch_warnings(action="ignore"):
+        body = ast.parse(source).body
+    return {node.name for node in body if isinstance(node, ast.FunctionDef)}
+
+
+def _rivals(block: _Block, best: _Block, sizes: dict[_Block, int]) -> bool:
+    """Whether another block may as well be the file: as much of one, and `policy`.
+
+    The longer of two files is as often the one that was taken back.
+    """
+    if block is best or block.source == best.source or 2 * sizes[block] < sizes[best]:
+        return False
+    return "policy" in _functions(block.source or "") & _functions(best.source or "")
+
+
+def _what_is_wrong(lines: list[str], fences: list[_Fence], blocks: list[_Block]) -> str:
+    """Why an answer without a whole file is none."""
+    if not fences:
+        return "it has no fenced block"
+    broken = [b for b in blocks if b.source is None and b.opening.language not in OTHER]
+    if not blocks:
+        return "its last fenced block has no end"
+    if not broken:
+        return "it has no fenced block of Python"
+    worst = max(broken, key=lambda block: block.length)
+    first = worst.opening.line + 1
+    source = _source(lines[first : worst.opening.line + worst.length])
+    return f"its block is not Python: {_why_broken(source)}"
+
+
+def _why_broken(source: str) -> str:
+    """What Python says of a text that it cannot parse, with the line."""
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            ast.parse(source)
+    except SyntaxError as error:
+        line = (error.text or "").strip()[:80]
+        return f"{error.msg} (line {error.lineno}: {line!r})"
+    except (ValueError, RecursionError, MemoryError) as error:
+        return str(error).partition("\n")[0] or type(error).__name__
+    return "there is no statement in it"
 
 
 def _overshadows(broken: _Block, best: _Block) -> bool:

@@ -23,6 +23,7 @@ SAVERS = frozenset(
         *("dump", "open_memmap", "write_text", "write_bytes"),
     ]
 )
+SURFACES = frozenset({"surface", "screen", "window", "map_img", "display"})
 
 
 def forbidden_calls(tree: ast.Module) -> Iterator[str]:
@@ -109,7 +110,7 @@ def surface_indexing(tree: ast.Module) -> Iterator[str]:
     for node in nodes_of(tree):
         if isinstance(node, ast.Subscript):
             name = last_name(node.value)
-            if name in {"surface", "screen", "window", "map_img", "display"}:
+            if name in SURFACES:
                 yield f"line {node.lineno}: {name}[...]"
 
 

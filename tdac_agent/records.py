@@ -7,7 +7,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,11 +18,12 @@ from tdac_agent.files import append_line, write_atomic
 from tdac_agent.provider import Reply, Request
 from tdac_agent.report import Report
 from tdac_agent.retry import Missed
-from tdac_agent.rules import RepairRule
+from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, portable_task_file, write_workdir
 
 Status = Literal["running", "verified", "not verified", "interrupted", "fault"]
 OWN_SUITE = "suite"
+RULES_FILE = "rules.json"
 Event = Callable[[dict[str, Any]], None]
 
 
@@ -132,8 +133,7 @@ class Recorder:
     def asked(self, request: Request, model: str) -> None:
         """Keeps a prompt before it is sent to a model."""
         _, k, j = request.sample
-        path = self._folder(k, j) / f"{request.kind}.prompt.md"
-        write_atomic(path, request.prompt)
+        write_atomic(self._unused(request, "prompt"), request.prompt)
         self.event("call.intent", kind=request.kind, k=k, j=j, model=model)
 
     def missed(self, request: Request, miss: Missed) -> None:
@@ -154,12 +154,7 @@ class Recorder:
     def answered(self, request: Request, reply: Reply) -> None:
         """Keeps an answer as it came, beside earlier ones to the same prompt."""
         _, k, j = request.sample
-        folder = self._folder(k, j)
-        path, number = folder / f"{request.kind}.reply.md", 1
-        while path.exists():
-            number += 1
-            path = folder / f"{request.kind}.reply-{number}.md"
-        write_atomic(path, reply.text)
+        write_atomic(self._unused(request, "reply"), reply.text)
         self.run.tokens_in += reply.tokens_in
         self.run.tokens_out += reply.tokens_out
         self.run.tokens_cached += reply.tokens_cached
@@ -213,9 +208,12 @@ class Recorder:
         self.event("verify.end", **attempt.model_dump(mode="json"))
         self.save()
 
-    def rules(self, k: int, rules: tuple[RepairRule, ...]) -> None:
-        """Keeps the rules in force after an iteration."""
-        self.event("rules", k=k, rules=[asdict(rule) for rule in rules])
+    def rules(self, k: int, book: RuleBook, notes: tuple[str, ...] = ()) -> None:
+        """Keeps the rules of the run, and what changed them in iteration k."""
+        rules = [rule.model_dump(mode="json") for rule in book.in_force]
+        self.event("rules", k=k, rules=rules, notes=list(notes))
+        text = book.model_dump_json(indent=2) + "\n"
+        write_atomic(self.run.folder / RULES_FILE, text)
 
     def finish(self, status: Status, **facts: Any) -> None:
         """Closes the run."""
@@ -229,6 +227,16 @@ class Recorder:
         write_atomic(
             self.run.folder / "run.json", self.run.model_dump_json(indent=2) + "\n"
         )
+
+    def _unused(self, request: Request, what: str) -> Path:
+        """`edit.reply.md`, or `edit.reply-2.md` where that is there already."""
+        _, k, j = request.sample
+        folder = self._folder(k, j)
+        path, number = folder / f"{request.kind}.{what}.md", 1
+        while path.exists():
+            number += 1
+            path = folder / f"{request.kind}.{what}-{number}.md"
+        return path
 
     def _folder(self, k: int, j: int) -> Path:
         folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"

@@ -1,70 +1,175 @@
-"""AUTO_REPAIR_RULES: what failed before, as rules that stay in the prompt."""
+"""AUTO_REPAIR_RULES: what failed before, as rules that stay in the prompt.
+
+A rule is a record: it knows which failures it came from, and what came of the
+controllers that were written under it. Rules that were dropped are remembered, so that
+they do not come back.
+"""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_agent.tokens import estimate_tokens
 
 BEGIN, END = "AUTO_REPAIR_RULES_BEGIN", "AUTO_REPAIR_RULES_END"
 _MARKER = re.compile(f"{BEGIN}|{END}")
-MAX_RULES = 24
 MAX_RULE_CHARS = 200
+MAX_RULE_TOKENS = 800
+"""Of all rules in force together, estimated."""
+SIMILAR = 0.8
+"""Share of common words (Jaccard) from which on two texts are the same rule."""
+
+Scope = Literal["task", "environment", "code"]
+Status = Literal["in force", "dropped", "made room"]
 
 
-@dataclass(frozen=True, slots=True)
-class RepairRule:
-    """One rule.
-
-    Attributes:
-        id: `R1`, `R2` …, never used twice in a run.
-        text: At most 200 characters.
-        born: Iteration k that it comes from.
-        evidence: Tests that had failed.
-    """
-
-    id: str
-    text: str
-    born: int
-    evidence: tuple[str, ...]
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def add_rules(
-    rules: tuple[RepairRule, ...], texts: list[str], k: int, evidence: tuple[str, ...]
-) -> tuple[RepairRule, ...]:
-    """The rules with new ones added: no doubles, and the oldest make room.
+class RepairRule(_Record):
+    """One rule, and its life."""
 
-    Args:
-        rules: Rules in force.
-        texts: Texts of new rules; cut at 200 characters.
-        k: Iteration they come from.
-        evidence: Tests that had failed.
-    """
-    known = {_key(rule.text) for rule in rules}
-    number = max((int(rule.id[1:]) for rule in rules), default=0)
-    added = []
-    for text in texts:
-        clean = " ".join(_MARKER.sub("…", text).split())[:MAX_RULE_CHARS]
-        if clean and _key(clean) not in known:
-            known.add(_key(clean))
-            number += 1
-            added.append(RepairRule(f"R{number}", clean, k, evidence))
-    return (*rules, *added)[-MAX_RULES:]
+    id: str = Field(description="`R1`, `R2` ..., never used twice in a run.")
+    text: str = Field(max_length=MAX_RULE_CHARS)
+    scope: Scope = Field("task", description="Where it holds.")
+    born: int = Field(description="Iteration k that it comes from.")
+    evidence: tuple[str, ...] = Field(description="Tests that had failed.")
+    edits: tuple[str, ...] = Field((), description="`k=3: was ...`, oldest first.")
+    tried: int = Field(0, description="First candidates written under it.")
+    cured: int = Field(0, description="Of these, those that passed its evidence.")
+    worse: int = Field(0, description="Those that failed more tests than before it.")
+    status: Status = "in force"
+    ended: int | None = Field(None, description="Iteration k of its end.")
+    reason: str = Field("", description="Of its end.")
+
+    @property
+    def effect_told(self) -> str:
+        """What came of it, for people and models."""
+        if not self.tried:
+            return "not tried yet"
+        return f"cured {self.cured} of {self.tried}, worse in {self.worse}"
+
+    @property
+    def in_force(self) -> bool:
+        """Whether it stands in the prompt."""
+        return self.status == "in force"
+
+    @property
+    def rejected(self) -> bool:
+        """Whether it may not come back: it was dropped, or did more harm than good."""
+        return self.status == "dropped" or (
+            not self.in_force and self.cured < self.worse
+        )
 
 
-def _key(text: str) -> str:
+class RuleBook(_Record):
+    """`rules.json`: all rules of a run, also those that are no longer in force."""
+
+    schema_version: Literal[1] = 1
+    rules: tuple[RepairRule, ...] = ()
+
+    @property
+    def in_force(self) -> tuple[RepairRule, ...]:
+        """Those that stand in the prompt, oldest first."""
+        return tuple(rule for rule in self.rules if rule.in_force)
+
+    def get(self, name: str) -> RepairRule | None:
+        """The rule in force with an id."""
+        return next((rule for rule in self.in_force if rule.id == name), None)
+
+    def double_of(self, text: str, but: str = "") -> RepairRule | None:
+        """A rule in force, or a rejected one, that says the same.
+
+        Args:
+            text: Of the rule in question.
+            but: Id of a rule that does not count.
+        """
+        same = (
+            rule
+            for rule in self.rules
+            if rule.id != but
+            and (rule.in_force or rule.rejected)
+            and say_the_same(rule.text, text)
+        )
+        return next(same, None)
+
+    def add(
+        self, text: str, scope: Scope, k: int, evidence: tuple[str, ...]
+    ) -> RuleBook:
+        """With one rule more; the text must be clean and no double."""
+        number = max((int(rule.id[1:]) for rule in self.rules), default=0) + 1
+        new = RepairRule(
+            id=f"R{number}", text=text, scope=scope, born=k, evidence=evidence
+        )
+        return self.model_copy(update={"rules": (*self.rules, new)})
+
+    def change(self, name: str, **fields: object) -> RuleBook:
+        """With other fields of one rule."""
+        rules = (
+            rule.model_copy(update=fields) if rule.id == name else rule
+            for rule in self.rules
+        )
+        return self.model_copy(update={"rules": tuple(rules)})
+
+    def bounded(self, k: int) -> RuleBook:
+        """With as many rules in force as fit: the worst make room, then the oldest."""
+        book, newest = self, max((rule.born for rule in self.in_force), default=0)
+        while estimate_tokens(render_block(book.in_force)) > MAX_RULE_TOKENS:
+            rules = book.in_force
+            # What was just learnt has had no chance yet.
+            old = [rule for rule in rules if rule.born < newest] or rules
+            worst = min(old, key=lambda rule: rule.cured - rule.worse)
+            reason = f"{worst.effect_told}; no room for more rules"
+            book = book.change(worst.id, status="made room", ended=k, reason=reason)
+        return book
+
+    def observed(self, failed: tuple[str, ...], before: int) -> RuleBook:
+        """With what came of a first candidate that was written under these rules.
+
+        Args:
+            failed: Tests that it failed.
+            before: How many tests the last candidate of the iteration before failed.
+        """
+        book, now = self, set(failed)
+        for rule in self.in_force:
+            cured = not now.intersection(rule.evidence)
+            book = book.change(
+                rule.id,
+                tried=rule.tried + 1,
+                cured=rule.cured + cured,
+                worse=rule.worse + (len(now) > before),
+            )
+        return book
+
+
+def clean(text: str) -> str:
+    """A rule's text on one line, without what would end the block of rules."""
+    return " ".join(_MARKER.sub("…", text).split())
+
+
+def say_the_same(one: str, other: str) -> bool:
+    """Whether two texts have nearly the same words, and the same numbers."""
+    (words, numbers), (words_2, numbers_2) = _words(one), _words(other)
+    if numbers != numbers_2:
+        return False
+    union = words | words_2
+    return not union or len(words & words_2) / len(union) >= SIMILAR
+
+
+def _words(text: str) -> tuple[set[str], set[str]]:
+    """Words and numbers of a text, however they are spelled."""
     plain = unicodedata.normalize("NFKC", text).casefold()
     # Numbers decide what a rule says, so a decimal point is not punctuation.
-    return " ".join(re.findall(r"[a-z_]+|\d+(?:\.\d+)?", plain))
-
-
-def parse_rules(reply: str) -> list[str]:
-    """Texts of the rules in an answer: its lines that start with `- `."""
-    lines = (line.strip() for line in reply.splitlines())
-    return [line[2:].strip() for line in lines if line.startswith("- ")]
+    numbers = re.findall(r"\d+(?:\.\d+)?", plain)
+    return set(re.findall(r"[^\W\d]+", plain)), set(numbers)
 
 
 def render_block(rules: tuple[RepairRule, ...]) -> str:
     """The block of the prompt that holds the rules."""
-    lines = [f"- {rule.text}" for rule in rules] or ["(none yet)"]
+    lines = [f"- {rule.text} [{rule.id}]" for rule in rules] or ["(none yet)"]
     return "\n".join([f"# === {BEGIN} ===", *lines, f"# === {END} ==="])

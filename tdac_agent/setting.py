@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from gymnasium import Space
 from numpy.typing import NDArray
 
 from tdac_agent.units import Units
@@ -59,6 +60,14 @@ class Nominal(Protocol):
 
 class JudgedEnv(Protocol):
     """An environment whose episodes are judged."""
+
+    @property
+    def observation_space(self) -> Space[Any]:
+        """Of a `Dict` of boxes."""
+
+    @property
+    def action_space(self) -> Space[Any]:
+        """A box for both wheels."""
 
     @property
     def readings(self) -> str:

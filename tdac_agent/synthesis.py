@@ -91,6 +91,7 @@ def synthesize(
                     folder / "controller.py", task, seed=seed, out=folder, judge=judge
                 )
                 recorder.judged(k, j, report, notes)
+                dialogue.saw(k, j, report)
                 if report.passed:
                     return _deliver(recorder, task, k, source, report, folder)
                 if j < patience:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from functools import partial
 from typing import Generic
@@ -85,11 +86,17 @@ class Builtin(Generic[P]):
             notes.append("no parameter answers these failures")
         if request.kind == "summarise":
             rules = write_rules(parameters, changes, bounds, k)
-            return Reply("\n".join(f"- {rule}" for rule in rules), notes=tuple(notes))
+            return Reply(_operations(rules), notes=tuple(notes))
         return Reply(self._file(parameters), notes=tuple(notes))
 
     def _file(self, parameters: P) -> str:
         return f"```python\n{self.render(parameters)}```\n"
+
+
+def _operations(rules: list[str]) -> str:
+    """The answer of an optimizer that adds rules for this task."""
+    operations = [{"op": "add", "scope": "task", "text": rule} for rule in rules]
+    return f"```json\n{json.dumps(operations, indent=1)}\n```\n"
 
 
 def _describe(parameters: P) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from tdac_agent.builtin.parameters import P, Tuned, about, changed, names_of
 from tdac_agent.builtin.remedies import MARGIN, Bounds, remedies_for
 from tdac_agent.report import Cause, Report
+from tdac_agent.rules import MAX_RULE_CHARS
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +103,8 @@ def write_rules(
 ) -> list[str]:
     """Rules that lead to these parameters, for a person and for `read_rules`.
 
-    They read `set LOOKAHEAD = 60 px (k = 1: collision in test_no_collisions)` and
-    `keep INFLATION_MARGIN > 2 px (k = 1: collision)`. All that is not neutral is said
-    again, so that older rules may be forgotten.
+    They read `set LOOKAHEAD = 60 px; keep INFLATION_MARGIN > 2 px (k = 1: collision)`.
+    All that is not neutral is said again, so that older rules may be forgotten.
 
     Args:
         parameters: What the next controller shall have.
@@ -112,22 +112,31 @@ def write_rules(
         bounds: Margins known to fail.
         iteration: k, which also keeps a rule from being taken for an older one.
     """
-    reasons = {change.name: f"{change.cause} in {change.test}" for change in changes}
+    causes = {change.name: change.cause for change in changes}
     kind = type(parameters)
-    neutral, rules = kind(), []
+    neutral, said = kind(), list[str]()
     for name in names_of(kind):
         value = getattr(parameters, name)
-        if value != getattr(neutral, name) or name in reasons:
-            reason = reasons.get(name, "as before")
-            told = _say(kind, "set", name, "=", value)
-            rules.append(f"{told} (k = {iteration}: {reason})")
+        if value != getattr(neutral, name) or name in causes:
+            said.append(_say(kind, "set", name, "=", value))
     if bounds.above > 0.0:
-        told = _say(kind, "keep", MARGIN, ">", bounds.above)
-        rules.append(f"{told} (k = {iteration}: collision)")
+        said.append(_say(kind, "keep", MARGIN, ">", bounds.above))
     if bounds.below < math.inf:
-        told = _say(kind, "keep", MARGIN, "<", bounds.below)
-        rules.append(f"{told} (k = {iteration}: no motion)")
-    return rules
+        said.append(_say(kind, "keep", MARGIN, "<", bounds.below))
+    why = ", ".join(dict.fromkeys(causes.values())) or "as before"
+    return _packed(said, f" (k = {iteration}: {why})")
+
+
+def _packed(said: list[str], ending: str) -> list[str]:
+    """As few rules as hold these words, each with the same ending."""
+    rules: list[str] = []
+    for words in said:
+        longer = f"{rules[-1]}; {words}" if rules else ""
+        if rules and len(longer + ending) <= MAX_RULE_CHARS:
+            rules[-1] = longer
+        else:
+            rules.append(words)
+    return [rule + ending for rule in rules]
 
 
 def _say(kind: type[Tuned], verb: str, name: str, relation: str, value: float) -> str:
@@ -143,8 +152,8 @@ def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, Bounds]:
     """What `write_rules` wrote, the latest rule winning; other rules are skipped."""
     values: dict[str, float] = {}
     above, below = 0.0, math.inf
-    for rule in rules:
-        match = _RULE.match(rule.strip())
+    for words in (part for rule in rules for part in rule.split(";")):
+        match = _RULE.match(words.strip())
         if match is None or match[2].lower() not in names_of(kind):
             continue
         name, value = match[2].lower(), float(match[4])

@@ -16,7 +16,8 @@ from tdac_agent.builtin.repair import read_rules, repair
 from tdac_agent.extract import extract_source
 from tdac_agent.provider import Request
 from tdac_agent.report import Diagnosis, Failure, Report
-from tdac_agent.rules import MAX_RULE_CHARS, add_rules, parse_rules
+from tdac_agent.rule_answer import apply, parse_operations
+from tdac_agent.rules import RuleBook
 from tdac_envs.params import RobotParams
 
 MIDDLE = Parameters(
@@ -58,6 +59,15 @@ def source_of(reply):
     source = extract_source(reply.text)
     assert source is not None
     return source
+
+
+def learnt(book, reply, k):
+    """The rules after an answer of the optimizer."""
+    return apply(book, parse_operations(reply.text), k, ()).book
+
+
+def texts_of(book):
+    return tuple(rule.text for rule in book.in_force)
 
 
 def test_first_candidate_is_neutral(builtin):
@@ -160,11 +170,10 @@ def test_rules_carry_the_parameters_over(builtin):
     reply = builtin.complete(
         Request("summarise", "", controller=text, report=failed, sample=(0, 3, 1))
     )
-    told = parse_rules(reply.text)
+    told = [operation.text for operation in parse_operations(reply.text)]
     assert told
-    assert all(len(rule) <= MAX_RULE_CHARS for rule in told)
-    rules = add_rules((), ["Turn in place when lost.", *told], 3, ())
-    request = Request("generate", "", rules=tuple(rule.text for rule in rules))
+    book = RuleBook().add("Turn in place when lost.", "task", 2, ())
+    request = Request("generate", "", rules=texts_of(learnt(book, reply, 3)))
     parameters = read_parameters(source_of(builtin.complete(request)), Parameters)
     wanted, _ = repair(MIDDLE, failed, Bounds(above=2.0), 301)
     assert parameters == wanted
@@ -185,10 +194,10 @@ def test_a_persons_rule_counts(builtin):
 )
 def test_never_tries_the_same_twice(builtin, cause):
     """Ten iterations that all fail in the same way are twenty different candidates."""
-    rules, tried = (), []
+    book, tried = RuleBook(), []
     failed = report((f"{END}test_x", cause))
     for k in range(1, 11):
-        texts = tuple(rule.text for rule in rules)
+        texts = texts_of(book)
         reply = builtin.complete(Request("generate", "", rules=texts, sample=(0, k, 0)))
         for j, kind in enumerate(("edit", "summarise")):
             text = source_of(reply)
@@ -203,7 +212,7 @@ def test_never_tries_the_same_twice(builtin, cause):
                     sample=(0, k, j),
                 )
             )
-        rules = add_rules(rules, parse_rules(reply.text), k, ())
+        book = learnt(book, reply, k)
     assert len(set(tried)) == len(tried)
 
 

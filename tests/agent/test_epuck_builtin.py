@@ -29,7 +29,8 @@ from tdac_agent.hygiene import HYGIENE
 from tdac_agent.oracle import Oracle
 from tdac_agent.provider import Request
 from tdac_agent.report import Diagnosis, Failure, Report
-from tdac_agent.rules import add_rules, parse_rules
+from tdac_agent.rule_answer import MAX_OPERATIONS, apply, parse_operations
+from tdac_agent.rules import RuleBook
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
 from tdac_agent.task_file import EPUCK as EPUCK_ENV
@@ -102,6 +103,7 @@ def test_parameters_are_read_back(seed, crates):
     text = render_epuck(parameters, crates.nominal)
     assert read_parameters(text, EPuckParameters) == parameters
     rules = write_rules(parameters, [], Bounds(0.0015, 0.02), 1)
+    assert len(rules) <= MAX_OPERATIONS
     known, bounds = read_rules(rules, EPuckParameters)
     assert bounds == Bounds(0.0015, 0.02)
     for name, value in drawn.items():
@@ -152,16 +154,16 @@ def failed(cause):
 @pytest.mark.parametrize("cause", ["collision", "no motion", "too slow", "error"])
 def test_never_tries_the_same_twice(crates, cause):
     """Ten iterations that all fail in the same way are twenty different candidates."""
-    builtin, rules, tried = builtin_for(crates.setting), (), []
+    builtin, book, tried = builtin_for(crates.setting), RuleBook(), []
     for k in range(1, 11):
-        told = tuple(rule.text for rule in rules)
+        told = tuple(rule.text for rule in book.in_force)
         reply = builtin.complete(Request("generate", "", rules=told, sample=(0, k, 0)))
         for j, kind in enumerate(("edit", "summarise")):
             text = extract_source(reply.text)
             tried.append(read_parameters(text, EPuckParameters))
             request = Request(kind, "", text, failed(cause), told, (0, k, j))
             reply = builtin.complete(request)
-        rules = add_rules(rules, parse_rules(reply.text), k, ())
+        book, _ = apply(book, parse_operations(reply.text), k, ())
     assert len(set(tried)) == len(tried)
 
 

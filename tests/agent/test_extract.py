@@ -2,13 +2,14 @@
 
 import ast
 import itertools
+import re
 import warnings
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tdac_agent.extract import extract_source
+from tdac_agent.extract import extract_source, fenced_blocks, read_answer
 
 FEW = settings(
     deadline=None,
@@ -320,3 +321,65 @@ def test_strings_keep_their_spaces():
     code = '  x = """\n    \n   a\n b\n"""\n'
     got = extract_source(f"  ```\n{code}  ```\n")
     assert got == 'x = """\n  \n a\n b\n"""\n'
+
+
+FILE = "def policy(obs):\n    return 0.0, 0.0\n\n\nX = 1\n"
+
+
+def test_two_files_are_no_answer():
+    """Of two whole files nobody says which is meant; the same one twice is one."""
+    later = FILE.replace("0.0, 0.0", "0.5, 0.5 if X else 0.0")
+    block = "```python\n{}```\n".format
+    answer = read_answer(f"{block(FILE)}Wait, better:\n{block(later)}")
+    assert answer.source is None
+    assert "two blocks" in answer.problem
+    assert read_answer(block(FILE) + block(FILE)).source == FILE
+    part = "def policy(obs):\n    ...\n"
+    whole = FILE + "Y = [1, 2, 3]\n" * 9
+    assert read_answer(block(part) + block(whole)).source == whole
+
+
+def test_the_larger_tree_is_the_file():
+    """Lines of comment do not make a block the file."""
+    talk = "# a line\n" * 50 + "x = 1\n"
+    text = f"```python\n{talk}```\n```python\n{FILE}```\n"
+    assert extract_source(text) == FILE
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("Sorry.", "it has no fenced block"),
+        ("```json\n{}\n```", "no fenced block of Python"),
+        ("```python\nx = 1\n", "its last fenced block has no end"),
+        ("```python\nx = (\n```", r"'\(' was never closed \(line 1: 'x = \('\)"),
+        ("```python\n# nothing\n```", "there is no statement in it"),
+        ("```python\nx = 1\n```", "no `def policy` at its top level"),
+        ("```python\nclass policy: ...\n```", "no `def policy` at its top level"),
+    ],
+)
+def test_what_is_wrong_is_said(text, problem):
+    """An answer that cannot be used is asked for again with the reason."""
+    answer = read_answer(text, must_define="policy")
+    assert answer.source is None
+    assert re.search(problem, answer.problem)
+
+
+@FEW
+@given(replies | whole_replies().map(lambda parts: "".join(parts[1:])) | st.text())
+def test_an_answer_is_a_file_or_a_problem(reply):
+    """Never both, never neither."""
+    for name in (None, "policy"):
+        answer = read_answer(reply, must_define=name)
+        assert (answer.source is None) == bool(answer.problem)
+        assert "\n" not in answer.problem
+
+
+@FEW
+@given(replies | st.text())
+def test_fenced_blocks_stand_in_the_text(reply):
+    """Every block is a quotation, and a bare one is found, too."""
+    text = reply.replace("\r\n", "\n")
+    for block in fenced_blocks(reply, frozenset({"", "python", "json"})):
+        assert block in text
+    assert fenced_blocks("a\n```json\n[]\n```\n", frozenset({"json"})) == ["[]"]

@@ -1,7 +1,18 @@
 """What is told to the one who repairs."""
 
-from tdac_agent.feedback import MAX_CHARS, render_feedback
-from tdac_agent.report import Diagnosis, Failure
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tdac_agent.feedback import (
+    MAX_CHARS,
+    choose,
+    cut,
+    group_failures,
+    render_feedback,
+    tell_attempt,
+)
+from tdac_agent.report import GROUPS, Diagnosis, Failure
 from tdac_agent.verification import verify
 
 WALL = "def policy(obs):\n    return 1.0, 1.0\n"
@@ -48,18 +59,130 @@ def test_long_messages_are_cut(small_task, warm):
     assert "8500 characters left out" in text
 
 
-def test_three_kinds_of_failure_in_full(small_task, warm):
-    """What shares a message shares a paragraph; a fourth of a part is named only."""
+def test_at_most_three_causes_in_full(small_task, warm):
+    """What shares a cause shares a paragraph; each part of the suite has its say."""
     report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
     failures = [
         Failure(test=f"a::t{n}", group="unit", message=f"reason {n // 2}.")
         for n in range(10)
     ]
     driving = Failure(test="e::drive", group="end to end", message="it hit a wall")
-    assert "it hit a wall" in render_feedback(report_with(report, *failures, driving))
+    text = render_feedback(report_with(report, *failures, driving))
+    assert "it hit a wall" in text
+    assert "reason 1." in text
+    assert "reason 2." not in text
     text = render_feedback(report_with(report, *failures))
     assert "a::t0, a::t1" in text
     assert text.count("reason 0.") == 1
     assert "reason 2." in text
     assert "reason 3." not in text
     assert text.endswith("Also failed: a::t6, a::t7, a::t8, a::t9")
+
+
+SAME = {
+    "names that are not there": [
+        "missing constants: LOOKAHEAD",
+        "missing at the top level: plan_path",
+        "no `def main()` at the top level",
+        "AttributeError at N_RAYS: module 'controller' has no attribute 'N_RAYS'",
+    ],
+    "syntax": [
+        "the source does not parse: '(' was never closed (line 1)",
+        "SyntaxError at import (line 1): '(' was never closed",
+    ],
+    "KeyError: 'a'": [
+        "KeyError at policy (line 2): 'a'",
+        "KeyError at run_episode (line 2): 'a'",
+    ],
+    "is_occupied": ["is_occupied(0, 0) is a str", "is_occupied(-1, 0) is False"],
+}
+
+
+@pytest.mark.parametrize("cause", SAME)
+def test_failures_with_one_root_are_one_group(small_task, warm, cause):
+    """One mistake that fails tests in many ways is told once, whatever the part."""
+    report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    groups = ("static", "unit", "end to end", "user")
+    failures = [
+        Failure(test=f"t{n}", group=groups[n], message=message)
+        for n, message in enumerate(SAME[cause])
+    ]
+    other = Failure(test="z", group="unit", message="KeyError at policy (line 2): 'b'")
+    found, _ = group_failures(report_with(report, *failures, other))
+    assert [group.cause for group in found] == [cause, "KeyError: 'b'"]
+    assert found[0].members == tuple(failures)
+
+
+def test_a_broken_file_is_one_cause(small_task, warm):
+    """A file that does not parse fails everything, and is told in a few lines."""
+    report = verify("def policy(obs:\n    pass\n", small_task, judge=warm)
+    assert report.verdict.failed_tests == report.verdict.expected
+    text = render_feedback(report)
+    assert len(text) < 1500
+    assert "\n2. " not in text
+    assert "'(' was never closed (line 1)" in text
+
+
+def test_an_attempt_in_one_line(small_task, warm):
+    """Which attempt, how many tests, what happened, with figures."""
+    report = verify(WALL, small_task, profile="policy", judge=warm)
+    line = tell_attempt(2, 1, report)
+    failed, expected = report.verdict.failed_tests, report.verdict.expected
+    assert line.startswith(f"k=2 j=1: {failed} of {expected} tests failed: nominal: ")
+    figures = report.failures[0].diagnosis
+    assert f"collision in step {figures.step} at ({figures.x:.4g}, " in line
+    assert f"with {figures.d_min:.4g} of {figures.d0:.4g} px left at best" in line
+    assert "\n" not in line
+
+
+messages = st.text(max_size=20) | st.text(max_size=5000) | st.just("not run, since x")
+causes = st.sampled_from([None, "held out", "collision", "error"])
+
+
+@st.composite
+def failures(draw):
+    """Failures of any kind; whatever is held out has a secret for its message."""
+    found = []
+    for n in range(draw(st.integers(1, 12))):
+        cause, message = draw(causes), draw(messages)
+        diagnosis = cause and Diagnosis(cause=cause, text=draw(st.text(max_size=3000)))
+        if cause == "held out":
+            message = f"{message} 71.25 px"
+            diagnosis = Diagnosis(cause="held out", text="nothing more is told")
+        group = draw(st.sampled_from(GROUPS))
+        found.append(
+            Failure(test=f"t{n}", group=group, message=message, diagnosis=diagnosis)
+        )
+    return found
+
+
+@pytest.fixture(scope="module")
+def any_report(small_task, warm):
+    return verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+
+
+@settings(deadline=None)
+@given(failed=failures())
+def test_whatever_failed_is_told_within_bounds(any_report, failed):
+    """Each test is named or counted, no secret is told, and the length is bounded."""
+    report = report_with(any_report, *failed)
+    text = render_feedback(report)
+    assert "71.25" not in text
+    assert "71.25" not in tell_attempt(1, 0, report)
+    assert len(text) <= 3 * (2 * 5 * (MAX_CHARS + 60)) + 1000
+    groups, not_run = group_failures(report)
+    told = [f for group in groups for f in group.members] + not_run
+    assert sorted(f.test for f in told) == sorted(f.test for f in failed)
+    assert len(choose(groups)) == min(len(groups), 3)
+
+
+@given(st.text(max_size=400), st.integers(2, 100))
+def test_a_cut_text_says_how_much_was_cut(text, limit):
+    """Head and tail are those of the text, and the number is that of the rest."""
+    short = cut(text, limit)
+    if len(text) <= limit:
+        assert short == text
+        return
+    count = len(text) - 2 * (limit // 2)
+    mark = f" … {count} characters left out … "
+    assert short == text[: limit // 2] + mark + text[-(limit // 2) :]

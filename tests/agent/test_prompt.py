@@ -1,19 +1,28 @@
 """The prompts: complete, and nothing in them that must stay hidden."""
 
+import inspect
 import re
 
+import numpy as np
 import pytest
+from gymnasium import spaces
 from small import write_small_task
 
 from tdac_agent import contract, hygiene
-from tdac_agent.prompt import generate_prompt, repair_prompt
-from tdac_agent.rules import add_rules
+from tdac_agent.manual import ManualError, interface_of
+from tdac_agent.prompt import (
+    PromptError,
+    PromptTemplate,
+    generate_prompt,
+    load_template,
+    repair_prompt,
+)
+from tdac_agent.rules import BEGIN, RuleBook
 from tdac_agent.task import load_task, write_workdir
 from tdac_agent.task_file import bundled_tasks
 from tdac_agent.verification import verify
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.infrared import TABLE
-from tdac_envs.map2d import Map2DEnv
 
 CONTRACT = (
     *contract.CONSTANTS_2D,
@@ -53,16 +62,52 @@ def test_every_name_of_the_contract_is_in_the_prompt(asked, names, request):
     prompt = request.getfixturevalue(asked)
     for name in (*names, *contract.ALLOWED_IMPORTS - {"__future__"}):
         assert re.search(rf"\b{re.escape(name)}\b", prompt), name
-    for call in hygiene.FORBIDDEN_CALLS | hygiene.FORBIDDEN_ATTRIBUTES:
+    forbidden = hygiene.FORBIDDEN_CALLS | hygiene.FORBIDDEN_ATTRIBUTES
+    for call in forbidden | hygiene.SAVERS | hygiene.SURFACES:
         assert re.search(rf"\b{call}\b", prompt), call
 
 
-def test_the_tables_come_from_the_environment(prompt):
-    """Observations and actions are told in the words of the environment's manual."""
-    table = [line for line in (Map2DEnv.__doc__ or "").splitlines() if "| `" in line]
-    assert table
-    for line in table:
-        assert line.strip() in prompt
+ROW = re.compile(r"^\| `(\w+)` \| (.*) \|$", re.M)
+
+
+def cells(row):
+    return [cell.strip() for cell in row.split("|")]
+
+
+@pytest.mark.parametrize("name", ["small_task", "epuck_task"])
+def test_the_tables_come_from_the_environment(name, request):
+    """Keys, shapes and limits are those of the spaces, words those of the manual."""
+    task = request.getfixturevalue(name)
+    env = task.make_env()
+    told = {key: cells(row) for key, row in ROW.findall(generate_prompt(task, ()))}
+    manual = {
+        key: cells(row)
+        for key, row in ROW.findall(inspect.cleandoc(type(env).__doc__ or ""))
+    }
+    assert set(told) == set(env.observation_space.keys())
+    for key, (shape, limits, *words) in told.items():
+        box = env.observation_space[key]
+        assert shape == str(box.shape)
+        low, high = (
+            np.broadcast_to(np.array(re.findall(r"-?[\d.e+]+", text), float), box.shape)
+            for text in limits.split(" to ")
+        )
+        np.testing.assert_allclose(low, box.low, rtol=1e-3)
+        np.testing.assert_allclose(high, box.high, rtol=1e-3)
+        assert words == manual[key][1:]
+
+
+def test_a_manual_that_has_drifted_is_refused(small_task):
+    """A key without words, or words about another action, never reach a prompt."""
+    env = small_task.make_env()
+    keys, action = env.observation_space, env.action_space
+    env.observation_space = spaces.Dict({**keys.spaces, "smell": action})
+    with pytest.raises(ManualError, match="no row for smell"):
+        interface_of(env)
+    env.observation_space = keys
+    env.action_space = spaces.Box(-2, 2, (2,), np.float32)
+    with pytest.raises(ManualError, match=r"begin its action space with `Box\(-2, 2"):
+        interface_of(env)
 
 
 def test_the_figures_are_those_of_the_task(prompt, small_task):
@@ -89,7 +134,8 @@ def test_the_e_pucks_observations_come_from_its_environment(epuck_prompt):
     table = [line.strip() for line in manual if "| `" in line]
     assert any("`ps`" in line for line in table)
     for line in table:
-        assert (line in epuck_prompt) == ("=True" not in line), line
+        words = line.strip("| ").rpartition("| ")[2]
+        assert (words in epuck_prompt) == ("=True" not in line), line
     assert "ps0 to ps3 are on the robot's RIGHT" in epuck_prompt
     for distance, reading, _ in TABLE.tolist():
         assert f" {1e3 * distance:g} |" in epuck_prompt
@@ -163,17 +209,114 @@ def test_profiles(tmp_path):
 def test_the_users_instructions_are_passed_on(tmp_path, prompt):
     """They stand at the end under a heading of their own, or not at all."""
     task = load_task(write_small_task(tmp_path / "t", instructions="Keep LEFT. {{x}}"))
-    tail = generate_prompt(task, ())[-200:]
-    assert "## Further instructions from the user\nKeep LEFT. {{x}}" in tail
+    before, block, _ = generate_prompt(task, ()).partition("\n\n## Rules learnt")
+    assert block
+    assert before.endswith("\n## Further instructions from the user\nKeep LEFT. {{x}}")
     assert "Further instructions" not in prompt
 
 
 def test_rules_are_in_the_block(small_task):
     """The rules in force stand between the markers."""
-    rules = add_rules((), ["slow down near walls"], 1, ())
-    text = generate_prompt(small_task, rules)
+    book = RuleBook().add("slow down near walls", "task", 1, ())
+    text = generate_prompt(small_task, book.in_force)
     block = text.partition("AUTO_REPAIR_RULES_BEGIN")[2]
     assert "- slow down near walls" in block.partition("AUTO_REPAIR_RULES_END")[0]
+
+
+def test_what_changes_comes_last(small_task, epuck_task, warm):
+    """All prompts of a run begin alike, up to the rules: a provider can keep that."""
+    book = RuleBook().add("slow down near walls", "task", 1, ())
+    for task in (small_task, epuck_task):
+        first = generate_prompt(task, ())
+        stable = first.partition(BEGIN)[0]
+        assert len(stable) > 0.95 * len(first)
+        later = generate_prompt(task, book.in_force)
+        assert later.startswith(stable)
+    report = verify("def policy(obs):\n    return 1, 1\n", small_task, judge=warm)
+    first = generate_prompt(small_task, ())
+    stable = first.partition(BEGIN)[0]
+    for kind in ("edit", "summarise"):
+        assert repair_prompt(kind, first, "x = 1", report).startswith(stable)
+
+
+@pytest.mark.parametrize("name", ["small_task", "epuck_task"])
+def test_the_underspecified_prompt(name, request):
+    """The goal and the interface, names and types; no figures, tests or advice."""
+    task = request.getfixturevalue(name)
+    text = generate_prompt(task, (), load_template("underspecified"))
+    names = contract.NAMES[task.setting.suite]
+    for word in (*names.constants, *names.functions, *names.classes, "policy(obs)"):
+        assert word in text
+    assert text.count(BEGIN) == 1
+    full = generate_prompt(task, ())
+    assert len(text) < 0.3 * len(full)
+    for word in (
+        "## Advice",
+        "## What is tested",
+        "within ",
+        "1.1",
+        "params.json\n```",
+    ):
+        assert word in full
+        assert word not in text
+
+
+def test_a_template_of_ones_own(small_task, tmp_path):
+    """A file may use every name, and parts of the shipped templates."""
+    file = tmp_path / "mine.j2"
+    file.write_text(
+        "Steps: {{ horizon }}\n{% include 'answer.md.j2' %}\n{{ rules_block }}\n"
+    )
+    text = generate_prompt(small_task, (), load_template(str(file)))
+    assert text.startswith(f"Steps: {small_task.nominal.horizon}\n## Answer\n")
+    assert text.count(BEGIN) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("{{ horizonn }} {{ rules_block }}", "'horizonn' is undefined; known names: "),
+        ("a\n{% if %}", "line 2: Expected an expression"),
+        ("{% include 'x.j2' %}", "includes 'x.j2', which is not there"),
+        ("Drive!", "must hold {{ rules_block }} once"),
+        ("{{ rules_block }}{{ rules_block }}", "must hold {{ rules_block }} once"),
+        ("{{ horizon / 0 }}{{ rules_block }}", "division by zero"),
+    ],
+)
+def test_a_broken_template_is_refused(small_task, text, problem):
+    """One line says what is wrong with it."""
+    with pytest.raises(PromptError, match=re.escape(problem)) as caught:
+        generate_prompt(small_task, (), PromptTemplate("mine.j2", text))
+    assert "mine.j2" in str(caught.value)
+
+
+def test_a_template_that_is_not_there(tmp_path):
+    """A wrong name is told with the names that there are."""
+    with pytest.raises(PromptError, match=r"no prompt 'ful'.*expected a template file"):
+        load_template("ful")
+    (tmp_path / "x.j2").write_bytes(b"\xff")
+    with pytest.raises(PromptError, match="not UTF-8 text"):
+        load_template(str(tmp_path / "x.j2"))
+
+
+def test_repair_prompts_tell_earlier_attempts_and_rules(small_task, warm):
+    """The attempts before this one, and to the summariser what came of each rule."""
+    book = RuleBook().add("slow down near walls", "task", 1, ("test_x",))
+    book = book.observed(("test_x",), 0)
+    report = verify("def policy(obs):\n    return 1, 1\n", small_task, judge=warm)
+    prompt = generate_prompt(small_task, book.in_force)
+    told = {
+        kind: repair_prompt(
+            kind, prompt, "x = 1", report, earlier=("k=1 j=0: 3",), rules=book.in_force
+        )
+        for kind in ("edit", "summarise")
+    }
+    for text in told.values():
+        assert "## Earlier attempts, oldest first\n- k=1 j=0: 3\n" in text
+    line = "- R1 (task, since k=1; cured 0 of 1, worse in 1): slow down near walls\n"
+    assert line in told["summarise"]
+    assert line not in told["edit"]
+    assert "test_x" not in told["summarise"]
 
 
 @pytest.mark.parametrize("kind", ["edit", "summarise"])

@@ -61,7 +61,9 @@ def journal(folder):
     return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
-RULES = Reply("- Drive towards the goal.\n- Do not stand still.\n", tokens_in=7)
+LEARNT = ("Drive towards the goal.", "Do not stand still.")
+OPERATIONS = [{"op": "add", "scope": "code", "text": text} for text in LEARNT]
+RULES = Reply(f"```json\n{json.dumps(OPERATIONS)}\n```", tokens_in=7)
 
 
 def test_it_passes_after_rules_and_an_edit(policy_task, good_source, out):
@@ -79,10 +81,9 @@ def test_it_passes_after_rules_and_an_edit(policy_task, good_source, out):
         *[(2, 0, True, False), (2, 1, True, True)],
     ]
     assert "Drive towards" not in learner.requests[0].prompt
-    rules = ("Drive towards the goal.", "Do not stand still.")
     for later in (learner.requests[1], optimizer.requests[2]):
-        assert later.rules == rules
-        assert all(f"- {rule}" in later.prompt for rule in rules)
+        assert later.rules == LEARNT
+        assert all(f"- {rule} [R" in later.prompt for rule in LEARNT)
     assert optimizer.requests[0].controller == NOTHING
     assert "no motion" in optimizer.requests[0].prompt
     assert run.tokens_in == 10 * 4 + 7
@@ -161,7 +162,7 @@ def test_four_faults_stop_the_run(policy_task, out):
 def test_a_permanent_fault_keeps_what_there_is(policy_task, out):
     """It is not asked again; the candidate before it stays on record."""
     learner = Script(code(NOTHING), PermanentFault("401 no such key"))
-    with pytest.raises(Fault, match="permanent fault: 401 no such key$"):
+    with pytest.raises(Fault, match=r"permanent fault: 401 no such key$"):
         synthesize(policy_task, learner, out=out)
     run = load_run(out)
     assert run.status == "fault"

@@ -1,0 +1,118 @@
+"""What the prompt templates may tell of a task, by name."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from tdac_agent.contract import ALLOWED_IMPORTS, NAMES, time_step
+from tdac_agent.hygiene import (
+    FORBIDDEN_ATTRIBUTES,
+    FORBIDDEN_CALLS,
+    SAVERS,
+    SURFACES,
+)
+from tdac_agent.manual import interface_of
+from tdac_agent.sandbox import Limits
+from tdac_agent.task import SENSORS_FILE, Task
+
+LONGEST_WORLD = 16_000
+"""Of a world file's characters, so many are shown."""
+
+
+def context_of(task: Task) -> dict[str, Any]:
+    """Names and values for the templates of a task's environment.
+
+    They hold the nominal task alone: nothing of the moved starts, and no test.
+    """
+    own = {"map2d": _of_map, "epuck": _of_world}[task.setting.suite](task)
+    return {**_of_any(task), **own}
+
+
+def _of_any(task: Task) -> dict[str, Any]:
+    """What the prompts of both environments tell."""
+    nominal, progress = task.nominal, task.spec.progress
+    interface, limits = interface_of(task.make_env()), Limits()
+    return {
+        "environment": task.setting.suite,
+        "env_description": interface.description,
+        "observation_table": interface.observation,
+        "action_text": interface.action,
+        "allowed_imports": " ".join(sorted(ALLOWED_IMPORTS - {"__future__"})),
+        "forbidden_calls": ", ".join(sorted(FORBIDDEN_CALLS)),
+        "forbidden_attributes": ", ".join(sorted(FORBIDDEN_ATTRIBUTES)),
+        "savers": ", ".join(sorted(SAVERS)),
+        "surfaces": ", ".join(sorted(SURFACES)),
+        "names": NAMES[task.setting.suite],
+        "dt": f"{nominal.dt:g}",
+        "dt_ms": f"{1000 * nominal.dt:g}",
+        "import_seconds": f"{limits.import_seconds:g}",
+        "reset_seconds": f"{limits.reset_seconds:g}",
+        "call_seconds": f"{limits.call_seconds:g}",
+        "cpu_seconds": f"{limits.cpu_seconds:g}",
+        "profile": task.spec.profile,
+        "progress_steps": task.progress_steps,
+        "progress_fraction": f"{progress.fraction:g}",
+        "progress_distance": {
+            "geodesic": "length of the shortest free path",
+            "euclidean": "straight line",
+        }[progress.distance],
+        "horizon": nominal.horizon,
+        "params_text": task.params.model_dump_json(indent=2),
+        "straight": math.dist(nominal.start[:2], nominal.goal),
+        "shortest": nominal.shortest,
+        "instructions": task.spec.instructions.strip(),
+    }
+
+
+def _of_map(task: Task) -> dict[str, Any]:
+    """What only a map's prompt tells."""
+    from tdac_agent.task_map2d import map_setting
+
+    grid = map_setting(task.setting).nominal.terrain.grid
+    return {
+        "number": 6,
+        "speed_unit": "px/s",
+        "full_speed": "max_wheel_speed",
+        "width": grid.width,
+        "height": grid.height,
+        "tolerance": task.nominal.goal_tolerance,
+        "radius": task.nominal.body_radius,
+        "sensors_text": SENSORS_FILE.read_text(encoding="utf-8").rstrip(),
+    }
+
+
+def _of_world(task: Task) -> dict[str, Any]:
+    """What only a world's prompt tells."""
+    from tdac_agent.task_epuck import EPuckSetting
+    from tdac_envs.bodies import BODY_BOTTOM, BODY_TOP
+    from tdac_envs.epuck.infrared import TABLE
+
+    setting = task.setting
+    assert isinstance(setting, EPuckSetting)
+    nominal, robot = setting.nominal, setting.params.robot
+    return {
+        "distances": [f"{1e3 * row[0]:g}" for row in TABLE.tolist()],
+        "readings": [f"{row[1]:.0f}" for row in TABLE.tolist()],
+        "number": 7,
+        "speed_unit": "m/s",
+        "full_speed": f"{robot.max_wheel_speed * robot.wheel_radius:g}",
+        "wheel_limit": f"{robot.max_wheel_speed:g}",
+        "axle": f"{robot.axle_length:g}",
+        "time_step": time_step(nominal.dt),
+        "sensor_range": f"{robot.sensor_range:g}",
+        "tolerance_m": f"{nominal.goal_tolerance:g}",
+        "tolerance_mm": f"{1e3 * nominal.goal_tolerance:g}",
+        "radius_mm": f"{1e3 * nominal.body_radius:g}",
+        "body_bottom": f"{1e3 * BODY_BOTTOM:g}",
+        "body_top": f"{1e3 * BODY_TOP:g}",
+        "world_text": _shown(setting.text),
+    }
+
+
+def _shown(text: str) -> str:
+    """A world file, or as much of it as there is room for."""
+    if len(text) <= LONGEST_WORLD:
+        return text.rstrip()
+    head = text[:LONGEST_WORLD].rpartition("\n")[0]
+    return f"{head}\n# ... {len(text) - len(head)} characters more: read the file"
