@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import cv2
+import gymnasium as gym
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
@@ -146,7 +147,10 @@ def _warm_up() -> None:
 
 
 def _rehearse() -> None:
-    """Has pytest load what it needs for a suite."""
+    """Loads what else is compiled, and has pytest load what it needs for a suite."""
+    world = gym.make("tdac_envs:TDAC-EPuck-v0")
+    world.reset(seed=0)
+    world.step(np.zeros(2, np.float32))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "test_nothing.py").write_text("def test_nothing(): pass\n")

@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 from small import small_cells, write_small_task
 
-COMMANDS = ["map", "synth", "verify", "play", "check-suite", "doctor"]
+COMMANDS = [
+    "map", "world", "synth", "verify", "play", "check-suite", "doctor",
+    "webots run", "export webots",
+]  # fmt: skip
 ENDS = ["--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6"]
 
 
@@ -41,7 +44,7 @@ def black_png(width, height):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_help_has_an_example(tdac, command):
     """`--help` of each command shows how it is called."""
-    code, out, _ = tdac(command, "--help")
+    code, out, _ = tdac(*command.split(), "--help")
     assert code == 0
     assert re.search(rf"Examples?: .*tdac {command}", re.sub(r"\s+", " ", out))
 
@@ -50,7 +53,7 @@ def test_help_and_version(tdac):
     """Without a command the help; `--version` in one line."""
     code, out, _ = tdac("--help")
     assert code == 0
-    assert all(command in out for command in COMMANDS)
+    assert all(command in out for command in " ".join(COMMANDS).split())
     code, out, _ = tdac("--version")
     assert code == 0
     assert re.fullmatch(r"tdac \d+\.\d+\.\d+\n", out)
@@ -144,8 +147,8 @@ PLACES = {
     "radius": ([*ENDS[:6], "--robot-radius", "nan"], "radius"),
     "robot image": ([*ENDS, "--robot-image", "no.png"], "no robot image 'no.png'"),
     "bad robot image": ([*ENDS, "--robot-image", __file__], "robot image"),
-    "unknown learner": ([*ENDS, "--learner", "gpt"], "unknown learner 'gpt'"),
-    "unknown optimizer": ([*ENDS, "--optimizer", "gpt"], "unknown learner 'gpt'"),
+    "unknown learner": ([*ENDS, "--learner", "gpt"], "unknown model 'gpt'"),
+    "unknown optimizer": ([*ENDS, "--optimizer", "gpt"], "unknown model 'gpt'"),
     "from a missing file": ([*ENDS, "--from", "no.py"], "'no.py'"),
     "no iterations": ([*ENDS, "-K", 0], "-K"),
     "instructions": ([*ENDS, "--task", "maze"], "--task already says it all"),
