@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import importlib.util
 import json
+import os
 import platform
 import sys
 from dataclasses import asdict, dataclass
@@ -18,9 +19,11 @@ from tdac_agent.sandbox import available_tiers
 EXTRAS = {
     "human": "pygame",
     "sb3": "stable_baselines3",
+    "anthropic": "anthropic",
     "openai": "openai",
     "ray": "ray",
 }
+KEYS = ("ANTHROPIC_API_KEY", "OPENAI_API_KEY")
 PACKAGES = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
 
 
@@ -43,7 +46,7 @@ class Check:
 
 def run(as_json: bool) -> int:
     """Tries everything and prints it; 3 where something needed does not work."""
-    checks = [*_sandbox(), _video(), _window(), *_extras()]
+    checks = [*_sandbox(), _video(), _window(), *_extras(), *_keys()]
     if as_json:
         record = {
             "checks": [asdict(check) for check in checks],
@@ -96,6 +99,16 @@ def _extras() -> list[Check]:
         found = importlib.util.find_spec(module) is not None
         detail = module if found else f'optional: pip install "tdac[{extra}]"'
         checks.append(Check(f"extra {extra}", found, detail))
+    return checks
+
+
+def _keys() -> list[Check]:
+    """Whether there are keys; never what they are, nor whether they are accepted."""
+    checks = []
+    for name in KEYS:
+        there = bool(os.environ.get(name, "").strip())
+        detail = "set" if there else f"optional: set {name} to use these models"
+        checks.append(Check(f"key {name}", there, detail))
     return checks
 
 
