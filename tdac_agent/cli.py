@@ -144,6 +144,19 @@ def synth(
     learner: Learner = "builtin",
     optimizer: Optimizer = None,
     base_url: BaseUrl = None,
+    prompt: Annotated[
+        str,
+        typer.Option(
+            help="What is asked: `full`, `underspecified`, or your own template file."
+        ),
+    ] = "full",
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Print the first prompt and the cost at most; asks nobody.",
+        ),
+    ] = False,
     out: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--out", help="Run folder.  [default: runs/TASK-N]"),
@@ -158,8 +171,16 @@ def synth(
         task, map_image, world, ignore, start, goal, heading, robot_radius, robot_image,
         snap, metres, instructions,
     )  # fmt: skip
+    if dry_run:
+        from tdac_agent.commands import dry_run as dry
+
+        raise typer.Exit(
+            dry.run(spec, prompt, k, j, learner, optimizer, base_url, as_json)
+        )
     raise typer.Exit(
-        command.run(spec, from_, k, j, learner, optimizer, base_url, out, seed, as_json)
+        command.run(
+            spec, from_, k, j, learner, optimizer, base_url, prompt, out, seed, as_json
+        )
     )
 
 
@@ -357,9 +378,19 @@ def check_suite(
     raise typer.Exit(command.run(spec, profile, suite, tier, seed, repeats, as_json))
 
 
+@app.command("rules", epilog="Example: `tdac rules runs/office-1`")
+def rules_command(
+    run: Annotated[Path, typer.Argument(help="A run folder.")], as_json: Json = False
+) -> None:
+    """Show what a run has learnt: each rule, where it came from, what came of it."""
+    from tdac_agent.commands import rules
+
+    raise typer.Exit(rules.run(run, as_json))
+
+
 @app.command(epilog="Example: `tdac doctor`")
 def doctor(as_json: Json = False) -> None:
-    """Say what works on this machine: sandbox tiers, window, video, versions."""
+    """Say what works on this machine: sandbox tiers, window, video, extras, keys."""
     from tdac_agent.commands import doctor as command
 
     raise typer.Exit(command.run(as_json))

@@ -62,6 +62,7 @@ class Run(BaseModel):
     tokens_cached: int = Field(0, description="Of tokens_in, read from a cache.")
     models: tuple[str, ...] = Field((), description="As the providers report them.")
     base_url: str | None = None
+    prompt: str = Field("full", description="Template of the first question.")
     started: str
     seconds: float = 0.0
 
@@ -91,6 +92,22 @@ def load_run(folder: Path) -> Run:
     except (OSError, ValueError, TypeError, RecursionError) as error:
         reason = str(error).partition("\n")[0]
         raise RunError(f"{folder} is not a run folder: {reason}") from error
+
+
+def load_rules(folder: Path) -> RuleBook:
+    """The rules of a run folder; none where no iteration came to an end.
+
+    Raises:
+        RunError: Their file is damaged.
+    """
+    path = folder / RULES_FILE
+    try:
+        return RuleBook.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return RuleBook()
+    except (OSError, ValueError) as error:
+        reason = str(error).partition("\n")[0]
+        raise RunError(f"{path} holds no rules: {reason}") from error
 
 
 @dataclass(slots=True)

@@ -9,6 +9,7 @@ from tdac_agent.dialogue import Candidate, Dialogue
 from tdac_agent.errors import RunError
 from tdac_agent.figures import draw_trajectories
 from tdac_agent.files import write_atomic
+from tdac_agent.prompt import generate_prompt, load_template
 from tdac_agent.provider import Provider
 from tdac_agent.providers import choose_models
 from tdac_agent.records import Event, Recorder, Run
@@ -31,6 +32,7 @@ def synthesize(
     seed: int = 0,
     start_from: str | None = None,
     base_url: str | None = None,
+    prompt: str = "full",
     retry: RetryPolicy | None = None,
     on_event: Event | None = None,
 ) -> Run:
@@ -47,6 +49,8 @@ def synthesize(
         seed: Of the jittered starts.
         start_from: Source of a controller to begin with instead of a generated one.
         base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
+        prompt: Template of the question for a new controller: `full`,
+            `underspecified`, or a file (docs/prompts.md).
         retry: How patiently a model is asked after faults.
         on_event: Called with each journal record, if given.
 
@@ -56,8 +60,11 @@ def synthesize(
     Raises:
         RunError: The folder cannot be used.
         ProviderError: A model cannot be chosen so, e.g. without its key.
+        PromptError: The template cannot be used.
         Fault: Sandbox, suite or provider broken; the run's record says so, too.
     """
+    template = load_template(prompt)
+    generate_prompt(task, (), template)  # refuses a broken one before a folder is made
     first, second = choose_models(learner, optimizer, task.setting, base_url)
     run = Run(
         folder=out,
@@ -66,13 +73,16 @@ def synthesize(
         learner=first.name,
         optimizer=second.name,
         base_url=base_url,
+        prompt=template.name,
         iterations=iterations,
         patience=patience,
         seed=seed,
         started=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     recorder = _recorder(task, run, on_event)
-    dialogue = Dialogue(task, first, second, recorder, retry=retry or RetryPolicy())
+    dialogue = Dialogue(
+        task, first, second, recorder, retry=retry or RetryPolicy(), template=template
+    )
     given = Candidate(start_from) if start_from is not None else None
     judge = WarmJudge()
     try:

@@ -100,6 +100,7 @@ def run(
     learner: str,
     optimizer: str | None,
     base_url: str | None,
+    prompt: str,
     out: Path | None,
     seed: int,
     as_json: bool,
@@ -122,6 +123,7 @@ def run(
                 seed=seed,
                 start_from=source,
                 base_url=base_url,
+                prompt=prompt,
                 on_event=progress,
             )
     except KeyboardInterrupt:

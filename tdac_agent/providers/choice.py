@@ -86,9 +86,21 @@ def choose_model(name: str, options: Options) -> Provider:
     if kind in OWN:
         make: Make = resolve_name(OWN[kind])
         return make(words, options)
+    check_name(name)
     others = {point.name: point for point in entry_points(group=GROUP)}
-    if kind in others:
-        return _load(others[kind])(words, options)
+    return _load(others[kind])(words, options)
+
+
+def check_name(name: str) -> None:
+    """Refuses a name that no provider answers to; makes none, and needs no key.
+
+    Raises:
+        ProviderError: With the forms that there are.
+    """
+    kind = name.partition(":")[0]
+    others = {point.name for point in entry_points(group=GROUP)}
+    if kind in OWN or kind in others:
+        return
     near = difflib.get_close_matches(kind, [*OWN, *others], n=1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     also = "".join(f", {other}:…" for other in sorted(others))

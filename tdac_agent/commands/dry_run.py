@@ -1,0 +1,81 @@
+"""`tdac synth --dry-run`: the first prompt, and what the run can cost at most."""
+
+from __future__ import annotations
+
+import sys
+
+from rich.console import Console
+from rich.markup import escape
+
+from tdac_agent.commands.flags import TaskFlags
+from tdac_agent.outlook import Outlook, foresee
+from tdac_agent.prices import SHIPPED, load_prices, price_file
+from tdac_agent.prompt import load_template
+from tdac_agent.providers.choice import check_name
+
+
+def run(
+    flags: TaskFlags,
+    prompt: str,
+    k: int,
+    j: int,
+    learner: str,
+    optimizer: str | None,
+    base_url: str | None,
+    as_json: bool,
+) -> int:
+    """Prints the prompt, and nothing else, to stdout, the rest to stderr."""
+    for name in (learner, optimizer or learner):
+        check_name(name)
+    template, prices = load_template(prompt), load_prices()
+    outlook = foresee(
+        flags.load(),
+        learner,
+        optimizer or learner,
+        prices,
+        iterations=k,
+        patience=j,
+        template=template,
+        base_url=base_url,
+    )
+    if as_json:
+        sys.stdout.write(outlook.model_dump_json(indent=2) + "\n")
+        return 0
+    sys.stdout.write(outlook.prompt)
+    sys.stdout.flush()
+    console = Console(stderr=True, highlight=False)
+    for line in _lines(outlook):
+        console.print(escape(line), soft_wrap=True)
+    return 0
+
+
+def _lines(outlook: Outlook) -> list[str]:
+    k, j = outlook.iterations, outlook.patience
+    questions = f"{outlook.questions} questions (K={k}, J={j}) if nothing ever passes"
+    lines = [
+        f"prompt: about {outlook.prompt_tokens} tokens (an estimate: a third of its "
+        "bytes; models count differently)",
+        f"answer: at most {outlook.answer_tokens} tokens",
+    ]
+    if outlook.unknown_prices:
+        names = " and ".join(outlook.unknown_prices)
+        lines.append(
+            f"price: unknown for {names}; enter it in a copy of {SHIPPED} at "
+            "~/.config/tdac/prices.yaml (or where $TDAC_PRICES says) to see the cost"
+        )
+    if outlook.cost_most == 0.0:
+        return [*lines, "cost: none, no model is asked"]
+    if outlook.first_cost is not None:
+        lines.append(f"first question: at most {_usd(outlook.first_cost)}")
+    if outlook.cost_once is not None and outlook.cost_most is not None:
+        lines.append(
+            f"whole run: {questions}: at most {_usd(outlook.cost_once)}, or "
+            f"{_usd(outlook.cost_most)} if every answer has to be asked for three times"
+        )
+    else:
+        lines.append(f"whole run: {questions}")
+    return [*lines, f"prices of {outlook.prices_dated}: {price_file()}"]
+
+
+def _usd(amount: float) -> str:
+    return f"{amount:.2f} USD" if amount >= 0.1 or amount == 0 else f"{amount:.4f} USD"

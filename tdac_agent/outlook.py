@@ -1,0 +1,105 @@
+"""What a run would ask first, and what it can cost at most, before it is begun."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_agent.dialogue import MAX_ASKS
+from tdac_agent.prices import PriceList
+from tdac_agent.prompt import FULL, PromptTemplate, generate_prompt
+from tdac_agent.provider import MAX_OUTPUT_TOKENS
+from tdac_agent.rules import MAX_RULE_TOKENS
+from tdac_agent.task import Task
+from tdac_agent.tokens import estimate_tokens
+
+FEEDBACK_TOKENS = 12_000
+"""Room for what failed, the earlier attempts and the words around them."""
+
+
+class Outlook(BaseModel):
+    """The first question of a run, and bounds of the whole; tokens are estimates."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    task: str
+    learner: str
+    optimizer: str
+    iterations: int = Field(description="K")
+    patience: int = Field(description="J")
+    prompt: str = Field(description="The first prompt, exactly.")
+    prompt_tokens: int = Field(description="Estimated from its length in bytes.")
+    answer_tokens: int = Field(description="That the first answer may have.")
+    first_cost: float | None = Field(description="USD at most; None if unknown.")
+    questions: int = Field(description="Of the whole run, if nothing ever passes.")
+    cost_once: float | None = Field(
+        description="USD at most, each question being answered at once."
+    )
+    cost_most: float | None = Field(
+        description="USD at most, each answer being cut off, and asked for three times."
+    )
+    unknown_prices: tuple[str, ...] = Field(description="Models without a price.")
+    prices_dated: str
+
+
+def foresee(
+    task: Task,
+    learner: str,
+    optimizer: str,
+    prices: PriceList,
+    *,
+    iterations: int = 20,
+    patience: int = 1,
+    template: PromptTemplate = FULL,
+    base_url: str | None = None,
+) -> Outlook:
+    """The first prompt of a run and its worst case; no model is asked, no key needed.
+
+    Args:
+        task: What the controller must do.
+        learner: Name of LLM1.
+        optimizer: Name of LLM2.
+        prices: Of the models.
+        iterations: K.
+        patience: J.
+        template: Of the question for a new controller.
+        base_url: Where the models are served, if not by the vendor.
+
+    Raises:
+        PromptError: The template cannot be used.
+    """
+    prompt = generate_prompt(task, (), template)
+    tokens = estimate_tokens(prompt)
+    repairs = patience + 1  # the edits, and the rules
+    first, second = (prices.price_of(m, base_url) for m in (learner, optimizer))
+    once = most = first_cost = None
+    if first is not None:
+        first_cost = first.most(tokens, MAX_OUTPUT_TOKENS)
+    if first is not None and second is not None:
+        asked = tokens + MAX_RULE_TOKENS
+        # A controller that was cut off may have twice the tokens when it comes.
+        shown = asked + FEEDBACK_TOKENS + 2 * MAX_OUTPUT_TOKENS
+        said = MAX_OUTPUT_TOKENS * (1 + 2 * (MAX_ASKS - 1))
+        once, most = (
+            iterations
+            * (first.most(n * asked, out) + repairs * second.most(n * shown, out))
+            for n, out in ((1, MAX_OUTPUT_TOKENS), (MAX_ASKS, said))
+        )
+    names = dict.fromkeys(
+        name for name, price in ((learner, first), (optimizer, second)) if price is None
+    )
+    return Outlook(
+        task=task.name,
+        learner=learner,
+        optimizer=optimizer,
+        iterations=iterations,
+        patience=patience,
+        prompt=prompt,
+        prompt_tokens=tokens,
+        answer_tokens=MAX_OUTPUT_TOKENS,
+        first_cost=first_cost,
+        questions=iterations * (1 + repairs),
+        cost_once=once,
+        cost_most=most,
+        unknown_prices=tuple(names),
+        prices_dated=prices.dated.isoformat(),
+    )

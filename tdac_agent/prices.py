@@ -1,0 +1,88 @@
+"""What models cost, by a dated file that a user can replace."""
+
+from __future__ import annotations
+
+import os
+from datetime import date
+from pathlib import Path
+from typing import Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tdac_envs.errors import TdacError
+
+SHIPPED = Path(__file__).parent / "prices.yaml"
+FREE = frozenset({"builtin", "replay"})
+"""Providers that ask no model."""
+
+
+class PriceError(TdacError):
+    """A price file cannot be used."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Price(_Strict):
+    """Of one model, USD per million tokens."""
+
+    input: float = Field(ge=0)
+    output: float = Field(ge=0)
+    cache_read: float | None = Field(None, ge=0)
+    cache_write: float | None = Field(None, ge=0)
+
+    def most(self, tokens_in: int, tokens_out: int) -> float:
+        """USD for so many tokens, whether or not they are written to a cache."""
+        dearest = max(self.input, self.cache_write or 0.0)
+        return (dearest * tokens_in + self.output * tokens_out) / 1e6
+
+
+class PriceList(_Strict):
+    """Contents of a price file, schema 1."""
+
+    schema_version: Literal[1] = Field(1, alias="schema")
+    dated: date
+    source: str = Field("", description="Where the prices are from.")
+    models: dict[str, Price] = Field(description="By `anthropic:MODEL` and so on.")
+
+    def price_of(self, model: str, base_url: str | None = None) -> Price | None:
+        """Price of a model by its name for `--learner`; None where it is unknown.
+
+        Somebody else's server has prices of its own, or none.
+        """
+        if model.partition(":")[0] in FREE:
+            return Price(input=0.0, output=0.0)
+        return None if base_url is not None else self.models.get(model)
+
+
+def price_file() -> Path:
+    """The file in use: `$TDAC_PRICES`, `~/.config/tdac/prices.yaml`, or the shipped."""
+    named = os.environ.get("TDAC_PRICES")
+    if named:
+        return Path(named)
+    settings = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    own = settings / "tdac" / "prices.yaml"
+    return own if own.is_file() else SHIPPED
+
+
+def load_prices(path: Path | None = None) -> PriceList:
+    """The prices in a file.
+
+    Args:
+        path: The file; the one in use by default.
+
+    Raises:
+        PriceError: It cannot be read, or has a wrong or unknown key.
+    """
+    file = path or price_file()
+    try:
+        return PriceList.model_validate(yaml.safe_load(file.read_text("utf-8")))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise PriceError(f"{file}: {place}: {first['msg']}") from error
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise PriceError(f"cannot read the prices in {file}: {reason}") from error
