@@ -1,0 +1,210 @@
+"""Repairs and rules with a program for a model: what it is asked, what is learnt."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+from small import write_small_task
+
+from tdac_agent.records import load_rules, load_run
+from tdac_agent.rules import BEGIN
+from tdac_agent.synthesis import synthesize
+from tdac_agent.task import load_task
+
+PROGRAM = Path(__file__).parent / "scripted_model.py"
+STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+WALL = "def policy(obs):\n    return 1.0, 1.0\n"
+SLOW = "Drive no faster than 0.5 near walls."
+
+
+def code(source):
+    return f"Here it is.\n```python\n{source}```\n"
+
+
+def rules(*operations):
+    return f"```json\n{json.dumps(operations)}\n```\n"
+
+
+def add(text, scope="environment"):
+    return {"op": "add", "scope": scope, "text": text}
+
+
+class Model:
+    """The program, its answers, and what it was asked."""
+
+    def __init__(self, folder, *replies):
+        folder.mkdir()
+        self.folder = folder
+        for number, reply in enumerate(replies, 1):
+            (folder / f"reply-{number}.md").write_text(reply)
+        words = [sys.executable, str(PROGRAM), str(folder)]
+        self.name = f"command:{shlex.join(words)}"
+
+    def prompts(self):
+        count = len(list(self.folder.glob("prompt-*.md")))
+        files = (self.folder / f"prompt-{n}.md" for n in range(1, count + 1))
+        return [file.read_text() for file in files]
+
+
+@pytest.fixture
+def policy_task(tmp_path):
+    """The small task in the profile `policy`."""
+    return load_task(write_small_task(tmp_path / "task", profile="policy"))
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "run"
+
+
+def test_rules_live_on(policy_task, good_source, tmp_path, out, tdac):
+    """Learnt, edited and dropped over three iterations; `tdac rules` shows it all."""
+    model = Model(
+        tmp_path / "model",
+        code(STILL),
+        rules(add(SLOW), add("Do not stand still."), add("DO NOT STAND STILL")),
+        code(WALL),
+        rules(
+            {"op": "drop", "id": "R2", "reason": "it drives now"},
+            {"op": "edit", "id": "R1", "text": "Turn before the wall at x = 70."},
+            add("Do not stand still!"),
+        ),
+        code(good_source),
+    )
+    run = synthesize(policy_task, model.name, out=out, iterations=3, patience=0)
+    assert run.tau == 3
+    prompts = model.prompts()
+    assert len(prompts) == 5
+    blocks = [prompt.partition(BEGIN)[2] for prompt in prompts]
+    assert "(none yet)" in blocks[1]
+    assert f"- {SLOW} [R1]\n- Do not stand still. [R2]\n# ===" in blocks[2]
+    assert "- Turn before the wall at x = 70. [R1]\n# ===" in blocks[4]
+    assert len({prompt.partition(BEGIN)[0] for prompt in prompts}) == 1
+    assert "- R2 (environment, since k=1; cured 0 of 1, worse in 1): Do" in prompts[3]
+    assert "k=1 j=0: " in prompts[3].partition("## Earlier attempts")[2]
+    check_life(out)
+    code_, shown, _ = tdac("rules", out)
+    assert code_ == 0
+    for words in ("R2", "dropped", "it drives now", f"was '{SLOW}'", "cured 1 of 1"):
+        assert words in " ".join(shown.split()), shown
+    code_, shown, _ = tdac("rules", out, "--json")
+    assert json.loads(shown) == load_rules(out).model_dump(mode="json")
+
+
+def check_life(folder):
+    """The two rules of `test_rules_live_on` at the end of the run."""
+    first, second = load_rules(folder).rules
+    assert (first.id, first.in_force, first.born) == ("R1", True, 1)
+    assert (first.tried, first.cured) == (1, 1)
+    assert first.edits == (f"k=2: was {SLOW!r}",)
+    assert "test_end_to_end.py::test_reaches_goal" in first.evidence
+    assert (second.status, second.ended) == ("dropped", 2)
+    lines = (folder / "journal.jsonl").read_text().splitlines()
+    notes = [r["notes"] for r in map(json.loads, lines) if r["event"] == "rules"]
+    assert notes[0][2] == "not added: it says what R2 says"
+    assert "not added: it says what R2 says, which was ended in k=2" in notes[2]
+
+
+def test_a_malformed_answer_about_rules_is_asked_again(
+    policy_task, good_source, tmp_path, out
+):
+    """With the reason; after three of them the rules stay, and the run goes on."""
+    model = Model(
+        tmp_path / "model",
+        *(code(STILL), "- Do not stand still.", rules(add("x" * 201)), rules()),
+        *(code(STILL), "no", "no", "no", code(good_source)),
+    )
+    run = synthesize(policy_task, model.name, out=out, iterations=3, patience=0)
+    assert run.tau == 3
+    assert load_rules(out).rules == ()
+    first, second, third = model.prompts()[1:4]
+    assert second.startswith(first)
+    assert "reason: expected one fenced ```json block, got no block." in second[-200:]
+    assert "201 characters, at most 200" in third[-200:]
+    assert third.count("could not be used") == 1
+
+
+def test_an_unusable_answer_is_asked_again_with_the_reason(
+    policy_task, good_source, tmp_path, out
+):
+    """Nothing is guessed: not from two files, and not from a part of one."""
+    two = code(good_source) + code(good_source.replace("1.0", "0.9"))
+    part = code("def helper(obs):\n    return 0.0, 0.0\n")
+    model = Model(tmp_path / "model", two, part, code(good_source))
+    run = synthesize(policy_task, model.name, out=out, iterations=1)
+    assert run.tau == 1
+    _, second, third = model.prompts()
+    assert "two blocks that may be the file" in second[-200:]
+    assert "no `def policy` at its top level" in third[-200:]
+    folder = out / "iterations" / "k01" / "j0"
+    assert (folder / "generate.prompt-3.md").read_text() == third
+    assert (folder / "generate.reply-2.md").read_text() == part
+
+
+def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out):
+    """One line each, the one in question left out; no figure of a held-out start."""
+    model = Model(
+        tmp_path / "model",
+        *(code(STILL), code(WALL), code(f"{WALL}X = 1\n"), code(good_source)),
+    )
+    run = synthesize(policy_task, model.name, out=out, iterations=1, patience=3)
+    assert run.tau == 1
+    first, second, third = (
+        prompt.partition("## Earlier attempts, oldest first\n")[2]
+        for prompt in model.prompts()[1:]
+    )
+    assert first == ""
+    lines = second.partition("\n\n")[0].splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("- k=1 j=0: ")
+    assert "no motion" in lines[0]
+    lines = third.partition("\n\n")[0].splitlines()
+    assert [line[:11] for line in lines] == ["- k=1 j=0: ", "- k=1 j=1: "]
+    assert "nominal: collision in step " in lines[1]
+
+
+def test_the_prompt_is_on_record(policy_task, good_source, tmp_path, out):
+    """A run says which template its questions were made from."""
+    model = Model(tmp_path / "model", code(good_source))
+    synthesize(policy_task, model.name, out=out, prompt="underspecified")
+    assert load_run(out).prompt == "underspecified"
+    assert "## Advice" not in model.prompts()[0]
+
+
+def test_a_broken_template_leaves_no_folder(tmp_path, tdac):
+    """Refused in one line before anything is asked or written."""
+    (tmp_path / "mine.j2").write_text("{{ nothing }}")
+    folder = write_small_task(tmp_path / "task")
+    words = ("--task", folder, "--prompt", tmp_path / "mine.j2", "--out", "run")
+    code_, _, told = tdac("synth", *words)
+    assert code_ == 2
+    assert "'nothing' is undefined" in told
+    assert told.count("\n") == 1
+    assert not Path("run").exists()
+
+
+def test_rules_of_what_is_no_run(tmp_path, tdac):
+    """A wrong folder and a damaged file are one clear line each."""
+    code_, _, told = tdac("rules", tmp_path)
+    assert code_ == 2
+    assert "is not a run folder" in told
+
+
+def test_builtin_learns_by_rules(tmp_path, tdac):
+    """The template's own optimizer passes through the same rules, and says so."""
+    folder = write_small_task(tmp_path / "task", horizon=40)
+    code_, _, _ = tdac("synth", "--task", folder, "-K", "3", "-J", "0", "--out", "run")
+    assert code_ == 1
+    book = load_rules(Path("run"))
+    assert book.in_force
+    assert all(rule.text.startswith(("set ", "keep ")) for rule in book.rules)
+    assert {rule.born for rule in book.rules} == {1, 2, 3}
+    code_, shown, _ = tdac("rules", "run")
+    assert code_ == 0
+    assert "builtin" in shown
+    (Path("run") / "rules.json").write_text("[1")
+    code_, _, told = tdac("rules", "run")
+    assert code_ == 2
+    assert "holds no rules" in told
