@@ -28,6 +28,8 @@ from tdac_envs.task2d import Pose
 
 JITTERS = 5
 SHOWN_JITTERS = 2
+# As many as a suite has: the nominal one, the jittered ones, those of `run_episode`.
+EPISODES = 1 + JITTERS + 3
 WALL_SECONDS = 600.0
 
 Key = tuple[str, int | None, str]
@@ -63,6 +65,7 @@ class Judge:
         seed: Of the jittered starts.
         limits: Of each child; `cpu_seconds` is for all of them together.
         nursery: Where children are started ahead; one of its own by default.
+        at_a_time: How many episodes may go on side by side.
 
     Attributes:
         tier: Name of the tier that was used.
@@ -80,6 +83,7 @@ class Judge:
         seed: int = 0,
         limits: Limits | None = None,
         nursery: Nursery | None = None,
+        at_a_time: int = min(SIZE, EPISODES),
     ) -> None:
         self.task = task
         self.source = source
@@ -94,10 +98,10 @@ class Judge:
         self._nursery = nursery or Nursery(ahead=False)
         self._owns_nursery = nursery is None
         # Before the first thread.
-        self._crew = Crew(self._in_crew, self._nursery.close)
-        self._pool = ThreadPoolExecutor(max_workers=SIZE)
+        self._crew = Crew(self._in_crew, self._nursery.close, at_a_time)
+        self._pool = ThreadPoolExecutor(max_workers=at_a_time)
         # The suite's own calls are made beside the episodes.
-        self._turns = Turns(SIZE + 1)
+        self._turns = Turns(at_a_time + 1)
         self._lock = threading.Lock()
         self._episodes: dict[Key, Future[Rollout]] = {}
         self._unit: Unit | None = None

@@ -169,10 +169,11 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
 def _in_order(stage: Stage, job: SeededJob) -> Generator[tuple[SeededEpisode, str]]:
     """Episodes and their tiers, several at a time; closing waits for the last."""
     seeds = range(job.first_seed, job.first_seed + job.episodes)
-    turns = Turns(SIZE)
+    size = min(SIZE, job.episodes)
+    turns = Turns(size)
     with (
-        closing(Crew(partial(_driven, stage), stage.nursery.close)) as crew,
-        ThreadPoolExecutor(max_workers=SIZE) as pool,
+        closing(Crew(partial(_driven, stage), stage.nursery.close, size)) as crew,
+        ThreadPoolExecutor(max_workers=size) as pool,
     ):
         try:
             yield from pool.map(partial(_in_turn, crew, turns), seeds)

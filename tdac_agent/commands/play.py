@@ -74,7 +74,7 @@ def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work = Path(folder)
         write_workdir(work, task)
-        judge = Judge(task, source, work, tier=tier, seed=0)
+        judge = Judge(task, source, work, tier=tier, seed=0, at_a_time=1)
         try:
             return judge.drive(name)
         finally:
