@@ -7,9 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
 from tdac_agent.setting import JudgedEnv
 
@@ -77,8 +75,9 @@ def _observation(space: spaces.Space[Any], text: str) -> str:
         if key in space.keys():  # noqa: SIM118 - a Dict space has no `in`
             box = space[key]
             assert isinstance(box, spaces.Box)
-            limits = f"{_limit(box.low)} to {_limit(box.high)}"
-            rows.append(f"| `{key}` | {box.shape} | {limits} | {unit} | {content} |")
+            rows.append(
+                f"| `{key}` | {box.shape} | {_limits(box)} | {unit} | {content} |"
+            )
     _, _, rest = text.rpartition("|\n")
     return "\n".join([*rows, "", rest.strip()]).rstrip()
 
@@ -91,10 +90,13 @@ def _rows(text: str) -> Iterator[tuple[str, list[str]]]:
             yield match[1], [cell.strip() for cell in match[2].split("|")]
 
 
-def _limit(values: NDArray[np.floating]) -> str:
-    """`0`, or `(-0.5, -0.5, -3.142)` where not all are equal."""
-    flat = [f"{value:.4g}" for value in values.ravel().tolist()]
-    return flat[0] if len(set(flat)) == 1 else f"({', '.join(flat)})"
+def _limits(box: spaces.Box) -> str:
+    """`0 to 220`, or `(-0.5, -3.142) to (99.5, 3.142)` where the numbers differ."""
+    ends = (box.low, box.high)
+    flat = [[f"{v:.4g}" for v in end.ravel().tolist()] for end in ends]
+    if all(len(set(numbers)) == 1 for numbers in flat):
+        return " to ".join(numbers[0] for numbers in flat)
+    return " to ".join(f"({', '.join(numbers)})" for numbers in flat)
 
 
 def _action(space: spaces.Space[Any], text: str) -> str:
@@ -104,8 +106,8 @@ def _action(space: spaces.Space[Any], text: str) -> str:
         ManualError: They begin with another space.
     """
     assert isinstance(space, spaces.Box)
-    low, high = _limit(space.low), _limit(space.high)
-    real = f"`Box({low}, {high}, {space.shape}, {space.dtype})`"
+    limits = _limits(space).replace(" to ", ", ")
+    real = f"`Box({limits}, {space.shape}, {space.dtype})`"
     if not text.startswith(real):
         raise ManualError(f"the manual page must begin its action space with {real}")
     return text

@@ -52,6 +52,7 @@ def _of_any(task: Task) -> dict[str, Any]:
         "cpu_seconds": f"{limits.cpu_seconds:g}",
         "profile": task.spec.profile,
         "progress_steps": task.progress_steps,
+        "full_way": task.progress_steps * nominal.full_step,
         "progress_fraction": f"{progress.fraction:g}",
         "progress_distance": {
             "geodesic": "length of the shortest free path",

@@ -77,7 +77,8 @@ def test_is_occupied_returns_bool(small_map):
     _, own = small_map
     for x, y in ((0, 0), (5, 4), (36, 22), (-1, 3), (999, 999)):
         found = own.call("is_occupied", x, y)
-        assert type(found) is bool, f"is_occupied({x}, {y}) is a {type(found).__name__}"
+        kind = f"{type(found).__module__}.{type(found).__name__}"
+        assert type(found) is bool, f"is_occupied({x}, {y}) is a {kind}, not a bool"
 
 
 def test_is_occupied_outside(small_map):
