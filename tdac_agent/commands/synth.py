@@ -67,6 +67,9 @@ class Progress:
         elif kind == "call.reply":
             for note in record["notes"]:
                 self._console.print(f"  [dim]{at}  {escape(note)}[/]")
+        elif kind == "rules":
+            for note in record["notes"]:
+                self._console.print(f"  [dim]k={record['k']}  rules: {escape(note)}[/]")
         elif kind == "verify.start":
             self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
         elif kind == "verify.end":
