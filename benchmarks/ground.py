@@ -1,66 +1,69 @@
-"""The task and the good controllers that the mutation score is measured with."""
+"""What a mutation score is measured on: one ground for each kind of task."""
 
 from __future__ import annotations
 
-import re
-import tempfile
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
-import numpy as np
-import yaml
-
+from benchmarks import epuck_oracles, independent_oracles
+from benchmarks.ground_epuck import good_drivers, small_world
+from benchmarks.ground_map2d import good_controllers, small_task
 from benchmarks.mutants import Original
-from tdac_agent.builtin import Parameters, render_controller
-from tdac_agent.task import Task, load_task
-from tdac_envs.grid import BoolGrid
-
-ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "map2d" / "good"
+from tdac_agent.sandbox import Child
+from tdac_agent.task import Task
 
 
-def cells() -> BoolGrid:
-    """Three rooms in a row, 240 x 166 px: passages of 2.9 radii below and above."""
-    occupied = np.zeros((166, 240), np.bool_)
-    occupied[:7] = occupied[-4:] = occupied[:, :4] = occupied[:, -4:] = True
-    occupied[:127, 70:77] = occupied[42:, 154:161] = True
-    # A pillar that can be passed on one side only.
-    occupied[76:84, 114:120] = True
-    return occupied[:, ::-1]
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """A task, its good controllers, and how much is asked of them.
 
-
-def small_task() -> Task:
-    """A way of twice the straight distance for a body of 12 px.
-
-    The robot looks away from its goal at first, and headings around pi are its way.
+    Attributes:
+        results: Name of the files of results.
+        task: Makes the task.
+        originals: Good controllers for it.
+        violations: What a file does against the contract of profile `paper`.
+        domain: Number of mutants from the domain's own mistakes.
+        syntactic: Number of mutants from cosmic-ray.
+        seeds: Number of jittered starts that the independent judge tries.
     """
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        np.save(folder / "map.npy", cells())
-        content = {
-            "schema": 1,
-            "name": "three rooms",
-            "map": "map.npy",
-            "start": [201, 52],
-            "goal": [41, 110],
-            "robot": {"radius": 12},
-            "horizon": 600,
-        }
-        (folder / "task.yaml").write_text(yaml.safe_dump(content))
-        return load_task(folder)
+
+    results: str
+    task: Callable[[], Task]
+    originals: Callable[[Task], list[Original]]
+    violations: Callable[[Child, Task, str], Iterator[str]]
+    domain: int
+    syntactic: int
+    seeds: int
+
+    @property
+    def starts(self) -> Sequence[int]:
+        """Seeds of the jittered starts."""
+        return range(7_000_001, 7_000_001 + self.seeds)
+
+    @property
+    def failures_allowed(self) -> int:
+        """One more, and less than 90 % of the starts succeed."""
+        return self.seeds // 10
 
 
-def good_controllers(task: Task) -> list[Original]:
-    """The template in two tunings, and the good ones of the zoo."""
-    robot, dt = task.params.robot, task.nominal.dt
-    tuned = Parameters(inflation_margin=3.0, lookahead=60.0, unstick_after=80.0)
-    originals = [
-        Original("builtin", "paper", render_controller(Parameters(), robot, dt)),
-        Original("builtin_tuned", "paper", render_controller(tuned, robot, dt)),
-    ]
-    for path in sorted(ZOO.glob("*.py")):
-        text = path.read_text(encoding="utf-8")
-        profile = re.search(r"^# profile: (\w+)", text, re.MULTILINE)
-        if profile and profile[1] == "paper":
-            originals.append(Original(path.stem, "paper", text))
-        elif profile and profile[1] == "policy":
-            originals.append(Original(path.stem, "policy", text))
-    return originals
+GROUNDS = {
+    "map2d": Ground(
+        "mutation",
+        small_task,
+        good_controllers,
+        independent_oracles.contract_violations,
+        domain=205,
+        syntactic=105,
+        seeds=50,
+    ),
+    "epuck": Ground(
+        "mutation_epuck",
+        small_world,
+        good_drivers,
+        epuck_oracles.contract_violations,
+        domain=81,
+        syntactic=24,
+        seeds=20,
+    ),
+}
+"""By the kind of task."""

@@ -14,16 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.independent_oracles import contract_violations
+from benchmarks.ground import Ground
 from benchmarks.witness import Witness
 from tdac_agent.nursery import Nursery
 from tdac_agent.sandbox import Child, ControllerFault, Limits
+from tdac_agent.setting import JudgedEnv
 from tdac_agent.task import Task, write_workdir
-from tdac_envs.map2d import Map2DEnv
 
-SEEDS = tuple(range(7_000_001, 7_000_051))
-FAILURES_ALLOWED = len(SEEDS) // 10
-"""One more, and less than 90 % of the seeds succeed."""
 Loop = dict[str, Any]
 
 
@@ -43,14 +40,16 @@ class Judgement:
 
 
 class IndependentJudge:
-    """Judges controllers on one task.
+    """Judges controllers on one ground.
 
     Args:
+        ground: What is asked of them.
         task: What they must do.
         limits: Of each child.
     """
 
-    def __init__(self, task: Task, limits: Limits) -> None:
+    def __init__(self, ground: Ground, task: Task, limits: Limits) -> None:
+        self.ground = ground
         self.task = task
         self.limits = limits
 
@@ -81,15 +80,16 @@ class IndependentJudge:
 
     def _jittered(self, begin: Any, all_seeds: bool) -> Judgement:
         failed, last = 0, ""
-        for tried, seed in enumerate(SEEDS, 1):
+        starts, allowed = self.ground.starts, self.ground.failures_allowed
+        for tried, seed in enumerate(starts, 1):
             env = self.task.make_env(variation="jitter")
             reason = self._episode(begin, env, seed)
             failed += bool(reason)
             last = reason or last
             good = tried - failed
-            if failed > FAILURES_ALLOWED and not all_seeds:
+            if failed > allowed and not all_seeds:
                 return Judgement(f"{failed} of {tried} starts: {last}", tried, failed)
-            if good >= len(SEEDS) - FAILURES_ALLOWED and not all_seeds:
+            if good >= len(starts) - allowed and not all_seeds:
                 break
         return Judgement("", tried, failed)
 
@@ -97,7 +97,7 @@ class IndependentJudge:
         try:
             with begin() as child:
                 child.load()
-                yield from contract_violations(child, self.task, text)
+                yield from self.ground.violations(child, self.task, text)
             for loop in self._loops():
                 yield from self._own_loop(begin, **loop)
         except ControllerFault as fault:
@@ -112,15 +112,15 @@ class IndependentJudge:
         yield {"env": make(variation="jitter"), "most": 25, "bumps": 3}
 
     def _own_loop(
-        self, begin: Any, env: Map2DEnv, most: int, bumps: int = 0
+        self, begin: Any, env: JudgedEnv, most: int, bumps: int = 0
     ) -> Iterator[str]:
-        witness = Witness(env, most, bumps)
+        witness = Witness(env, most, bumps, self.task.setting.units)
         with begin() as child:
             child.load()
             result = child.run_episode(witness, most, 60.0)
         yield from witness.contradictions(result)
 
-    def _episode(self, begin: Any, env: Map2DEnv, seed: int) -> str:
+    def _episode(self, begin: Any, env: JudgedEnv, seed: int) -> str:
         """Why an episode of `policy` failed, empty where it did not."""
         observation, _ = env.reset(seed=seed)
         seconds, steps = 0.0, 0

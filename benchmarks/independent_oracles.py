@@ -23,24 +23,24 @@ SEED = 20_240_717
 
 def contract_violations(child: Child, task: Task, text: str) -> Iterator[str]:
     """What the file and its functions do against the contract of profile `paper`."""
-    yield from _file(text)
+    yield from guard_faults(ast.parse(text))
     yield from _constants(child, task)
     draw = random.Random(SEED)
     for _ in range(4):
-        yield from _occupancy(child, _random_map(draw))
+        yield from _occupancy(child, random_map(draw))
     for _ in range(25):
         yield from _nearest(
-            child, _random_map(draw, draw.choice([0.5, 0.8, 0.97])), draw
+            child, random_map(draw, draw.choice([0.5, 0.8, 0.97])), draw
         )
     for _ in range(40):
-        cells = _random_map(draw, draw.choice([0.0, 0.15, 0.3, 0.4]))
+        cells = random_map(draw, draw.choice([0.0, 0.15, 0.3, 0.4]))
         yield from _planning(child, cells, draw, cell=1)
     for size in (2, 3):
-        yield from _planning(child, _random_map(draw, 0.02), draw, cell=size)
+        yield from _planning(child, random_map(draw, 0.02), draw, cell=size)
 
 
-def _file(text: str) -> Iterator[str]:
-    tree = ast.parse(text)
+def guard_faults(tree: ast.Module) -> Iterator[str]:
+    """What is missing of `main()` and its guard."""
     last = ast.unparse(tree.body[-1])
     if not (last.startswith("if __name__") and "main()" in last):
         yield "no guard"
@@ -74,7 +74,8 @@ def _constants(child: Child, task: Task) -> Iterator[str]:
             yield f"{name} is {child.get(name)!r}"
 
 
-def _random_map(draw: random.Random, density: float = 0.3) -> Cells:
+def random_map(draw: random.Random, density: float = 0.3) -> Cells:
+    """Rows of cells, True = occupied."""
     width, height = draw.randint(5, 34), draw.randint(5, 26)
     return [[draw.random() < density for _ in range(width)] for _ in range(height)]
 
@@ -135,19 +136,32 @@ def _planning(
             draw.randrange(start[1] % cell, height, cell),
         )
         path = child.call("plan_path", (own, start, goal, cell))
-        best = _octile_length(cells, start, goal, cell)
+        best = octile_length(cells, start, goal, cell)
         if cell == 1 and math.isfinite(best) != _joined(cells, start, goal):
             raise AssertionError(f"the oracles differ on {cells}")
-        reason = _path_fault(cells, path, start, goal, cell, best)
+        reason = path_fault(cells, path, start, goal, cell, best)
         if reason:
             yield f"plan_path {start} -> {goal}, cell {cell}: {reason}"
 
 
-def _path_fault(
+def path_fault(
     cells: Cells, path: Any, start: Point, goal: Point, cell: int, best: float
 ) -> str | None:
+    """What is wrong with what a planner returned, or None."""
     if type(path) is not list or not all(map(_is_point, path)):
         return f"no list of (int, int): {path!r:.60}"
+    return step_fault(cells, path, start, goal, best, cell)
+
+
+def step_fault(
+    cells: Cells,
+    path: list[Point],
+    start: Point,
+    goal: Point,
+    best: float,
+    cell: int = 1,
+) -> str | None:
+    """What is wrong with a list of points as a path, or None."""
     if math.isinf(best):
         return "a path where there is none" if path and cell == 1 else None
     if not path or path[0] != start or path[-1] != goal:
@@ -173,7 +187,7 @@ def _steps(cells: Cells, point: Point, cell: int) -> Iterator[tuple[Point, float
             yield (x, y), cell * math.hypot(dx, dy)
 
 
-def _octile_length(cells: Cells, start: Point, goal: Point, cell: int) -> float:
+def octile_length(cells: Cells, start: Point, goal: Point, cell: int = 1) -> float:
     """Dijkstra; inf where there is no path."""
     if _solid(cells, *start) or _solid(cells, *goal):
         return math.inf

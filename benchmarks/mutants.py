@@ -6,22 +6,43 @@ import ast
 import difflib
 import functools
 import random
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from benchmarks.domain_mutations import DOMAIN
+from benchmarks.epuck_mutations import DOMAIN_EPUCK
+from benchmarks.mutation_rules import Rule
 from benchmarks.source import Source
 from tdac_agent.task_file import Profile
+
+RULES: dict[str, dict[str, Rule]] = {"map2d": DOMAIN, "epuck": DOMAIN_EPUCK}
+"""The domain's mistakes, by kind of task."""
 
 
 @dataclass(frozen=True, slots=True)
 class Original:
-    """A good controller."""
+    """A good controller for a kind of task."""
 
     name: str
     profile: Profile
     text: str
+    kind: str = "map2d"
+
+
+def originals_in(folder: Path, kind: str = "map2d") -> list[Original]:
+    """The controllers of a folder; each names its profile in a comment."""
+    found = []
+    for path in sorted(folder.glob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        profile = re.search(r"^# profile: (\w+)", text, re.MULTILINE)
+        if profile and profile[1] == "paper":
+            found.append(Original(path.stem, "paper", text, kind))
+        elif profile and profile[1] == "policy":
+            found.append(Original(path.stem, "policy", text, kind))
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +104,9 @@ def choose(
 
 
 def domain_mutants(original: Original) -> Iterator[Candidate]:
-    """Every mutant of a controller that `DOMAIN` knows."""
+    """Every mutant of a controller that the rules of its kind of task know."""
     source = Source(original.text)
-    for name, rule in DOMAIN.items():
+    for name, rule in RULES[original.kind].items():
         for node in ast.walk(source.tree):
             for target, text in rule(node, source):
                 make = functools.partial(source.replaced, target, text)

@@ -1,15 +1,18 @@
 """Mutation score of the shipped suite: of the harmful mutants, how many it kills.
 
-    python -m benchmarks.mutation [--sample N] [--seed S] [--json] [--resume FILE]
+    python -m benchmarks.mutation [--kind map2d|epuck] [--sample N] [--seed S] [--json]
+                                  [--resume FILE]
 
 Mutants of good controllers get one change each: a mistake of the domain
 (`domain_mutations`, `lies`) or an operator of cosmic-ray (`pip install "tdac[bench]"`).
 *Killed*: `tdac_agent.verify` does not pass it. *Harmful*: an independent judge, with
 oracles and starts of its own, finds that it violates the contract, or that it succeeds
-on less than 90 % of 50 jittered starts, where the original succeeds on all of them.
+on less than 90 % of 50 jittered starts (e-puck: 20), where the original succeeds on all
+of them.
 
-The whole run writes `results/mutation.csv` and `results/mutation.md`; a sample only
-prints. Exit 1 where a harmful mutant survives.
+Both kinds of task have their turn, unless one is named. The whole run writes
+`results/mutation.csv` and `.md`, and `results/mutation_epuck.csv` and `.md`; a sample
+only prints. Exit 1 where a harmful mutant survives.
 """
 
 from __future__ import annotations
@@ -25,19 +28,17 @@ from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
 
-from benchmarks.ground import good_controllers, small_task
-from benchmarks.independent_judge import SEEDS, IndependentJudge
+from benchmarks.ground import GROUNDS, Ground
+from benchmarks.independent_judge import IndependentJudge
 from benchmarks.journal import Journal
 from benchmarks.mutants import Mutant, Original, choose
 from benchmarks.mutation_tables import write_csv, write_markdown
 from tdac_agent.report import Report
 from tdac_agent.sandbox import Limits
 from tdac_agent.task import Task
-from tdac_agent.task_file import Profile
 from tdac_agent.verification import verify
 from tdac_agent.warm import WarmJudge
 
-DOMAIN_MUTANTS, SYNTACTIC_MUTANTS = 205, 105
 LIMITS = Limits(import_seconds=4.0, reset_seconds=4.0, call_seconds=4.0, cpu_seconds=40)
 RESULTS = Path(__file__).parent.parent / "results"
 
@@ -77,8 +78,8 @@ class Row:
 
 
 @cache
-def _task() -> Task:
-    return small_task()
+def _task(kind: str) -> Task:
+    return GROUNDS[kind].task()
 
 
 @cache
@@ -89,21 +90,27 @@ def _warm_judge() -> WarmJudge:
     return judge
 
 
-def _report(text: str, profile: Profile) -> Report:
-    source, judge = text.encode(), _warm_judge()
-    return verify(source, _task(), profile=profile, limits=LIMITS, judge=judge)
+def _report(original: Original, text: str) -> Report:
+    task, profile = _task(original.kind), original.profile
+    return verify(
+        text.encode(), task, profile=profile, limits=LIMITS, judge=_warm_judge()
+    )
+
+
+def _independent(kind: str) -> IndependentJudge:
+    return IndependentJudge(GROUNDS[kind], _task(kind), LIMITS)
 
 
 def examine(mutant: Mutant) -> dict[str, Any]:
     """Asks the suite and the independent judge about a mutant; a `Row` as a dict."""
-    text, profile = mutant.text, mutant.original.profile
-    report = _report(text, profile)
-    found = IndependentJudge(_task(), LIMITS).judge(text, profile)
+    text, original = mutant.text, mutant.original
+    report = _report(original, text)
+    found = _independent(original.kind).judge(text, original.profile)
     line, change = mutant.change()
     row = Row(
         mutation=mutant.mutation,
-        controller=mutant.original.name,
-        profile=profile,
+        controller=original.name,
+        profile=original.profile,
         line=line,
         change=change[:160],
         killed=not report.passed,
@@ -115,13 +122,13 @@ def examine(mutant: Mutant) -> dict[str, Any]:
 
 
 def fault_of(original: Original) -> str:
-    """Why a controller is not good on this task; empty where it passes everything."""
-    text, profile = original.text, original.profile
-    report = _report(text, profile)
+    """Why a controller is not good on its task; empty where it passes everything."""
+    report = _report(original, original.text)
     if not report.passed:
         failure = report.failures[0]
         return f"fails {failure.test}: {' '.join(failure.message.split())[:160]}"
-    found = IndependentJudge(_task(), LIMITS).judge(text, profile, all_seeds=True)
+    judge = _independent(original.kind)
+    found = judge.judge(original.text, original.profile, all_seeds=True)
     failed = f"fails {found.failed} of {found.tried} starts"
     return found.reason or (failed if found.failed else "")
 
@@ -129,47 +136,61 @@ def fault_of(original: Original) -> str:
 def main() -> int:
     """Returns the exit code."""
     options = _options()
-    began = time.monotonic()
-    whole = DOMAIN_MUTANTS + SYNTACTIC_MUTANTS
-    count = whole if options.sample is None else options.sample
-    syntactic = count * SYNTACTIC_MUTANTS // whole
-    journal = Journal(options.resume, _task().sha256())
+    kinds = [options.kind] if options.kind else list(GROUNDS)
     with ProcessPoolExecutor(options.workers) as pool:
-        candidates = good_controllers(_task())
-        faults = list(journal.answers(pool, fault_of, candidates))
-        left_out = {c.name: f for c, f in zip(candidates, faults, strict=True) if f}
-        originals = [item for item in candidates if item.name not in left_out]
-        for name, fault in left_out.items():
-            print(f"left out: {name}: {fault}", file=sys.stderr)
-        mutants = choose(originals, count - syntactic, syntactic, options.seed)
-        rows = []
-        for answer in journal.answers(pool, examine, mutants):
-            rows.append(Row(**answer))
-            if not options.json:
-                print(f"{len(rows):4} {rows[-1]}", flush=True)
+        survivors = sum(measure(kind, options, pool) for kind in kinds)
+    return 1 if survivors else 0
+
+
+def measure(kind: str, options: argparse.Namespace, pool: ProcessPoolExecutor) -> int:
+    """Examines mutants for a kind of task and tells; how many harmful ones survive."""
+    ground, task, began = GROUNDS[kind], _task(kind), time.monotonic()
+    journal = Journal(options.resume, task.sha256())
+    candidates = ground.originals(task)
+    faults = list(journal.answers(pool, fault_of, candidates))
+    left_out = {c.name: f for c, f in zip(candidates, faults, strict=True) if f}
+    originals = [item for item in candidates if item.name not in left_out]
+    for name, fault in left_out.items():
+        print(f"left out: {name}: {fault}", file=sys.stderr)
+    rows = []
+    mutants = choose(originals, *_shares(ground, options.sample), options.seed)
+    for answer in journal.answers(pool, examine, mutants):
+        rows.append(Row(**answer))
+        if not options.json:
+            print(f"{len(rows):4} {rows[-1]}", flush=True)
     if options.json:
         print(json.dumps([asdict(row) for row in rows], indent=1))
-    harmful = [row for row in rows if row.harmful]
-    survivors = [row for row in harmful if not row.killed]
+    survivors = [row for row in rows if row.harmful and not row.killed]
     for row in survivors:
         print(row, file=sys.stderr)
+    harmful = sum(row.harmful for row in rows)
     print(
-        f"{len(rows)} mutants of {len(originals)} controllers: {len(harmful)} harmful, "
-        f"{len(harmful) - len(survivors)} of these killed, {len(survivors)} survived; "
-        f"{time.monotonic() - began:.0f} s",
+        f"{kind}: {len(rows)} mutants of {len(originals)} controllers: {harmful} "
+        f"harmful, {harmful - len(survivors)} of these killed, {len(survivors)} "
+        f"survived; {time.monotonic() - began:.0f} s",
         file=sys.stderr,
     )
     if options.sample is None:
         RESULTS.mkdir(exist_ok=True)
-        write_csv(RESULTS / "mutation.csv", rows)
-        names = [item.name for item in originals]
-        write_markdown(RESULTS / "mutation.md", rows, names, left_out, len(SEEDS))
-    return 1 if survivors else 0
+        names, file = [item.name for item in originals], RESULTS / ground.results
+        write_csv(file.with_suffix(".csv"), rows)
+        table = file.with_suffix(".md")
+        write_markdown(table, kind, rows, names, left_out, ground.seeds)
+    return len(survivors)
+
+
+def _shares(ground: Ground, sample: int | None) -> tuple[int, int]:
+    """Numbers of the domain's and of cosmic-ray's mutants."""
+    whole = ground.domain + ground.syntactic
+    count = whole if sample is None else sample
+    syntactic = count * ground.syntactic // whole
+    return count - syntactic, syntactic
 
 
 def _options() -> argparse.Namespace:
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="benchmarks.mutation", description=about)
+    parser.add_argument("--kind", choices=GROUNDS, help="only this kind of task")
     parser.add_argument("--sample", type=int, help="only so many mutants")
     parser.add_argument("--seed", type=int, default=1, help="of the choice of mutants")
     parser.add_argument("--json", action="store_true", help="print rows as JSON")

@@ -70,13 +70,13 @@ def in_policy(*lines: str) -> Rule:
     return rule
 
 
-def margin(form: str) -> Rule:
+def margin(form: str, names: re.Pattern[str] = BODY) -> Rule:
     """Uses of the body's size and of margins in another form."""
 
     def rule(node: ast.AST, source: Source) -> Iterator[Change]:
         name = node.id if isinstance(node, ast.Name) else constant_key(node)
         name = node.attr if isinstance(node, ast.Attribute) else name
-        if not name or not BODY.search(name) or source.is_called(node):
+        if not name or not names.search(name) or source.is_called(node):
             return
         if isinstance(node.ctx, ast.Load):
             yield node, form.format(text_of(node))
@@ -121,5 +121,17 @@ def heuristic(form: str) -> Rule:
             first = node.args[1].elts[0]
             if isinstance(first, ast.BinOp) and isinstance(first.op, ast.Add):
                 yield first.right, form.format(f"({text_of(first.right)})")
+
+    return rule
+
+
+def words(old: str, new: str) -> Rule:
+    """Texts that name something, with another name in its place."""
+
+    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
+        if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
+            return
+        if re.search(rf"\b{old}\b", node.value) and not source.is_docstring(node):
+            yield node, repr(re.sub(rf"\b{old}\b", new, node.value))
 
     return rule

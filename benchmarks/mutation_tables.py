@@ -20,6 +20,7 @@ def write_csv(path: Path, rows: Sequence[Any]) -> None:
 
 def write_markdown(
     path: Path,
+    kind: str,
     rows: Sequence[Any],
     controllers: Sequence[str],
     left_out: Mapping[str, str],
@@ -32,10 +33,11 @@ def write_markdown(
     alive = [row for row in harmless if not row.killed]
     killed = len(harmful) - len(survivors)
     lines = [
-        "# Mutation score",
+        f"# Mutation score: {kind}",
         "",
-        f"Remade by `python -m benchmarks.mutation`: {len(rows)} mutants of "
-        f"{len(controllers)} good controllers; each row is in `mutation.csv`.",
+        f"Remade by `python -m benchmarks.mutation --kind {kind}`: {len(rows)} mutants "
+        f"of {len(controllers)} good controllers; each row is in "
+        f"`{path.with_suffix('.csv').name}`.",
         "",
         f"**{killed} of {len(harmful)} harmful mutants are killed** "
         f"({100 * killed / max(len(harmful), 1):.1f} %). Harmful: an independent judge "

@@ -27,6 +27,7 @@ class Source:
         self.functions: dict[str, ast.FunctionDef] = {}
         self._owner: dict[ast.AST, str] = {}
         self._called: set[ast.AST] = set()
+        self._docstrings: set[ast.AST] = set()
         for node in ast.walk(self.tree):
             if isinstance(node, ast.FunctionDef):
                 self.functions.setdefault(node.name, node)
@@ -34,6 +35,8 @@ class Source:
                 self._owner.update((child, node.name) for child in ast.walk(node))
             if isinstance(node, ast.Call):
                 self._called.add(node.func)
+            if isinstance(node, ast.Expr):
+                self._docstrings.add(node.value)
 
     def replaced(self, node: ast.AST, text: str) -> str:
         """The source with another text in the place of a node."""
@@ -52,6 +55,10 @@ class Source:
     def is_called(self, node: ast.AST) -> bool:
         """Whether a node is the function of a call."""
         return node in self._called
+
+    def is_docstring(self, node: ast.AST) -> bool:
+        """Whether a text stands by itself."""
+        return node in self._docstrings
 
     def defines(self, name: str) -> bool:
         """Whether a function of this name is in the file."""

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.sandbox import EnvRefusalError
-from tdac_envs.map2d import Map2DEnv
+from tdac_agent.setting import JudgedEnv
+from tdac_agent.units import Units
 
 SEED = 7_000_001
 
@@ -20,10 +21,12 @@ class Witness:
         env: Steps.
         most: The `max_steps` that the controller was given.
         bumps: Collisions that the environment has counted before.
+        units: Of its lengths.
     """
 
-    def __init__(self, env: Map2DEnv, most: int, bumps: int) -> None:
+    def __init__(self, env: JudgedEnv, most: int, bumps: int, units: Units) -> None:
         self.env, self.most, self.bumps = env, most, bumps
+        self.slack = 0.01 / units.scale
         self.positions: list[Any] = []
         self.speeds: list[float] = []
         self.collisions = bumps
@@ -43,8 +46,8 @@ class Witness:
         observation, reward, terminated, truncated, info = self.env.step(wheels)
         self.over = terminated or truncated
         self.positions.append(observation["pose"][:2])
-        robot = self.env.nominal.robot
-        self.speeds.append(float(wheels.mean()) * robot.max_wheel_speed)
+        task = self.env.nominal
+        self.speeds.append(float(wheels.mean()) * task.full_step / task.dt)
         self.collisions = info["collisions"] + self.bumps
         info = {**info, "collisions": self.collisions}
         return observation, reward, terminated, truncated, info
@@ -68,9 +71,9 @@ class Witness:
             yield f"run_episode returned a {type(told).__name__}"
             return
         wanted = {
-            "positions": (self.positions, 0.01),
-            "speeds": (self.speeds, 0.01),
-            "goal": (task.goal, 1e-3),
+            "positions": (self.positions, self.slack),
+            "speeds": (self.speeds, self.slack),
+            "goal": (task.goal, 0.1 * self.slack),
             "dt": (task.dt, 1e-9),
             "collisions": (self.collisions, 0.0),
         }

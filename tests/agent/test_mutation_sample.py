@@ -2,17 +2,18 @@
 
 import pytest
 
-from benchmarks.ground import good_controllers, small_task
-from benchmarks.mutants import choose, domain_mutants, normal
+from benchmarks.ground import GROUNDS
+from benchmarks.mutants import Mutant, choose, domain_mutants, normal
 from benchmarks.mutation import Row, examine
 
 SAMPLE = 12
 
 
-@pytest.fixture(scope="module")
-def template():
-    """The template's controller with neutral parameters."""
-    return good_controllers(small_task())[0]
+@pytest.fixture(scope="module", params=GROUNDS)
+def template(request):
+    """The template's controller with neutral parameters, for each kind of task."""
+    ground = GROUNDS[request.param]
+    return ground.originals(ground.task())[0]
 
 
 def test_mutants_are_many_and_differ(template):
@@ -24,13 +25,19 @@ def test_mutants_are_many_and_differ(template):
     assert len({mutant.mutation for mutant in mutants}) >= 50
 
 
+def test_mutants_are_of_their_kind():
+    """Each good controller is judged, and changed, as one for its kind of task."""
+    for kind, ground in GROUNDS.items():
+        originals = ground.originals(ground.task())
+        assert {original.kind for original in originals} == {kind}
+        assert {original.profile for original in originals} == {"paper", "policy"}
+
+
 def test_a_mutant_names_its_line(template):
     """The line and what it became, as the table shows them."""
     candidates = domain_mutants(template)
     chosen = next(item for item in candidates if item.mutation == "swapped wheels")
-    mutant = choose([template], 400, 0, seed=1)
-    (found,) = [m for m in mutant if m.text == chosen.make()]
-    line, change = found.change()
+    line, change = Mutant(chosen.mutation, template, chosen.make()).change()
     assert "return" in template.text.splitlines()[line - 1]
     assert change.startswith("return")
 

@@ -1,0 +1,34 @@
+"""The world and the good controllers of the e-puck's mutation score."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks.mutants import Original, originals_in
+from tdac_agent.builtin import EPuckParameters, render_epuck
+from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import EPUCK, TaskFile
+from tdac_envs.epuck.task import EPuckTask
+
+ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "epuck"
+
+
+def small_world() -> Task:
+    """Two walls to drive around, in an arena that is turned and off the origin.
+
+    Headings around pi are the robot's way, and it looks away from its goal at first.
+    """
+    world = str(ZOO / "world.wbt")
+    return load_task(TaskFile(env=EPUCK, world=world, name="two walls", horizon=1600))
+
+
+def good_drivers(task: Task) -> list[Original]:
+    """The template in two tunings, and the good ones of the zoo."""
+    assert isinstance(task.nominal, EPuckTask)
+    tuned = EPuckParameters(inflation_margin=0.01, slow_dist=0.03, unstick_after=120.0)
+    texts = {
+        "builtin": render_epuck(EPuckParameters(), task=task.nominal),
+        "builtin_tuned": render_epuck(tuned, task=task.nominal),
+    }
+    built = [Original(name, "paper", text, "epuck") for name, text in texts.items()]
+    return [*built, *originals_in(ZOO / "good", "epuck")]
