@@ -33,9 +33,12 @@ def run(folder: Path, as_json: bool) -> int:
 
 
 def _table(book: RuleBook, title: str) -> Table:
-    table = Table(title=escape(title), title_justify="left", show_lines=True)
+    table = Table(
+        title=escape(title), title_justify="left", expand=True, show_lines=True
+    )
+    widths = {"text": 3, "evidence": 2, "effect": 1, "state": 1}
     for name in ("rule", "text", "scope", "born", "evidence", "effect", "state"):
-        table.add_column(name, overflow="fold")
+        table.add_column(name, overflow="fold", ratio=widths.get(name))
     for rule in book.rules:
         table.add_row(
             rule.id,
