@@ -59,7 +59,7 @@ def out(tmp_path):
     return tmp_path / "run"
 
 
-def test_rules_live_on(policy_task, good_source, tmp_path, out, tdac):
+def test_rules_live_on(policy_task, good_source, tmp_path, out, tdac, monkeypatch):
     """Learnt, edited and dropped over three iterations; `tdac rules` shows it all."""
     model = Model(
         tmp_path / "model",
@@ -85,6 +85,7 @@ def test_rules_live_on(policy_task, good_source, tmp_path, out, tdac):
     assert "- R2 (environment, since k=1; cured 0 of 1, worse in 1): Do" in prompts[3]
     assert "k=1 j=0: " in prompts[3].partition("## Earlier attempts")[2]
     check_life(out)
+    monkeypatch.setenv("COLUMNS", "800")  # so that no cell is wrapped
     code_, shown, _ = tdac("rules", out)
     assert code_ == 0
     for words in ("R2", "dropped", "it drives now", f"was '{SLOW}'", "cured 1 of 1"):
