@@ -107,24 +107,24 @@ class Provider(Protocol):
 
 
 class ProviderFault(Exception):
-    """An infrastructure fault of a provider that may be gone the next time."""
-
-    kind = "transient"
-
-
-class RateLimited(ProviderFault):
-    """Too many requests or tokens for now.
+    """An infrastructure fault of a provider that may be gone the next time.
 
     Args:
         message: One line.
         retry_after: Seconds after which the provider wants to be asked again.
     """
 
-    kind = "rate limit"
+    kind = "transient"
 
     def __init__(self, message: str, retry_after: float | None = None) -> None:
         super().__init__(message)
         self.retry_after = retry_after
+
+
+class RateLimited(ProviderFault):
+    """Too many requests or tokens for now."""
+
+    kind = "rate limit"
 
 
 class PermanentFault(ProviderFault):

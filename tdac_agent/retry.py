@@ -98,7 +98,6 @@ def _wait(
     # Capped before the power: of a provider that is limited for hours it is large.
     longest = min(policy.longest_wait, policy.first_wait * 2 ** min(attempt - 1, 20))
     wait = random.uniform(longest / 2, longest)
-    asked = fault.retry_after if isinstance(fault, RateLimited) else None
-    if asked is not None:
-        wait = min(max(wait, asked), policy.longest_wait)
+    if fault.retry_after is not None:
+        wait = min(max(wait, fault.retry_after), policy.longest_wait)
     return wait if wait < left else None

@@ -46,7 +46,7 @@ def fault_of(error: Exception) -> ProviderFault:
         return RateLimited(message, retry_after(headers))
     if 300 <= status < 500 and status not in PASSING:
         return PermanentFault(message)
-    return ProviderFault(message)
+    return ProviderFault(message, retry_after(headers))
 
 
 def _told(body: object) -> tuple[set[str], str]:

@@ -181,6 +181,19 @@ def test_a_truncated_answer_gets_more_room(policy_task, good_source, out):
     assert second == 2 * first
 
 
+def test_more_room_than_a_model_can_have(policy_task, good_source, out):
+    """Where it is refused, the usual room is asked for; the run goes on."""
+    cut, refused = (
+        Reply("```python", stop="length"),
+        PermanentFault("400 at most 16384"),
+    )
+    learner = Script(cut, refused, cut, refused, code(good_source))
+    assert synthesize(policy_task, learner, out=out).tau == 1
+    rooms = [request.max_tokens for request in learner.requests]
+    usual = rooms[0]
+    assert rooms == [usual, 2 * usual, usual, 2 * usual, usual]
+
+
 def test_it_gives_up_after_k_iterations(policy_task, out):
     """Nothing verified: no controller.py, status `not verified`."""
     learner = Script(code(NOTHING), RULES, code(NOTHING), RULES)

@@ -74,13 +74,10 @@ def test_a_rate_limit_is_waited_for():
 
 @given(
     st.lists(
-        st.one_of(
-            st.builds(ProviderFault, st.just("503")),
-            st.builds(
-                RateLimited,
-                st.just("429"),
-                st.none() | st.floats(0, allow_infinity=False) | st.just(1e300),
-            ),
+        st.builds(
+            lambda kind, after: kind("503", after),
+            st.sampled_from([ProviderFault, RateLimited, PermanentFault]),
+            st.none() | st.floats(0, allow_infinity=False) | st.just(1e300),
         ),
         max_size=12,
     ),
@@ -101,6 +98,12 @@ def test_no_wait_is_longer_than_it_may_be(faults, policy):
     assert max(model.given) <= policy.seconds
     assert len(model.given) == len(waits) + 1
     assert end == "done" or end is faults[len(waits)]
+
+
+def test_a_busy_server_is_left_alone_as_long_as_it_asks():
+    """Its `Retry-After` counts, up to the longest wait."""
+    model = Script(ProviderFault("503", 30.0), ProviderFault("529", 1e9))
+    assert ask(model, RetryPolicy()) == ("done", [30.0, 60.0])
 
 
 def test_an_interrupt_ends_the_wait():

@@ -158,9 +158,13 @@ def test_the_key_is_in_no_place(server, canary, task_file, tmp_path, no_traces):
     server.script = [look]
     words = ["synth", "--task", task_file, "--learner", "openai:m", "--json"]
     out = tmp_path / "run"
-    process = start([*words, "--base-url", server.url(OPENAI), "--out", out])
+    # The packages' own logs are asked for, too: they go to stderr.
+    process = start(
+        [*words, "--base-url", server.url(OPENAI), "--out", out], OPENAI_LOG="debug"
+    )
     stdout, stderr = process.communicate(timeout=120)
     assert process.returncode == 3, stderr
+    assert "HTTP Request" in stderr
     assert len(server.seen) == 2
     assert canary not in stdout + stderr
     assert "401: invalid_api_key: wrong key: Bearer [" in stderr
