@@ -131,10 +131,10 @@ class Dialogue:
         notes: tuple[str, ...] = ()
         for _ in range(MAX_ASKS):
             reply = self._ask(model, request)
-            notes = reply.notes
             answer = _file_in(reply)
             if answer.source is not None:
-                return Candidate(answer.source, notes)
+                return Candidate(answer.source, reply.notes)
+            notes = (*reply.notes, f"not used: {answer.problem}")
             request = _again(request, reply, answer.problem)
         return Candidate(None, notes)
 

@@ -129,6 +129,7 @@ def test_invalid_answers_are_asked_again_twice(policy_task, good_source, out, re
         (1, False, False),
         (2, True, True),
     ]
+    assert run.attempts[0].notes[-1].startswith("not used: it")
     first = out / "iterations" / "k01" / "j0"
     replies = sorted(path.name for path in first.glob("generate.reply*"))
     assert replies == [
