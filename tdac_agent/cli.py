@@ -98,7 +98,9 @@ def map_command(
 
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")
 def world_command(
-    file: Annotated[Path, typer.Argument(help="Webots world, V6 to R2025a.")],
+    file: Annotated[
+        str, typer.Argument(help="Webots world, V6 to R2025a, or a bundled name.")
+    ],
     png: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--png", metavar="OUT", help="Draw it from above."),

@@ -281,11 +281,14 @@ def _why_not(
         return f"teleport: {log.teleport}"
     if error is not None:
         return f"the controller failed: {error}"
+    reasons = []
+    if log.first_contact is not None:
+        step, x, y = log.first_contact
+        count = f"{log.collisions} steps with a contact"
+        reasons.append(f"{count}, the first in step {step} at ({x:.3f}, {y:.3f})")
     if stage.has_goal and outcome != "reached":
-        return f"the goal was not reached ({outcome})"
-    if log.collisions:
-        return f"{log.collisions} steps with a contact"
-    return ""
+        reasons.append(f"the goal was not reached ({outcome})")
+    return "; ".join(reasons)
 
 
 def _printed(usage: ChildUsage) -> str:

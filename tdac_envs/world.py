@@ -294,9 +294,11 @@ def check_modelled(world: World, ignore: Iterable[str] = ()) -> tuple[Unmodelled
         kinds = sorted({node.kind for node in left})
         first = left[0]
         raise WorldError(
-            f"{where}: {len(left)} nodes may be solid but are not modelled "
+            f"{where}: {len(left)} node{'s' * (len(left) > 1)} may be solid but "
+            f"{'are' if len(left) > 1 else 'is'} not modelled "
             f"({', '.join(kinds)}; the first at ({first.x:g}, {first.y:g}): "
-            f"{first.why}); leave them out with --ignore NAME or --ignore TYPE"
+            f"{first.why}); leave them out with --ignore NAME or TYPE "
+            "(ignore=[...] in Python)"
         )
     for name in names:
         if not any(node.is_called(name) for node in world.unmodelled):

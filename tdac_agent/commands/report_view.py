@@ -49,6 +49,17 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
         f"passed in {report.seconds:.1f} s  (task {escape(about.task)}, profile "
         f"{about.profile}, sandbox {about.sandbox})"
     )
+    if not verdict.passed and _only_drives(report):
+        console.print(
+            "it drives, but has not all functions that the profile paper asks for: "
+            "--profile policy asks for policy(obs) alone"
+        )
+
+
+def _only_drives(report: Report) -> bool:
+    """Whether the profile `paper` alone stands in the way."""
+    reached = all(episode.outcome == "reached" for episode in report.episodes)
+    return report.provenance.profile == "paper" and bool(report.episodes) and reached
 
 
 def _show_files(out: Path, console: Console) -> None:

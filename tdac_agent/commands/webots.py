@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,8 @@ from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds import world_file
 
 STRIDE = 2
+# A line that a controller prints more often is shown once.
+REPEATS = 5
 _STEERING = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
 
 
@@ -76,6 +79,21 @@ def printable(text: str) -> str:
     )
 
 
+def _once(text: str) -> str:
+    """A text in which lines that repeat say how often, where they are first."""
+    lines = text.rstrip().splitlines()
+    counts = Counter(lines)
+    kept: list[str] = []
+    seen: set[str] = set()
+    for line in lines:
+        if counts[line] <= REPEATS or not line.strip():
+            kept.append(line)
+        elif line not in seen:
+            kept.append(f"{line}  (×{counts[line]})")
+        seen.add(line)
+    return "\n".join(kept)
+
+
 def _show(report: WebotsReport, console: Console) -> None:
     if report.sandbox == "rlimits":
         console.print(
@@ -84,7 +102,7 @@ def _show(report: WebotsReport, console: Console) -> None:
         )
     if report.output.strip():
         console.print("[cyan]the controller printed[/]")
-        console.print(Text(printable(report.output.rstrip())), soft_wrap=True)
+        console.print(Text(_once(printable(report.output))), soft_wrap=True)
     if report.error is not None:
         console.print("[red]the controller failed[/]")
         console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)
@@ -103,7 +121,8 @@ def _table(report: WebotsReport) -> Table:
         title="The run as the environment recorded it", title_justify="left",
         show_header=False,
     )  # fmt: skip
-    table.add_row("outcome", report.outcome)
+    ended = report.goal is None and report.outcome == "out of time"
+    table.add_row("outcome", "drove to the end" if ended else report.outcome)
     table.add_row("steps", f"{report.steps} ({report.time:.2f} s)")
     contact = report.first_contact
     where = "" if contact is None else f", the first at {_at(*contact[1:])}"
@@ -113,7 +132,7 @@ def _table(report: WebotsReport) -> Table:
         table.add_row("goal", "none in this world")
     else:
         table.add_row("goal", _at(*report.goal))
-        table.add_row("way left", f"{report.d_min:.3f} m of {report.d0:.3f} m")
+        table.add_row("path left", f"{report.d_min:.3f} m of {report.d0:.3f} m")
         table.add_row("straight left", f"{report.d_min_euclidean:.3f} m")
     table.add_row("driven", f"{report.way:.3f} m")
     for name, (x, y, heading) in (("start", report.start), ("end", report.end)):

@@ -20,13 +20,14 @@ from tdac_envs.footprint import Disc, Polygon, Rectangle
 from tdac_envs.wbt.reader import load_world
 from tdac_envs.world import Arena, Obstacle, Unmodelled, World
 from tdac_envs.world_picture import draw_world
+from tdac_envs.worlds import world_file
 
 SHOWN = 60
 
 
-def run(file: Path, png: Path | None, as_json: bool) -> None:
+def run(file: str, png: Path | None, as_json: bool) -> None:
     """Reads a world, draws it where asked to, and prints what is in it."""
-    world = load_world(file)
+    world = load_world(world_file(file))
     if png is not None:
         _draw(world, png)
     if as_json:

@@ -20,12 +20,15 @@ def bundled_worlds() -> tuple[str, ...]:
 def world_file(source: str | Path) -> Path:
     """The file of a bundled world, or of a path.
 
+    Where there is no such file, `maze.wbt` is the bundled world `maze`.
+
     Raises:
         WorldError: There is neither; the message offers the closest name.
     """
     path = Path(source)
-    if isinstance(source, str) and source in bundled_worlds():
-        return _FOLDER / f"{source}.wbt"
+    name = str(source).removesuffix(".wbt") if not path.exists() else str(source)
+    if isinstance(source, str) and name in bundled_worlds():
+        return _FOLDER / f"{name}.wbt"
     if path.exists() or path.suffix or len(path.parts) != 1:
         return path
     names = bundled_worlds()
