@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,10 @@ from tdac_envs.world import Arena, Obstacle, Part, World
 
 Point = tuple[float, float]
 _FIRST = ("WorldInfo", "Viewpoint")
+_POSE = re.compile(
+    r"^( +)Pose \{\n +translation (\S+) (\S+) (\S+)\n(?: +rotation 0 0 1 (\S+)\n)?",
+    re.MULTILINE,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +99,38 @@ def reordered(text: str, random: np.random.Generator) -> str:
     shuffled = [named[k] for k in random.permutation(len(named))]
     externs = [line for line in text.splitlines() if line.startswith("EXTERNPROTO")]
     return "\n".join([head, "", *externs, "", *first, *shuffled]) + "\n"
+
+
+def turned_groups(text: str, angle: float) -> str:
+    """The same world, but what has several pieces is turned, and these back again.
+
+    `write_world` turns none of it, so that its pieces would be found by who does not
+    look at how it is turned.
+
+    Args:
+        text: From `write_world`.
+        angle: rad.
+    """
+    for node in _nodes(text):
+        if "  boundingObject Group {" in node:
+            text = text.replace(node, _turned(node, angle), 1)
+    return text
+
+
+def _turned(node: str, angle: float) -> str:
+    back = Motion(-angle, 0.0, 0.0)
+
+    def pose(found: re.Match[str]) -> str:
+        space, x, y, z, yaw = found.groups()
+        u, v = back.point(float(x), float(y))
+        turn = float(yaw or 0.0) - angle
+        return (
+            f"{space}Pose {{\n{space}  translation {u:.9f} {v:.9f} {z}\n"
+            f"{space}  rotation 0 0 1 {turn:.9f}\n"
+        )
+
+    head, line, rest = _POSE.sub(pose, node).partition("\n  children [")
+    return f"{head}\n  rotation 0 0 1 {angle:.9f}{line}{rest}"
 
 
 def _nodes(text: str) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tdac_agent.moved_world import Motion, reordered
+from tdac_agent.moved_world import Motion, reordered, turned_groups
 from tdac_agent.world_oracle import Point, WorldCase, gap_to, prisms_of
 from tdac_envs.bodies import bodies
 from tdac_envs.footprint import Disc, Polygon, Rectangle, ring
@@ -32,7 +32,8 @@ def world_cases(world: World) -> list[WorldCase]:
         random = np.random.default_rng(100 + number)
         shift = random.uniform(-1.5, 1.5, 2).tolist()
         copy = Motion(angle, *shift).world(_renamed(_fuller(world, random)))
-        text = reordered(write_world(copy), random)
+        turned = turned_groups(write_world(copy), random.uniform(0.4, 2.4))
+        text = reordered(turned, random)
         cases.append(WorldCase(f"a copy turned by {angle} rad", text, copy))
     return cases
 
@@ -66,6 +67,10 @@ def _shapes(random: np.random.Generator) -> Iterator[tuple[str, list[Part]]]:
     corners = np.sort(random.uniform(0.0, 2.0 * math.pi, 9))
     unit = np.column_stack([np.cos(corners), np.sin(corners)])
     high = 0.12
+    # Of several pieces, and not the same when it is turned: it comes first, so that
+    # there is room for it.
+    ell = Rectangle(0.03, 0.0, 0.0, 0.03, 0.12), Rectangle(-0.02, 0.045, 0.3, 0.1, 0.03)
+    yield "WoodenPallet", [Part(piece, 0.0, high) for piece in ell]
     for kind, shape in (
         ("WoodenBox", Rectangle(0.0, 0.0, yaw[0], 2 * long, wide)),
         ("CardboardBox", Rectangle(0.0, 0.0, yaw[1], long, long)),
