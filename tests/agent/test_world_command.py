@@ -98,3 +98,12 @@ def test_help_has_an_example(tdac):
     code, out, _ = tdac("--help")
     assert code == 0
     assert "Example: tdac world maze.wbt --png maze.png" in " ".join(out.split())
+
+
+@pytest.mark.parametrize("name", ["arena", "arena.wbt"])
+def test_a_bundled_world(tdac, name):
+    """It goes by its name, and by that of its file where there is no such file."""
+    code, out, err = tdac(name)
+    assert (code, err) == (0, "")
+    assert "arena.wbt" in out
+    assert "WoodenBox" in out

@@ -378,7 +378,7 @@ class TestArguments:
 
     def test_what_is_not_modelled_is_refused_unless_ignored(self):
         world = read_world(text("E-puck { }", "Castle { }"), goal=(1.0, 0.0))
-        with pytest.raises(WorldError, match="may be solid but are not modelled"):
+        with pytest.raises(WorldError, match="1 node may be solid but is not modelled"):
             EPuckEnv(world)
         assert EPuckEnv(world, ignore=["Castle"]).task.goal == (1.0, 0.0)
 

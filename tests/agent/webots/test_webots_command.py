@@ -171,3 +171,28 @@ def test_usage(tdac, words, said):
     assert code == 2, (out, err)
     assert said in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_a_line_that_repeats_is_shown_once(tdac, there):
+    """With how often it came; a contact is a reason, with its place."""
+    program = there / "loud.py"
+    program.write_text(
+        "from controller import Robot\n"
+        "robot = Robot()\n"
+        "for side in ('left', 'right'):\n"
+        "    motor = robot.getDevice(f'{side} wheel motor')\n"
+        "    motor.setPosition(float('inf'))\n"
+        "    motor.setVelocity(6.0)\n"
+        "print('once')\n"
+        "while robot.step(32) != -1:\n"
+        "    print('again')\n"
+    )
+    code, out, _ = tdac(
+        "webots", "run", program, there / "blocked.wbt", "--steps", 200
+    )  # fmt: skip
+    assert code == 1
+    assert out.count("again") == 1
+    assert "again  (×" in out
+    assert "once\n" in out
+    assert "steps with a contact, the first in step" in out
+    assert "the goal was not reached" in out
