@@ -10,10 +10,9 @@ from gymnasium import Space
 from numpy.typing import NDArray
 
 from tdac_agent.units import Units
+from tdac_envs.driven import Observation
 from tdac_envs.plan import Path as Way
 from tdac_envs.task2d import Pose
-
-Observation = dict[str, NDArray[np.float32]]
 
 
 class Nominal(Protocol):
