@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tdac_agent.errors import ProviderError
 from tdac_agent.provider import Reply, Request
-from tdac_agent.providers.choice import Options
 from tdac_agent.providers.faults import as_faults
 from tdac_agent.providers.gathered import Gathered, Stop, count
-from tdac_agent.providers.patience import CONNECT_SECONDS, STALL_SECONDS, within
-from tdac_agent.providers.secrets import read_key
+from tdac_agent.providers.vendor import Vendor, VendorModel
 
 if TYPE_CHECKING:
     import anthropic
     from anthropic.types import RawMessageStreamEvent, TextBlockParam
 
-KEY = "ANTHROPIC_API_KEY"
 STOPS: dict[str, Stop] = {
     "end_turn": "end",
     "stop_sequence": "end",
@@ -27,64 +22,21 @@ STOPS: dict[str, Stop] = {
 }
 
 
-def make(words: str, options: Options) -> AnthropicModel:
-    """A model of Anthropic, or of a server that speaks its language.
+class AnthropicModel(VendorModel["anthropic.Anthropic"]):
+    """A model of Anthropic, or of a server that speaks its language."""
 
-    Raises:
-        ProviderError: The package, the key or the model's name is missing.
-    """
-    if not words:
-        raise ProviderError("which model? As in anthropic:claude-sonnet-5-5")
-    try:
-        import anthropic  # noqa: F401
-    except ImportError as error:
-        raise ProviderError(
-            f'anthropic:{words} needs a package: pip install "tdac[anthropic]"'
-        ) from error
-    base_url = options.base_url or os.environ.get("ANTHROPIC_BASE_URL") or None
-    model = AnthropicModel(words, base_url)
-    read_key(KEY, "Anthropic", needed=base_url is None)
-    return model
+    vendor = Vendor(
+        package="anthropic",
+        company="Anthropic",
+        key="ANTHROPIC_API_KEY",
+        base_url="ANTHROPIC_BASE_URL",
+        example="claude-sonnet-5-5",
+    )
 
-
-class AnthropicModel:
-    """A provider; see `Provider`. The key is read at each call, and not kept.
-
-    Args:
-        model: Its id.
-        base_url: Of the server; None for Anthropic's own.
-        stall: Seconds of silence after which the connection is given up.
-    """
-
-    paid = True
-
-    def __init__(
-        self, model: str, base_url: str | None, stall: float = STALL_SECONDS
-    ) -> None:
-        self.name = f"anthropic:{model}"
-        self._model = model
-        self._base_url = base_url
-        self._stall = stall
-
-    def complete(self, request: Request) -> Reply:
-        """Answers one request; see `Provider`."""
-        client = self._client()
-        with client:
-            return within(
-                request.seconds, lambda: self._ask(client, request), client.close
-            )
-
-    def _client(self) -> anthropic.Anthropic:
+    def _client(self, **options: Any) -> anthropic.Anthropic:
         import anthropic
 
-        return anthropic.Anthropic(
-            api_key=read_key(KEY, "Anthropic", needed=self._base_url is None),
-            base_url=self._base_url,
-            max_retries=0,
-            timeout=anthropic.Timeout(self._stall, connect=CONNECT_SECONDS),
-            # A redirect might take prompt and key elsewhere.
-            http_client=anthropic.DefaultHttpxClient(follow_redirects=False),
-        )
+        return anthropic.Anthropic(**options)
 
     def _ask(self, client: anthropic.Anthropic, request: Request) -> Reply:
         import anthropic
@@ -139,3 +91,6 @@ def _count(
         cached = gathered.tokens_cached + gathered.tokens_written
         gathered.tokens_in = count(usage.input_tokens) + cached
     gathered.tokens_out = count(usage.output_tokens)
+
+
+make = AnthropicModel.make

@@ -1,0 +1,108 @@
+"""What the models of the vendors share, each of them behind its official package."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+from tdac_agent.errors import ProviderError
+from tdac_agent.provider import Reply, Request
+from tdac_agent.providers.choice import Options
+from tdac_agent.providers.patience import CONNECT_SECONDS, STALL_SECONDS, within
+from tdac_agent.providers.secrets import read_key
+
+C = TypeVar("C")
+
+
+@dataclass(frozen=True, slots=True)
+class Vendor:
+    """Who serves a model.
+
+    Attributes:
+        package: Of Python; also the extra, and the first word of a model's name.
+        company: For people.
+        key: Environment variable that holds the key.
+        base_url: Environment variable that names another server.
+        example: Of a model's id.
+    """
+
+    package: str
+    company: str
+    key: str
+    base_url: str
+    example: str
+
+
+class VendorModel(ABC, Generic[C]):
+    """A provider; see `Provider`. The key is read at each call, and not kept.
+
+    Args:
+        model: Its id.
+        base_url: Of the server; None for the vendor's own.
+        stall: Seconds of silence after which the connection is given up.
+    """
+
+    vendor: ClassVar[Vendor]
+    paid = True
+
+    def __init__(
+        self, model: str, base_url: str | None, stall: float = STALL_SECONDS
+    ) -> None:
+        self.name = f"{self.vendor.package}:{model}"
+        self._model = model
+        self._base_url = base_url
+        self._stall = stall
+
+    @classmethod
+    def make(cls, words: str, options: Options) -> VendorModel[C]:
+        """A model of the vendor, or of a server that speaks its language.
+
+        Raises:
+            ProviderError: The package, the key or the model's name is missing.
+        """
+        vendor = cls.vendor
+        if not words:
+            example = f"{vendor.package}:{vendor.example}"
+            raise ProviderError(f"which model? As in {example}")
+        try:
+            importlib.import_module(vendor.package)
+        except ImportError as error:
+            raise ProviderError(
+                f"{vendor.package}:{words} needs a package: "
+                f'pip install "tdac[{vendor.package}]"'
+            ) from error
+        base_url = options.base_url or os.environ.get(vendor.base_url) or None
+        model = cls(words, base_url)
+        model._read_key()
+        return model
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`."""
+        package: Any = importlib.import_module(self.vendor.package)
+        client = self._client(
+            api_key=self._read_key(),
+            base_url=self._base_url,
+            max_retries=0,
+            timeout=package.Timeout(self._stall, connect=CONNECT_SECONDS),
+            # A redirect might take prompt and key elsewhere.
+            http_client=package.DefaultHttpxClient(follow_redirects=False),
+        )
+        with client:
+            return within(
+                request.seconds, lambda: self._ask(client, request), client.close
+            )
+
+    @abstractmethod
+    def _client(self, **options: Any) -> Any:
+        """The package's client."""
+
+    @abstractmethod
+    def _ask(self, client: C, request: Request) -> Reply:
+        """Asks, and gathers the stream's answer."""
+
+    def _read_key(self) -> str:
+        vendor = self.vendor
+        return read_key(vendor.key, vendor.company, needed=self._base_url is None)
