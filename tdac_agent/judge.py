@@ -104,6 +104,7 @@ class Judge:
         self._turns = Turns(at_a_time + 1)
         self._lock = threading.Lock()
         self._episodes: dict[Key, Future[Rollout]] = {}
+        self._wanted: set[Key] = set()
         self._unit: Unit | None = None
         self._import_fault: ControllerFault | None = None
 
@@ -146,15 +147,22 @@ class Judge:
                 `truncated run_episode`, where the environment ends that loop after
                 `steps`, and has counted collisions before it.
         """
-        return self._submit((name, steps, drive)).result()
+        key = (name, steps, drive)
+        self._wanted.add(key)
+        return self._submit(key).result()
 
     @property
     def rollouts(self) -> dict[Key, Rollout]:
-        """The episodes that were run, by (name, steps, drive)."""
+        """The episodes that were asked for, by (name, steps, drive).
+
+        Of those only begun, how many have ended by now is a matter of time.
+        """
         return {
             key: future.result()
             for key, future in self._episodes.items()
-            if not future.cancelled() and future.exception() is None
+            if key in self._wanted
+            and not future.cancelled()
+            and future.exception() is None
         }
 
     def begin(self, *, jitters: bool, own_loop: bool) -> None:
@@ -210,7 +218,7 @@ class Judge:
         return self._starts[name]
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
-        if name != "nominal" and not self.rollout("nominal").reached:
+        if name != "nominal" and not self._submit(NOMINAL).result().reached:
             reason = "not run, since the nominal episode failed"
             return self._skipped(name, "not run", reason)
         with self._turns.beside():
