@@ -79,7 +79,7 @@ class Kernel(Generic[P, R]):
         """
         if self.signature is None:
             return self.function(*args, **kwargs)
-        slots, kept = self._pack(args)
+        slots, kept = self.pack(args)
         self._run(slots.ctypes.data)
         del kept
         return cast(R, self._result_in(slots))
@@ -89,8 +89,8 @@ class Kernel(Generic[P, R]):
 
         Numbers are passed in arrays; so is the result.
         """
-        slots, kept = self._pack(args)
-        entry, address = self._load(), slots.ctypes.data
+        slots, kept = self.pack(args)
+        entry, address = self.load(), slots.ctypes.data
 
         def call(_kept: object = (slots, kept)) -> None:
             if entry(address):
@@ -102,7 +102,7 @@ class Kernel(Generic[P, R]):
         return self.name
 
     def _run(self, address: int) -> None:
-        if self._load()(address):
+        if self.load()(address):
             raise ArithmeticError(f"{self.name} failed")
 
     def _result_in(self, slots: NDArray[np.int64]) -> Any:
@@ -113,7 +113,7 @@ class Kernel(Generic[P, R]):
             return float(word.view(_DTYPES[self._result])[0])
         return int(word[0]) if self._result == "i8" else None
 
-    def _pack(self, args: Any) -> tuple[NDArray[np.int64], list[Any]]:
+    def pack(self, args: Any) -> tuple[NDArray[np.int64], list[Any]]:
         """The arguments as the compiled entry reads them, and what they point to."""
         words: list[int] = [0, 0]
         kept: list[Any] = []
@@ -125,13 +125,16 @@ class Kernel(Generic[P, R]):
         slots = np.array(words, np.int64)
         return slots, kept
 
-    def _load(self) -> Callable[[int], int]:
-        """The compiled entry; compiles it where that has not been done."""
+    def load(self) -> Callable[[int], int]:
+        """The compiled entry, which takes the address of packed arguments.
+
+        It is not 0 on failure. Compiles where that has not been done.
+        """
         if self._entry is None:
             with _LOCK:
                 if self._entry is None:
                     objects = _read(self._file()) or self._compile()
-                    self._engine, address = _link(objects, self._symbol())
+                    self._engine, address = link(objects, self._symbol())
                     kind = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
                     self._entry = kind(address)
         return self._entry
@@ -278,10 +281,10 @@ define i32 @{symbol}(ptr %slots) {{
 ret i32 %status
 }}
 """
-    return bytes(_machine().emit_object(llvm.parse_assembly(text)))
+    return bytes(machine().emit_object(llvm.parse_assembly(text)))
 
 
-def _machine() -> Any:
+def machine() -> Any:
     """The processor that this process runs on; an engine takes it for its own."""
     import llvmlite.binding as llvm
 
@@ -292,16 +295,16 @@ def _machine() -> Any:
     )
 
 
-def _link(objects: list[bytes], symbol: str) -> tuple[Any, int]:
+def link(objects: list[bytes], symbol: str) -> tuple[Any, int]:
     """An engine that holds the code, which must outlive it, and the entry's address."""
     import llvmlite.binding as llvm
 
-    machine = _machine()
+    target = machine()
     stub = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value
     for name in _HELPERS:
         if not llvm.address_of_symbol(name):
             llvm.add_symbol(name, stub)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
     for data in objects:
         engine.add_object_file(llvm.ObjectFileRef.from_data(data))
     engine.finalize_object()
