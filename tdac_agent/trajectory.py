@@ -112,7 +112,8 @@ class Rollout:
         radius: Body radius, px or m.
         tolerance: Goal tolerance, px or m.
         error: What the controller did wrong, in one line, for `error` and `not run`.
-        call_ms: Mean and 99th percentile of the time of a policy call, ms.
+        call_ms: Mean of the time of a policy call without what its process stood in
+            line for a CPU, and 99th percentile with it, ms.
         returned: What `run_episode` returned, for an episode driven by it.
         timed_out: Whether the controller was too slow, in one call or on average.
     """

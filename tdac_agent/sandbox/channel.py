@@ -9,11 +9,15 @@ import select
 import time
 
 from tdac_agent.sandbox.inner.wire import HEADER
+from tdac_agent.sandbox.waiting import Line
 
 CHUNK = 1 << 16
 # Most answers are short, and a large buffer costs more than the whole round trip.
 SHORT = 1 << 12
 KEPT_OUTPUT = 4000
+# Most answers come sooner; after this, waiting for a CPU is looked at.
+SOON_SECONDS = 0.25
+MOST_WAITED_SECONDS = 300.0
 
 
 class ChannelClosedError(Exception):
@@ -41,6 +45,7 @@ class Channel:
         output: Descriptor of what the child prints.
         frame_bytes: Largest payload of an answer.
         output_bytes: Most that may be printed.
+        line: Where the child stands in line for a CPU, which puts a deadline off.
     """
 
     def __init__(
@@ -50,7 +55,10 @@ class Channel:
         output: int,
         frame_bytes: int,
         output_bytes: int,
+        line: Line,
     ) -> None:
+        self._line = line
+        self._deadline, self._waited_before = 0.0, 0.0
         self._requests, self._answers, self._output = requests, answers, output
         self._frame_bytes, self._output_bytes = frame_bytes, output_bytes
         self._buffer = b""
@@ -121,9 +129,25 @@ class Channel:
 
     def _events(self, deadline: float) -> list[tuple[int, int]]:
         left = deadline - time.monotonic()
-        if left <= 0:
-            raise DeadlineError
-        return self._poll.poll(math.ceil(left * 1000))
+        if left > SOON_SECONDS and self._deadline != deadline:
+            events = self._poll.poll(math.ceil(SOON_SECONDS * 1000))
+            if events:
+                return events
+            self._deadline, self._waited_before = deadline, self._line.waited()
+        while (left := self._left(deadline)) > 0:
+            events = self._poll.poll(math.ceil(left * 1000))
+            if events:
+                return events
+        raise DeadlineError
+
+    def _left(self, deadline: float) -> float:
+        """Seconds until a deadline, put off by what the machine kept from the child."""
+        left = deadline - time.monotonic()
+        if left > 0 or left < -MOST_WAITED_SECONDS or self._deadline != deadline:
+            return left
+        if self._line.stands():
+            return SOON_SECONDS
+        return left + self._line.waited() - self._waited_before
 
     def _drain(self) -> bool:
         """Read what has been printed; return whether more can come."""

@@ -11,6 +11,9 @@ MAX_SOURCE_BYTES = 200_000
 class Limits:
     """Bounds on one child.
 
+    Wall times of the controller leave out what it stands in line for a CPU, so that a
+    busy machine makes no verdict (Linux; up to five minutes each).
+
     Attributes:
         start_seconds: Wall time until the child is ready; ours, not the controller's.
         import_seconds: Wall time of importing the controller.

@@ -14,6 +14,7 @@ from tdac_agent.sandbox.ending import ChildUsage, Ending
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
 from tdac_agent.sandbox.inner.wire import Handle, Kind
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
+from tdac_agent.sandbox.waiting import Line
 from tdac_agent.sandbox.zygote import Forked
 
 
@@ -72,6 +73,7 @@ class Child:
         self.limits = limits
         self.folder = forked.folder
         self.pid = forked.pid
+        self._line = Line(self.pid)
         end, root = Ending(forked), forked.folder.root
         self._talk = Conversation(forked.channel, self.pid, limits, root, end)
         weakref.finalize(self, end)
@@ -86,6 +88,10 @@ class Child:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+    def waited(self) -> float:
+        """Seconds for which it stood in line for a CPU; 0 where nobody knows."""
+        return self._line.waited()
 
     def close(self) -> ChildUsage:
         """Kill the child and all it started, and return what it used."""

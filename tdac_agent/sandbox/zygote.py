@@ -32,6 +32,7 @@ from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.inner import landlock
 from tdac_agent.sandbox.inner.zygote import FORK, REAP, REPLY, REQUEST
 from tdac_agent.sandbox.limits import Limits
+from tdac_agent.sandbox.waiting import Line
 
 BOOT = (
     "import sys; *fds, code, site = sys.argv[1:]; "
@@ -143,7 +144,7 @@ class Zygote:
             self._alive.value += 1
         write, read, printed, lifeline = outer
         frame, most = limits.frame_bytes, limits.output_bytes
-        channel = Channel(write, read, printed, frame, most)
+        channel = Channel(write, read, printed, frame, most, Line(pid))
         return Forked(pid, folder, channel, lifeline, lambda: self._reap(number))
 
     @property
