@@ -16,7 +16,8 @@ from tdac_agent.touch import Touch
 from tdac_agent.trajectory import Trajectory
 from tdac_agent.units import METRES, Points, Units
 from tdac_envs.bodies import BODY_RADIUS, at_body_height
-from tdac_envs.epuck.contact import first_touch, part_gap
+from tdac_envs.epuck.contact import first_touch
+from tdac_envs.epuck.gaps import part_gap
 from tdac_envs.epuck.infrared import PLACES
 from tdac_envs.epuck.prisms import Owned, Prisms
 from tdac_envs.epuck.task import EPuckTask

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.bodies import at_body_height, bodies, floor_under
-from tdac_envs.epuck.contact import nearest_gap
+from tdac_envs.epuck.gaps import nearest_gap
 from tdac_envs.epuck.prisms import Owned, Prisms
 from tdac_envs.footprint import Disc, Rectangle
 from tdac_envs.world import Arena, Part, World

@@ -22,6 +22,7 @@ from tdac_envs.driven import DrivenEnv, Observation, Outcome
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, sense_ground
+from tdac_envs.epuck.nearby import Surroundings, surroundings
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import (
     TOLERANCE,
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
 
 VARIATIONS = ("nominal", "jitter", "random")
-_MOST_TURNED = 1e4
 
 
 class EPuckEnv(DrivenEnv):
@@ -190,16 +190,23 @@ class EPuckEnv(DrivenEnv):
         )
         self.observation_space = space  # type: ignore[assignment]
         self._fixed_horizon = horizon is not None
-        self._visible = ground.visible(reflectance == "webots", bool(goal_visible))
+        self._surroundings = surroundings(
+            ground,
+            reflectance == "webots",
+            bool(goal_visible),
+            BODY_RADIUS + self.nominal.full_step,
+        )
+        visible = self._surroundings.visible
         self._pushes = on_collision == "block" and len(ground.masses) > 0
         # Where things are now; the originals stay where they were at first.
         self._solid = ground.solid.copy() if self._pushes else ground.solid
-        self._seen = self._visible.copy() if self._pushes else self._visible
+        self._seen = visible.copy() if self._pushes else visible
         self._things = np.zeros((len(ground.masses), 6))
         self._speed = np.zeros(3)
-        self._constants = _constants(self.nominal, self.motor_lag)
+        self._constants = _constants(self.nominal, self.motor_lag, self._surroundings)
         self._state = np.zeros(6)
         self._pose = np.zeros(3, np.float32)
+        self._turned = np.zeros(2, np.float32)
         self._wheel_speeds = np.zeros(2, np.float32)
         self._readings = np.zeros(N_SENSORS, np.float32)
         self._hits = np.zeros((N_SENSORS, 3))
@@ -257,26 +264,27 @@ class EPuckEnv(DrivenEnv):
     def _moved(self) -> Outcome:
         if not self._is_bound:
             self._bind()
-        if not (self._pushes and self._pushed()):
+        if self._pushes and self._pushed():
+            self._observe()
+        else:
             self._drive()
-        self._observe()
         touched, arrived, remaining, gap, room, *_ = self._outcome.tolist()
         return touched == 1.0, arrived == 1.0, remaining, gap, room
 
     def _bind(self) -> None:
         """Ties the kernels to this environment's own arrays."""
-        solid, seen = self._solid, self._seen
+        solid, seen, near = self._solid, self._seen, self._surroundings
+        shapes = (
+            solid.points, solid.first, solid.extent, near.solid.cells,
+            near.solid.listed,
+            seen.points, seen.first, seen.extent, near.seen.cells, near.seen.listed,
+            self.task.field, self._constants,
+        )  # fmt: skip
+        observed = (self._pose, self._turned, self._readings, self._hits, self._outcome)
         self._drive = kernels.drive.bind(
-            solid.points, solid.first, solid.extent,
-            self._constants, self._command, self._state, self._wheel_speeds,
-            self._outcome,
-        )  # fmt: skip
-        self._observe = kernels.observe.bind(
-            solid.points, solid.first, solid.extent,
-            seen.points, seen.first, seen.extent,
-            self.task.field, self._constants, self._state,
-            self._pose, self._readings, self._hits, self._outcome,
-        )  # fmt: skip
+            *shapes, self._command, self._state, self._wheel_speeds, *observed
+        )
+        self._observe = kernels.observe.bind(*shapes, self._state, *observed)
         self._is_bound = True
 
     def _pushed(self) -> bool:
@@ -304,7 +312,8 @@ class EPuckEnv(DrivenEnv):
         """Puts what is solid and what is seen where the things are."""
         ground = self.task.ground
         self._solid.carry(ground.solid, ground.centres, self._things)
-        self._seen.carry(self._visible, ground.centres, self._things)
+        visible = self._surroundings.visible
+        self._seen.carry(visible, ground.centres, self._things)
 
     def _draw_task(self, options: dict[str, Any]) -> EPuckTask:
         check_reset_options(options)
@@ -331,13 +340,12 @@ class EPuckEnv(DrivenEnv):
         return replace(drawn, horizon=default_horizon(drawn))
 
     def _observation(self) -> Observation:
-        turned = np.clip(self._state[4:], -_MOST_TURNED, _MOST_TURNED)
         observation = {
             "pose": self._pose.copy(),
             "goal": self._goal.copy(),
             "wheel_speeds": self._wheel_speeds.copy(),
             "ps": self._noisy(self._readings, self._hits[:, 2]),
-            "wheel_positions": turned.astype(np.float32),
+            "wheel_positions": self._turned.copy(),
         }
         if self.ground_sensors:
             observation["ground"] = self._ground_readings()
@@ -393,7 +401,7 @@ def observation_space(
     least = np.array([left, low], np.float32) - np.float32(BODY_RADIUS)
     most = np.array([right, high], np.float32) + np.float32(BODY_RADIUS)
     pi, floor = np.float32(math.pi), np.float32(task.ground.floor)
-    turned = np.float32(_MOST_TURNED)
+    turned = np.float32(kernels.MOST_TURNED)
     space: dict[str, spaces.Space[Any]] = {
         "pose": spaces.Box(np.append(least, -pi), np.append(most, pi)),
         "goal": spaces.Box(least, most),
@@ -412,7 +420,9 @@ def observation_space(
     return spaces.Dict(space)
 
 
-def _constants(task: EPuckTask, motor_lag: float) -> NDArray[np.float64]:
+def _constants(
+    task: EPuckTask, motor_lag: float, near: Surroundings
+) -> NDArray[np.float64]:
     """What `kernels.observe` takes as `constants`, in its order."""
     ground = task.ground
     return np.array(
@@ -426,5 +436,6 @@ def _constants(task: EPuckTask, motor_lag: float) -> NDArray[np.float64]:
             ground.floor,
             *ground.bounds[:2],
             ground.spacing,
+            near.width,
         ]
     )

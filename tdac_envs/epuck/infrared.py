@@ -61,8 +61,8 @@ LARGEST = 4200.0
 """Above any value with its noise."""
 _COS, _SIN = math.cos(ELEVATION), math.sin(ELEVATION)
 _WAYS = np.column_stack([np.cos(PLACES[:, 2]), np.sin(PLACES[:, 2])])
-# No ray gets farther from the robot's axle than this, m.
-_FARTHEST = 0.11
+FARTHEST = 0.11
+"""No ray gets farther from the robot's axle than this, m."""
 
 # Ground sensors: see down from here, m.
 GROUND_PLACES = np.array([(0.03, 0.01), (0.03, 0.0), (0.03, -0.01)])
@@ -167,11 +167,22 @@ def sees(
     return True
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f8 f8[:] f4[:] f8[:,:] ->")
+def at_ray_height(extent: Array, floor: float) -> NDArray[np.bool_]:
+    """Which parts are neither too low nor too high for all rays, shape (n,)."""
+    bottom = floor + HEIGHT
+    return np.asarray(
+        (extent[:, HIGH] >= bottom) & (extent[:, LOW] <= bottom + RANGE * _SIN + 1e-9)
+    )
+
+
+@kernel("f8[:,:] i8[:] f8[:,:] i8[:] i8 i8 f8 f8[:] f4[:] f8[:,:] ->")
 def sense(
     points: Array,
     first: Index,
     extent: Array,
+    listed: Index,
+    begin: int,
+    end: int,
     floor: float,
     state: Array,
     readings: NDArray[np.float32],
@@ -184,9 +195,12 @@ def sense(
     reflectance.
 
     Args:
-        points: See `tdac_envs.epuck.contact`, as the next two.
+        points: See `tdac_envs.epuck.gaps`, as the next five.
         first: Of what is visible.
         extent: Of what is visible.
+        listed: Numbers of the parts that may be in reach.
+        begin: In `listed`.
+        end: In `listed`.
         floor: Height of the ground, m.
         state: Begins with x, y and heading.
         readings: Shape (8,), overwritten.
@@ -198,27 +212,32 @@ def sense(
     bottom = floor + HEIGHT
     for i in range(N_SENSORS):
         hits[i, 0], hits[i, 1] = RANGE, 1.0
-    for k in range(extent.shape[0]):
-        off = math.hypot(extent[k, MID_X] - x, extent[k, MID_Y] - y)
-        if off - extent[k, REACH] > _FARTHEST:
+    for n in range(begin, end):
+        k = listed[n] if listed.shape[0] else n
+        off_x, off_y = extent[k, MID_X] - x, extent[k, MID_Y] - y
+        if math.sqrt(off_x * off_x + off_y * off_y) - extent[k, REACH] > FARTHEST:
             continue
-        begin = (extent[k, LOW] - bottom) / _SIN
-        end = (extent[k, HIGH] - bottom) / _SIN
+        enter = (extent[k, LOW] - bottom) / _SIN
+        leave = (extent[k, HIGH] - bottom) / _SIN
         for i in range(N_SENSORS):
             ray_x = x + cos * PLACES[i, 0] - sin * PLACES[i, 1]
             ray_y = y + sin * PLACES[i, 0] + cos * PLACES[i, 1]
             way_x = _COS * (cos * _WAYS[i, 0] - sin * _WAYS[i, 1])
             way_y = _COS * (sin * _WAYS[i, 0] + cos * _WAYS[i, 1])
-            near, far = max(begin, 0.0), min(end, hits[i, 0])
+            near, far = max(enter, 0.0), min(leave, hits[i, 0])
             at = crossing(
                 points, first, extent, k, ray_x, ray_y, way_x, way_y, near, far
             )
             if at < hits[i, 0]:
                 hits[i, 0], hits[i, 1] = at, extent[k, FACTOR]
+    last = TABLE.shape[0] - 1
     for i in range(N_SENSORS):
         distance = hits[i, 0] / hits[i, 1]
-        readings[i] = _interpolated(TABLE, distance, 1)
-        hits[i, 2] = _interpolated(TABLE, distance, 2)
+        if distance >= RANGE:
+            readings[i], hits[i, 2] = TABLE[last, 1], TABLE[last, 2]
+        else:
+            readings[i] = _interpolated(TABLE, distance, 1)
+            hits[i, 2] = _interpolated(TABLE, distance, 2)
 
 
 @kernel("f8[:,:] i8[:] f8[:,:] f8 f8[:] f4[:] f8[:] ->")

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_envs.contact import move
-from tdac_envs.epuck.contact import advance, clear_grid, first_touch, nearest_gap
+from tdac_envs.epuck.contact import advance, first_touch
+from tdac_envs.epuck.gaps import clear_grid, nearest_gap
 from tdac_envs.epuck.infrared import sees
 from tdac_envs.epuck.prisms import Owned, Prisms
 from tdac_envs.footprint import Disc, Polygon, Rectangle
@@ -96,7 +97,7 @@ def test_the_first_contact_is_the_first_and_a_contact(seed):
 
 def test_a_disc_that_was_stopped_may_leave_but_not_go_on():
     """Driving on moves it by nothing, driving off by all of the way."""
-    prisms = arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)])
+    prisms = *arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)]), [], 0, 1
     state = np.zeros(3)
     assert advance(*prisms, state, 0.3, 0.0, RADIUS)
     stopped = state[0]

@@ -162,8 +162,9 @@ def test_rays_are_those_of_a_physics_engine():
             state = rng.uniform(-0.6, 0.6, 3) * (1, 1, 5)
             if oracle_gap(space, *state[:2]) < 0.037:
                 continue
+            every = (prisms.points, prisms.first, prisms.extent, [], 0, len(shapes))
             hits, found = np.zeros((8, 3)), np.zeros(8, np.float32)
-            sense(prisms.points, prisms.first, prisms.extent, 0.0, state, found, hits)
+            sense(*every, 0.0, state, found, hits)
             x, y, heading = state.tolist()
             for sensor, (ahead, aside, azimuth) in enumerate(PLACES.tolist()):
                 cos, sin = math.cos(heading), math.sin(heading)

@@ -1,0 +1,124 @@
+"""Compiled distances to prisms.
+
+Lengths are metres. A set of parts is given by the arrays `points`, `first` and `extent`
+of `tdac_envs.epuck.prisms.Prisms`; where only some count, by `listed`, `begin` and
+`end`, too: the numbers `listed[begin:end]`. An empty `listed` means that each part has
+its own place in the list.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tdac_envs.compiled import kernel
+from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, ROUND, Array, Index
+
+
+@kernel()
+def part_gap(
+    points: Array, first: Index, extent: Array, part: int, x: float, y: float
+) -> tuple[float, float, float]:
+    """Signed distance from a point to a part, and the unit vector that leads away."""
+    begin, end = first[part], first[part + 1]
+    if end - begin == 1:
+        off_x, off_y = x - points[begin, 0], y - points[begin, 1]
+        far = math.sqrt(off_x * off_x + off_y * off_y)
+        if far == 0.0:
+            return -extent[part, ROUND], 1.0, 0.0
+        return far - extent[part, ROUND], off_x / far, off_y / far
+    outside, out_x, out_y = -math.inf, 1.0, 0.0
+    square, near_x, near_y = math.inf, 0.0, 0.0
+    for i in range(begin, end):
+        j = i + 1 if i + 1 < end else begin
+        edge_x, edge_y = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+        off_x, off_y = x - points[i, 0], y - points[i, 1]
+        length2 = edge_x * edge_x + edge_y * edge_y
+        length = math.sqrt(length2)
+        side = (edge_y * off_x - edge_x * off_y) / length
+        if side > outside:
+            outside, out_x, out_y = side, edge_y / length, -edge_x / length
+        share = min(max((off_x * edge_x + off_y * edge_y) / length2, 0.0), 1.0)
+        off_x, off_y = off_x - share * edge_x, off_y - share * edge_y
+        distance2 = off_x * off_x + off_y * off_y
+        if distance2 < square:
+            square, near_x, near_y = distance2, off_x, off_y
+    distance = math.sqrt(square)
+    if outside <= 0.0 or distance == 0.0:
+        return min(outside, 0.0), out_x, out_y
+    return distance, near_x / distance, near_y / distance
+
+
+@kernel("f8[:,:] i8[:] f8[:,:] f8 f8 -> f8")
+def nearest_gap(
+    points: Array, first: Index, extent: Array, x: float, y: float
+) -> float:
+    """Distance from a point to the nearest part, negative within one; inf of none."""
+    return nearest_of(points, first, extent, first[:0], 0, extent.shape[0], x, y)
+
+
+@kernel()
+def nearest_of(
+    points: Array,
+    first: Index,
+    extent: Array,
+    listed: Index,
+    begin: int,
+    end: int,
+    x: float,
+    y: float,
+) -> float:
+    """As `nearest_gap`, of the listed parts."""
+    best = math.inf
+    for n in range(begin, end):
+        k = listed[n] if listed.shape[0] else n
+        off_x, off_y = extent[k, MID_X] - x, extent[k, MID_Y] - y
+        near = best + extent[k, REACH]
+        if near > 0.0 and off_x * off_x + off_y * off_y < near * near:
+            best = min(best, part_gap(points, first, extent, k, x, y)[0])
+    return best
+
+
+@kernel("f8[:,:] i8[:] f8[:,:] f8 f8 f8 f8[:,:] ->")
+def clear_grid(
+    points: Array,
+    first: Index,
+    extent: Array,
+    left: float,
+    low: float,
+    spacing: float,
+    clear: Array,
+) -> None:
+    """Lowers each entry of `clear` to the distance from its point to the parts.
+
+    Args:
+        points: See the module.
+        first: See the module.
+        extent: See the module.
+        left: x of `clear[:, 0]`.
+        low: y of `clear[0, :]`.
+        spacing: Between neighbours.
+        clear: Shape (height, width), filled with the largest distance of interest,
+            overwritten.
+    """
+    height, width = clear.shape
+    if height * width == 0:
+        return
+    most = clear[0, 0]
+    for k in range(extent.shape[0]):
+        reach = most + extent[k, ROUND]
+        x0 = x1 = points[first[k], 0]
+        y0 = y1 = points[first[k], 1]
+        for i in range(first[k], first[k + 1]):
+            x0, x1 = min(x0, points[i, 0]), max(x1, points[i, 0])
+            y0, y1 = min(y0, points[i, 1]), max(y1, points[i, 1])
+        for v in range(
+            max(math.floor((y0 - reach - low) / spacing), 0),
+            min(math.ceil((y1 + reach - low) / spacing) + 1, height),
+        ):
+            for u in range(
+                max(math.floor((x0 - reach - left) / spacing), 0),
+                min(math.ceil((x1 + reach - left) / spacing) + 1, width),
+            ):
+                x, y = left + u * spacing, low + v * spacing
+                gap = part_gap(points, first, extent, k, x, y)[0]
+                clear[v, u] = min(clear[v, u], gap)
