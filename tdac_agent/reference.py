@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.contact import first_contact, wrap_angle
 from tdac_envs.grid import BoolGrid, body_free
-from tdac_envs.kernels import first_contact, wrap_angle
 from tdac_envs.plan import Path, descend, distance_field
 from tdac_envs.task2d import Map2DTask
 
@@ -131,7 +131,6 @@ def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
     pieces = max(math.ceil(length / max(task.robot.radius, 4.0)), 1)
     for k in range(pieces):
         touch = first_contact(
-            terrain.padded,
             terrain.padded_clear,
             begin[0] + (end[0] - begin[0]) * k / pieces,
             begin[1] + (end[1] - begin[1]) * k / pieces,

@@ -178,8 +178,8 @@ def _window(
 
     One pixel beyond the border of the map, occupied, belongs to it.
     """
-    padded = task.terrain.padded
-    height, width = padded.shape
+    clear = task.terrain.padded_clear
+    height, width = clear.shape
     x0, y0 = max(math.floor(x - reach) + 1, 0), max(math.floor(y - reach) + 1, 0)
     x1, y1 = min(math.ceil(x + reach) + 2, width), min(math.ceil(y + reach) + 2, height)
-    return padded[y0:y1, x0:x1], x0 - 1, y0 - 1
+    return clear[y0:y1, x0:x1] == 0.0, x0 - 1, y0 - 1

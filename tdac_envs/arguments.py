@@ -107,23 +107,32 @@ def check_reset_options(options: dict[str, Any]) -> None:
         raise TaskError(f"unknown reset options {unknown}; expected 'start' and 'goal'")
 
 
-def wheel_command(action: Any) -> tuple[tuple[float, float], bool]:
-    """The wheel speeds of an action, clipped to [-1, 1], and whether they had to be.
+def wheel_speeds(action: Any) -> tuple[float, float]:
+    """The wheel speeds of an action, which may be out of [-1, 1].
 
     Raises:
         ValueError: The action is not two finite numbers.
     """
     try:
         left, right = np.asarray(action).tolist()
-        usual = -1.0 <= left <= 1.0 and -1.0 <= right <= 1.0
-        wheels = float(left), float(right)
+        # NaN and infinity times 0 are not 0.
+        if 0.0 * left + 0.0 * right == 0.0:
+            return float(left), float(right)
     except (TypeError, ValueError):
-        raise ValueError(_not_an_action(action)) from None
-    if usual:
+        pass
+    raise ValueError(_not_an_action(action)) from None
+
+
+def wheel_command(action: Any) -> tuple[tuple[float, float], bool]:
+    """The wheel speeds of an action, clipped to [-1, 1], and whether they had to be.
+
+    Raises:
+        ValueError: The action is not two finite numbers.
+    """
+    left, right = wheels = wheel_speeds(action)
+    if -1.0 <= left <= 1.0 and -1.0 <= right <= 1.0:
         return wheels, False
-    if not (math.isfinite(left) and math.isfinite(right)):
-        raise ValueError(_not_an_action(action))
-    return (_clip(wheels[0]), _clip(wheels[1])), True
+    return (_clip(left), _clip(right)), True
 
 
 def _not_an_action(action: Any) -> str:

@@ -30,7 +30,13 @@ R = TypeVar("R")
 
 # Names as numpy and numba have them, and what they are in LLVM as an argument.
 _SCALARS = {"f8": "double", "i8": "i64"}
-_DTYPES = {"b1": np.bool_, "f4": np.float32, "f8": np.float64, "i4": np.int32}
+_DTYPES = {
+    "b1": np.bool_,
+    "u1": np.uint8,
+    "f4": np.float32,
+    "f8": np.float64,
+    "i4": np.int32,
+}
 _DTYPES["i8"] = np.int64
 # numba's helpers that only a failing function calls, and no kernel's caller needs.
 _HELPERS = (

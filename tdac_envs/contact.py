@@ -1,11 +1,14 @@
-"""Compiled motion of a disc on a differential drive, up to its first contact."""
+"""Compiled motion of a disc on a differential drive, up to its first contact.
+
+`clear` is the clearance of a map, from `grid.clearance`, with a border of zeros.
+"""
 
 from __future__ import annotations
 
 import math
 
 from tdac_envs.compiled import kernel
-from tdac_envs.grid import BoolGrid, FloatGrid
+from tdac_envs.grid import FloatGrid
 
 # A disc that starts in touch is stopped when it gets this much deeper, px: driving
 # along a wall in touch with it is free.
@@ -45,9 +48,8 @@ def move(
     )
 
 
-@kernel("b1[:,:] f4[:,:] f8 f8 f8 f8 f8 f8 -> f8")
+@kernel("f4[:,:] f8 f8 f8 f8 f8 f8 -> f8")
 def first_contact(
-    cells: BoolGrid,
     clear: FloatGrid,
     x: float,
     y: float,
@@ -61,7 +63,6 @@ def first_contact(
     Exact for the arc of constant wheel speeds, to 1e-8 px.
 
     Args:
-        cells: Padded map, True = occupied.
         clear: Padded clearance, px.
         x: Column of the disc's centre, px.
         y: Row of the disc's centre, px.
@@ -83,16 +84,15 @@ def first_contact(
     open_at_end = max(_room(clear, end_x, end_y) - radius, 0.0)
     if open_at_start + open_at_end > length:
         return 2.0
-    best, gap = _scan(cells, clear, x, y, heading, forward, turn, radius, 0.0)
+    best, gap = _scan(clear, x, y, heading, forward, turn, radius, 0.0)
     if gap < SINK:
         floor = max(gap - SINK, -DEEPEST)
-        best, _ = _scan(cells, clear, x, y, heading, forward, turn, radius, floor)
+        best, _ = _scan(clear, x, y, heading, forward, turn, radius, floor)
     return best / length if best < length else 2.0
 
 
 @kernel()
 def _scan(
-    cells: BoolGrid,
     clear: FloatGrid,
     x: float,
     y: float,
@@ -116,19 +116,20 @@ def _scan(
     left, right = min(x, end_x), max(x, end_x)
     top, bottom = min(y, end_y), max(y, end_y)
     first_row = max(math.ceil(top - reach - 0.5), -1)
-    last_row = min(math.floor(bottom + reach + 0.5), cells.shape[0] - 2)
+    last_row = min(math.floor(bottom + reach + 0.5), clear.shape[0] - 2)
     nearest = math.inf
     for j in range(first_row, last_row + 1):
         above = max(j - 0.5 - bottom, top - j - 0.5, 0.0)
         span = math.sqrt(max(reach * reach - above * above, 0.0)) + 0.5
         i = max(math.ceil(left - span), -1)
-        last = min(math.floor(right + span), cells.shape[1] - 2)
+        last = min(math.floor(right + span), clear.shape[1] - 2)
         while i <= last:
-            if not cells[j + 1, i + 1]:
+            room = clear[j + 1, i + 1]
+            if room > 0.0:
                 # The nearest square is this far off, so it is in the row, too.
-                i += max(math.ceil(clear[j + 1, i + 1] + 0.5 - _ROUNDING), 1)
+                i += max(math.ceil(room + 0.5 - _ROUNDING), 1)
                 continue
-            if _is_edge(cells, i + 1, j + 1):
+            if _is_edge(clear, i + 1, j + 1):
                 gap = math.sqrt(_square_distance2(x, y, i, j)) - radius
                 nearest = min(nearest, gap)
                 if gap < best:
@@ -156,16 +157,17 @@ def _room(clear: FloatGrid, x: float, y: float) -> float:
 
 
 @kernel()
-def _is_edge(cells: BoolGrid, i: int, j: int) -> bool:
+def _is_edge(clear: FloatGrid, i: int, j: int) -> bool:
     """Whether a free pixel is beside (i, j) of the padded map.
 
     The first contact with a union of squares is one with such a square.
     """
-    return (
-        (i > 0 and not cells[j, i - 1])
-        or (j > 0 and not cells[j - 1, i])
-        or (i + 1 < cells.shape[1] and not cells[j, i + 1])
-        or (j + 1 < cells.shape[0] and not cells[j + 1, i])
+    height, width = clear.shape
+    return bool(
+        (i > 0 and clear[j, i - 1] > 0.0)
+        or (j > 0 and clear[j - 1, i] > 0.0)
+        or (i + 1 < width and clear[j, i + 1] > 0.0)
+        or (j + 1 < height and clear[j + 1, i] > 0.0)
     )
 
 

@@ -1,6 +1,7 @@
-"""Compiled step of TDAC-Map2D-v0: motion up to a contact, rays, way to the goal.
+"""Compiled step of TDAC-Map2D-v0: motion up to a contact, rays, reward and ends.
 
-All functions work on a *padded* map; see `tdac_envs.rays`.
+`clear` and `leaps` are those of a `tdac_envs.terrain.Terrain`, which are padded; the
+arrays of one robot are described in `tdac_envs.robot2d.Robot`.
 """
 
 from __future__ import annotations
@@ -12,37 +13,33 @@ from numpy.typing import NDArray
 
 from tdac_envs.compiled import kernel
 from tdac_envs.contact import first_contact, move, wrap_angle
-from tdac_envs.grid import BoolGrid, FloatGrid
-from tdac_envs.rays import cast_ray, cast_rays, pad, sees
-
-__all__ = [
-    "advance",
-    "cast_ray",
-    "cast_rays",
-    "drive",
-    "first_contact",
-    "move",
-    "pad",
-    "path_distance",
-    "sees",
-    "sense",
-    "wrap_angle",
-]
+from tdac_envs.grid import FloatGrid
+from tdac_envs.rays import LeapGrid, cast_rays, sees
+from tdac_envs.rewards import RewardWeights, step_reward
 
 # A body that was stopped by an obstacle goes back by this much of its way, px, so
 # that the next step starts outside it.
 CONTACT_GAP = 1e-6
 
-# Entries of `constants` and `state` of `drive`.
-AXLE, MAX_SPEED, DT, RADIUS, FAN, RANGE_MAX, GOAL_X, GOAL_Y, TOLERANCE, LAG = range(10)
-X, Y, HEADING, REMAINING = range(4)
+# Entries of `constants`.
+AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
+PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 17)
+N_CONSTANTS = 17
+# Entries of `state`.
+X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS = range(8)
+N_STATE = 8
+# Entries of `outcome`.
+REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
+GAP, REMAINING, ROOM = range(7, 10)
+N_OUTCOME = 10
+
+Array = NDArray[np.float64]
 
 
-@kernel("b1[:,:] f4[:,:] f8[:] f8 f8 f8 f8 f8 -> b1")
+@kernel("f4[:,:] f8[:] f8 f8 f8 f8 f8 -> b1")
 def advance(
-    cells: BoolGrid,
     clear: FloatGrid,
-    state: NDArray[np.float64],
+    state: Array,
     left: float,
     right: float,
     axle: float,
@@ -52,7 +49,6 @@ def advance(
     """Moves the robot by one step at constant wheel speeds, up to a contact.
 
     Args:
-        cells: Padded map, True = occupied.
         clear: Padded clearance, px.
         state: Begins with x, y (px) and heading (rad), which are overwritten.
         left: Speed of the left wheel, px/s.
@@ -69,7 +65,7 @@ def advance(
     # y points down, so a positive turn is clockwise on the screen.
     turn = (left - right) * dt / axle
     x, y, heading = state[X], state[Y], state[HEADING]
-    touch = first_contact(cells, clear, x, y, heading, forward, turn, radius)
+    touch = first_contact(clear, x, y, heading, forward, turn, radius)
     part = 1.0
     if touch <= 1.0:
         part = max(touch - CONTACT_GAP / abs(forward), 0.0)
@@ -78,10 +74,9 @@ def advance(
     return bool(touch <= 1.0)
 
 
-@kernel("b1[:,:] f4[:,:] f4[:,:] f8 f8 f8 -> f8")
+@kernel("u1[:,:,:] f4[:,:] f8 f8 f8 -> f8")
 def path_distance(
-    cells: BoolGrid,
-    clear: FloatGrid,
+    leaps: LeapGrid,
     field: FloatGrid,
     x: float,
     y: float,
@@ -94,8 +89,7 @@ def path_distance(
     `previous`.
 
     Args:
-        cells: Padded map, True = occupied.
-        clear: Padded clearance, px.
+        leaps: From `rays.leaps_of`.
         field: Shape (height, width), float32, from `plan.distance_field`.
         x: Column, px.
         y: Row, px.
@@ -107,84 +101,151 @@ def path_distance(
         best = math.inf
         for j in range(max(row - ring, 0), min(row + ring + 2, height)):
             for i in range(max(column - ring, 0), min(column + ring + 2, width)):
-                through = field[j, i] + math.hypot(x - i, y - j)
+                off_x, off_y = x - i, y - j
+                through = field[j, i] + math.sqrt(off_x * off_x + off_y * off_y)
                 # The four pixels around a point are never behind a wall.
-                if through < best and (ring == 0 or sees(cells, clear, x, y, i, j)):
+                if through < best and (ring == 0 or sees(leaps, x, y, i, j)):
                     best = through
         if best < math.inf:
             return best
     return previous
 
 
-@kernel("b1[:,:] f4[:,:] f8[:] f8[:] f4[:] f4[:] ->")
-def sense(
-    cells: BoolGrid,
-    clear: FloatGrid,
-    constants: NDArray[np.float64],
-    state: NDArray[np.float64],
-    pose: NDArray[np.float32],
-    ranges: NDArray[np.float32],
-) -> None:
-    """Fills `pose` and `ranges` with what the robot observes; see `drive`."""
-    x, y, heading = state[X], state[Y], state[HEADING]
-    pose[0], pose[1], pose[2] = x, y, heading
-    cast_rays(cells, clear, x, y, heading, constants[FAN], constants[RANGE_MAX], ranges)
-
-
-@kernel("b1[:,:] f4[:,:] f4[:,:] f8[:] f8[:] f8[:] f4[:] f4[:] f4[:] f8[:] ->")
-def drive(
-    cells: BoolGrid,
+@kernel()
+def _observe(
+    leaps: LeapGrid,
     clear: FloatGrid,
     field: FloatGrid,
-    constants: NDArray[np.float64],
-    command: NDArray[np.float64],
-    state: NDArray[np.float64],
+    directions: Array,
+    constants: Array,
+    state: Array,
+    pose: NDArray[np.float32],
+    ranges: NDArray[np.float32],
+    outcome: Array,
+) -> None:
+    """Fills in what follows from where the robot is."""
+    x, y, heading = state[X], state[Y], state[HEADING]
+    pose[0], pose[1], pose[2] = x, y, heading
+    cast_rays(leaps, directions, x, y, heading, constants[RANGE_MAX], ranges)
+    goal_x, goal_y = constants[GOAL_X], constants[GOAL_Y]
+    gap = math.hypot(goal_x - x, goal_y - y)
+    near = gap <= constants[TOLERANCE]
+    outcome[REACHED] = near and sees(leaps, x, y, goal_x, goal_y)
+    outcome[GAP] = gap
+    outcome[REMAINING] = path_distance(leaps, field, x, y, outcome[REMAINING])
+    outcome[ROOM] = clear[math.floor(y + 1.5), math.floor(x + 1.5)]
+
+
+_ARRAYS = (
+    "u1[:,:,:] f4[:,:] f4[:,:] f8[:,:] f8[:] f8[:] f8[:,:] f4[:] f4[:] f4[:] f8[:] ->"
+)
+
+
+@kernel(_ARRAYS)
+def begin(
+    leaps: LeapGrid,
+    clear: FloatGrid,
+    field: FloatGrid,
+    directions: Array,
+    constants: Array,
+    state: Array,
+    queue: Array,
     pose: NDArray[np.float32],
     wheel_speeds: NDArray[np.float32],
     ranges: NDArray[np.float32],
-    outcome: NDArray[np.float64],
+    outcome: Array,
+) -> None:
+    """Begins an episode where `state` says; arguments as of `drive`.
+
+    `outcome[REMAINING]` is given: the length of the shortest path from there.
+    """
+    state[LEFT] = state[RIGHT] = 0.0
+    state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
+    state[STEPS] = 0.0
+    queue[:] = 0.0
+    wheel_speeds[:] = 0.0
+    outcome[:REMAINING] = 0.0
+    remaining = outcome[REMAINING]
+    _observe(
+        leaps, clear, field, directions, constants, state, pose, ranges, outcome
+    )  # fmt: skip
+    outcome[REACHED], outcome[REMAINING] = 0.0, remaining
+
+
+@kernel()
+def _wheel(wanted: float, before: float, lag: float) -> float:
+    """Speed of a wheel, as a fraction, that was `before` and is to be `wanted`."""
+    return wanted + lag * (before - wanted)
+
+
+@kernel()
+def _within(value: float) -> float:
+    return min(max(value, -1.0), 1.0)
+
+
+@kernel(_ARRAYS)
+def drive(
+    leaps: LeapGrid,
+    clear: FloatGrid,
+    field: FloatGrid,
+    directions: Array,
+    constants: Array,
+    state: Array,
+    queue: Array,
+    pose: NDArray[np.float32],
+    wheel_speeds: NDArray[np.float32],
+    ranges: NDArray[np.float32],
+    outcome: Array,
 ) -> None:
     """One step of the environment, all of it but the random numbers.
 
     Args:
-        cells: Padded map, True = occupied.
+        leaps: From `rays.leaps_of`.
         clear: Padded clearance, px.
         field: Shape (height, width), float32: way to the goal, px.
-        constants: Shape (10,), float64: axle length (px), wheel limit (px/s), dt (s),
-            body radius (px), field of view (rad), range limit (px), goal x and y
-            (px), goal tolerance (px), and the share of its speed that a wheel keeps
-            from one step to the next.
-        command: Shape (4,), float64: wanted speed of the left and of the right wheel,
-            in [-1, 1]; for each the factor between its speed and what it does on the
-            ground.
-        state: Shape (4,), float64: x, y (px), heading (rad) and the way left to the
-            goal (px); overwritten.
-        pose: Shape (3,), float32, overwritten with what the robot observes.
-        wheel_speeds: Shape (2,), float32, fractions as last applied; overwritten.
-        ranges: Shape (n_rays,), float32, overwritten.
-        outcome: Shape (5,), float64, overwritten: whether the body touched an obstacle
-            (0 or 1); whether the goal is reached; the way left to the goal, the
-            straight distance to it, and the clearance of the pixel under the robot, px.
+        directions: From `rays.fan`.
+        constants: See `Robot`, as the following ones.
+        state: Overwritten, but for the wanted speeds and the slip.
+        queue: Overwritten.
+        pose: Overwritten.
+        wheel_speeds: Overwritten.
+        ranges: Overwritten.
+        outcome: Overwritten.
     """
-    left, right, slip_left, slip_right = command[0], command[1], command[2], command[3]
+    left, right = _within(state[LEFT]), _within(state[RIGHT])
+    if left != state[LEFT] or right != state[RIGHT]:
+        outcome[CLIPPED] += 1.0
+    delay = int(constants[DELAY])
+    if delay > 0:
+        late = int(state[STEPS]) % delay
+        wanted_left, wanted_right = left, right
+        left, right = queue[late, 0], queue[late, 1]
+        queue[late, 0], queue[late, 1] = wanted_left, wanted_right
     lag, limit = constants[LAG], constants[MAX_SPEED]
-    wheel_speeds[0] = left + lag * (wheel_speeds[0] - left)
-    wheel_speeds[1] = right + lag * (wheel_speeds[1] - right)
+    wheel_speeds[0] = _wheel(left, wheel_speeds[0], lag)
+    wheel_speeds[1] = _wheel(right, wheel_speeds[1], lag)
     touched = advance(
-        cells,
         clear,
         state,
-        limit * min(max(wheel_speeds[0] * slip_left, -1.0), 1.0),
-        limit * min(max(wheel_speeds[1] * slip_right, -1.0), 1.0),
+        limit * _within(wheel_speeds[0] * state[SLIP_LEFT]),
+        limit * _within(wheel_speeds[1] * state[SLIP_RIGHT]),
         constants[AXLE],
         constants[DT],
         constants[RADIUS],
     )
-    sense(cells, clear, constants, state, pose, ranges)
-    x, y, goal_x, goal_y = state[X], state[Y], constants[GOAL_X], constants[GOAL_Y]
-    state[REMAINING] = path_distance(cells, clear, field, x, y, state[REMAINING])
-    gap = math.hypot(goal_x - x, goal_y - y)
-    reached = gap <= constants[TOLERANCE] and sees(cells, clear, x, y, goal_x, goal_y)
-    room = clear[math.floor(y + 1.5), math.floor(x + 1.5)]
-    outcome[0], outcome[1], outcome[2] = touched, reached, state[REMAINING]
-    outcome[3], outcome[4] = gap, room
+    before = outcome[REMAINING]
+    _observe(
+        leaps, clear, field, directions, constants, state, pose, ranges, outcome
+    )  # fmt: skip
+    reached = outcome[REACHED] == 1.0
+    weights = RewardWeights(
+        constants[PROGRESS], constants[GOAL], constants[COLLISION], constants[TIME]
+    )
+    progress = (before - outcome[REMAINING]) / constants[FULL_STEP]
+    outcome[REWARD] = step_reward(weights, progress, reached, touched)
+    state[STEPS] += 1.0
+    outcome[TOUCHED] = touched
+    outcome[COLLISIONS] += touched
+    over = reached or (touched and constants[STOPS] == 1.0)
+    outcome[TERMINATED] = over
+    outcome[TRUNCATED] = not over and state[STEPS] >= constants[HORIZON]

@@ -4,36 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from tdac_envs.arguments import (
-    check_reset_options,
-    not_negative,
-    one_of,
-    positive,
-    whole_number,
-)
-from tdac_envs.driven import DrivenEnv, Observation, Outcome
-from tdac_envs.errors import TaskError
-from tdac_envs.kernels import GOAL_X, GOAL_Y, drive, sense
-from tdac_envs.params import RobotParams
+from tdac_envs.arguments import not_negative, one_of, wheel_speeds
+from tdac_envs.driven import DrivenEnv, Observation
+from tdac_envs.kernels import LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, begin, drive
 from tdac_envs.render import Scene, Status
+from tdac_envs.robot2d import Robot, info_of
+from tdac_envs.setup2d import Setup, override
 from tdac_envs.source2d import MapSource, prepare
-from tdac_envs.task2d import (
-    Map2DTask,
-    Pose,
-    Terrain,
-    default_horizon,
-    jittered_start,
-    make_task,
-    random_task,
-)
+from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
 
 VARIATIONS = ("nominal", "jitter", "random")
 
@@ -149,7 +133,7 @@ class Map2DEnv(DrivenEnv):
             map, start, goal, heading=heading, robot_radius=robot_radius, snap=snap
         )
         params = prepared.params
-        robot = _override(
+        robot = override(
             params.robot,
             axle_length=axle_length,
             max_wheel_speed=max_wheel_speed,
@@ -181,16 +165,23 @@ class Map2DEnv(DrivenEnv):
         )
         self.variation = variation
         self.range_noise = not_negative("range_noise", range_noise)
+        self.setup = Setup(
+            self.nominal,
+            variation,
+            horizon is not None,
+            on_collision,
+            self.range_noise,
+            self.wheel_slip,
+            self.motor_lag,
+            self.delay,
+            self.weights,
+        )
         space = observation_space(self.nominal)
         self.observation_space = space  # type: ignore[assignment]
-        self._fixed_horizon = horizon is not None
-        self._constants = _constants(self.nominal, self.motor_lag)
-        self._state = np.zeros(4)
-        self._pose = np.zeros(3, np.float32)
-        self._wheel_speeds = np.zeros(2, np.float32)
-        self._ranges = np.zeros(robot.n_rays, np.float32)
-        self._outcome = np.zeros(5)
-        self._drive: Callable[[], None] | None = None
+        self._robot = Robot.blank(robot.n_rays, self.delay)
+        self._robot.constants[:] = self.setup.constants()
+        self._goal = np.array(self.nominal.goal, np.float32)
+        self._bind()
         self._scene: Scene | None = None
 
     def reset(
@@ -203,100 +194,74 @@ class Map2DEnv(DrivenEnv):
                 these are not feasible.
         """
         super().reset(seed=seed)
-        self.task = task = self._draw_task(options or {})
-        self._constants[GOAL_X : GOAL_Y + 1] = task.goal
-        self._drive = None
-        self._state[:] = *task.start, task.shortest
-        self._goal = np.array(task.goal, np.float32)
-        self._wheel_speeds[:] = 0.0
-        self._begin(task.start[:2], task.shortest, task.horizon)
+        before, self.task = self.task, self.setup.draw(options or {}, self.np_random)
+        if self.task.field is not before.field:
+            self._bind()
+        task, robot = self.task, self._robot
+        robot.place(task)
+        self._goal[:] = task.goal
+        self._call_begin()
+        self._steps = 0
+        self._trail = [task.start[:2]]
+        self._status = ""
         self._scene = None
-        terrain = task.terrain
-        sense(
-            terrain.padded,
-            terrain.padded_clear,
-            self._constants,
-            self._state,
-            self._pose,
-            self._ranges,
-        )
-        gap = math.dist(task.start[:2], task.goal)
-        column, row = (math.floor(v + 0.5) for v in task.start[:2])
-        info = self._info(False, False, gap, float(terrain.clear[row, column]))
         if self.render_mode == "human":
             self.render()
-        return self._observation(), info
+        return self._observation(), info_of(robot.outcome.tolist())
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Applies wheel speeds for one `dt`.
+
+        Raises:
+            ValueError: The action is not two finite numbers.
+        """
+        state = self._robot.state
+        state[LEFT], state[RIGHT] = wheel_speeds(action)
+        if self.wheel_slip:
+            slip = self.np_random.normal(1.0, self.wheel_slip, 2)
+            state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
+        self._call_drive()
+        outcome = self._robot.outcome.tolist()
+        reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
+        info = info_of(outcome)
+        if self.render_mode is not None:
+            self._steps += 1
+            self._note(info["is_success"], info["collision"], truncated)
+        return self._observation(), reward, terminated, truncated, info
 
     def pose(self) -> NDArray[np.float64]:
         """The true pose, shape (3,): x, y (px), heading (rad)."""
-        return self._state[:3].copy()
+        return self._robot.state[:3].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_drive": None}
+        return {**self.__dict__, "_call_begin": None, "_call_drive": None}
 
-    def _moved(self) -> Outcome:
-        if self._drive is None:
-            self._drive = self._bound()
-        self._drive()
-        touched, arrived, remaining, gap, room = self._outcome.tolist()
-        return touched == 1.0, arrived == 1.0, remaining, gap, room
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
 
-    def _bound(self) -> Callable[[], None]:
-        """`drive` on this environment's own arrays."""
-        terrain = self.task.terrain
-        return drive.bind(
-            terrain.padded,
-            terrain.padded_clear,
-            self.task.field,
-            self._constants,
-            self._command,
-            self._state,
-            self._pose,
-            self._wheel_speeds,
-            self._ranges,
-            self._outcome,
-        )
-
-    def _draw_task(self, options: dict[str, Any]) -> Map2DTask:
-        check_reset_options(options)
-        task = self.nominal
-        if options:
-            start = (*options.get("start", task.start), task.start.heading)[:3]
-            drawn = make_task(
-                task.terrain,
-                start,
-                options.get("goal", task.goal),
-                task.robot,
-                dt=task.dt,
-                goal_tolerance=task.goal_tolerance,
-                horizon=task.horizon,
-            )
-        elif self.variation == "random":
-            drawn = random_task(task, self.np_random)
-        elif self.variation == "jitter":
-            return task.moved(jittered_start(task, self.np_random))
-        else:
-            return task
-        if self._fixed_horizon or drawn.goal == task.goal:
-            return drawn
-        steps = default_horizon(drawn.shortest, drawn.robot, drawn.dt)
-        return replace(drawn, horizon=steps)
+    def _bind(self) -> None:
+        """Makes the kernels' calls on this environment's own arrays."""
+        arguments = self.setup.arguments(self.task, self._robot)
+        self._call_begin: Callable[[], None] = begin.bind(*arguments)
+        self._call_drive: Callable[[], None] = drive.bind(*arguments)
 
     def _observation(self) -> Observation:
-        ranges = self._ranges.copy()
+        robot = self._robot
+        ranges = robot.ranges.copy()
         if self.range_noise:
-            noise = self.np_random.normal(1.0, self.range_noise, ranges.size)
-            np.clip(ranges * noise, 0.0, self.task.robot.range_max, out=noise)
-            ranges[:] = noise
+            ranges[:] = noisy(ranges, self.setup, self.np_random)
         return {
-            "pose": self._pose.copy(),
+            "pose": robot.pose.copy(),
             "goal": self._goal.copy(),
-            "wheel_speeds": self._wheel_speeds.copy(),
+            "wheel_speeds": robot.wheel_speeds.copy(),
             "ranges": ranges,
         }
 
     def _frame(self) -> NDArray[np.uint8]:
-        task = self.task
+        task, robot = self.task, self._robot
         if self._scene is None:
             self._scene = Scene(
                 task.terrain.grid.cells,
@@ -309,8 +274,16 @@ class Map2DEnv(DrivenEnv):
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)
         return self._scene.frame(
-            self._state[:3].tolist(), self._ranges, self._trail, status
+            robot.state[:3].tolist(), robot.ranges, self._trail, status
         )
+
+
+def noisy(
+    ranges: NDArray[np.float32], setup: Setup, random: np.random.Generator
+) -> NDArray[np.float64]:
+    """Ranges of one robot with relative noise, within the sensor's limits."""
+    noise = random.normal(1.0, setup.range_noise, ranges.size)
+    return np.clip(ranges * noise, 0.0, setup.nominal.robot.range_max, out=noise)
 
 
 def observation_space(task: Map2DTask) -> spaces.Dict:
@@ -327,40 +300,3 @@ def observation_space(task: Map2DTask) -> spaces.Dict:
             "ranges": spaces.Box(0.0, robot.range_max, (robot.n_rays,), np.float32),
         }
     )
-
-
-def _constants(task: Map2DTask, motor_lag: float) -> NDArray[np.float64]:
-    """What `kernels.drive` takes as `constants`, in its order."""
-    robot = task.robot
-    return np.array(
-        [
-            robot.axle_length,
-            robot.max_wheel_speed,
-            task.dt,
-            robot.radius,
-            math.radians(robot.field_of_view_deg),
-            robot.range_max,
-            *task.goal,
-            task.goal_tolerance,
-            math.exp(-task.dt / motor_lag) if motor_lag else 0.0,
-        ]
-    )
-
-
-def _override(robot: RobotParams, **given: float | None) -> RobotParams:
-    """The robot with the options that were given."""
-    changes: dict[str, float] = {}
-    for name, value in given.items():
-        if value is None:
-            continue
-        if name == "n_rays":
-            changes[name] = whole_number(name, value, 1)
-        else:
-            field = "field_of_view_deg" if name == "field_of_view" else name
-            changes[field] = positive(name, value)
-    try:
-        return RobotParams.model_validate({**robot.model_dump(), **changes})
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = str(first["loc"][0]).removesuffix("_deg")
-        raise TaskError(f"{name} {first['input']!r}: {first['msg']}") from None

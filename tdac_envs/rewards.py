@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from tdac_envs.compiled import kernel
+
 
 class RewardWeights(NamedTuple):
     """Weights of the four terms.
@@ -22,6 +24,7 @@ class RewardWeights(NamedTuple):
     time: float = 0.01
 
 
+@kernel()
 def step_reward(
     weights: RewardWeights, progress: float, reached: bool, collided: bool
 ) -> float:

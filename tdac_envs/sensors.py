@@ -75,8 +75,9 @@ class Ultrasonic:
         self.height, self.width = occ.shape
         self.range_max = float(range_max)
         fov = math.radians(field_of_view_deg) if n_rays > 1 else 0.0
-        self._first, self._step = 0.5 * fov, fov / max(n_rays - 1, 1)
-        self.angles = self._step * np.arange(n_rays) - self._first
+        first, step = -0.5 * fov, fov / max(n_rays - 1, 1)
+        self.angles = first + step * np.arange(n_rays)
+        self._ways = [(math.cos(turn), math.sin(turn)) for turn in self.angles.tolist()]
         # A rim of obstacles stands for the outside; bytes are quick to index.
         self._cells = np.pad(occ, 1, constant_values=True).tobytes()
 
@@ -88,11 +89,11 @@ class Ultrasonic:
             (x, y) itself is occupied.
         """
         x, y, heading = float(x), float(y), float(heading)
-        first, step, n = heading - self._first, self._step, self.angles.size
-        hits = [self._cast(x, y, first + k * step) for k in range(n)]
+        c, s = math.cos(heading), math.sin(heading)
+        hits = [self._cast(x, y, c * a - s * b, s * a + c * b) for a, b in self._ways]
         return np.array(hits, np.float32)
 
-    def _cast(self, x: float, y: float, angle: float) -> float:
+    def _cast(self, x: float, y: float, dx: float, dy: float) -> float:
         """Walks from pixel to pixel in the order in which the ray enters them."""
         u, v = x + 1.5, y + 1.5  # in the map with its rim
         i, j = math.floor(u), math.floor(v)
@@ -101,7 +102,6 @@ class Ultrasonic:
         cells, pitch = self._cells, self.width + 2
         if cells[j * pitch + i]:
             return 0.0
-        dx, dy = math.cos(angle), math.sin(angle)
         step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
         ahead_x, ahead_y = (1 if dx > 0 else 0), (1 if dy > 0 else 0)
         per_x, per_y = (1 / dx if dx else math.inf), (1 / dy if dy else math.inf)

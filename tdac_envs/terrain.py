@@ -12,36 +12,37 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.contact import first_contact
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import (
-    BoolGrid,
     FloatGrid,
     OccupancyGrid,
     body_free,
     clearance,
     clearance_at,
 )
-from tdac_envs.kernels import first_contact, pad, path_distance, sees
+from tdac_envs.kernels import path_distance
 from tdac_envs.plan import distance_field
+from tdac_envs.rays import LeapGrid, leaps_of, sees
 
 Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
-    """A grid and what is computed from it once; 10 bytes a pixel, read-only.
+    """A grid and what is computed from it once; 9 bytes a pixel, read-only.
 
     Attributes:
         grid: The map.
         clear: Shape (height, width), float32, from `grid.clearance`.
-        padded: `grid.cells` with an occupied border, for the kernels.
         padded_clear: `clear` with a border of zeros, for the kernels.
+        leaps: Shape (4, height + 2, width + 2), uint8, from `rays.leaps_of`.
     """
 
     grid: OccupancyGrid
     clear: FloatGrid
-    padded: BoolGrid
     padded_clear: FloatGrid
+    leaps: LeapGrid
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Terrain.of, (self.grid,)
@@ -55,9 +56,10 @@ class Terrain:
 # A map is often loaded by several envs, or again and again in one process.
 @lru_cache(maxsize=4)
 def _terrain(grid: OccupancyGrid) -> Terrain:
-    padded, padded_clear = pad(grid.cells, clearance(grid.cells))
-    padded.flags.writeable = padded_clear.flags.writeable = False
-    return Terrain(grid, padded_clear[1:-1, 1:-1], padded, padded_clear)
+    padded_clear = np.pad(clearance(grid.cells), 1)
+    leaps = leaps_of(grid.cells)
+    padded_clear.flags.writeable = leaps.flags.writeable = False
+    return Terrain(grid, padded_clear[1:-1, 1:-1], padded_clear, leaps)
 
 
 def at_goal(
@@ -66,7 +68,7 @@ def at_goal(
     """Whether (x, y) is within the tolerance and no wall stands in between."""
     if math.hypot(goal[0] - x, goal[1] - y) > tolerance:
         return False
-    return bool(sees(terrain.padded, terrain.padded_clear, x, y, *goal))
+    return bool(sees(terrain.leaps, x, y, *goal))
 
 
 def _near(x: float, y: float, shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
@@ -109,7 +111,6 @@ def _may_hop(
 ) -> bool:
     """Whether the body touches nothing on the straight line between two points."""
     touch = first_contact(
-        terrain.padded,
         terrain.padded_clear,
         float(begin[0]),
         float(begin[1]),
@@ -200,8 +201,7 @@ _shared_field = lru_cache(maxsize=4)(field_to)
 
 def way(terrain: Terrain, field: NDArray[np.float32], x: float, y: float) -> float:
     """Length of the shortest path from any point by a field of `field_to`, px."""
-    cells, clear = terrain.padded, terrain.padded_clear
-    return float(path_distance(cells, clear, field, x, y, math.inf))
+    return float(path_distance(terrain.leaps, field, x, y, math.inf))
 
 
 def widest_connected_radius(clear: FloatGrid, start: Point, goal: Point) -> float:

@@ -12,7 +12,7 @@ from tdac_envs import compiled, contact, grid, kernels, plan, rays
 from tdac_envs.compiled import Kernel, kernel
 from tdac_envs.contact import first_contact
 from tdac_envs.grid import clearance
-from tdac_envs.rays import cast_ray, pad
+from tdac_envs.rays import cast_ray, leaps_of
 
 HALF = 0.5
 
@@ -149,15 +149,18 @@ def test_compiled_and_plain_agree(seed):
     own = np.full(cells.shape, np.inf)
     plan._spread.function(free, 12, 12, -1, own, settled, buckets)
     np.testing.assert_array_equal(field, own)
-    world = pad(cells, clear)
+    leaps, padded = leaps_of(cells), np.pad(clear, 1)
+    plain = np.zeros_like(leaps)
+    rays._fill_leaps.function(cells, plain)
+    np.testing.assert_array_equal(leaps, plain)
     for _ in range(20):
         x, y = random.uniform(10.5, 12.5, 2)
         angle, turn = random.uniform(-math.pi, math.pi, 2)
-        ray = (*world, x, y, angle, 40.0)
+        ray = (leaps, x, y, angle, 40.0)
         assert cast_ray(*ray) == pytest.approx(rays.cast_ray.function(*ray), abs=1e-12)
-        step = (*world, x, y, angle, random.uniform(-9, 9), turn, 1.0)
+        step = (padded, x, y, angle, random.uniform(-9, 9), turn, 1.0)
         exact = contact.first_contact.function(*step)
         assert first_contact(*step) == pytest.approx(exact, abs=1e-9)
-        way = (*world, field.astype(np.float32), x, y, 5.0)
+        way = (leaps, field.astype(np.float32), x, y, 5.0)
         exact = kernels.path_distance.function(*way)
         assert kernels.path_distance(*way) == pytest.approx(exact, rel=1e-5)

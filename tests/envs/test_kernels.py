@@ -8,19 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tdac_envs.grid import body_free, clearance
-from tdac_envs.kernels import (
-    advance,
-    cast_ray,
-    cast_rays,
-    first_contact,
-    move,
-    pad,
-    path_distance,
-    sees,
-    wrap_angle,
-)
+from tdac_envs.contact import first_contact, move, wrap_angle
+from tdac_envs.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.kernels import advance, path_distance
 from tdac_envs.plan import distance_field
+from tdac_envs.rays import cast_ray, cast_rays, fan, leaps_of, sees
+from tdac_envs.terrain import Terrain
 
 ANGLES = [k * math.pi / 4 for k in range(-3, 5)]
 exact = settings(derandomize=True, deadline=None, max_examples=150)
@@ -28,7 +21,8 @@ many = settings(derandomize=True, deadline=None, max_examples=3000)
 
 
 def padded(cells):
-    return pad(cells, clearance(cells))
+    """The clearance with its border, as the contact test takes it."""
+    return np.pad(clearance(cells), 1)
 
 
 def open_map(width, height, *occupied):
@@ -67,10 +61,10 @@ class TestRays:
         point = free_point(cells, random, 1e-6)
         if point is None:
             return
-        world = padded(cells)
+        leaps = leaps_of(cells)
         for angle in [*random.uniform(-7, 7, 6), float(random.choice(ANGLES))]:
             expected = brute_force.ray(cells, *point, angle, 18.0)
-            measured = cast_ray(*world, *point, angle, 18.0)
+            measured = cast_ray(leaps, *point, angle, 18.0)
             assert measured == pytest.approx(expected, abs=1e-9)
 
     @pytest.mark.parametrize("seed", range(20))
@@ -78,76 +72,78 @@ class TestRays:
         random = np.random.default_rng(seed)
         cells = random.random((150, 200)) < 0.0005
         x, y = free_point(cells, random, 1.0)
-        world = padded(cells)
+        leaps = leaps_of(cells)
         for angle in random.uniform(-4, 4, 10):
             expected = brute_force.ray(cells, x, y, angle, 300.0)
-            measured = cast_ray(*world, x, y, angle, 300.0)
+            measured = cast_ray(leaps, x, y, angle, 300.0)
             assert measured == pytest.approx(expected, abs=1e-9)
 
     def test_a_one_pixel_wall_stops_every_ray_that_crosses_it(self):
         cells = open_map(101, 101, np.s_[:, 60], np.s_[20, :])
-        world = padded(cells)
+        leaps = leaps_of(cells)
         for angle in np.linspace(-math.pi, math.pi, 2001):
             expected = brute_force.ray(cells, 40.3, 50.7, angle, 200.0)
-            measured = cast_ray(*world, 40.3, 50.7, angle, 200.0)
+            measured = cast_ray(leaps, 40.3, 50.7, angle, 200.0)
             assert measured == pytest.approx(expected, abs=1e-9)
 
     def test_a_staircase_of_corners_lets_no_ray_through(self):
         cells = np.eye(31, dtype=bool)
-        world = padded(cells)
+        leaps = leaps_of(cells)
         for x in np.arange(17.0, 26.0, 0.25):
-            measured = cast_ray(*world, x, 30 - x, 3 * math.pi / 4, 50.0)
+            measured = cast_ray(leaps, x, 30 - x, 3 * math.pi / 4, 50.0)
             to_corner = (x - 15) * math.sqrt(2)
             assert to_corner - 0.75 < measured <= to_corner
 
     def test_a_ray_along_a_border_of_pixels_belongs_to_the_next_row(self):
         cells = open_map(40, 20, np.s_[9, 30])
-        world = padded(cells)
-        assert cast_ray(*world, 5.0, 8.5, 0.0, 100.0) == 24.5
-        assert cast_ray(*world, 5.0, 9.5, 0.0, 100.0) == 34.5
-        assert cast_ray(*world, 5.0, np.nextafter(9.5, 0), 0.0, 100.0) == 24.5
+        leaps = leaps_of(cells)
+        assert cast_ray(leaps, 5.0, 8.5, 0.0, 100.0) == 24.5
+        assert cast_ray(leaps, 5.0, 9.5, 0.0, 100.0) == 34.5
+        assert cast_ray(leaps, 5.0, np.nextafter(9.5, 0), 0.0, 100.0) == 24.5
 
     def test_a_ray_into_a_pinch_of_two_corners_stops_there(self):
         cells = open_map(20, 20, np.s_[10, 11], np.s_[11, 10])
-        measured = cast_ray(*padded(cells), 5.0, 5.0, math.pi / 4, 30.0)
+        measured = cast_ray(leaps_of(cells), 5.0, 5.0, math.pi / 4, 30.0)
         assert measured == pytest.approx(5.5 * math.sqrt(2))
 
     @pytest.mark.parametrize("angle", ANGLES)
     def test_no_hit_is_range_max(self, angle):
-        world = padded(open_map(50, 50))
-        assert cast_ray(*world, 25.0, 25.0, angle, 10.0) == 10.0
+        leaps = leaps_of(open_map(50, 50))
+        assert cast_ray(leaps, 25.0, 25.0, angle, 10.0) == 10.0
 
     @pytest.mark.parametrize("point", [(5.0, 5.0), (-3.0, 4.0), (4.0, 90.0)])
     def test_an_occupied_origin_or_one_outside_reads_0(self, point):
-        world = padded(open_map(10, 10, np.s_[5, 5]))
-        assert cast_ray(*world, *point, 0.3, 10.0) == 0.0
+        leaps = leaps_of(open_map(10, 10, np.s_[5, 5]))
+        assert cast_ray(leaps, *point, 0.3, 10.0) == 0.0
 
     def test_the_border_of_the_map_is_a_wall(self):
-        world = padded(open_map(30, 20))
-        assert cast_ray(*world, 10.0, 10.0, 0.0, 99.0) == 19.5
-        assert cast_ray(*world, 10.0, 10.0, math.pi, 99.0) == 10.5
-        assert cast_ray(*world, 10.0, 10.0, math.pi / 2, 99.0) == 9.5
+        leaps = leaps_of(open_map(30, 20))
+        assert cast_ray(leaps, 10.0, 10.0, 0.0, 99.0) == 19.5
+        assert cast_ray(leaps, 10.0, 10.0, math.pi, 99.0) == 10.5
+        assert cast_ray(leaps, 10.0, 10.0, math.pi / 2, 99.0) == 9.5
 
     def test_the_first_ray_is_the_leftmost(self):
         """Looking right along +x, a wall above on the picture is at the left."""
-        world = padded(open_map(100, 100, np.s_[:30, :]))
+        leaps = leaps_of(open_map(100, 100, np.s_[:30, :]))
         out = np.zeros(5, np.float32)
-        cast_rays(*world, 50.0, 50.0, 0.0, math.pi, 40.0, out)
+        cast_rays(leaps, fan(math.pi, out.size), 50.0, 50.0, 0.0, 40.0, out)
         assert out[0] == 20.5 - 0.0
         assert out[-1] == 40.0
 
     def test_ray_i_points_where_it_says(self):
         cells, _ = some_map(8)
-        world = padded(open_map(30, 30) | np.pad(cells, 8)[:30, :30])
+        leaps = leaps_of(open_map(30, 30) | np.pad(cells, 8)[:30, :30])
         out = np.zeros(7, np.float32)
-        cast_rays(*world, 4.0, 4.0, 0.4, 1.9, 25.0, out)
+        cast_rays(leaps, fan(1.9, out.size), 4.0, 4.0, 0.4, 25.0, out)
         for i, measured in enumerate(out):
             angle = 0.4 - 0.95 + i * 1.9 / 6
-            assert measured == np.float32(cast_ray(*world, 4.0, 4.0, angle, 25.0))
+            assert measured == np.float32(cast_ray(leaps, 4.0, 4.0, angle, 25.0))
 
     def test_a_single_ray_points_ahead(self):
         out = np.zeros(1, np.float32)
-        cast_rays(*padded(open_map(30, 30)), 10.0, 10.0, 0.0, 2.0, 99.0, out)
+        cast_rays(
+            leaps_of(open_map(30, 30)), fan(2.0, out.size), 10.0, 10.0, 0.0, 99.0, out
+        )
         assert out[0] == 19.5
 
     @given(st.integers(0, 10**6))
@@ -157,15 +153,15 @@ class TestRays:
         here, there = (free_point(cells, random, 1e-3) for _ in range(2))
         if here is None or there is None:
             return
-        world = padded(cells)
+        leaps = leaps_of(cells)
         gap = math.dist(here, there)
         angle = math.atan2(there[1] - here[1], there[0] - here[0])
         clear = brute_force.ray(cells, *here, angle, gap) >= gap
-        assert sees(*world, *here, *there) == clear
-        assert sees(*world, *there, *here) == clear
+        assert sees(leaps, *here, *there) == clear
+        assert sees(leaps, *there, *here) == clear
 
     def test_a_point_sees_itself(self):
-        assert sees(*padded(open_map(3, 3)), 1.0, 1.0, 1.0, 1.0)
+        assert sees(leaps_of(open_map(3, 3)), 1.0, 1.0, 1.0, 1.0)
 
 
 class TestMotion:
@@ -189,7 +185,7 @@ class TestMotion:
     def test_straight_and_in_place(self, left, right, expected):
         state = np.array([50.0, 50.0, 0.0])
         touched = advance(
-            *padded(open_map(101, 101)), state, left, right, 10.0, 0.1, 5.0
+            padded(open_map(101, 101)), state, left, right, 10.0, 0.1, 5.0
         )
         assert not touched
         np.testing.assert_allclose(state, expected, atol=1e-12)
@@ -197,14 +193,14 @@ class TestMotion:
     def test_the_faster_right_wheel_turns_up_on_the_picture(self):
         """At heading 0 the robot looks right; left is up, where y falls."""
         state = np.array([50.0, 50.0, 0.0])
-        advance(*padded(open_map(101, 101)), state, 5.0, 10.0, 10.0, 1.0, 3.0)
+        advance(padded(open_map(101, 101)), state, 5.0, 10.0, 10.0, 1.0, 3.0)
         assert state[1] < 50.0
         assert state[2] == pytest.approx(-0.5)
 
     def test_the_heading_is_wrapped(self):
         world, state = padded(open_map(9, 9)), np.array([4.0, 4.0, 3.0])
         for _ in range(50):
-            advance(*world, state, 5.0, -5.0, 10.0, 0.3, 1.0)
+            advance(world, state, 5.0, -5.0, 10.0, 0.3, 1.0)
             assert -math.pi < state[2] <= math.pi
         turned = 3.0 + 50 * 0.3
         assert math.remainder(state[2] - turned, 2 * math.pi) == pytest.approx(
@@ -232,7 +228,7 @@ def gaps_along(cells, pose, forward, turn, radius, parts):
 
 def assert_first_contact(cells, pose, forward, turn, radius):
     """No overlap before the contact, none missed, and a touch where it is."""
-    touch = first_contact(*padded(cells), *pose, forward, turn, radius)
+    touch = first_contact(padded(cells), *pose, forward, turn, radius)
     parts = np.linspace(0.0, min(touch, 1.0), 400)
     gaps = gaps_along(cells, pose, forward, turn, radius, parts)
     assert gaps.min() >= min(gaps[0], 0.0) - 1e-6
@@ -289,14 +285,14 @@ class TestFirstContact:
     def test_head_on_into_a_wall(self, heading, expected):
         """Wall at x >= 49.5; the disc of 5 px stands at 30."""
         cells = open_map(100, 100, np.s_[:, 50:])
-        touch = first_contact(*padded(cells), 30.0, 50.0, heading, 15.0, 0.0, 5.0)
+        touch = first_contact(padded(cells), 30.0, 50.0, heading, 15.0, 0.0, 5.0)
         wanted = expected / 15.0 if expected != 2.0 else 2.0
         assert touch == pytest.approx(wanted, abs=1e-8)
 
     def test_a_corner_is_met_by_the_round_of_the_disc(self):
         cells = open_map(60, 60, np.s_[30, 30])
         x = 29.5 - math.sqrt(5.0**2 - 3.0**2)
-        touch = first_contact(*padded(cells), 15.0, 26.5, 0.0, 30.0, 0.0, 5.0)
+        touch = first_contact(padded(cells), 15.0, 26.5, 0.0, 30.0, 0.0, 5.0)
         assert touch == pytest.approx((x - 15.0) / 30.0, abs=1e-9)
 
     @pytest.mark.parametrize(
@@ -345,7 +341,7 @@ class TestFirstContact:
             state = np.array([200.0, 100.0, heading])
             wheel = 0.5 * turn
             touched = advance(
-                *padded(cells),
+                padded(cells),
                 state,
                 forward + wheel,
                 forward - wheel,
@@ -361,7 +357,7 @@ class TestFirstContact:
 
     def test_turning_in_place_never_touches(self):
         cells = open_map(100, 100, np.s_[:, 50:])
-        assert first_contact(*padded(cells), 44.5, 50.0, 0.0, 0.0, 3.0, 5.0) == 2.0
+        assert first_contact(padded(cells), 44.5, 50.0, 0.0, 0.0, 3.0, 5.0) == 2.0
 
     def test_the_corner_between_two_squares_counts(self):
         """A small disc meets the pinch of a diagonal of squares."""
@@ -378,7 +374,7 @@ class TestFirstContact:
         contacts = 0
         for _ in range(3000):
             left, right = random.uniform(-1, 1, 2) * 40
-            contacts += advance(*world, state, left, right, 8.0, 0.05, 4.0)
+            contacts += advance(world, state, left, right, 8.0, 0.05, 4.0)
             assert brute_force.distance(cells, state[0], state[1]) >= 4.0 - 1e-6
         assert contacts > 100
 
@@ -388,41 +384,41 @@ class TestFirstContact:
         world = padded(cells)
         state = np.array([6.0, 14.5 - 4.0, slope])
         for _ in range(1000):
-            advance(*world, state, 5.0, 5.0, 8.0, 0.05, 4.0)
+            advance(world, state, 5.0, 5.0, 8.0, 0.05, 4.0)
             assert 14.5 - state[1] >= 4.0 - 2e-7
 
 
 class TestPathDistance:
     def test_on_the_lattice_it_is_the_field(self):
         cells, _ = some_map(7)
-        world = padded(cells)
-        free = body_free(world[1][1:-1, 1:-1], 0.3)
+        world = Terrain.of(OccupancyGrid(cells))
+        free = body_free(world.clear, 0.3)
         goal = tuple(int(v) for v in np.argwhere(free)[0])[::-1]
         field = distance_field(free, goal).astype(np.float32)
         for y, x in np.argwhere(np.isfinite(field)):
-            there = path_distance(*world, field, float(x), float(y), -1.0)
+            there = path_distance(world.leaps, field, float(x), float(y), -1.0)
             assert there == pytest.approx(field[y, x], abs=1e-4)
 
     def test_between_pixels_it_changes_no_faster_than_the_robot_moves(self):
-        world = padded(open_map(40, 40, np.s_[20, 5:35]))
-        free = body_free(world[1][1:-1, 1:-1], 2.0)
+        world = Terrain.of(OccupancyGrid(open_map(40, 40, np.s_[20, 5:35])))
+        free = body_free(world.clear, 2.0)
         field = distance_field(free, (20, 8)).astype(np.float32)
         line = np.linspace(5.0, 34.0, 500)
-        there = [path_distance(*world, field, x, 30.0, -1.0) for x in line]
+        there = [path_distance(world.leaps, field, x, 30.0, -1.0) for x in line]
         # Both ends of a hop are rounded to the lattice: up to its octile error.
         assert np.abs(np.diff(there)).max() < 0.1
 
     def test_squeezed_into_a_corner_it_uses_a_pixel_in_sight(self):
-        world = padded(open_map(30, 30))
-        free = body_free(world[1][1:-1, 1:-1], 5.0)
+        world = Terrain.of(OccupancyGrid(open_map(30, 30)))
+        free = body_free(world.clear, 5.0)
         field = distance_field(free, (20, 20)).astype(np.float32)
-        there = path_distance(*world, field, 4.5, 4.5, -1.0)
+        there = path_distance(world.leaps, field, 4.5, 4.5, -1.0)
         assert field[5, 5] < there <= field[5, 5] + 1.0
 
     def test_no_pixel_in_sight_gives_the_previous_value(self):
         cells = open_map(30, 30, np.s_[:, 10])
-        world = padded(cells)
-        free = body_free(world[1][1:-1, 1:-1], 0.2)
+        world = Terrain.of(OccupancyGrid(cells))
+        free = body_free(world.clear, 0.2)
         free[:, :10] = False
         field = distance_field(free, (20, 20)).astype(np.float32)
-        assert path_distance(*world, field, 8.9, 15.0, 77.0) == 77.0
+        assert path_distance(world.leaps, field, 8.9, 15.0, 77.0) == 77.0

@@ -16,8 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tdac_envs import kernels, sensors
-from tdac_envs.grid import clearance
+from tdac_envs import rays, sensors
 from tdac_envs.params import MapParams, RobotParams
 
 SOURCE = Path(sensors.__file__)
@@ -107,11 +106,10 @@ def test_ranges_equal_analytic_ray_and_square_intersections(scene):
 def test_ranges_equal_those_of_the_env(scene):
     """The controller's rays are the judge's rays, corner and border cases included."""
     occ, x, y, heading, n_rays, fov_deg, range_max = scene
-    cells, clear = kernels.pad(occ, clearance(occ))
+    leaps = rays.leaps_of(occ)
     out = np.empty(n_rays, np.float32)
-    kernels.cast_rays(
-        cells, clear, x, y, heading, math.radians(fov_deg), range_max, out
-    )
+    directions = rays.fan(math.radians(fov_deg), n_rays)
+    rays.cast_rays(leaps, directions, x, y, heading, range_max, out)
     ours = sensors.Ultrasonic(occ, n_rays, fov_deg, range_max).ranges(x, y, heading)
     np.testing.assert_allclose(ours, out, atol=1e-4, rtol=0)
 
@@ -120,12 +118,13 @@ def test_ranges_in_open_space_equal_those_of_the_env():
     """Far from walls the env leaps; long rays along borders come out the same."""
     occ = np.zeros((300, 300), bool)
     occ[150:152, 40:260] = True
-    cells, clear = kernels.pad(occ, clearance(occ))
+    leaps = rays.leaps_of(occ)
     out = np.empty(18, np.float32)
     sensor = sensors.Ultrasonic(occ)
+    directions = rays.fan(math.radians(110), 18)
     for k in range(64):
         x, y, heading = 40.0 + 3.5 * k, 30.5 + k / 2, k * math.pi / 16
-        kernels.cast_rays(cells, clear, x, y, heading, math.radians(110), 220.0, out)
+        rays.cast_rays(leaps, directions, x, y, heading, 220.0, out)
         np.testing.assert_allclose(sensor.ranges(x, y, heading), out, atol=1e-4)
 
 

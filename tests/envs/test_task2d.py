@@ -249,7 +249,7 @@ class TestSharing:
     def test_what_is_shared_cannot_be_written(self):
         task = task_on(two_rooms())
         world = task.terrain
-        for array in (task.field, world.clear, world.padded, world.padded_clear):
+        for array in (task.field, world.clear, world.padded_clear, world.leaps):
             assert not array.flags.writeable
 
     def test_a_task_takes_at_most_16_bytes_a_pixel(self):
@@ -258,9 +258,9 @@ class TestSharing:
             id(array if array.base is None else array.base): array.nbytes
             for array in (
                 task.terrain.grid.cells,
-                task.terrain.padded,
                 task.terrain.padded_clear,
                 task.terrain.clear,
+                task.terrain.leaps,
                 task.field,
             )
         }
