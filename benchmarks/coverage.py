@@ -1,0 +1,109 @@
+"""How often each interval of `tdac_agent.metrics` holds the true value.
+
+Run `python -m benchmarks.coverage`. Runs are simulated: each iteration passes with one
+probability, the first success ends a run.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+from scipy.stats import binom
+
+from tdac_agent.metrics import (
+    cumulative_success,
+    exact_interval,
+    frames_from_tau,
+    success_rate,
+)
+
+MOST = 20
+PROBABILITIES = (0.2, 0.5, 0.8, 0.95)
+
+
+def exact_coverage(probability: float, runs: int) -> float:
+    """Of the exact interval, summed over all numbers of successes."""
+    held = 0.0
+    for successes in range(runs + 1):
+        low, high = exact_interval(successes, runs)
+        if low <= probability <= high:
+            held += float(binom.pmf(successes, runs, probability))
+    return held
+
+
+def rate_coverage(
+    probability: float, runs: int, *, trials: int = 1000, seed: int = 0
+) -> float:
+    """Of SR's interval by resampling runs; simulated."""
+    random = np.random.default_rng(seed)
+    held = 0
+    for _ in range(trials):
+        first = random.geometric(probability, runs)
+        tau = [int(k) if k <= MOST else None for k in first]
+        rate = success_rate(frames_from_tau(tau, MOST))
+        held += rate.low <= probability <= rate.high
+    return held / trials
+
+
+def kaplan_meier_coverage(
+    probability: float,
+    runs: int,
+    stopped: float,
+    *,
+    at: int = 3,
+    trials: int = 1000,
+    seed: int = 0,
+) -> float:
+    """Of CS(at) where each iteration is the last one affordable with `stopped`."""
+    random = np.random.default_rng(seed)
+    true = 1 - (1 - probability) ** at
+    held = 0
+    for _ in range(trials):
+        first = random.geometric(probability, runs)
+        last = np.minimum(random.geometric(stopped, runs), MOST)
+        seen = first <= last
+        frame = pd.DataFrame(
+            {
+                "tau": pd.array(np.where(seen, first, 0), "Int64"),
+                "done": np.minimum(first, last),
+                "censored": ~seen,
+                "K": MOST,
+            }
+        )
+        frame.loc[~seen, "tau"] = pd.NA
+        row = cumulative_success(frame).iloc[at - 1]
+        held += row["low"] <= true <= row["high"]
+    return held / trials
+
+
+def main() -> None:
+    """Prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=int, default=1000)
+    trials = parser.parse_args().trials
+    table = Table(title="Coverage of the 95 % intervals", title_justify="left")
+    table.add_column("interval")
+    table.add_column("runs", justify="right")
+    for probability in PROBABILITIES:
+        table.add_column(f"p = {probability:g}", justify="right")
+    for runs in (5, 10, 20, 50):
+        exact = [exact_coverage(p, runs) for p in PROBABILITIES]
+        table.add_row("CS, Clopper-Pearson", str(runs), *(f"{c:.3f}" for c in exact))
+    for runs in (5, 10, 20, 50):
+        rates = [rate_coverage(p, runs, trials=trials) for p in PROBABILITIES]
+        table.add_row("SR, runs resampled", str(runs), *(f"{c:.3f}" for c in rates))
+    for runs in (5, 10, 20, 50):
+        curves = [
+            kaplan_meier_coverage(p, runs, 0.25, trials=trials) for p in PROBABILITIES
+        ]
+        name = "CS(3), Kaplan-Meier, 1 in 4 stopped"
+        table.add_row(name, str(runs), *(f"{c:.3f}" for c in curves))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""Metrics of synthesis runs: what the paper defines, and how sure one can be of it.
+
+Everything goes in and out as pandas frames with one row per thing (`RUN_COLUMNS`,
+`CANDIDATE_COLUMNS`); each interval says what it assumes in `ASSUMPTIONS`.
+"""
+
+from tdac_agent.metrics.compare import (
+    Comparison,
+    best_of_n,
+    compare_paired,
+    pass_at_n,
+)
+from tdac_agent.metrics.cumulative import cumulative_success
+from tdac_agent.metrics.frames import (
+    CANDIDATE_COLUMNS,
+    RUN_COLUMNS,
+    Frames,
+    find_runs,
+    frames_from_tau,
+    frames_of,
+    iterations_of,
+    load_frames,
+)
+from tdac_agent.metrics.rates import (
+    ASSUMPTIONS,
+    Rate,
+    candidate_rate,
+    exact_interval,
+    first_pass,
+    success_rate,
+    unbiased_success_rate,
+)
+from tdac_agent.metrics.table import summarise
+
+__all__ = [
+    "ASSUMPTIONS",
+    "CANDIDATE_COLUMNS",
+    "RUN_COLUMNS",
+    "Comparison",
+    "Frames",
+    "Rate",
+    "best_of_n",
+    "candidate_rate",
+    "compare_paired",
+    "cumulative_success",
+    "exact_interval",
+    "find_runs",
+    "first_pass",
+    "frames_from_tau",
+    "frames_of",
+    "iterations_of",
+    "load_frames",
+    "pass_at_n",
+    "success_rate",
+    "summarise",
+    "unbiased_success_rate",
+]

@@ -1,0 +1,139 @@
+"""Which of two is better: on the same tasks and seeds, and for the same money."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest
+
+from tdac_agent.errors import RunError
+from tdac_agent.metrics.frames import Frames
+from tdac_agent.metrics.rates import solved
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Two kinds of runs over the same pairs of task and seed.
+
+    Attributes:
+        pairs: Number of pairs.
+        first_only: Pairs that only the first solved within K.
+        second_only: Pairs that only the second solved.
+        p_solved: Exact McNemar test of these two (two-sided); 1 where there are none.
+        sooner: Pairs in which the first needed fewer iterations; no success counts as
+            more than any.
+        later: Pairs in which it needed more.
+        p_tau: Exact sign test of these two (two-sided).
+    """
+
+    pairs: int
+    first_only: int
+    second_only: int
+    p_solved: float
+    sooner: int
+    later: int
+    p_tau: float
+
+
+def compare_paired(
+    first: Frames, second: Frames, on: Sequence[str] = ("task", "seed")
+) -> Comparison:
+    """Compares runs that share a task and a seed.
+
+    Assumes independent pairs. Pairs of which one was censored are left out.
+
+    Args:
+        first: Runs of one kind, one of each pair.
+        second: Runs of the other kind.
+        on: Columns that make a pair.
+
+    Raises:
+        RunError: They have no pair in common, or several runs for one.
+    """
+    keys = list(on)
+    sides = [frames.runs[~frames.runs["censored"]] for frames in (first, second)]
+    for side in sides:
+        if side.duplicated(keys).any():
+            again = side.loc[side.duplicated(keys), keys].iloc[0].to_dict()
+            raise RunError(f"there are several runs with {again}")
+    both = sides[0].merge(sides[1], on=keys, suffixes=("_1", "_2"))
+    if both.empty:
+        raise RunError(f"no two runs share {' and '.join(keys)}")
+    most = max(int(both["K_1"].max()), int(both["K_2"].max()))
+    one, two = (both[f"tau_{n}"].fillna(most + 1).to_numpy(float) for n in (1, 2))
+    first_only = int(((one <= most) & (two > most)).sum())
+    second_only = int(((two <= most) & (one > most)).sum())
+    sooner, later = int((one < two).sum()), int((one > two).sum())
+    return Comparison(
+        len(both),
+        first_only,
+        second_only,
+        sign_test(first_only, second_only),
+        sooner,
+        later,
+        sign_test(sooner, later),
+    )
+
+
+def sign_test(ups: int, downs: int) -> float:
+    """Two-sided p of so many ups and downs, if both are equally likely; exact.
+
+    Of discordant pairs this is McNemar's exact test.
+    """
+    total = ups + downs
+    return float(binomtest(ups, total).pvalue) if total else 1.0
+
+
+def pass_at_n(tried: int, passed: int, n: int) -> float:
+    """Probability that one of n one-shot candidates passes, without bias.
+
+    From `tried` independent candidates of which `passed` did (Chen et al. 2021, eq.
+    1). NaN for n above `tried`: there is no unbiased estimate.
+    """
+    if n > tried:
+        return math.nan
+    if tried - passed < n:
+        return 1.0
+    terms = 1.0 - n / np.arange(tried - passed + 1, tried + 1)
+    return float(1.0 - np.prod(terms))
+
+
+def best_of_n(frames: Frames, loop: Frames, within: int | None = None) -> pd.DataFrame:
+    """One-shot candidates for what the loop costs, beside the loop.
+
+    Args:
+        frames: Runs whose first candidates are the one-shot ones.
+        loop: Runs of the loop.
+        within: Iterations of the loop; all by default.
+
+    Returns:
+        A row per measure of cost that both have (`cost` in USD, `tokens`): what one
+        shot and a run of the loop cost on average, n that fit into the latter, pass@n
+        of the one-shot candidates (NaN where there were fewer than n), CS of the loop.
+    """
+    tried = frames.candidates
+    first = tried[(tried["k"] == 1) & (tried["j"] == 0)]
+    single = frames.runs[frames.runs["done"] == 1]
+    most = within if within is not None else int(loop.runs["K"].max())
+    rows = []
+    for measure in ("cost", "tokens"):
+        one, run = single[measure].mean(), loop.runs[measure].mean()
+        if pd.isna(one) or pd.isna(run) or not one > 0:
+            continue
+        n = max(1, int(run // one))
+        rows.append(
+            {
+                "measure": measure,
+                "one_shot": float(one),
+                "run": float(run),
+                "n": n,
+                "best_of_n": pass_at_n(len(first), int(first["passed"].sum()), n),
+                "cs": float(solved(loop.runs, most).mean()),
+            }
+        )
+    columns = ["measure", "one_shot", "run", "n", "best_of_n", "cs"]
+    return pd.DataFrame(rows, columns=columns)

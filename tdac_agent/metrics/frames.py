@@ -1,0 +1,193 @@
+"""Run records as tidy frames: one row per run, per iteration, per candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from tdac_agent.errors import RunError
+from tdac_agent.records import Attempt, Run, load_run
+
+RUN_COLUMNS = {
+    "run": "Its folder, or another name that no other run has.",
+    "task": "Name of the task.",
+    "learner": "LLM1, as named for `--learner`.",
+    "optimizer": "LLM2.",
+    "prompt": "Template of the first question.",
+    "K": "Most iterations.",
+    "J": "Edits per iteration.",
+    "seed": "Of the jittered starts, and of the run among those of a kind.",
+    "status": "As in `run.json`.",
+    "tau": "Iteration of the first success; missing where there was none.",
+    "done": "Iterations that were judged to their end, with success or without.",
+    "censored": "Whether money, time or a fault ended it before success or K.",
+    "tokens": "Of all questions and answers; missing where nobody counted.",
+    "cost": "USD; missing where a price is unknown.",
+    "seconds": "Wall time.",
+}
+CANDIDATE_COLUMNS = {
+    "run": "As above.",
+    "k": "Iteration, from 1.",
+    "j": "Edit, 0 for what the Learner wrote.",
+    "valid": "Whether there was a controller; the paper's set of valid pairs.",
+    "passed": "Whether all of its tests passed.",
+    "failed": "Number of failed tests; missing where there was no controller.",
+}
+Row = dict[str, object]
+STOPPED = frozenset({"running", "interrupted", "fault", "budget"})
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """What is known of some runs.
+
+    Attributes:
+        runs: A row per run, with `RUN_COLUMNS`.
+        candidates: A row per candidate (k, j), with `CANDIDATE_COLUMNS`.
+    """
+
+    runs: pd.DataFrame
+    candidates: pd.DataFrame
+
+    def only(self, **columns: object) -> Frames:
+        """The runs whose columns have these values, and their candidates."""
+        chosen = self.runs
+        for name, value in columns.items():
+            chosen = chosen[chosen[name] == value]
+        kept = self.candidates["run"].isin(chosen["run"])
+        return Frames(chosen, self.candidates[kept])
+
+
+def find_runs(folder: Path) -> Iterator[Run]:
+    """The runs at or below a folder, in the order of their names.
+
+    Raises:
+        RunError: There is none, or one cannot be read.
+    """
+    found = sorted(path.parent for path in folder.rglob("run.json"))
+    if not found:
+        raise RunError(f"there is no run at or below {folder}: no file run.json")
+    yield from map(load_run, found)
+
+
+def load_frames(*folders: Path) -> Frames:
+    """The runs at or below some folders.
+
+    Raises:
+        RunError: There is none in one of them, or one cannot be read.
+    """
+    return frames_of(run for folder in folders for run in find_runs(folder))
+
+
+def frames_of(runs: Iterable[Run]) -> Frames:
+    """Frames of run records."""
+    kept = list(runs)
+    candidates = [_candidate(run, attempt) for run in kept for attempt in run.attempts]
+    return _frames([_row(run) for run in kept], candidates)
+
+
+def _candidate(run: Run, attempt: Attempt) -> Row:
+    return {
+        "run": str(run.folder),
+        "k": attempt.k,
+        "j": attempt.j,
+        "valid": attempt.valid,
+        "passed": attempt.passed,
+        "failed": len(attempt.failed_tests) if attempt.valid else None,
+    }
+
+
+def _row(run: Run) -> Row:
+    last: dict[int, tuple[int, bool, bool]] = {
+        a.k: (a.j, a.valid, a.passed) for a in run.attempts
+    }
+    done = sum(
+        passed or not valid or j == run.patience for j, valid, passed in last.values()
+    )
+    tokens = run.tokens_in + run.tokens_out
+    return {
+        "run": str(run.folder),
+        "task": run.task,
+        "learner": run.learner,
+        "optimizer": run.optimizer,
+        "prompt": run.prompt,
+        "K": run.iterations,
+        "J": run.patience,
+        "seed": run.seed,
+        "status": run.status,
+        "tau": run.tau,
+        "done": done,
+        "censored": run.status in STOPPED,
+        "tokens": tokens or None,
+        "cost": getattr(run, "cost", None),
+        "seconds": run.seconds,
+    }
+
+
+def frames_from_tau(
+    tau: Sequence[int | None],
+    most: int,
+    *,
+    invalid: int = 0,
+    **labels: str,
+) -> Frames:
+    """Frames of runs of which only the first successes are known, as in a paper.
+
+    Args:
+        tau: Iteration of the first success of each run, None where there was none.
+        most: K.
+        invalid: How many of the iterations gave no controller; they are taken to be
+            the first ones of the longest runs, which no metric depends on.
+        labels: Columns such as `learner` and `task`.
+    """
+    left = invalid
+    rows: list[Row] = []
+    candidates: list[Row] = []
+    for number, first in enumerate(sorted(tau, key=lambda t: -(t or most + 1))):
+        run, done = f"{' '.join(labels.values())} {number + 1}", first or most
+        status = "verified" if first else "not verified"
+        known = {"run": run, "K": most, "status": status, "tau": first, "done": done}
+        rows.append(dict.fromkeys(RUN_COLUMNS) | known | {"censored": False, **labels})
+        for k in range(1, done + 1):
+            passed = k == first
+            valid = passed or left == 0
+            left -= not valid
+            failed = None if not valid else 0 if passed else 1
+            candidate = (run, k, 0, valid, passed, failed)
+            candidates.append(dict(zip(CANDIDATE_COLUMNS, candidate, strict=True)))
+    return _frames(rows, candidates)
+
+
+def iterations_of(candidates: pd.DataFrame) -> pd.DataFrame:
+    """A row per iteration: what the paper counts, edits being part of it.
+
+    Returns:
+        Columns run, k, valid (a controller was generated), passed (one of its
+        candidates passed), failed (tests that its last valid candidate failed, the
+        paper's f), candidates (how many there were).
+    """
+    ordered = candidates.sort_values(["run", "k", "j"])
+    grouped = ordered.groupby(["run", "k"], sort=False)
+    return grouped.agg(
+        valid=("valid", "any"),
+        passed=("passed", "any"),
+        failed=("failed", "last"),
+        candidates=("j", "size"),
+    ).reset_index()
+
+
+def _frames(rows: list[Row], candidates: list[Row]) -> Frames:
+    runs = pd.DataFrame(rows, columns=list(RUN_COLUMNS))
+    runs = runs.astype(
+        {"tau": "Int64", "done": "Int64", "K": "Int64", "censored": bool}
+        | {"cost": float, "seconds": float, "tokens": "Int64"}
+    )
+    if runs["run"].duplicated().any():
+        again = runs["run"][runs["run"].duplicated()].iloc[0]
+        raise RunError(f"the run {again} is there twice")
+    tried = pd.DataFrame(candidates, columns=list(CANDIDATE_COLUMNS))
+    types = {"k": int, "j": int, "valid": bool, "passed": bool, "failed": "Int64"}
+    return Frames(runs, tried.astype(types))

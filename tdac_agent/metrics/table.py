@@ -1,0 +1,87 @@
+"""One row per kind of run: the metrics that belong into a paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from tdac_agent.metrics.frames import Frames
+from tdac_agent.metrics.rates import (
+    Rate,
+    candidate_rate,
+    exact_interval,
+    first_pass,
+    solved,
+    success_rate,
+    unbiased_success_rate,
+)
+
+KIND = ("learner", "optimizer", "task", "prompt")
+
+
+def summarise(frames: Frames, by: Sequence[str] = KIND) -> pd.DataFrame:
+    """The metrics of each kind of run.
+
+    Args:
+        frames: The runs.
+        by: Columns of `runs` that tell kinds apart.
+
+    Returns:
+        A row per kind: the columns of `by`; R, verified, censored (runs); sr, sr_low,
+        sr_high (runs resampled); sr_unbiased; first_pass with _low and _high (exact);
+        cs_K, the fraction solved, with _low and _high (exact, censored runs left out);
+        candidate_rate; tau_mean (of the verified); tokens_per_verified and
+        cost_per_verified (of all runs of the kind, over the verified ones);
+        seconds_mean.
+    """
+    columns = list(by)
+    rows = []
+    for names, _ in frames.runs.groupby(columns, sort=False, dropna=False):
+        label = dict(zip(columns, names, strict=True))
+        rows.append(label | _metrics(_kind(frames, label)))
+    return pd.DataFrame(rows)
+
+
+def _kind(frames: Frames, label: dict[str, object]) -> Frames:
+    chosen = frames.runs
+    for name, value in label.items():
+        same = chosen[name].isna() if pd.isna(value) else chosen[name] == value
+        chosen = chosen[same]
+    kept = frames.candidates["run"].isin(chosen["run"])
+    return Frames(chosen, frames.candidates[kept])
+
+
+def _metrics(frames: Frames) -> dict[str, object]:
+    runs = frames.runs
+    verified = int(runs["tau"].notna().sum())
+    whole = runs[~runs["censored"]]
+    done = int(solved(whole, int(runs["K"].max())).sum())
+    low, high = exact_interval(done, len(whole))
+    return {
+        "R": len(runs),
+        "verified": verified,
+        "censored": int(runs["censored"].sum()),
+        **_told("sr", success_rate(frames)),
+        "sr_unbiased": unbiased_success_rate(frames),
+        **_told("first_pass", first_pass(frames)),
+        "cs_K": done / len(whole) if len(whole) else float("nan"),
+        "cs_K_low": low,
+        "cs_K_high": high,
+        "candidate_rate": candidate_rate(frames).value,
+        "tau_mean": float(runs["tau"].mean()) if verified else float("nan"),
+        "tokens_per_verified": _each(runs["tokens"], verified),
+        "cost_per_verified": _each(runs["cost"], verified),
+        "seconds_mean": float(runs["seconds"].mean()),
+    }
+
+
+def _told(name: str, rate: Rate) -> dict[str, float]:
+    return {name: rate.value, f"{name}_low": rate.low, f"{name}_high": rate.high}
+
+
+def _each(spent: pd.Series, verified: int) -> float:
+    """Spent by all, for each that was verified; NaN where not all is known."""
+    if not verified or spent.isna().any():
+        return float("nan")
+    return float(spent.sum()) / verified
