@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.infrared import PLACES, RANGE
-from tdac_envs.epuck.kernels import AXLE, WHEEL_RADIUS
+from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
 
 _AZIMUTHS: tuple[float, ...] = tuple(PLACES[:, 2].tolist())
@@ -23,7 +23,7 @@ class EPuckRobot(_Record):
 
     radius: float = Field(BODY_RADIUS, description="Of the body, m.")
     wheel_radius: float = Field(WHEEL_RADIUS, description="m")
-    axle_length: float = Field(AXLE, description="m")
+    axle_length: float = Field(AXLE_LENGTH, description="m")
     max_wheel_speed: float = Field(description="rad/s")
     sensor_range: float = Field(RANGE, description="Of ps0 to ps7, m.")
     sensor_azimuths: tuple[float, ...] = Field(

@@ -4,35 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
-from tdac_envs.arguments import (
-    check_reset_options,
-    finite_numbers,
-    not_negative,
-    one_of,
-)
+from tdac_envs.arguments import not_negative, one_of, wheel_speeds
 from tdac_envs.bodies import BODY_RADIUS
-from tdac_envs.driven import DrivenEnv, Observation, Outcome
+from tdac_envs.driven import DrivenEnv, Observation
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.ground import Ground
-from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, sense_ground
-from tdac_envs.epuck.nearby import Surroundings, surroundings
-from tdac_envs.epuck.source import WorldSource, open_world
-from tdac_envs.epuck.task import (
-    TOLERANCE,
-    EPuckTask,
-    default_horizon,
-    jittered_start,
-    make_task,
-    random_task,
+from tdac_envs.epuck.nearby import surroundings
+from tdac_envs.epuck.observed import (
+    ground_readings,
+    noisy,
+    north,
+    observation_space,
+    position,
 )
+from tdac_envs.epuck.robot import Robot
+from tdac_envs.epuck.setup import Setup
+from tdac_envs.epuck.source import WorldSource, open_world
+from tdac_envs.epuck.task import TOLERANCE, make_task
 from tdac_envs.render import Status
+from tdac_envs.stepping import LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, TOUCHED, info_of
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
@@ -189,31 +184,29 @@ class EPuckEnv(DrivenEnv):
             self.nominal, ground=self.ground_sensors, gps=self.gps, compass=self.compass
         )
         self.observation_space = space  # type: ignore[assignment]
-        self._fixed_horizon = horizon is not None
-        self._surroundings = surroundings(
-            ground,
-            reflectance == "webots",
-            bool(goal_visible),
-            BODY_RADIUS + self.nominal.full_step,
+        reach = BODY_RADIUS + self.nominal.full_step
+        self.setup = setup = Setup(
+            self.nominal,
+            surroundings(ground, reflectance == "webots", bool(goal_visible), reach),
+            variation,
+            horizon is not None,
+            on_collision,
+            self.wheel_slip,
+            self.motor_lag,
+            self.delay,
+            self.weights,
         )
-        visible = self._surroundings.visible
-        self._pushes = on_collision == "block" and len(ground.masses) > 0
+        self._pushes = setup.pushes
         # Where things are now; the originals stay where they were at first.
+        visible = setup.around.visible
         self._solid = ground.solid.copy() if self._pushes else ground.solid
         self._seen = visible.copy() if self._pushes else visible
         self._things = np.zeros((len(ground.masses), 6))
         self._speed = np.zeros(3)
-        self._constants = _constants(self.nominal, self.motor_lag, self._surroundings)
-        self._state = np.zeros(6)
-        self._pose = np.zeros(3, np.float32)
-        self._turned = np.zeros(2, np.float32)
-        self._wheel_speeds = np.zeros(2, np.float32)
-        self._readings = np.zeros(N_SENSORS, np.float32)
-        self._hits = np.zeros((N_SENSORS, 3))
-        self._outcome = np.zeros(7)
-        self._drive: Callable[[], None]
-        self._observe: Callable[[], None]
-        self._is_bound = False
+        self._robot = Robot.blank(self.delay)
+        self._robot.constants[:] = setup.constants()
+        self._goal = np.array(self.nominal.goal, np.float32)
+        self._bind()
         self._scene: EPuckScene | None = None
 
     def reset(
@@ -226,29 +219,53 @@ class EPuckEnv(DrivenEnv):
                 these are not feasible.
         """
         super().reset(seed=seed)
-        self.task = task = self._draw_task(options or {})
-        self._constants[kernels.GOAL_X : kernels.GOAL_Y + 1] = task.goal
-        self._state[:] = *task.start, task.shortest, 0.0, 0.0
-        self._goal = np.array(task.goal, np.float32)
-        self._wheel_speeds[:] = 0.0
-        self._speed[:] = 0.0
+        before = self.task
+        self.task = task = self.setup.draw(options or {}, self.np_random)
+        if task.field is not before.field:
+            self._bind()
         if self._pushes:
+            self._speed[:] = 0.0
             self._things[:] = 0.0
             self._things[:, :2] = task.ground.centres
             self._carry()
-        self._begin(task.start[:2], task.shortest, task.horizon)
+        self._robot.place(task)
+        self._goal[:] = task.goal
+        self._call_begin()
+        self._steps = 0
+        self._trail = [task.start[:2]]
+        self._status = ""
         self._scene = None
-        self._bind()
-        self._observe()
-        _, _, _, gap, room, *_ = self._outcome.tolist()
-        info = self._info(False, False, gap, room)
+        info = info_of(self._robot.outcome.tolist())
         if self.render_mode == "human":
             self.render()
         return self._observation(), info
 
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Applies wheel speeds for one `dt`.
+
+        Raises:
+            ValueError: The action is not two finite numbers.
+        """
+        state = self._robot.state
+        state[LEFT], state[RIGHT] = wheel_speeds(action)
+        if self.wheel_slip:
+            slip = self.np_random.normal(1.0, self.wheel_slip, 2)
+            state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
+        if not (self._pushes and self._pushed()):
+            self._call_drive()
+        outcome = self._robot.outcome.tolist()
+        reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
+        info = info_of(outcome)
+        if self.render_mode is not None:
+            self._steps += 1
+            self._note(info["is_success"], info["collision"], truncated)
+        return self._observation(), reward, terminated, truncated, info
+
     def pose(self) -> NDArray[np.float64]:
         """The true pose, shape (3,): x, y (m), heading (rad)."""
-        return self._state[:3].copy()
+        return self._robot.state[:3].copy()
 
     def things(self) -> NDArray[np.float64]:
         """Centre (m) and turn since the start (rad) of what can be pushed, (k, 3)."""
@@ -258,184 +275,88 @@ class EPuckEnv(DrivenEnv):
         return np.column_stack([centres, np.zeros(len(centres))])
 
     def __getstate__(self) -> dict[str, Any]:
-        bound = {"_drive": None, "_observe": None, "_is_bound": False}
-        return {**self.__dict__, **bound, "_scene": None}
+        calls = {"_call_begin": None, "_call_drive": None}
+        return {**self.__dict__, **calls, "_scene": None}
 
-    def _moved(self) -> Outcome:
-        if not self._is_bound:
-            self._bind()
-        if self._pushes and self._pushed():
-            self._observe()
-        else:
-            self._drive()
-        touched, arrived, remaining, gap, room, *_ = self._outcome.tolist()
-        return touched == 1.0, arrived == 1.0, remaining, gap, room
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
 
     def _bind(self) -> None:
-        """Ties the kernels to this environment's own arrays."""
-        solid, seen, near = self._solid, self._seen, self._surroundings
-        shapes = (
-            solid.points, solid.first, solid.extent, near.solid.cells,
-            near.solid.listed,
-            seen.points, seen.first, seen.extent, near.seen.cells, near.seen.listed,
-            self.task.field, self._constants,
-        )  # fmt: skip
-        observed = (self._pose, self._turned, self._readings, self._hits, self._outcome)
-        self._drive = kernels.drive.bind(
-            *shapes, self._command, self._state, self._wheel_speeds, *observed
-        )
-        self._observe = kernels.observe.bind(*shapes, self._state, *observed)
-        self._is_bound = True
+        """Makes the kernels' calls on this environment's own arrays."""
+        arguments = self._arguments()
+        self._call_begin: Callable[[], None] = kernels.begin.bind(*arguments)
+        self._call_drive: Callable[[], None] = kernels.drive.bind(*arguments)
+
+    def _arguments(self) -> tuple[Any, ...]:
+        return self.setup.arguments(self.task, self._robot, self._solid, self._seen)
 
     def _pushed(self) -> bool:
         """Takes the step with physics, if something that can be pushed is near."""
         from tdac_envs.epuck.pushing import Drive, is_near, push
 
-        ground, reach = self.task.ground, 1.5 * self.task.full_step
-        if not is_near(self._solid, self._state, self._things, reach):
+        task, robot = self.task, self._robot
+        ground, reach = task.ground, 1.5 * task.full_step
+        if not is_near(self._solid, robot.state, self._things, reach):
             self._speed[:] = 0.0
             return False
-        kernels.turn_wheels(
-            self._constants, self._command, self._state, self._wheel_speeds,
-            self._outcome,
-        )  # fmt: skip
-        forward, turn = self._outcome[-2:].tolist()
-        wish = Drive(forward, turn, self.task.dt)
-        self._outcome[kernels.TOUCHED] = push(
+        constants, state, queue, _, speeds, *_, outcome = robot
+        kernels.turn_wheels(constants, state, queue, speeds, outcome)
+        forward, turn = outcome[kernels.FORWARD :].tolist()
+        outcome[TOUCHED] = push(
             self._solid, ground.solid, ground.centres, ground.masses,
-            self._state, self._speed, self._things, wish,
+            state, self._speed, self._things, Drive(forward, turn, task.dt),
         )  # fmt: skip
         self._carry()
+        kernels.finish(*self._arguments())
         return True
 
     def _carry(self) -> None:
         """Puts what is solid and what is seen where the things are."""
         ground = self.task.ground
         self._solid.carry(ground.solid, ground.centres, self._things)
-        visible = self._surroundings.visible
+        visible = self.setup.around.visible
         self._seen.carry(visible, ground.centres, self._things)
 
-    def _draw_task(self, options: dict[str, Any]) -> EPuckTask:
-        check_reset_options(options)
-        task = self.nominal
-        if options:
-            start = tuple(options.get("start", task.start))
-            drawn = make_task(
-                task.ground,
-                finite_numbers("start", (*start, task.start.heading)[:3], 3),
-                options.get("goal", task.goal),
-                max_wheel_speed=task.max_wheel_speed,
-                dt=task.dt,
-                goal_tolerance=task.goal_tolerance,
-                horizon=task.horizon,
-            )
-        elif self.variation == "random":
-            drawn = random_task(task, self.np_random)
-        elif self.variation == "jitter":
-            return task.moved(jittered_start(task, self.np_random))
-        else:
-            return task
-        if self._fixed_horizon or drawn.goal == task.goal:
-            return drawn
-        return replace(drawn, horizon=default_horizon(drawn))
-
     def _observation(self) -> Observation:
+        robot, floor = self._robot, self.task.ground.floor
         observation = {
-            "pose": self._pose.copy(),
+            "pose": robot.pose.copy(),
             "goal": self._goal.copy(),
-            "wheel_speeds": self._wheel_speeds.copy(),
-            "ps": self._noisy(self._readings, self._hits[:, 2]),
-            "wheel_positions": self._turned.copy(),
+            "wheel_speeds": robot.wheel_speeds.copy(),
+            "ps": self._noisy(robot.readings.copy(), robot.hits[:, 2]),
+            "wheel_positions": robot.turned.copy(),
         }
         if self.ground_sensors:
-            observation["ground"] = self._ground_readings()
+            found = ground_readings(self._seen, floor, robot)
+            observation["ground"] = self._noisy(*found)
         if self.gps:
-            height = self.task.ground.floor
-            observation["gps"] = np.append(self._pose[:2], np.float32(height))
+            observation["gps"] = position(robot, floor)
         if self.compass:
-            heading = self._state[2]
-            north = (math.sin(heading), math.cos(heading), 0.0)
-            observation["compass"] = np.array(north, np.float32)
+            observation["compass"] = north(robot)
         return observation
 
     def _noisy(
         self, readings: NDArray[np.float32], spreads: NDArray[np.float64]
     ) -> NDArray[np.float32]:
         if not self.sensor_noise:
-            return readings.copy()
-        factor = self.np_random.normal(1.0, self.sensor_noise * spreads)
-        return np.clip(readings * factor, 0.0, LARGEST).astype(np.float32)
-
-    def _ground_readings(self) -> NDArray[np.float32]:
-        seen, readings, spreads = self._seen, np.zeros(3, np.float32), np.zeros(3)
-        floor = self.task.ground.floor
-        sense_ground(
-            seen.points, seen.first, seen.extent, floor, self._state, readings, spreads
-        )
-        return self._noisy(readings, spreads)
+            return readings
+        normal = self.np_random.standard_normal(readings.size)
+        return noisy(readings, self.sensor_noise * spreads, normal)
 
     def _frame(self) -> NDArray[np.uint8]:
         from tdac_envs.epuck.picture import EPuckScene
 
-        task = self.task
+        task, robot = self.task, self._robot
         if self._scene is None:
             self._scene = EPuckScene(task, movable=self._pushes)
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)
         return self._scene.frame(
-            self._state[:3].tolist(),
-            readings=self._readings,
-            reaches=self._hits[:, 0],
+            robot.state[:3].tolist(),
+            readings=robot.readings,
+            reaches=robot.hits[:, 0],
             trail=self._trail,
             solid=self._solid,
             status=status,
         )
-
-
-def observation_space(
-    task: EPuckTask, *, ground: bool = False, gps: bool = False, compass: bool = False
-) -> spaces.Dict:
-    """The observation space of a task; see `EPuckEnv`."""
-    # A body inside the fence; a little more for what physics lets in.
-    left, low, right, high = task.ground.bounds
-    least = np.array([left, low], np.float32) - np.float32(BODY_RADIUS)
-    most = np.array([right, high], np.float32) + np.float32(BODY_RADIUS)
-    pi, floor = np.float32(math.pi), np.float32(task.ground.floor)
-    turned = np.float32(kernels.MOST_TURNED)
-    space: dict[str, spaces.Space[Any]] = {
-        "pose": spaces.Box(np.append(least, -pi), np.append(most, pi)),
-        "goal": spaces.Box(least, most),
-        "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
-        "ps": spaces.Box(0.0, LARGEST, (N_SENSORS,), np.float32),
-        "wheel_positions": spaces.Box(-turned, turned, (2,), np.float32),
-    }
-    if ground:
-        space["ground"] = spaces.Box(0.0, LARGEST, (3,), np.float32)
-    if gps:
-        space["gps"] = spaces.Box(
-            np.append(least, floor - 1), np.append(most, floor + 1)
-        )
-    if compass:
-        space["compass"] = spaces.Box(-1.0, 1.0, (3,), np.float32)
-    return spaces.Dict(space)
-
-
-def _constants(
-    task: EPuckTask, motor_lag: float, near: Surroundings
-) -> NDArray[np.float64]:
-    """What `kernels.observe` takes as `constants`, in its order."""
-    ground = task.ground
-    return np.array(
-        [
-            task.max_wheel_speed,
-            task.dt,
-            BODY_RADIUS,
-            *task.goal,
-            task.goal_tolerance,
-            math.exp(-task.dt / motor_lag) if motor_lag else 0.0,
-            ground.floor,
-            *ground.bounds[:2],
-            ground.spacing,
-            near.width,
-        ]
-    )

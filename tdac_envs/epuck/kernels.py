@@ -1,4 +1,7 @@
-"""Compiled step of TDAC-EPuck-v0: motion up to a contact, and all that follows."""
+"""Compiled step of TDAC-EPuck-v0: motion up to a contact, sensors, reward and ends.
+
+The arrays of one robot are described in `tdac_envs.epuck.robot.Robot`.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +17,42 @@ from tdac_envs.epuck.gaps import nearest_of
 from tdac_envs.epuck.infrared import sees, sense
 from tdac_envs.epuck.nearby import listed_at
 from tdac_envs.epuck.prisms import Array, Index
+from tdac_envs.stepping import (
+    AXLE,
+    DT,
+    GAP,
+    GOAL_X,
+    GOAL_Y,
+    HEADING,
+    MAX_SPEED,
+    RADIUS,
+    REACHED,
+    REMAINING,
+    ROOM,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    TOLERANCE,
+    TOUCHED,
+    X,
+    Y,
+    apply_command,
+    clear,
+    settle,
+    within,
+)
 
-WHEEL_RADIUS, AXLE = 0.02, 0.052
+WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
 """Of an e-puck, m."""
 MOST_TURNED = 1e4
 """Limit of the wheels' angles, as observed, rad."""
 
-# Entries of `constants`, `state`, `command` and `outcome`.
-(
-    LIMIT, DT, BODY, GOAL_X, GOAL_Y, TOLERANCE, KEEP, FLOOR, LEFT_END, LOW_END, SPACING,
-    CELL,
-) = range(12)  # fmt: skip
-X, Y, HEADING, REMAINING, LEFT_TURNED, RIGHT_TURNED = range(6)
-TOUCHED, REACHED, WAY, GAP, ROOM, FORWARD, TURN = range(7)
+# Entries of `constants`, `state` and `outcome` beyond those of `tdac_envs.stepping`.
+FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(17, 22)
+N_CONSTANTS = 22
+LEFT_TURNED, RIGHT_TURNED = range(8, 10)
+N_STATE = 10
+FORWARD, TURN = range(10, 12)
+N_OUTCOME = 12
 
 
 @kernel()
@@ -47,18 +73,15 @@ def way_left(
         for j in range(max(row - ring, 0), min(row + ring + 2, height)):
             for i in range(max(column - ring, 0), min(column + ring + 2, width)):
                 hop = spacing * math.hypot(u - i, v - j)
-                if ring == 0 or hop < constants[BODY]:
+                if ring == 0 or hop < constants[RADIUS]:
                     best = min(best, field[j, i] + hop)
         if best < math.inf:
             return best
     return previous
 
 
-@kernel(
-    "f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] "
-    "f4[:,:] f8[:] f8[:] f4[:] f4[:] f4[:] f8[:,:] f8[:] ->"
-)
-def observe(
+@kernel()
+def _observe(
     points: Array,
     first: Index,
     extent: Array,
@@ -78,34 +101,7 @@ def observe(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Fills in what follows from where the robot is.
-
-    Args:
-        points: Of what is solid; see `tdac_envs.epuck.gaps`, as the next two.
-        first: Of what is solid.
-        extent: Of what is solid.
-        cells: Of what is solid; see `tdac_envs.epuck.nearby.Nearby`, as the next.
-        listed: Of what is solid.
-        seen_points: The same five of what is visible.
-        seen_first: Of what is visible.
-        seen_extent: Of what is visible.
-        seen_cells: Of what is visible.
-        seen_listed: Of what is visible.
-        field: Shape (height, width): way to the goal from each grid point, m.
-        constants: Shape (12,): wheel limit (rad/s), dt (s), body radius (m), goal x
-            and y, goal tolerance, share of its speed that a wheel keeps from one step
-            to the next, height of the floor, x and y of the first point of the field
-            and of the first cell, the spacing of that field, the width of those cells.
-        state: Shape (6,): x, y, heading, way left to the goal (overwritten), angles
-            of the wheels.
-        pose: Shape (3,), overwritten with what the robot observes.
-        turned: Shape (2,), overwritten with the angles of the wheels, as observed.
-        readings: Shape (8,), overwritten, as `hits`; see `infrared.sense`.
-        hits: Shape (8, 3).
-        outcome: Shape (7,), of which are overwritten: whether the goal is reached, the
-            way left to it, the straight distance to it, and from the robot's centre to
-            the nearest solid part.
-    """
+    """Fills in what follows from where the robot is; arguments as for `drive`."""
     x, y, goal_x, goal_y = state[X], state[Y], constants[GOAL_X], constants[GOAL_Y]
     left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
     pose[0], pose[1], pose[2] = x, y, state[HEADING]
@@ -116,53 +112,120 @@ def observe(
         seen_points, seen_first, seen_extent, seen_listed, begin, end,
         constants[FLOOR], state, readings, hits,
     )  # fmt: skip
-    state[REMAINING] = way_left(field, constants, x, y, state[REMAINING])
+    outcome[REMAINING] = way_left(field, constants, x, y, outcome[REMAINING])
     gap = math.hypot(goal_x - x, goal_y - y)
     begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
     room = nearest_of(points, first, extent, listed, begin, end, x, y)
-    reached = gap <= constants[TOLERANCE] and (
+    outcome[REACHED] = gap <= constants[TOLERANCE] and (
         gap < room or sees(points, first, extent, x, y, goal_x, goal_y)
     )
-    outcome[REACHED], outcome[WAY] = reached, state[REMAINING]
     outcome[GAP], outcome[ROOM] = gap, room
 
 
-@kernel("f8[:] f8[:] f8[:] f4[:] f8[:] ->")
+_ARRAYS = (
+    "f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] f4[:,:] "
+    "f8[:] f8[:] f8[:,:] f4[:] f4[:] f4[:] f4[:] f8[:,:] f8[:] ->"
+)
+
+
+@kernel(_ARRAYS)
+def begin(
+    points: Array,
+    first: Index,
+    extent: Array,
+    cells: Index,
+    listed: Index,
+    seen_points: Array,
+    seen_first: Index,
+    seen_extent: Array,
+    seen_cells: Index,
+    seen_listed: Index,
+    field: NDArray[np.float32],
+    constants: Array,
+    state: Array,
+    queue: Array,
+    pose: NDArray[np.float32],
+    wheel_speeds: NDArray[np.float32],
+    turned: NDArray[np.float32],
+    readings: NDArray[np.float32],
+    hits: Array,
+    outcome: Array,
+) -> None:
+    """Begins an episode where `state` says; arguments as for `drive`.
+
+    `outcome[REMAINING]` is given: the length of the shortest path from there.
+    """
+    clear(state, queue, wheel_speeds, outcome)
+    state[LEFT_TURNED] = state[RIGHT_TURNED] = 0.0
+    remaining = outcome[REMAINING]
+    _observe(
+        points, first, extent, cells, listed,
+        seen_points, seen_first, seen_extent, seen_cells, seen_listed,
+        field, constants, state, pose, turned, readings, hits, outcome,
+    )  # fmt: skip
+    outcome[REACHED], outcome[REMAINING] = 0.0, remaining
+
+
+@kernel("f8[:] f8[:] f8[:,:] f4[:] f8[:] ->")
 def turn_wheels(
     constants: Array,
-    command: Array,
     state: Array,
+    queue: Array,
     wheel_speeds: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Sets the wheels' speeds and angles, and the arc that they wish to drive.
+    """Sets the wheels' speeds and angles, and in `outcome` the arc that they wish.
 
-    Args:
-        constants: See `observe`.
-        command: Shape (4,): wanted speed of the left and the right wheel in [-1, 1];
-            for each the factor between its speed and what it does on the ground.
-        state: See `observe`; the angles of the wheels are overwritten.
-        wheel_speeds: Shape (2,), fractions as last applied; overwritten.
-        outcome: Shape (7,), whose last two are overwritten: length (m) and turn (rad)
-            of the arc.
+    Arguments as for `drive`.
     """
-    keep, dt = constants[KEEP], constants[DT]
-    wheel_speeds[0] = command[0] + keep * (wheel_speeds[0] - command[0])
-    wheel_speeds[1] = command[1] + keep * (wheel_speeds[1] - command[1])
-    swept = constants[LIMIT] * dt
+    apply_command(constants, state, queue, wheel_speeds, outcome)
+    swept = constants[MAX_SPEED] * constants[DT]
     left, right = float(wheel_speeds[0]), float(wheel_speeds[1])
     state[LEFT_TURNED] += swept * left
     state[RIGHT_TURNED] += swept * right
-    left = swept * min(max(left * command[2], -1.0), 1.0)
-    right = swept * min(max(right * command[3], -1.0), 1.0)
+    left, right = left * state[SLIP_LEFT], right * state[SLIP_RIGHT]
+    left, right = swept * within(left), swept * within(right)
     outcome[FORWARD] = 0.5 * (left + right) * WHEEL_RADIUS
-    outcome[TURN] = (right - left) * WHEEL_RADIUS / AXLE
+    outcome[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]
 
 
-@kernel(
-    "f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] "
-    "f4[:,:] f8[:] f8[:] f8[:] f4[:] f4[:] f4[:] f4[:] f8[:,:] f8[:] ->"
-)
+@kernel(_ARRAYS)
+def finish(
+    points: Array,
+    first: Index,
+    extent: Array,
+    cells: Index,
+    listed: Index,
+    seen_points: Array,
+    seen_first: Index,
+    seen_extent: Array,
+    seen_cells: Index,
+    seen_listed: Index,
+    field: NDArray[np.float32],
+    constants: Array,
+    state: Array,
+    queue: Array,  # noqa: ARG001 - the same arrays as the others take
+    pose: NDArray[np.float32],
+    wheel_speeds: NDArray[np.float32],  # noqa: ARG001
+    turned: NDArray[np.float32],
+    readings: NDArray[np.float32],
+    hits: Array,
+    outcome: Array,
+) -> None:
+    """Ends a step after `turn_wheels`, when the robot is where it gets to.
+
+    Arguments as for `drive`; `outcome[TOUCHED]` is given.
+    """
+    before = outcome[REMAINING]
+    _observe(
+        points, first, extent, cells, listed,
+        seen_points, seen_first, seen_extent, seen_cells, seen_listed,
+        field, constants, state, pose, turned, readings, hits, outcome,
+    )  # fmt: skip
+    settle(constants, state, outcome, before)
+
+
+@kernel(_ARRAYS)
 def drive(
     points: Array,
     first: Index,
@@ -176,25 +239,42 @@ def drive(
     seen_listed: Index,
     field: NDArray[np.float32],
     constants: Array,
-    command: Array,
     state: Array,
-    wheel_speeds: NDArray[np.float32],
+    queue: Array,
     pose: NDArray[np.float32],
+    wheel_speeds: NDArray[np.float32],
     turned: NDArray[np.float32],
     readings: NDArray[np.float32],
     hits: Array,
     outcome: Array,
 ) -> None:
-    """One step in which nothing is pushed: the wheels, the arc, and what follows.
+    """One step in which nothing is pushed, all of it but the random numbers.
 
-    Arguments as for `turn_wheels` and `observe`; `outcome[0]` then says whether the
-    body touched something. What is in `outcome` is that of the place where the step
-    begins.
+    Args:
+        points: Of what is solid; see `tdac_envs.epuck.gaps`, as the next two.
+        first: Of what is solid.
+        extent: Of what is solid.
+        cells: Of what is solid; see `tdac_envs.epuck.nearby.Nearby`, as the next.
+        listed: Of what is solid.
+        seen_points: The same five of what is visible.
+        seen_first: Of what is visible.
+        seen_extent: Of what is visible.
+        seen_cells: Of what is visible.
+        seen_listed: Of what is visible.
+        field: Shape (height, width): way to the goal from each grid point, m.
+        constants: See `Robot`, as the following ones.
+        state: Overwritten, but for the wanted speeds and the slip.
+        queue: Overwritten.
+        pose: Overwritten.
+        wheel_speeds: Overwritten.
+        turned: Overwritten.
+        readings: Overwritten.
+        hits: Overwritten.
+        outcome: Overwritten; what it says of the place where the step begins is used.
     """
-    turn_wheels(constants, command, state, wheel_speeds, outcome)
-    forward, turn = outcome[FORWARD], outcome[TURN]
-    x, y = state[X], state[Y]
-    if outcome[ROOM] - constants[BODY] > abs(forward):
+    turn_wheels(constants, state, queue, wheel_speeds, outcome)
+    forward, turn, x, y = outcome[FORWARD], outcome[TURN], state[X], state[Y]
+    if outcome[ROOM] - constants[RADIUS] > abs(forward):
         # Nothing is within reach.
         x, y, heading = move(x, y, state[HEADING], forward, turn)
         state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
@@ -204,10 +284,10 @@ def drive(
         begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
         outcome[TOUCHED] = advance(
             points, first, extent, listed, begin, end,
-            state, forward, turn, constants[BODY],
+            state, forward, turn, constants[RADIUS],
         )  # fmt: skip
-    observe(
+    finish(
         points, first, extent, cells, listed,
-        seen_points, seen_first, seen_extent, seen_cells, seen_listed,
-        field, constants, state, pose, turned, readings, hits, outcome,
+        seen_points, seen_first, seen_extent, seen_cells, seen_listed, field,
+        constants, state, queue, pose, wheel_speeds, turned, readings, hits, outcome,
     )  # fmt: skip

@@ -1,0 +1,92 @@
+"""What an e-puck observes: the space, and what is added to the compiled step's arrays.
+
+Functions take one robot, or many with one more axis in front.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, sense_ground
+from tdac_envs.epuck.kernels import MOST_TURNED
+from tdac_envs.epuck.prisms import Prisms
+from tdac_envs.epuck.robot import Robot
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.stepping import HEADING
+
+Array = NDArray[np.float64]
+Observed = NDArray[np.float32]
+
+
+def observation_space(
+    task: EPuckTask, *, ground: bool = False, gps: bool = False, compass: bool = False
+) -> spaces.Dict:
+    """The observation space of a task; see `EPuckEnv`."""
+    # A body inside the fence; a little more for what physics lets in.
+    left, low, right, high = task.ground.bounds
+    least = np.array([left, low], np.float32) - np.float32(BODY_RADIUS)
+    most = np.array([right, high], np.float32) + np.float32(BODY_RADIUS)
+    pi, floor = np.float32(math.pi), np.float32(task.ground.floor)
+    turned = np.float32(MOST_TURNED)
+    space: dict[str, spaces.Space[Any]] = {
+        "pose": spaces.Box(np.append(least, -pi), np.append(most, pi)),
+        "goal": spaces.Box(least, most),
+        "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
+        "ps": spaces.Box(0.0, LARGEST, (N_SENSORS,), np.float32),
+        "wheel_positions": spaces.Box(-turned, turned, (2,), np.float32),
+    }
+    if ground:
+        space["ground"] = spaces.Box(0.0, LARGEST, (3,), np.float32)
+    if gps:
+        space["gps"] = spaces.Box(
+            np.append(least, floor - 1), np.append(most, floor + 1)
+        )
+    if compass:
+        space["compass"] = spaces.Box(-1.0, 1.0, (3,), np.float32)
+    return spaces.Dict(space)
+
+
+def noisy(readings: Observed, spreads: Array, normal: Array) -> Observed:
+    """Readings with noise, within the sensors' limits.
+
+    Args:
+        readings: Without noise.
+        spreads: Relative standard deviation of each.
+        normal: Draws from the standard normal distribution, as many.
+    """
+    factor = 1.0 + spreads * normal
+    return np.clip(readings * factor, 0.0, LARGEST).astype(np.float32)
+
+
+def ground_readings(seen: Prisms, floor: float, robot: Robot) -> tuple[Observed, Array]:
+    """Readings of gs0 to gs2 of one robot and their relative standard deviations.
+
+    Args:
+        seen: What is visible.
+        floor: Height of the ground, m.
+        robot: Its memory.
+    """
+    readings, spreads = np.zeros(3, np.float32), np.zeros(3)
+    sense_ground(
+        seen.points, seen.first, seen.extent, floor, robot.state, readings, spreads
+    )
+    return readings, spreads
+
+
+def position(robot: Robot, floor: float | Array) -> Observed:
+    """Of the GPS: x, y and height, m; shape (3,)."""
+    height = np.broadcast_to(np.float32(floor), robot.pose.shape[:-1])
+    return np.concatenate([robot.pose[..., :2], height[..., None]], axis=-1)
+
+
+def north(robot: Robot) -> Observed:
+    """Of the compass: the direction of +y as the robot sees it, shape (3,)."""
+    heading = robot.state[..., HEADING]
+    aim = np.stack([np.sin(heading), np.cos(heading), 0.0 * heading], axis=-1)
+    return aim.astype(np.float32)

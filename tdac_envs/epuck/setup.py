@@ -1,0 +1,143 @@
+"""What a TDAC-EPuck-v0 is made of, and how its episodes begin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.arguments import check_reset_options, finite_numbers
+from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.epuck.infrared import RANGE
+from tdac_envs.epuck.kernels import AXLE_LENGTH
+from tdac_envs.epuck.nearby import Surroundings
+from tdac_envs.epuck.prisms import Prisms
+from tdac_envs.epuck.robot import Robot
+from tdac_envs.epuck.task import (
+    EPuckTask,
+    default_horizon,
+    jittered_start,
+    make_task,
+    random_task,
+)
+from tdac_envs.rewards import RewardWeights
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Setup:
+    """Everything about an environment that lasts longer than an episode.
+
+    Attributes:
+        nominal: The task as given.
+        around: What may be touched and seen at each place.
+        variation: `"nominal"`, `"jitter"` or `"random"`.
+        fixed_horizon: Whether the horizon was given, or follows from the task.
+        on_collision: `"terminate"` or `"block"`.
+        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        motor_lag: Time constant of the wheel speeds, s.
+        delay: Steps by which an action takes effect late.
+        weights: Of the reward.
+    """
+
+    nominal: EPuckTask
+    around: Surroundings
+    variation: str
+    fixed_horizon: bool
+    on_collision: str
+    wheel_slip: float
+    motor_lag: float
+    delay: int
+    weights: RewardWeights
+
+    @property
+    def pushes(self) -> bool:
+        """Whether there is something to push, and the robot does."""
+        return self.on_collision == "block" and len(self.nominal.ground.masses) > 0
+
+    def constants(self) -> NDArray[np.float64]:
+        """`Robot.constants` of the nominal task."""
+        task = self.nominal
+        ground = task.ground
+        return np.array(
+            [
+                AXLE_LENGTH,
+                task.max_wheel_speed,
+                task.dt,
+                BODY_RADIUS,
+                RANGE,
+                math.exp(-task.dt / self.motor_lag) if self.motor_lag else 0.0,
+                self.delay,
+                self.on_collision == "terminate",
+                task.full_step,
+                *self.weights,
+                *task.goal,
+                task.goal_tolerance,
+                task.horizon,
+                ground.floor,
+                *ground.bounds[:2],
+                ground.spacing,
+                self.around.width,
+            ],
+            np.float64,
+        )
+
+    def arguments(
+        self,
+        task: EPuckTask,
+        robot: Robot,
+        solid: Prisms | None = None,
+        seen: Prisms | None = None,
+    ) -> tuple[Any, ...]:
+        """What the kernels `begin`, `drive` and `finish` take.
+
+        Args:
+            task: Of the episode.
+            robot: Its memory.
+            solid: What is solid, where that can be pushed; else the ground's own.
+            seen: What is visible, likewise.
+        """
+        solid = task.ground.solid if solid is None else solid
+        seen = self.around.visible if seen is None else seen
+        near, sighted = self.around.solid, self.around.seen
+        return (
+            solid.points, solid.first, solid.extent, near.cells, near.listed,
+            seen.points, seen.first, seen.extent, sighted.cells, sighted.listed,
+            task.field, *robot,
+        )  # fmt: skip
+
+    def draw(self, options: dict[str, Any], random: np.random.Generator) -> EPuckTask:
+        """The task of an episode.
+
+        Args:
+            options: Of `reset`: `start` and `goal`, which win over the variation.
+            random: Source of the variation.
+
+        Raises:
+            TaskError: The options name something else than a start and a goal, or
+                these are not feasible.
+        """
+        check_reset_options(options)
+        task = self.nominal
+        if options:
+            start = tuple(options.get("start", task.start))
+            drawn = make_task(
+                task.ground,
+                finite_numbers("start", (*start, task.start.heading)[:3], 3),
+                options.get("goal", task.goal),
+                max_wheel_speed=task.max_wheel_speed,
+                dt=task.dt,
+                goal_tolerance=task.goal_tolerance,
+                horizon=task.horizon,
+            )
+        elif self.variation == "random":
+            drawn = random_task(task, random)
+        elif self.variation == "jitter":
+            return task.moved(jittered_start(task, random))
+        else:
+            return task
+        if self.fixed_horizon or drawn.goal == task.goal:
+            return drawn
+        return replace(drawn, horizon=default_horizon(drawn))

@@ -1,0 +1,108 @@
+"""What the compiled steps of all environments share: memory, wheels, reward and ends.
+
+A robot's memory is a few arrays, in which the environments have these entries in
+common; see `tdac_envs.epuck.robot.Robot` for what they mean.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.compiled import kernel
+from tdac_envs.rewards import RewardWeights, step_reward
+
+Array = NDArray[np.float64]
+
+# Entries of `constants`.
+AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
+PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 17)
+N_CONSTANTS = 17
+# Entries of `state`.
+X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS = range(8)
+N_STATE = 8
+# Entries of `outcome`.
+REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
+GAP, REMAINING, ROOM = range(7, 10)
+N_OUTCOME = 10
+
+
+@kernel()
+def clear(
+    state: Array, queue: Array, wheel_speeds: NDArray[np.float32], outcome: Array
+) -> None:
+    """Forgets the episode before; the pose and the way that is left are kept."""
+    state[LEFT] = state[RIGHT] = 0.0
+    state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
+    state[STEPS] = 0.0
+    queue[:] = 0.0
+    wheel_speeds[:] = 0.0
+    outcome[:REMAINING] = 0.0
+
+
+@kernel()
+def within(value: float) -> float:
+    """The value, limited to [-1, 1]."""
+    return min(max(value, -1.0), 1.0)
+
+
+@kernel()
+def apply_command(
+    constants: Array,
+    state: Array,
+    queue: Array,
+    wheel_speeds: NDArray[np.float32],
+    outcome: Array,
+) -> None:
+    """Sets the wheels' speeds, as fractions, from those that are wanted."""
+    left, right = within(state[LEFT]), within(state[RIGHT])
+    if left != state[LEFT] or right != state[RIGHT]:
+        outcome[CLIPPED] += 1.0
+    delay = int(constants[DELAY])
+    if delay > 0:
+        late = int(state[STEPS]) % delay
+        wanted_left, wanted_right = left, right
+        left, right = queue[late, 0], queue[late, 1]
+        queue[late, 0], queue[late, 1] = wanted_left, wanted_right
+    lag = constants[LAG]
+    wheel_speeds[0] = left + lag * (wheel_speeds[0] - left)
+    wheel_speeds[1] = right + lag * (wheel_speeds[1] - right)
+
+
+@kernel()
+def settle(constants: Array, state: Array, outcome: Array, before: float) -> None:
+    """Reward and end of a step, from what was touched and reached.
+
+    Args:
+        constants: See the module.
+        state: See the module.
+        outcome: See the module.
+        before: Way that was left before the step.
+    """
+    reached, touched = outcome[REACHED] == 1.0, outcome[TOUCHED] == 1.0
+    weights = RewardWeights(
+        constants[PROGRESS], constants[GOAL], constants[COLLISION], constants[TIME]
+    )
+    progress = (before - outcome[REMAINING]) / constants[FULL_STEP]
+    outcome[REWARD] = step_reward(weights, progress, reached, touched)
+    state[STEPS] += 1.0
+    outcome[COLLISIONS] += touched
+    over = reached or (touched and constants[STOPS] == 1.0)
+    outcome[TERMINATED] = over
+    outcome[TRUNCATED] = not over and state[STEPS] >= constants[HORIZON]
+
+
+def info_of(outcome: list[float]) -> dict[str, Any]:
+    """The `info` of a step, from its `outcome` as a list."""
+    _, _, _, reached, touched, collisions, clipped, gap, remaining, room, *_ = outcome
+    return {
+        "is_success": reached == 1.0,
+        "collision": touched == 1.0,
+        "collisions": int(collisions),
+        "clipped": int(clipped),
+        "distance_to_goal": gap,
+        "path_distance": remaining,
+        "clearance": room,
+    }
