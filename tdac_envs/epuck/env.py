@@ -203,8 +203,8 @@ class EPuckEnv(DrivenEnv):
         self._seen = visible.copy() if self._pushes else visible
         self._things = np.zeros((len(ground.masses), 6))
         self._speed = np.zeros(3)
-        self._robot = Robot.blank(self.delay)
-        self._robot.constants[:] = setup.constants()
+        self.robot = Robot.blank(self.delay)
+        self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self._bind()
         self._scene: EPuckScene | None = None
@@ -228,14 +228,14 @@ class EPuckEnv(DrivenEnv):
             self._things[:] = 0.0
             self._things[:, :2] = task.ground.centres
             self._carry()
-        self._robot.place(task)
+        self.robot.place(task)
         self._goal[:] = task.goal
         self._call_begin()
         self._steps = 0
         self._trail = [task.start[:2]]
         self._status = ""
         self._scene = None
-        info = info_of(self._robot.outcome.tolist())
+        info = info_of(self.robot.outcome.tolist())
         if self.render_mode == "human":
             self.render()
         return self._observation(), info
@@ -248,14 +248,14 @@ class EPuckEnv(DrivenEnv):
         Raises:
             ValueError: The action is not two finite numbers.
         """
-        state = self._robot.state
+        state = self.robot.state
         state[LEFT], state[RIGHT] = wheel_speeds(action)
         if self.wheel_slip:
             slip = self.np_random.normal(1.0, self.wheel_slip, 2)
             state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
         if not (self._pushes and self._pushed()):
             self._call_drive()
-        outcome = self._robot.outcome.tolist()
+        outcome = self.robot.outcome.tolist()
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
         info = info_of(outcome)
         if self.render_mode is not None:
@@ -265,7 +265,7 @@ class EPuckEnv(DrivenEnv):
 
     def pose(self) -> NDArray[np.float64]:
         """The true pose, shape (3,): x, y (m), heading (rad)."""
-        return self._robot.state[:3].copy()
+        return self.robot.state[:3].copy()
 
     def things(self) -> NDArray[np.float64]:
         """Centre (m) and turn since the start (rad) of what can be pushed, (k, 3)."""
@@ -289,13 +289,13 @@ class EPuckEnv(DrivenEnv):
         self._call_drive: Callable[[], None] = kernels.drive.bind(*arguments)
 
     def _arguments(self) -> tuple[Any, ...]:
-        return self.setup.arguments(self.task, self._robot, self._solid, self._seen)
+        return self.setup.arguments(self.task, self.robot, self._solid, self._seen)
 
     def _pushed(self) -> bool:
         """Takes the step with physics, if something that can be pushed is near."""
         from tdac_envs.epuck.pushing import Drive, is_near, push
 
-        task, robot = self.task, self._robot
+        task, robot = self.task, self.robot
         ground, reach = task.ground, 1.5 * task.full_step
         if not is_near(self._solid, robot.state, self._things, reach):
             self._speed[:] = 0.0
@@ -319,7 +319,7 @@ class EPuckEnv(DrivenEnv):
         self._seen.carry(visible, ground.centres, self._things)
 
     def _observation(self) -> Observation:
-        robot, floor = self._robot, self.task.ground.floor
+        robot, floor = self.robot, self.task.ground.floor
         observation = {
             "pose": robot.pose.copy(),
             "goal": self._goal.copy(),
@@ -347,7 +347,7 @@ class EPuckEnv(DrivenEnv):
     def _frame(self) -> NDArray[np.uint8]:
         from tdac_envs.epuck.picture import EPuckScene
 
-        task, robot = self.task, self._robot
+        task, robot = self.task, self.robot
         if self._scene is None:
             self._scene = EPuckScene(task, movable=self._pushes)
         gap = math.dist(self._trail[-1], task.goal)
