@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import beta
 
@@ -116,6 +116,7 @@ def test_an_iteration_passes_by_any_of_its_candidates():
     assert first_pass(frames).value == 0.0
 
 
+@settings(deadline=None, max_examples=50)
 @given(st.integers(0, 40), st.integers(0, 40))
 def test_the_exact_interval_is_that_of_the_beta_distribution(successes, more):
     """Clopper and Pearson by the quantiles of the beta distribution."""
@@ -129,6 +130,7 @@ def test_the_exact_interval_is_that_of_the_beta_distribution(successes, more):
     assert (low, high) == pytest.approx((lowest, highest), abs=1e-9)
 
 
+@settings(deadline=None, max_examples=50)
 @given(taus)
 def test_without_censoring_kaplan_meier_is_the_fraction(tau):
     """The estimator of Kaplan and Meier is CS(k) where each run went on to K."""
@@ -142,6 +144,7 @@ def test_without_censoring_kaplan_meier_is_the_fraction(tau):
     assert kaplan_meier(frames.runs, 6) == pytest.approx(shares)
 
 
+@settings(deadline=None, max_examples=50)
 @given(st.lists(st.tuples(st.integers(1, 6), st.booleans()), min_size=1, max_size=9))
 def test_censored_runs_count_as_long_as_they_were_at_risk(ends):
     """Against the product of (1 - solved / at risk), by hand; bounds hold it."""
