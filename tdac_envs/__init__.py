@@ -63,5 +63,9 @@ def __getattr__(name: str) -> Any:
 
 
 # The horizon depends on the task, so the envs truncate themselves: no TimeLimit here.
-gym.register("TDAC-Map2D-v0", entry_point="tdac_envs.map2d:Map2DEnv")
+gym.register(
+    "TDAC-Map2D-v0",
+    entry_point="tdac_envs.map2d:Map2DEnv",
+    vector_entry_point="tdac_envs.map2d_vector:Map2DVectorEnv",
+)
 gym.register("TDAC-EPuck-v0", entry_point="tdac_envs.epuck.env:EPuckEnv")

@@ -178,8 +178,8 @@ class Map2DEnv(DrivenEnv):
         )
         space = observation_space(self.nominal)
         self.observation_space = space  # type: ignore[assignment]
-        self._robot = Robot.blank(robot.n_rays, self.delay)
-        self._robot.constants[:] = self.setup.constants()
+        self.robot = Robot.blank(robot.n_rays, self.delay)
+        self.robot.constants[:] = self.setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self._bind()
         self._scene: Scene | None = None
@@ -197,7 +197,7 @@ class Map2DEnv(DrivenEnv):
         before, self.task = self.task, self.setup.draw(options or {}, self.np_random)
         if self.task.field is not before.field:
             self._bind()
-        task, robot = self.task, self._robot
+        task, robot = self.task, self.robot
         robot.place(task)
         self._goal[:] = task.goal
         self._call_begin()
@@ -217,13 +217,13 @@ class Map2DEnv(DrivenEnv):
         Raises:
             ValueError: The action is not two finite numbers.
         """
-        state = self._robot.state
+        state = self.robot.state
         state[LEFT], state[RIGHT] = wheel_speeds(action)
         if self.wheel_slip:
             slip = self.np_random.normal(1.0, self.wheel_slip, 2)
             state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
         self._call_drive()
-        outcome = self._robot.outcome.tolist()
+        outcome = self.robot.outcome.tolist()
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
         info = info_of(outcome)
         if self.render_mode is not None:
@@ -233,7 +233,7 @@ class Map2DEnv(DrivenEnv):
 
     def pose(self) -> NDArray[np.float64]:
         """The true pose, shape (3,): x, y (px), heading (rad)."""
-        return self._robot.state[:3].copy()
+        return self.robot.state[:3].copy()
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_call_begin": None, "_call_drive": None}
@@ -244,12 +244,12 @@ class Map2DEnv(DrivenEnv):
 
     def _bind(self) -> None:
         """Makes the kernels' calls on this environment's own arrays."""
-        arguments = self.setup.arguments(self.task, self._robot)
+        arguments = self.setup.arguments(self.task, self.robot)
         self._call_begin: Callable[[], None] = begin.bind(*arguments)
         self._call_drive: Callable[[], None] = drive.bind(*arguments)
 
     def _observation(self) -> Observation:
-        robot = self._robot
+        robot = self.robot
         ranges = robot.ranges.copy()
         if self.range_noise:
             ranges[:] = noisy(ranges, self.setup, self.np_random)
@@ -261,7 +261,7 @@ class Map2DEnv(DrivenEnv):
         }
 
     def _frame(self) -> NDArray[np.uint8]:
-        task, robot = self.task, self._robot
+        task, robot = self.task, self.robot
         if self._scene is None:
             self._scene = Scene(
                 task.terrain.grid.cells,

@@ -1,0 +1,104 @@
+"""Seeds, masks, infos and spaces of many environments at once, as in Gymnasium."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from tdac_envs import kernels
+from tdac_envs.errors import TaskError
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_INFOS: dict[str, tuple[int, type]] = {
+    "is_success": (kernels.REACHED, np.bool_),
+    "collision": (kernels.TOUCHED, np.bool_),
+    "collisions": (kernels.COLLISIONS, np.int64),
+    "clipped": (kernels.CLIPPED, np.int64),
+    "distance_to_goal": (kernels.GAP, np.float64),
+    "path_distance": (kernels.REMAINING, np.float64),
+    "clearance": (kernels.ROOM, np.float64),
+}
+
+
+def infos_of(outcome: Array, mask: Flags) -> dict[str, Any]:
+    """The infos of the robots in the mask, each key with its own.
+
+    Args:
+        outcome: Shape (entries, num_envs), 0 out of the mask.
+        mask: Shape (num_envs,).
+    """
+    infos: dict[str, Any] = {}
+    for key, (entry, kind) in _INFOS.items():
+        infos[key], infos[f"_{key}"] = outcome[entry].astype(kind), mask.copy()
+    return infos
+
+
+def autoreset_mode_of(given: str | AutoresetMode) -> AutoresetMode:
+    """The mode that is meant.
+
+    Raises:
+        TaskError: There is no such mode.
+    """
+    try:
+        return AutoresetMode(given)
+    except ValueError:
+        names = ", ".join(repr(mode.value) for mode in AutoresetMode)
+        raise TaskError(
+            f"expected autoreset_mode to be one of {names}, got {given!r}"
+        ) from None
+
+
+def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
+    """The observation space that holds those of all environments.
+
+    Raises:
+        TaskError: Their robots' memory is of several shapes.
+    """
+    first = envs[0]
+    shapes = [[array.shape for array in env.robot] for env in envs]
+    if any(each != shapes[0] for each in shapes):
+        raise TaskError("expected the same n_rays and delay of all robots of a batch")
+    bounds: dict[str, gym.Space[Any]] = {}
+    for key, box in first.observation_space.items():
+        others = [env.observation_space[key] for env in envs]
+        low = np.min([each.low for each in others], axis=0)
+        high = np.max([each.high for each in others], axis=0)
+        bounds[key] = gym.spaces.Box(low, high, dtype=box.dtype)
+    return gym.spaces.Dict(bounds)
+
+
+def seeds_of(seed: Any, count: int) -> Sequence[int | None]:
+    """A seed for each robot, from one number, one for each, or None.
+
+    Raises:
+        ValueError: There are more or fewer than robots.
+    """
+    if seed is None or isinstance(seed, int | np.integer):
+        return [None if seed is None else int(seed) + i for i in range(count)]
+    if len(seed) != count:
+        raise ValueError(f"expected {count} seeds, one a robot, got {len(seed)}")
+    return list(seed)
+
+
+def mask_of(given: Any, count: int) -> Flags:
+    """Which robots are reset; all where nothing is given.
+
+    Raises:
+        ValueError: It is not a bool for each robot, or all are False.
+    """
+    if given is None:
+        return np.ones(count, np.bool_)
+    mask = np.asarray(given)
+    if mask.dtype != np.bool_ or mask.shape != (count,) or not mask.any():
+        raise ValueError(
+            f"expected options['reset_mask'] to be {count} bools, one of them True at "
+            f"least, got {given!r}"
+        )
+    return mask

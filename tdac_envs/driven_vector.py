@@ -1,0 +1,256 @@
+"""What the batched environments share: many robots, stepped in one go on all cores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from tdac_envs import kernels
+from tdac_envs.arguments import whole_number
+from tdac_envs.batching import (
+    Array,
+    Flags,
+    autoreset_mode_of,
+    infos_of,
+    joint_space,
+    mask_of,
+    seeds_of,
+)
+from tdac_envs.compiled import Kernel
+from tdac_envs.rows import Rows
+
+Observations = dict[str, NDArray[np.float32]]
+Result = tuple[Observations, Array, Flags, Flags, dict[str, Any]]
+
+
+class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
+    """Many robots, each with a task of its own, each as in an environment alone.
+
+    Robot i does what `envs[i % len(envs)]` would do with its seed and its actions, to
+    the last bit: both call the same compiled functions.
+
+    Args:
+        envs: Environments of one kind, whose robots have memory of one shape. Each
+            has a `robot` and a `setup`, as `Map2DEnv` has.
+        num_envs: Number of robots.
+        begin: Kernel that begins an episode.
+        drive: Kernel that makes a step.
+        autoreset_mode: When an episode that has ended begins anew.
+        threads: How many work at a time; by default as many as there are cores.
+    """
+
+    def __init__(
+        self,
+        envs: Sequence[Any],
+        num_envs: int,
+        begin: Kernel[Any, Any],
+        drive: Kernel[Any, Any],
+        *,
+        autoreset_mode: str | AutoresetMode,
+        threads: int | None,
+    ) -> None:
+        self.num_envs = whole_number("num_envs", num_envs, 1)
+        self.autoreset_mode = autoreset_mode_of(autoreset_mode)
+        self.threads = None if threads is None else whole_number("threads", threads, 1)
+        first = envs[0]
+        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
+        self.single_action_space = first.action_space
+        self.action_space = batch_space(first.action_space, num_envs)
+        self.single_observation_space = joint_space(envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.setups: list[Any] = [envs[i % len(envs)].setup for i in range(num_envs)]
+        self.tasks = [setup.nominal for setup in self.setups]
+        self.robots = type(first.robot)(
+            *(np.zeros((num_envs, *each.shape), each.dtype) for each in first.robot)
+        )
+        for constants, setup in zip(self.robots.constants, self.setups, strict=True):
+            constants[:] = setup.constants()
+        self._kernels = begin, drive
+        self._slippery = [i for i, s in enumerate(self.setups) if s.wheel_slip]
+        self._randoms: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds: list[int | None] = [None] * num_envs
+        self._over = np.zeros(num_envs, np.bool_)
+        self._bind()
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts the episodes of all robots, or of those in `options["reset_mask"]`.
+
+        Args:
+            seed: One number, from which robot i has `seed + i`; or one for each.
+            options: As of one environment, and `reset_mask`.
+
+        Raises:
+            ValueError: There are more or fewer seeds than robots, or the mask is not
+                one of robots.
+            TaskError: The options are not feasible.
+        """
+        rest = dict(options or {})
+        mask = mask_of(rest.pop("reset_mask", None), self.num_envs)
+        for i, one in enumerate(seeds_of(seed, self.num_envs)):
+            if one is not None and mask[i]:
+                self._randoms[i], self._seeds[i] = seeding.np_random(one)
+        chosen = np.flatnonzero(mask).tolist()
+        for i in chosen:
+            self._begin(i, rest)
+        self._over[mask] = False
+        observations = self._observations()
+        self._disturb(observations, chosen)
+        return observations, infos_of(np.where(mask, self.robots.outcome.T, 0.0), mask)
+
+    def step(self, actions: NDArray[np.float32]) -> Result:
+        """Applies wheel speeds, shape (num_envs, 2), for one step.
+
+        Raises:
+            ValueError: The actions are not two finite numbers a robot.
+            ResetNeeded: The mode is `DISABLED` and an episode has ended.
+        """
+        wanted = self._wanted(actions)
+        resting = np.flatnonzero(self._over).tolist()
+        if resting and self.autoreset_mode is AutoresetMode.DISABLED:
+            raise gym.error.ResetNeeded(
+                f"expected reset(options={{'reset_mask': ...}}) of the robots whose "
+                f"episodes have ended: {resting[:10]}"
+            )
+        self.robots.state[:, kernels.LEFT : kernels.RIGHT + 1] = wanted
+        self._slip(resting)
+        self._drive_rows.call_all()
+        for i in resting:
+            self._begin(i, {})
+        outcome = self.robots.outcome.T.copy()
+        rewards = outcome[kernels.REWARD]
+        terminated = outcome[kernels.TERMINATED] == 1.0
+        truncated = outcome[kernels.TRUNCATED] == 1.0
+        self._over = terminated | truncated
+        observations = self._observations()
+        self._disturb(observations, range(self.num_envs))
+        infos: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
+            infos = self._restart(observations, outcome)
+            outcome = self.robots.outcome.T.copy()
+        infos |= infos_of(outcome, np.ones(self.num_envs, np.bool_))
+        return observations, rewards, terminated, truncated, infos
+
+    def close_extras(self, **_: Any) -> None:
+        """Ends the threads."""
+        self._drive_rows.close()
+
+    def pose(self) -> Array:
+        """The true poses, shape (num_envs, 3)."""
+        poses: Array = self.robots.state[:, : kernels.HEADING + 1].copy()
+        return poses
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """Of each robot."""
+        return tuple(self._random(i) for i in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
+        """Of each robot."""
+        return tuple(self._seeds)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            **self.__dict__,
+            "_rows": None,
+            "_begin_rows": None,
+            "_drive_rows": None,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
+
+    def _observations(self) -> Observations:
+        """What the robots observe, without noise; the caller's own arrays."""
+        raise NotImplementedError
+
+    def _disturb(self, observations: Observations, robots: Sequence[int]) -> None:
+        """Adds the sensors' noise to the observations of these robots."""
+        raise NotImplementedError
+
+    def _bind(self) -> None:
+        """Makes the kernels' calls on the robots' own arrays."""
+        self._rows = [self.robots.row(i) for i in range(self.num_envs)]
+        arguments = [
+            setup.arguments(task, robot)
+            for setup, task, robot in zip(
+                self.setups, self.tasks, self._rows, strict=True
+            )
+        ]
+        begin, drive = self._kernels
+        self._begin_rows = Rows(begin, arguments, 1)
+        self._drive_rows = Rows(drive, arguments, self.threads)
+
+    def _begin(self, i: int, options: dict[str, Any]) -> None:
+        """Begins an episode of one robot."""
+        setup, before, robot = self.setups[i], self.tasks[i], self._rows[i]
+        task = self.tasks[i] = setup.draw(options, self._random(i))
+        if task.field is not before.field:
+            arguments = setup.arguments(task, robot)
+            self._begin_rows.put(i, *arguments)
+            self._drive_rows.put(i, *arguments)
+        robot.place(task)
+        self._begin_rows.call(i)
+
+    def _random(self, i: int) -> np.random.Generator:
+        random = self._randoms[i]
+        if random is None:
+            random, self._seeds[i] = seeding.np_random()
+            self._randoms[i] = random
+        return random
+
+    def _slip(self, resting: Sequence[int]) -> None:
+        """Draws the wheels' slip of the robots that move."""
+        if not self._slippery:
+            return
+        still = set(resting)
+        for i in self._slippery:
+            if i not in still:
+                slip = self._random(i).normal(1.0, self.setups[i].wheel_slip, 2)
+                self.robots.state[i, kernels.SLIP_LEFT : kernels.SLIP_RIGHT + 1] = slip
+
+    def _restart(self, observations: Observations, outcome: Array) -> dict[str, Any]:
+        """Begins anew what has ended; returns what it ended with."""
+        over = np.flatnonzero(self._over).tolist()
+        final = np.full(self.num_envs, None, object)
+        for i in over:
+            final[i] = {key: value[i].copy() for key, value in observations.items()}
+        ended = self._over.copy()
+        infos = {
+            "final_obs": final,
+            "_final_obs": ended,
+            "final_info": infos_of(np.where(ended, outcome, 0.0), ended),
+            "_final_info": ended.copy(),
+        }
+        for i in over:
+            self._begin(i, {})
+        for key, value in self._observations().items():
+            observations[key][over] = value[over]
+        self._disturb(observations, over)
+        self._over = np.zeros(self.num_envs, np.bool_)
+        return infos
+
+    def _wanted(self, actions: Any) -> Array:
+        try:
+            wanted = np.asarray(actions, np.float64)
+        except (TypeError, ValueError):
+            wanted = np.empty(0)
+        if wanted.shape != (self.num_envs, 2) or not np.isfinite(wanted).all():
+            raise ValueError(
+                f"expected actions of two finite numbers in [-1, 1] for each of "
+                f"{self.num_envs} robots, got {actions!r}"
+            )
+        return wanted
