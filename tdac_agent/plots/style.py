@@ -1,0 +1,88 @@
+"""What all figures have in common."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tdac_agent.files import write_atomic
+
+# Okabe and Ito (2008): told apart with any colour vision, and in this order in grey.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+LINES = ("-", "--", "-.", ":")
+PASSED, FAILED, NOTHING = "#009E73", "#D55E00", "#D9D9D9"
+TEXT = "#333333"
+
+
+def new_figure(width: float, height: float) -> tuple[Figure, Axes]:
+    """A figure with one pair of axes, sizes in inches.
+
+    It belongs to no window and no global list, so that nobody has to close it.
+    """
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, dress(figure.add_subplot())
+
+
+def dress(axes: Axes) -> Axes:
+    """Axes without the lines that say nothing."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color("#999999")
+    axes.tick_params(colors=TEXT, labelsize=9)
+    axes.grid(visible=True, axis="y", color="#E5E5E5", linewidth=0.8)
+    axes.set_axisbelow(True)
+    return axes
+
+
+def title(axes: Axes, text: str, provenance: str = "") -> None:
+    """A title at the left, with where the figures come from below it."""
+    axes.set_title(text, loc="left", fontsize=11, color=TEXT, pad=20)
+    if provenance:
+        axes.annotate(
+            provenance,
+            (0, 1),
+            (0, 6),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            fontsize=8.5,
+            color="#666666",
+        )
+
+
+def colours_of(names: Iterable[str]) -> dict[str, str]:
+    """A colour for each name, in the order they come."""
+    unique = dict.fromkeys(names)
+    return {name: COLOURS[n % len(COLOURS)] for n, name in enumerate(unique)}
+
+
+def legend(axes: Axes, count: int) -> None:
+    """A legend below the axes, where it covers nothing."""
+    axes.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.18),
+        ncols=min(count, 4),
+        frameon=False,
+        fontsize=9,
+    )
+
+
+def save_figure(figure: Figure, *paths: Path) -> None:
+    """Writes a figure, in the format of each name (svg, pdf, png); same bytes again."""
+    for path in paths:
+        stream = io.BytesIO()
+        kind = path.suffix.lstrip(".") or "svg"
+        stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+        with rc_context({"svg.hashsalt": "tdac"}):  # names of its parts
+            figure.savefig(stream, format=kind, dpi=150, metadata=stamp)
+        write_atomic(path, stream.getvalue())
+
+
+def spread(count: int, width: float = 0.8) -> Sequence[float]:
+    """Offsets of bars that stand side by side around a place."""
+    each = width / max(1, count)
+    return [each * (n - (count - 1) / 2) for n in range(count)]
