@@ -68,4 +68,8 @@ gym.register(
     entry_point="tdac_envs.map2d:Map2DEnv",
     vector_entry_point="tdac_envs.map2d_vector:Map2DVectorEnv",
 )
-gym.register("TDAC-EPuck-v0", entry_point="tdac_envs.epuck.env:EPuckEnv")
+gym.register(
+    "TDAC-EPuck-v0",
+    entry_point="tdac_envs.epuck.env:EPuckEnv",
+    vector_entry_point="tdac_envs.epuck.vector:EPuckVectorEnv",
+)

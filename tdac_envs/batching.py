@@ -59,12 +59,16 @@ def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
     """The observation space that holds those of all environments.
 
     Raises:
-        TaskError: Their robots' memory is of several shapes.
+        TaskError: Their robots' memory is of several shapes, or they observe other
+            things.
     """
     first = envs[0]
     shapes = [[array.shape for array in env.robot] for env in envs]
     if any(each != shapes[0] for each in shapes):
         raise TaskError("expected the same n_rays and delay of all robots of a batch")
+    keys = first.observation_space.keys()
+    if any(env.observation_space.keys() != keys for env in envs):
+        raise TaskError("expected the same sensors of all robots of a batch")
     bounds: dict[str, gym.Space[Any]] = {}
     for key, box in first.observation_space.items():
         others = [env.observation_space[key] for env in envs]
