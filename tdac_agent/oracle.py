@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.grid import BoolGrid
-from tdac_envs.plan import distance_field
+from tdac_envs.plan import path_length, plan_path
 
 if TYPE_CHECKING:
     from tdac_agent.world_oracle import WorldCase
@@ -60,8 +60,8 @@ class Oracle:
         Returns:
             inf where an end is occupied or no path joins them.
         """
-        field = distance_field(~occ, goal, until=start)
-        return float(field[start[1], start[0]])
+        path = plan_path(~occ, start, goal)
+        return path_length(path) if len(path) else math.inf
 
     def path_error(self, occ: BoolGrid, path: list[Point], cell: int = 1) -> str | None:
         """What is wrong with a path of pixels, or None.

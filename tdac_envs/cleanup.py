@@ -2,37 +2,132 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.compiled import kernel
 from tdac_envs.grid import BoolGrid
 
+Labels = NDArray[np.int32]
+Counts = NDArray[np.int64]
+
 _SQUARE = np.ones((3, 3), np.uint8)
+_ACROSS, _DOWN = np.array([1, -1, 0, 0]), np.array([0, 0, 1, -1])
 
 
-def clean(cells: BoolGrid, strength: int) -> BoolGrid:
-    """Removes noise, fills holes and closes hairline gaps.
+def cleanings(cells: BoolGrid, strengths: Sequence[int]) -> list[BoolGrid]:
+    """Removes noise, fills holes and closes hairline gaps, at several strengths.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
-        strength: Obstacle pieces (8-connected) and holes (free pieces, 4-connected)
-            of fewer than this many pixels go; above 0 the obstacles are then closed
-            with a 3 x 3 square. 0 changes nothing.
+        strengths: In rising order. Obstacle pieces (8-connected) and then holes (free
+            pieces, 4-connected) of fewer than this many pixels go; above 0 the
+            obstacles are then closed with a 3 x 3 square. 0 changes nothing.
+
+    Returns:
+        One a strength, shape (height, width), bool; the same array twice where two
+        strengths have the same result.
     """
-    if strength <= 0:
-        return cells.copy()
-    kept = _without_small(cells, strength, connectivity=8)
-    filled = ~_without_small(~kept, strength, connectivity=4)
-    closed = cv2.morphologyEx(filled.astype(np.uint8), cv2.MORPH_CLOSE, _SQUARE)
-    return np.asarray(closed > 0)
+    pieces, holes = _labels(cells, 8), _labels(~cells, 4)
+    first_hole = int(pieces.max()) + 1
+    size = np.zeros(first_hole + int(holes.max()) + 1, np.int64)
+    _measure(pieces, holes, first_hole, size)
+    joined, parent = size.copy(), np.arange(size.size)
+    found: list[BoolGrid] = []
+    for strength in strengths:
+        _free_small(pieces, holes, first_hole, strength, size, joined, parent)
+        occupied = np.empty(size.size, np.bool_)
+        _decide(first_hole, strength, size, joined, parent, occupied)
+        filled = np.empty(cells.shape, np.bool_)
+        _fill(pieces, holes, first_hole, occupied, filled)
+        if strength > 0:
+            closed = cv2.morphologyEx(filled.view(np.uint8), cv2.MORPH_CLOSE, _SQUARE)
+            filled = np.asarray(closed, np.uint8).view(np.bool_)
+        same = bool(found) and np.array_equal(found[-1], filled)
+        found.append(found[-1] if same else filled)
+    return found
 
 
-def _without_small(mask: BoolGrid, smallest: int, connectivity: int) -> BoolGrid:
-    labels, stats = _pieces(mask, connectivity)
-    keep = stats[:, cv2.CC_STAT_AREA] >= smallest
-    keep[0] = False
-    return np.asarray(keep[labels])
+def _labels(mask: BoolGrid, connectivity: int) -> Labels:
+    found = cv2.connectedComponents(mask.astype(np.uint8), connectivity=connectivity)
+    return np.asarray(found[1], np.int32)
+
+
+@kernel("i4[:,:] i4[:,:] i8 i8[:] ->")
+def _measure(pieces: Labels, holes: Labels, first_hole: int, size: Counts) -> None:
+    """Counts the pixels of each piece and of each hole."""
+    for y in range(pieces.shape[0]):
+        for x in range(pieces.shape[1]):
+            if pieces[y, x] > 0:
+                size[pieces[y, x]] += 1
+            else:
+                size[first_hole + holes[y, x]] += 1
+
+
+@kernel()
+def _root(parent: Counts, node: int) -> int:
+    while parent[node] != node:
+        parent[node] = parent[parent[node]]
+        node = parent[node]
+    return node
+
+
+@kernel("i4[:,:] i4[:,:] i8 i8 i8[:] i8[:] i8[:] ->")
+def _free_small(
+    pieces: Labels,
+    holes: Labels,
+    first_hole: int,
+    strength: int,
+    size: Counts,
+    joined: Counts,
+    parent: Counts,
+) -> None:
+    """Joins the pieces that go with the holes beside them, which become one."""
+    height, width = pieces.shape
+    for y in range(height):
+        for x in range(width):
+            piece = pieces[y, x]
+            if piece == 0 or size[piece] >= strength:
+                continue
+            for k in range(4):
+                i, j = x + _ACROSS[k], y + _DOWN[k]
+                if i < 0 or j < 0 or i >= width or j >= height or holes[j, i] == 0:
+                    continue
+                one, other = (
+                    _root(parent, piece),
+                    _root(parent, first_hole + holes[j, i]),
+                )
+                if one != other:
+                    parent[one] = other
+                    joined[other] += joined[one]
+
+
+@kernel("i8 i8 i8[:] i8[:] i8[:] b1[:] ->")
+def _decide(
+    first_hole: int,
+    strength: int,
+    size: Counts,
+    joined: Counts,
+    parent: Counts,
+    occupied: BoolGrid,
+) -> None:
+    """Whether each piece stays, and whether each hole is filled."""
+    for node in range(size.size):
+        stays = node < first_hole and size[node] >= strength
+        occupied[node] = stays or joined[_root(parent, node)] < strength
+
+
+@kernel("i4[:,:] i4[:,:] i8 b1[:] b1[:,:] ->")
+def _fill(
+    pieces: Labels, holes: Labels, first_hole: int, occupied: BoolGrid, cells: BoolGrid
+) -> None:
+    for y in range(pieces.shape[0]):
+        for x in range(pieces.shape[1]):
+            piece = pieces[y, x]
+            cells[y, x] = occupied[piece if piece > 0 else first_hole + holes[y, x]]
 
 
 def _pieces(

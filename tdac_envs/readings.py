@@ -21,13 +21,12 @@ from tdac_envs.binarize import (
     local_light,
     otsu,
     outside,
-    saturated,
     unevenly_lit,
 )
 from tdac_envs.cleanup import thick_share, without_lines, without_specks
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage, luminance
-from tdac_envs.scene import Reading, Scene, decide_light_free, touches, unknown_of
+from tdac_envs.scene import Reading, Scene, decide_light_free, touches
 
 SLIVER = 6.0
 """Widest strip along the outside of a plan that belongs to it, px."""
@@ -68,7 +67,7 @@ def _outwards(
     base = unmarked or plain
     if unmarked is not None:
         yield unmarked
-    if unknown_of(scene) is not None:
+    if scene.unknown is not None:
         # A mapping tool's output: what is dark was measured, and none of it drawn.
         yield _without(base, 4)
         return
@@ -81,7 +80,7 @@ def _outwards(
 
 def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
     """The outside, where start and goal are inside; empty otherwise."""
-    strong = saturated(scene.image.colour)
+    strong = scene.saturated
     ignored = strong if _are_marks(scene, strong, plain) else np.zeros_like(strong)
     region = outside(scene.luminance, plain.polarity == "dark", ignored)
     if touches(region, scene.ends):
@@ -116,13 +115,13 @@ def plain_reading(scene: Scene, light_free: bool) -> Reading:
     A map saver's "unknown" grey counts as occupied, and where most walls are drawn in
     strong colours, the light ones among these (green, yellow) are walls as well.
     """
-    threshold, method = otsu(scene.luminance), "otsu"
-    level = unknown_of(scene)
+    threshold, method = scene.threshold, "otsu"
+    level = scene.unknown
     if level is not None:
         threshold = _beside(level, threshold, light_free)
         method = f"otsu, unknown grey {level} not free"
     reading = _cut(scene.luminance, threshold, light_free, method)
-    strong = saturated(scene.image.colour)
+    strong = scene.saturated
     coloured = int((strong & reading.cells).sum()) > 0.5 * int(reading.cells.sum())
     if coloured and strong.mean() < 0.3 and not touches(strong, scene.ends):
         method = f"{method}, coloured walls"
@@ -158,7 +157,7 @@ def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
 def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
     """Saturated marks and lines dropped; None where there are none."""
     colour = scene.image.colour
-    strong = saturated(colour)
+    strong = scene.saturated
     marks = strong & plain.cells
     if not marks.any() or not _are_marks(scene, strong, plain):
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -18,7 +19,7 @@ from tdac_envs.binarize import (
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage, MapImage, luminance
 from tdac_envs.polarity import light_free_evidence
-from tdac_envs.score import Point
+from tdac_envs.score import Point, Trip
 
 Polarity = Literal["dark", "light", "mixed", "given"]
 
@@ -48,9 +49,9 @@ class Reading:
     opening: int = 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """A picture with what is asked of it."""
+    """A picture with what is asked of it, and what all its readings need."""
 
     image: MapImage
     luminance: GreyImage
@@ -70,6 +71,32 @@ class Scene:
         """Start and goal, as far as given."""
         return [point for point in (self.start, self.goal) if point is not None]
 
+    @property
+    def trip(self) -> Trip | None:
+        """What the body has to do; None unless both start and goal are given."""
+        if self.start is None or self.goal is None:
+            return None
+        return Trip(self.start, self.goal, self.radius)
+
+    @cached_property
+    def threshold(self) -> float:
+        """Otsu's threshold of the luminance."""
+        return otsu(self.luminance)
+
+    @cached_property
+    def saturated(self) -> BoolGrid:
+        """Pixels of strong colour."""
+        return saturated(self.image.colour)
+
+    @cached_property
+    def unknown(self) -> int | None:
+        """The "unknown" grey, unless start and goal both stand on it."""
+        level = unknown_level(self.luminance)
+        if level is None:
+            return None
+        shades = [abs(int(self.luminance[y, x]) - level) for x, y in self.ends]
+        return None if shades and max(shades) <= 3 else level
+
 
 def decide_light_free(scene: Scene) -> bool:
     """Whether the light side is free, from the picture, start and goal."""
@@ -78,27 +105,18 @@ def decide_light_free(scene: Scene) -> bool:
         negative = np.asarray(255 - grey, np.uint8)
         on_light, on_dark = local_light(grey), local_light(negative)
         return _evidence(scene, grey, on_light) >= _evidence(scene, negative, on_dark)
-    return _evidence(scene, grey, grey > otsu(grey)) > 0
+    return _evidence(scene, grey, grey > scene.threshold) > 0
 
 
 def _evidence(scene: Scene, grey: GreyImage, light: BoolGrid) -> float:
     """Log-odds that `light` is free, start and goal considered."""
     evidence = light_free_evidence(grey, light)
-    neutral = ~saturated(scene.image.colour)
+    neutral = ~scene.saturated
     for x, y in scene.ends:
         around = disc(light.shape, x, y, scene.radius)
         judged = around & neutral if (around & neutral).any() else around
         evidence += _W_TASK * (2 * float(light[judged].mean()) - 1)
     return evidence
-
-
-def unknown_of(scene: Scene) -> int | None:
-    """The "unknown" grey, unless start and goal both stand on it."""
-    level = unknown_level(scene.luminance)
-    if level is None:
-        return None
-    shades = [abs(int(scene.luminance[y, x]) - level) for x, y in scene.ends]
-    return None if shades and max(shades) <= 3 else level
 
 
 def touches(mask: BoolGrid, points: list[Point]) -> bool:

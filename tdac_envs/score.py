@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from tdac_envs.grid import BoolGrid, FloatGrid, body_free
+from tdac_envs.astar import Guide
+from tdac_envs.grid import BoolGrid, FloatGrid, body_free, clearance
 from tdac_envs.params import ScoreTerms
-from tdac_envs.plan import path_length, plan_path
+from tdac_envs.plan import Path, guide_between, path_length, plan_path
 
 Point = tuple[int, int]
 
@@ -22,7 +24,8 @@ def sharpness(cells: BoolGrid) -> float:
     The boundary term of Algorithm 1 (the paper favours "boundary smoothness" and
     leaves it undefined): 0 for an empty map, 2 for a chessboard.
     """
-    flips = int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum())
+    flips = np.count_nonzero(cells[1:] != cells[:-1])
+    flips += np.count_nonzero(cells[:, 1:] != cells[:, :-1])
     return flips / cells.size
 
 
@@ -41,48 +44,71 @@ class Trip:
     radius: float
 
 
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """Whether the body gets from start to goal.
-
-    Attributes:
-        failure: Why not; None where it does.
-        terms: Terms of the score; None where it does not.
-    """
-
-    failure: str | None
-    terms: ScoreTerms | None = None
-
-
-def judge(
-    cells: BoolGrid, clear: FloatGrid, trip: Trip, inflation: int = 0
-) -> Judgement:
-    """Checks start, goal and the way between them, and scores the shortest path.
+def terms_of(
+    cells: BoolGrid, clear: FloatGrid, trip: Trip, margins: Sequence[int], guide: Guide
+) -> Iterator[ScoreTerms | None]:
+    """Terms of the score with each margin that the planner keeps around the body.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
         clear: `clearance(cells)`.
         trip: Start, goal and body.
+        margins: In rising order, px.
+        guide: From `guide_of`, for these cells or for fewer.
+
+    Yields:
+        None, and then nothing more, where the body does not get to the goal.
+    """
+    edges = sharpness(cells)
+    path: Path = np.empty((0, 2))
+    for margin in margins:
+        free = body_free(clear, trip.radius + margin)
+        if not _leads_over(path, free):
+            path = plan_path(free, trip.start, trip.goal, guide)
+        if len(path) == 0:
+            yield None
+            return
+        columns, rows = path.astype(np.intp).T
+        yield ScoreTerms(
+            min_clearance=float(clear[rows, columns].min()),
+            path_length=path_length(path),
+            sharpness=edges,
+        )
+
+
+def guide_of(clear: FloatGrid, trip: Trip) -> Guide | None:
+    """What speeds up `terms_of` a grid, or of one with more obstacles.
+
+    Args:
+        clear: Clearance of the grid.
+        trip: Start, goal and body.
+
+    Returns:
+        None where the body does not get from start to goal.
+    """
+    return guide_between(body_free(clear, trip.radius), trip.start, trip.goal)
+
+
+def _leads_over(path: Path, free: BoolGrid) -> bool:
+    """Whether a path of single steps is still one where fewer pixels are free.
+
+    Then it is still the shortest one, and the one that `plan_path` takes.
+    """
+    columns, rows = path.astype(np.intp).T
+    over = free[rows, columns].all() and free[rows[1:], columns[:-1]].all()
+    return bool(len(path) and over and free[rows[:-1], columns[1:]].all())
+
+
+def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
+    """Why the body does not get from start to goal with a margin, and what would do.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        trip: Start, goal and body.
         inflation: Margin that the planner keeps around the body, px.
     """
+    clear = clearance(cells)
     free = body_free(clear, trip.radius + inflation)
-    failure = why_infeasible(cells, clear, free, trip)
-    if failure is not None:
-        return Judgement(failure)
-    path = plan_path(free, trip.start, trip.goal)
-    columns, rows = path.astype(np.intp).T
-    terms = ScoreTerms(
-        min_clearance=float(clear[rows, columns].min()),
-        path_length=path_length(path),
-        sharpness=sharpness(cells),
-    )
-    return Judgement(None, terms)
-
-
-def why_infeasible(
-    cells: BoolGrid, clear: FloatGrid, free: BoolGrid, trip: Trip
-) -> str | None:
-    """The first check that fails, where, and what would work; None if none does."""
     start, goal, radius = trip.start, trip.goal, trip.radius
     for name, (x, y) in (("start", start), ("goal", goal)):
         if free[y, x]:
@@ -93,8 +119,6 @@ def why_infeasible(
             else f"is {clear[y, x]:.1f} px from an obstacle, too near"
         )
         return f"{name} ({x}, {y}) {what}; {_nearest_text(free, x, y, radius)}"
-    if connected(free, start, goal):
-        return None
     widest = widest_radius(clear, start, goal)
     advice = (
         "no robot gets through: a wall closes the way"

@@ -147,7 +147,7 @@ def test_compiled_and_plain_agree(seed):
     field = plan.distance_field(free, (12, 12))
     settled, buckets = np.zeros(cells.size, np.bool_), np.empty((3, 9000), np.int64)
     own = np.full(cells.shape, np.inf)
-    plan._spread.function(free, 12, 12, -1, own, settled, buckets)
+    plan._spread.function(free, 12, 12, own, settled, buckets)
     np.testing.assert_array_equal(field, own)
     leaps, padded = leaps_of(cells), np.pad(clear, 1)
     plain = np.zeros_like(leaps)

@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skimage.graph import MCP_Geometric
 
+from tdac_envs import astar
 from tdac_envs.map_files import read_movingai
 from tdac_envs.plan import (
     descend,
     distance_field,
+    guide_between,
     path_length,
     plan_path,
 )
@@ -85,13 +87,40 @@ def test_field_of_a_goal_outside_or_occupied_is_infinite(goal):
     assert np.isinf(distance_field(free, goal)).all()
 
 
-def test_stopping_early_keeps_what_is_settled():
-    free = random_free(2, 0.2, (60, 60))
-    free[5, 5] = free[50, 50] = True
-    whole = distance_field(free, (5, 5))
-    part = distance_field(free, (5, 5), until=(50, 50))
-    assert part[50, 50] == whole[50, 50]
-    assert part.shape == whole.shape
+def assert_same_path(free, start, goal, guide=None):
+    """Equal to the descent of the whole field, ties included."""
+    wanted = descend(free, distance_field(free, goal), start)
+    np.testing.assert_array_equal(plan_path(free, start, goal, guide), wanted)
+
+
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.1, 0.25, 0.4]))
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_the_search_takes_the_path_of_the_whole_field(seed, density):
+    """Of several shortest paths, it is always the same one."""
+    free = random_free(seed, density, (40, 55))
+    free[3, 2] = free[35, 50] = True
+    assert_same_path(free, (2, 3), (50, 35))
+
+
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.1, 0.3]))
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_a_guide_changes_nothing(seed, density):
+    """One search guides those in parts of its pixels, also where the way is longer."""
+    free = random_free(seed, density, (40, 55))
+    free[3, 2] = free[35, 50] = True
+    guide = guide_between(free, (2, 3), (50, 35))
+    for part in (free, free & random_free(seed + 1, 0.1, free.shape)):
+        part[3, 2] = part[35, 50] = True
+        if guide is None:
+            assert len(plan_path(part, (2, 3), (50, 35))) == 0
+        else:
+            assert_same_path(part, (2, 3), (50, 35), guide)
+
+
+def test_buckets_grow_where_many_paths_are_equally_long(monkeypatch):
+    """In an open place nearly every pixel is on some shortest path."""
+    monkeypatch.setattr(astar, "_PIXELS_PER_ENTRY", 10**9)
+    assert_same_path(np.ones((90, 160), bool), (5, 5), (150, 80))
 
 
 @pytest.mark.parametrize("start", [(-1, 0), (9, 9), (2, 2)])

@@ -10,9 +10,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import plain_preprocess
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from tdac_envs.cleanup import clean
+from tdac_envs.cleanup import cleanings
 from tdac_envs.errors import MapError, TaskError
 from tdac_envs.grid import body_free, clearance
 from tdac_envs.image import load_image, luminance
@@ -416,12 +419,56 @@ def test_paper_preset_is_the_literal_grid() -> None:
     assert best == sorted(best, reverse=True)
 
 
+def noisy(seed: int, size: int) -> np.ndarray:
+    """Walls at random with gaps, specks and holes of many sizes, in colour."""
+    rng = np.random.default_rng(seed)
+    grey = np.full((size, size + 30), 235, np.uint8)
+    for _ in range(size // 18):
+        x, y = rng.integers(0, size, 2)
+        ends = rng.integers(0, size, 2)
+        cv2.line(grey, (int(x), int(y)), tuple(map(int, ends)), 30, 3)
+    for _ in range(size * size // 150):
+        x, y = rng.integers(1, size - 6, 2)
+        width, height = rng.integers(1, 6, 2)
+        grey[y : y + height, x : x + width] = 255 - grey[y, x]
+    return np.repeat(grey[..., None], 3, axis=2)
+
+
+@pytest.mark.parametrize("radius", [0.5, 1.0, 2.5])
+@pytest.mark.parametrize("seed", range(6))
+def test_sharing_work_changes_nothing(seed: int, radius: float) -> None:
+    """All candidates, their order, terms and failures are the plain version's."""
+    picture, start, goal = noisy(seed, 150), (8, 8), (165, 140)
+    for x, y in (start, goal):
+        cv2.circle(picture, (x, y), 6, (235, 235, 235), -1)
+    ours = rank_candidates(picture, start, goal, radius, preset="paper")
+    plain = plain_preprocess.candidates(picture, start, goal, radius)
+    assert len(ours) == len(plain)
+    for one, (polarity, cleanup, inflation, cells, why, terms) in zip(
+        ours, plain, strict=True
+    ):
+        who = (one.reading.polarity, one.reading.cleanup, one.inflation)
+        assert who == (polarity, cleanup, inflation)
+        np.testing.assert_array_equal(one.reading.cells, cells)
+        assert (one.failure, one.terms) == (why, terms)
+
+
+@given(st.integers(0, 10_000), st.sampled_from([0.1, 0.3, 0.5, 0.7]))
+@settings(derandomize=True, deadline=None, max_examples=40)
+def test_cleanings_are_those_of_the_plain_version(seed: int, density: float) -> None:
+    """Pieces that go leave larger holes; each strength is as if it were alone."""
+    cells = np.random.default_rng(seed).random((24, 31)) < density
+    strengths = (0, 2, 4, 8, 16, 60)
+    for strength, got in zip(strengths, cleanings(cells, strengths), strict=True):
+        np.testing.assert_array_equal(got, plain_preprocess.clean(cells, strength))
+
+
 @pytest.mark.parametrize("strength", [0, 4, 8])
 def test_cleanup_is_its_definition(strength: int) -> None:
     cells = np.random.default_rng(strength).random((18, 22)) < 0.3
     oracle = Oracle(np.zeros((18, 22), np.uint8), (0, 0), (1, 1), 1.0)
     wanted = oracle.cleaned(set(zip(*np.nonzero(cells), strict=True)), strength)
-    got = set(zip(*np.nonzero(clean(cells, strength)), strict=True))
+    got = set(zip(*np.nonzero(cleanings(cells, [strength])[0]), strict=True))
     assert got == wanted
 
 
