@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: synth test slow slow-sample lint clean
+.PHONY: synth test slow slow-sample bench lint clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
@@ -15,6 +15,10 @@ slow-sample: $(VENV)/.test-installed
 
 slow: $(VENV)/.test-installed
 	$(BIN)/pytest -q -n 2 -m slow
+
+bench: $(VENV)/.installed
+	$(BIN)/pip install --quiet -e ".[bench]"
+	$(BIN)/python -m benchmarks
 
 lint: $(VENV)/.lint-installed
 	$(BIN)/ruff check .

@@ -1,0 +1,105 @@
+"""Runs the benches at their real sizes.
+
+    python -m benchmarks [NAME …] [--maps DIR] [--quick] [--json] [--profile]
+
+Without names, all of them. Every bench times its floor and what it is compared with
+in the same run, in turns; only the ratios carry over to another machine. `--quick`
+shows that all of it works, on sizes that say nothing. `--profile` prints where the
+time of each bench goes instead of its rows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import json
+import os
+import platform
+import pstats
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+from benchmarks.timing import Bench, show
+
+NAMES = ("steps", "preprocessing", "planning", "start_up")
+PROFILED = 25
+"""Lines of a profile."""
+
+
+def main() -> int:
+    """Returns the exit code: 1 where something takes longer than it should."""
+    options = _options()
+    chosen = {name: _bench(name, options) for name in options.names or NAMES}
+    if options.profile:
+        for name, run in chosen.items():
+            _profile(name, run)
+        return 0
+    found: dict[str, Sequence[Bench]] = {}
+    if not options.json:
+        print(_machine())
+    for name, run in chosen.items():
+        found[name] = run()
+        if not options.json:
+            for bench in found[name]:
+                show(bench)
+    if options.json:
+        every = {name: [asdict(b) for b in benches] for name, benches in found.items()}
+        print(json.dumps({"machine": _machine(), **every}, indent=1))
+    return int(any(_too_long(b) for benches in found.values() for b in benches))
+
+
+def _bench(name: str, options: argparse.Namespace) -> Callable[[], Sequence[Bench]]:
+    benches = import_module(f"benchmarks.{name}").benches
+    if name == "planning":
+        return partial(benches, options.quick, options.maps)
+    return partial(benches, options.quick)
+
+
+def _profile(name: str, run: Callable[[], object]) -> None:
+    print(f"\n{name}")
+    profile = cProfile.Profile()
+    profile.runcall(run)
+    statistics = pstats.Stats(profile, stream=sys.stdout)
+    statistics.strip_dirs().sort_stats("tottime").print_stats(PROFILED)
+
+
+def _too_long(bench: Bench) -> bool:
+    return any(row.limit is not None and row.fastest > row.limit for row in bench.rows)
+
+
+def _machine() -> str:
+    load = os.getloadavg()[0]
+    return (
+        f"{os.cpu_count()} cores, load {load:.1f}, {platform.machine()}, "
+        f"Python {platform.python_version()}"
+    )
+
+
+def _options() -> argparse.Namespace:
+    about = (__doc__ or "").partition("\n")[0]
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=about)
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}"
+    )
+    parser.add_argument("--maps", type=Path, help="folder of MovingAI maps and .scen")
+    parser.add_argument("--quick", action="store_true", help="toy sizes, one round")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--profile", action="store_true", help="print profiles")
+    options = parser.parse_args()
+    wrong = sorted(set(options.names) - set(NAMES))
+    if wrong:
+        parser.error(f"no bench {wrong[0]!r}; there are {', '.join(NAMES)}")
+    if options.maps is not None and not any(options.maps.glob("*.map.scen")):
+        parser.error(f"{options.maps}: no *.map.scen in it")
+    if find_spec("skimage") is None:
+        parser.error('scikit-image is missing: pip install "tdac[bench]"')
+    return options
+
+
+if __name__ == "__main__":
+    sys.exit(main())

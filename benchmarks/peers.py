@@ -1,0 +1,69 @@
+"""Other simulators of the same kind, stepped where they are installed.
+
+ir-sim: one differential-drive robot with a lidar of 18 beams among three shapes. VMAS:
+its scenario "navigation" with one agent and 18 rays, as a batch.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.timing import Call
+
+BATCH = 1024
+IRSIM_WORLD = """
+world: {height: 10, width: 10, step_time: 0.05, collision_mode: unobstructed}
+robot:
+  - kinematics: {name: diff}
+    shape: {name: circle, radius: 0.2}
+    state: [2, 2, 0]
+    goal: [8, 8, 0]
+    sensors:
+      - {name: lidar2d, range_max: 5, angle_range: 1.92, number: 18}
+obstacle:
+  - {shape: {name: circle, radius: 1.0}, state: [5, 5, 0]}
+  - {shape: {name: rectangle, length: 1.5, width: 1.2}, state: [6, 2, 0.5]}
+  - {shape: {name: rectangle, length: 1.0, width: 2.0}, state: [3, 7, 0]}
+"""
+
+
+def steppers(count: int) -> Iterator[tuple[str, Call, int]]:
+    """Name, a call that steps, and how many robot steps it makes."""
+    if find_spec("irsim") is not None:
+        yield "ir-sim, 18 beams", _irsim(count), count
+    if find_spec("vmas") is not None:
+        yield f"VMAS navigation, 18 rays, N = {BATCH}", _vmas(), BATCH
+
+
+def _irsim(count: int) -> Call:
+    import irsim
+
+    with tempfile.TemporaryDirectory() as name:
+        world = Path(name) / "world.yaml"
+        world.write_text(IRSIM_WORLD)
+        env: Any = irsim.make(str(world), display=False, log_level="ERROR")
+    action = np.array([[0.3], [0.2]])
+
+    def call() -> None:
+        for _ in range(count):
+            env.step(action)
+
+    return call
+
+
+def _vmas() -> Call:
+    import torch
+    from vmas import make_env
+
+    env: Any = make_env(
+        "navigation", BATCH, seed=0, n_agents=1, n_lidar_rays=18, lidar_range=0.5
+    )
+    env.reset()
+    actions = [torch.full((BATCH, 2), 0.3)]
+    return lambda: env.step(actions)

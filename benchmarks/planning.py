@@ -1,0 +1,123 @@
+"""A* on grids beside `skimage.graph.MCP_Geometric`, and against published lengths.
+
+    python -m benchmarks planning [--maps DIR]
+
+DIR holds MovingAI maps with their `.scen` files; without it, floor plans are drawn and
+the lengths are checked against a whole distance field. Maps with water or swamp have
+rules of their own and are left out. scikit-image passes diagonally between obstacles
+and gives every scenario its own search object, as ours does its own arrays.
+
+Floor: one pass over the map that finds the pixels joined to the start, which every
+search without a heuristic makes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from skimage.graph import MCP_Geometric
+
+from benchmarks.preprocessing import floor_plan
+from benchmarks.timing import Bench, Call, compared, in_turn, row_of
+from tdac_envs.grid import BoolGrid
+from tdac_envs.map_files import read_movingai
+from tdac_envs.plan import distance_field, path_length, plan_path
+
+Point = tuple[int, int]
+
+TOLERANCE = 0.01
+SCENARIOS = 1000
+TIMED = 25
+FLOOR, OURS, THEIRS = "connected pixels", "A*", "MCP_Geometric"
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """Pixels (x, y) and the length of the shortest path, px."""
+
+    start: Point
+    goal: Point
+    length: float
+
+
+def benches(quick: bool = False, maps: Path | None = None) -> list[Bench]:
+    """One bench a map."""
+    rounds = 1 if quick else 3
+    return [
+        _on_map(name, free, trips, rounds) for name, free, trips in _maps(quick, maps)
+    ]
+
+
+def _maps(
+    quick: bool, folder: Path | None
+) -> Iterator[tuple[str, BoolGrid, list[Trip]]]:
+    if folder is None:
+        for size in (0.1,) if quick else (0.25, 1.0):
+            yield f"rooms, {size:g} MPix", *_drawn(size)
+        return
+    for file in sorted(folder.glob("*.map.scen")):
+        map_file = file.with_suffix("")
+        ground = set("".join(map_file.read_text().splitlines()[4:]))
+        occupied = read_movingai(map_file).occupied
+        if occupied is not None and not ground & set("WS"):
+            yield map_file.name, ~occupied, list(scenarios(file))
+
+
+def scenarios(file: Path, count: int = SCENARIOS) -> Iterator[Trip]:
+    """Up to `count` of a file's scenarios, spread over all of them."""
+    rows = [line.split() for line in file.read_text().splitlines()[1:] if line.strip()]
+    for row in rows[:: max(-(-len(rows) // count), 1)]:
+        x, y, to_x, to_y = map(int, row[4:8])
+        yield Trip((x, y), (to_x, to_y), float(row[8]))
+
+
+def _drawn(megapixels: float) -> tuple[BoolGrid, list[Trip]]:
+    picture, start, _ = floor_plan(megapixels)
+    free = np.asarray(picture[..., 0] > 128)
+    field = distance_field(free, start)
+    rows, columns = np.nonzero(np.isfinite(field))
+    chosen = np.random.default_rng(0).choice(rows.size, 200, replace=False)
+    ends = zip(columns[chosen].tolist(), rows[chosen].tolist(), strict=True)
+    return free, [Trip((x, y), start, float(field[y, x])) for x, y in ends]
+
+
+def _on_map(name: str, free: BoolGrid, trips: list[Trip], rounds: int) -> Bench:
+    wrong = sum(not _optimal(free, trip) for trip in trips)
+    timed = trips[:: max(len(trips) // TIMED, 1)][:TIMED]
+    taken: dict[str, list[float]] = {FLOOR: [], OURS: [], THEIRS: []}
+    for trip in timed:
+        for row in in_turn(_searches(free, trip), rounds):
+            taken[row.case].append(row.fastest)
+    rows = [row_of(case, seconds) for case, seconds in taken.items()]
+    pairs = zip(taken[THEIRS], taken[OURS], strict=True)
+    faster = float(np.median([theirs / ours for theirs, ours in pairs]))
+    right = f"{len(trips) - wrong} of {len(trips)} optimal"
+    note = f"{right}; in the median {faster:.1f} x as fast"
+    bench = compared(f"Planning, {name}", rows, FLOOR, THEIRS)
+    noted = [replace(r, note=note if r.case == OURS else "") for r in bench.rows]
+    return replace(bench, rows=noted)
+
+
+def _optimal(free: BoolGrid, trip: Trip) -> bool:
+    length = path_length(plan_path(free, trip.start, trip.goal))
+    return math.isclose(length, trip.length, rel_tol=0.0, abs_tol=TOLERANCE)
+
+
+def _searches(free: BoolGrid, trip: Trip) -> dict[str, Call]:
+    start, goal = trip.start, trip.goal
+
+    def theirs() -> None:
+        search = MCP_Geometric(np.where(free, 1.0, -1.0))
+        search.find_costs([start[::-1]], [goal[::-1]])
+        search.traceback(goal[::-1])
+
+    return {
+        FLOOR: lambda: cv2.connectedComponents(free.astype(np.uint8), connectivity=4),
+        OURS: lambda: plan_path(free, start, goal),
+        THEIRS: theirs,
+    }

@@ -1,0 +1,43 @@
+"""What it takes to start: the command line's help, an import, a first environment.
+
+    python -m benchmarks start_up
+
+Each is a process of its own. Floor: the bare interpreter; reference: one that imports
+numpy, which every tool of this kind has to. Compiled code lies ready on disk, as after
+the first use on a machine.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from functools import partial
+
+from benchmarks.timing import Bench, compared, in_turn
+
+FLOOR, REFERENCE = "python -c pass", "import numpy"
+STEP = (
+    "import gymnasium as gym, tdac_envs; env = gym.make('TDAC-Map2D-v0'); "
+    "env.reset(seed=0); env.step(env.action_space.sample())"
+)
+CASES = {
+    FLOOR: ["-c", "pass"],
+    REFERENCE: ["-c", "import numpy"],
+    "tdac --help": ["-m", "tdac_agent.cli", "--help"],
+    "import gymnasium": ["-c", "import gymnasium"],
+    "import gymnasium, tdac_envs": ["-c", "import gymnasium, tdac_envs"],
+    "make, reset and step TDAC-Map2D-v0": ["-c", STEP],
+}
+LIMITS = {"tdac --help": 0.3}
+
+
+def benches(quick: bool = False) -> list[Bench]:
+    """One bench."""
+    calls = {
+        name: partial(
+            subprocess.run, [sys.executable, *words], check=True, capture_output=True
+        )
+        for name, words in CASES.items()
+    }
+    rows = in_turn(calls, 1 if quick else 7)
+    return [compared("Start-up, a process each", rows, FLOOR, REFERENCE, LIMITS)]
