@@ -114,7 +114,8 @@ def wheel_speeds(action: Any) -> tuple[float, float]:
         ValueError: The action is not two finite numbers.
     """
     try:
-        left, right = np.asarray(action).tolist()
+        array = action if type(action) is np.ndarray else np.asarray(action)
+        left, right = array.tolist()
         # NaN and infinity times 0 are not 0.
         if 0.0 * left + 0.0 * right == 0.0:
             return float(left), float(right)

@@ -148,6 +148,18 @@ def _square_distance2(x: float, y: float, i: int, j: int) -> float:
 
 
 @kernel()
+def has_room(clear: FloatGrid, x: float, y: float, radius: float) -> bool:
+    """Whether a point is at least `radius` px from all occupied squares."""
+    for j in range(math.ceil(y - radius - 0.5), math.floor(y + radius + 0.5) + 1):
+        for i in range(math.ceil(x - radius - 0.5), math.floor(x + radius + 0.5) + 1):
+            inside = -1 <= i < clear.shape[1] - 1 and -1 <= j < clear.shape[0] - 1
+            occupied = not inside or clear[j + 1, i + 1] == 0.0
+            if occupied and _square_distance2(x, y, i, j) < radius * radius:
+                return False
+    return True
+
+
+@kernel()
 def _room(clear: FloatGrid, x: float, y: float) -> float:
     """Lower bound of the distance from a point to the nearest occupied square."""
     i, j = math.floor(x + 0.5), math.floor(y + 0.5)

@@ -236,7 +236,10 @@ class Map2DEnv(DrivenEnv):
         return self.robot.state[:3].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_call_begin": None, "_call_drive": None}
+        return {
+            **self.__dict__,
+            **dict.fromkeys(("_call_begin", "_call_drive", "_copies")),
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -247,18 +250,21 @@ class Map2DEnv(DrivenEnv):
         arguments = self.setup.arguments(self.task, self.robot)
         self._call_begin: Callable[[], None] = begin.bind(*arguments)
         self._call_drive: Callable[[], None] = drive.bind(*arguments)
+        robot = self.robot
+        seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
+        self._copies = [array.copy for array in seen]
 
     def _observation(self) -> Observation:
-        robot = self.robot
-        ranges = robot.ranges.copy()
-        if self.range_noise:
-            ranges[:] = noisy(ranges, self.setup, self.np_random)
-        return {
-            "pose": robot.pose.copy(),
-            "goal": self._goal.copy(),
-            "wheel_speeds": robot.wheel_speeds.copy(),
-            "ranges": ranges,
+        pose, goal, wheels, ranges = self._copies
+        seen = {
+            "pose": pose(),
+            "goal": goal(),
+            "wheel_speeds": wheels(),
+            "ranges": ranges(),
         }
+        if self.range_noise:
+            seen["ranges"][:] = noisy(seen["ranges"], self.setup, self.np_random)
+        return seen
 
     def _frame(self) -> NDArray[np.uint8]:
         task, robot = self.task, self.robot

@@ -72,8 +72,10 @@ def _cast(
         quadrant, flip_y, v, dy, j = quadrant + 2, -1, -v, -dy, ~j
     inv_x = 1.0 / dx if dx > 0.0 else math.inf
     inv_y = 1.0 / dy if dy > 0.0 else math.inf
+    squares = leaps[quadrant]
     while True:
-        side = int(leaps[quadrant, j ^ flip_y, i ^ flip_x])
+        # Unsigned: an index below 0 would have to be told from one from the end.
+        side = int(squares[np.uint64(j ^ flip_y), np.uint64(i ^ flip_x)])
         if side == 0:
             return t
         out_i, out_j = i + side, j + side

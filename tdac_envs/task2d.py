@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.arguments import finite_numbers, finite_point, positive, whole_number
 from tdac_envs.errors import TaskError
-from tdac_envs.grid import body_free, clearance_at
+from tdac_envs.grid import body_free
 from tdac_envs.params import RobotParams
 from tdac_envs.plan import Path, descend
 from tdac_envs.terrain import (
@@ -21,6 +21,7 @@ from tdac_envs.terrain import (
     check_stands,
     entry,
     field_to,
+    may_start,
     route,
     way,
     widest_connected_radius,
@@ -245,12 +246,16 @@ def wrapped(heading: float) -> float:
 
 
 def _may_start(task: Map2DTask, pose: Pose) -> bool:
-    radius, terrain = task.robot.radius, task.terrain
-    body = math.sqrt(radius**2 + 0.5)
-    return (
-        clearance_at(terrain.grid.cells, pose.x, pose.y, body) >= body
-        and entry(terrain, task.field, pose.x, pose.y, radius) is not None
-        and not at_goal(terrain, task.goal, task.goal_tolerance, pose.x, pose.y)
+    terrain = task.terrain
+    return may_start(
+        terrain.padded_clear,
+        terrain.leaps,
+        task.field,
+        pose.x,
+        pose.y,
+        task.robot.radius,
+        *task.goal,
+        task.goal_tolerance,
     )
 
 

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.contact import first_contact
+from tdac_envs.compiled import kernel
+from tdac_envs.contact import first_contact, has_room
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import (
     FloatGrid,
@@ -153,6 +154,48 @@ def _nearest_place(terrain: Terrain, x: float, y: float, radius: float) -> str:
         )
     nearest = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
     return f"the nearest free pixel is ({columns[nearest]}, {rows[nearest]})"
+
+
+@kernel("f4[:,:] u1[:,:,:] f4[:,:] f8 f8 f8 f8 f8 f8 -> b1")
+def may_start(
+    clear: FloatGrid,
+    leaps: LeapGrid,
+    field: NDArray[np.float32],
+    x: float,
+    y: float,
+    radius: float,
+    goal_x: float,
+    goal_y: float,
+    tolerance: float,
+) -> bool:
+    """Whether an episode may start at (x, y): see the last three arguments.
+
+    Args:
+        clear: `Terrain.padded_clear`.
+        leaps: `Terrain.leaps`.
+        field: From `field_to`.
+        x: Column, px.
+        y: Row, px.
+        radius: Of the body, px, which has room there and gets to the goal.
+        goal_x: Column of the goal, px, which is not reached yet.
+        goal_y: Row of the goal, px.
+        tolerance: Of the goal, px.
+    """
+    body = math.sqrt(radius * radius + 0.5)
+    if not has_room(clear, x, y, body):
+        return False
+    near = math.hypot(goal_x - x, goal_y - y) <= tolerance
+    if near and sees(leaps, x, y, goal_x, goal_y):
+        return False
+    height, width = field.shape
+    column, row = math.floor(x + 0.5), math.floor(y + 0.5)
+    for j in range(max(row - 2, 0), min(row + 3, height)):
+        for i in range(max(column - 2, 0), min(column + 3, width)):
+            if field[j, i] < math.inf:
+                length, bearing = math.hypot(i - x, j - y), math.atan2(j - y, i - x)
+                if first_contact(clear, x, y, bearing, length, 0.0, radius) > 1.0:
+                    return True
+    return False
 
 
 def route(

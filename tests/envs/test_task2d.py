@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tdac_envs.errors import TaskError
-from tdac_envs.grid import OccupancyGrid
+from tdac_envs.grid import OccupancyGrid, clearance_at
+from tdac_envs.map2d import Map2DEnv
 from tdac_envs.params import RobotParams
 from tdac_envs.plan import path_length
 from tdac_envs.task2d import (
@@ -20,6 +21,7 @@ from tdac_envs.task2d import (
     make_task,
     random_task,
 )
+from tdac_envs.terrain import entry, may_start
 
 ROBOT = RobotParams.disc(4.0)
 
@@ -286,3 +288,26 @@ class TestSharing:
         assert moved.shortest > 60.0
         assert moved.start.heading == pytest.approx(9.0 - 2 * math.pi)
         assert task.moved(Pose(20.0, 40.0, 0.0)).field is task.field
+
+
+@pytest.mark.parametrize("name", ["maze", "spiral"])
+def test_where_an_episode_may_start(name):
+    """It has room for the body, a way to the goal, and is not there already."""
+    task = Map2DEnv(name).nominal
+    world, radius, random = task.terrain, task.robot.radius, np.random.default_rng(0)
+    room, height = math.sqrt(radius**2 + 0.5), world.grid.height
+    found = 0
+    for k in range(400):
+        end = (task.start[:2], task.goal)[k % 2]
+        near = end + random.uniform(-1.5, 1.5, 2) * radius
+        anywhere = random.uniform(-1, 1.01, 2) * (world.grid.width, height)
+        x, y = (near if k % 4 < 3 else anywhere).tolist()
+        expected = (
+            clearance_at(world.grid.cells, x, y, room) >= room
+            and entry(world, task.field, x, y, radius) is not None
+            and not at_goal(world, task.goal, task.goal_tolerance, x, y)
+        )
+        given = (world.padded_clear, world.leaps, task.field, x, y, radius)
+        assert may_start(*given, *task.goal, task.goal_tolerance) == expected
+        found += expected
+    assert 40 < found < 360
