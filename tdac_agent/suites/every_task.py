@@ -113,6 +113,9 @@ def check_claims(episode, task):
     full_speed = task.nominal.full_step / task.nominal.dt
     forward = record.actions.mean(axis=1) * full_speed
     speeds = np.asarray(result["speeds"], float)
+    assert speeds.shape == forward.shape, (
+        f"speeds: shape {speeds.shape}, one forward speed a step is {forward.shape}"
+    )
     worst = float(np.abs(speeds - forward).max(initial=0.0))
     assert worst <= slack, (
         f"speeds differ from the applied ones by up to {worst * units.scale:.2f} "
