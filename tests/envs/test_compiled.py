@@ -132,6 +132,17 @@ def test_an_environment_needs_no_compiler_twice():
     assert done.stdout.split() == ["False"]
 
 
+def test_an_import_compiles_nothing():
+    """What is heavy waits for the first environment."""
+    script = (
+        "import sys, tdac_envs\n"
+        "print(sorted({'numba', 'llvmlite', 'cv2', 'scipy'} & set(sys.modules)))\n"
+    )
+    run = [sys.executable, "-c", script]
+    done = subprocess.run(run, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["[]"]
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_compiled_and_plain_agree(seed):
     """Machine code and the Python it was made of give the same numbers."""
