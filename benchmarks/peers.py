@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import Call
+from benchmarks.race import Burst
 
 BATCH = 1024
+STEPS = 50
 IRSIM_WORLD = """
 world: {height: 10, width: 10, step_time: 0.05, collision_mode: unobstructed}
 robot:
@@ -33,15 +34,15 @@ obstacle:
 """
 
 
-def steppers(count: int) -> Iterator[tuple[str, Call, int]]:
-    """Name, a call that steps, and how many robot steps it makes."""
+def steppers() -> Iterator[tuple[str, Burst]]:
+    """Name, and a call that makes some steps and returns how many."""
     if find_spec("irsim") is not None:
-        yield "ir-sim, 18 beams", _irsim(count), count
+        yield "ir-sim, 18 beams", _irsim()
     if find_spec("vmas") is not None:
-        yield f"VMAS navigation, 18 rays, N = {BATCH}", _vmas(), BATCH
+        yield f"VMAS navigation, 18 rays, {BATCH} robots", _vmas()
 
 
-def _irsim(count: int) -> Call:
+def _irsim() -> Burst:
     import irsim
 
     with tempfile.TemporaryDirectory() as name:
@@ -50,14 +51,15 @@ def _irsim(count: int) -> Call:
         env: Any = irsim.make(str(world), display=False, log_level="ERROR")
     action = np.array([[0.3], [0.2]])
 
-    def call() -> None:
-        for _ in range(count):
+    def burst() -> int:
+        for _ in range(STEPS):
             env.step(action)
+        return STEPS
 
-    return call
+    return burst
 
 
-def _vmas() -> Call:
+def _vmas() -> Burst:
     import torch
     from vmas import make_env
 
@@ -66,4 +68,9 @@ def _vmas() -> Call:
     )
     env.reset()
     actions = [torch.full((BATCH, 2), 0.3)]
-    return lambda: env.step(actions)
+
+    def burst() -> int:
+        env.step(actions)
+        return BATCH
+
+    return burst

@@ -2,100 +2,60 @@
 
     python -m benchmarks steps
 
-Each environment is stepped through `gym.make` in short bursts, in turn, its resets
-included; batches count one step for each robot. Floor: an environment whose step
-returns what is ready, so that Gymnasium's wrappers are all that it costs.
+The tables of `benchmarks.env_step`, and one with the e-puck and, where they are
+installed, other simulators. Floor: an environment that does nothing, so that
+Gymnasium's wrappers are all that it costs. Batches count one step for each robot.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
-from itertools import cycle
-from typing import Any
-
 import gymnasium as gym
-import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from benchmarks.env_step import CASES, random_driving
+from benchmarks import race
+from benchmarks.env_step import (
+    BENCHES,
+    REFERENCE,
+    DoNothing,
+    random_driving,
+    reference,
+    single_burst,
+)
 from benchmarks.peers import steppers
-from benchmarks.timing import Bench, Call, Row, compared, in_turn
+from benchmarks.timing import Bench, Row, compared, row_of
 
-FLOOR, REFERENCE = "does nothing", "CartPole-v1, random"
-BATCHES = (1024, 4096)
-
-
-class DoesNothing(gym.Env[Any, Any]):
-    """A step returns what is ready."""
-
-    observation_space = gym.spaces.Box(-1, 1, (4,), np.float32)
-    action_space = gym.spaces.Box(-1, 1, (2,), np.float32)
-
-    def __init__(self) -> None:
-        self._ready = np.zeros(4, np.float32)
-
-    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:  # noqa: ARG002
-        return self._ready, {}
-
-    def step(self, _: Any) -> Any:
-        return self._ready, 0.0, False, False, {}
-
-
-NOTHING = EnvSpec("DoesNothing-v0", DoesNothing)
+FLOOR = "nothing"
 
 
 def benches(quick: bool = False) -> list[Bench]:
-    """One bench."""
-    count, rounds = (50, 1) if quick else (2000, 15)
-    calls: dict[str, tuple[Call, int]] = {
-        FLOOR: (
-            _bursts(
-                gym.make(EnvSpec("DoesNothing-v0", DoesNothing)), random_driving, count
-            ),
-            count,
-        )
-    }
-    for name, (arguments, drive) in CASES.items():
-        calls[name] = _bursts(gym.make(**arguments), drive, count), count
-    world = gym.make("TDAC-EPuck-v0")
-    calls["e-puck, random"] = _bursts(world, random_driving, count), count
-    for size in BATCHES[: 1 if quick else 2]:
-        calls[f"maze, batch of {size}, random"] = _batch(size), size
-    for name, call, steps in steppers(max(count // 20, 1)):
-        calls[name] = call, steps
-    rows = in_turn({name: call for name, (call, _) in calls.items()}, rounds)
-    each = [_per_step(row, calls[row.case][1]) for row in rows]
-    return [compared("A step", each, FLOOR, REFERENCE)]
+    """The tables of `env_step`, then the others."""
+    rounds = 4 if quick else 30
+    found = [
+        Bench(title, FLOOR, REFERENCE, [_row(row) for row in rows(rounds)])
+        for title, rows in list(BENCHES.items())[: 1 if quick else None]
+    ]
+    return [*found, _others(rounds)]
 
 
-def _bursts(env: gym.Env[Any, Any], drive: Any, count: int) -> Call:
-    """A call of `count` steps, of the same actions again and again."""
-    env.reset(seed=0)
-    actions = cycle(drive(env, 4 * count))
-    env.reset(seed=0)
-
-    def call() -> None:
-        for _ in range(count):
-            _, _, terminated, truncated, _ = env.step(next(actions))
-            if terminated or truncated:
-                env.reset()
-
-    return call
-
-
-def _batch(size: int) -> Call:
-    envs = gym.make_vec("TDAC-Map2D-v0", num_envs=size)
-    envs.reset(seed=0)
-    envs.action_space.seed(0)
-    return partial(envs.step, envs.action_space.sample())
-
-
-def _per_step(row: Row, steps: int) -> Row:
-    return replace(
-        row,
-        seconds=row.seconds / steps,
-        fastest=row.fastest / steps,
-        slowest=row.slowest / steps,
-        note=f"{steps / row.fastest / 1e3:.4g} k/s",
+def _row(row: race.Row) -> Row:
+    """A row of a race; its ratio is of times here, and of speeds there."""
+    if row.ratio is None or not row.low or not row.high:
+        return Row(row.name, 0.0, 0.0, 0.0, note=f"{row.value:.3g} {row.unit}")
+    seconds = 1e-6 * row.value
+    spread = f"{row.ratio:.2f} x as fast, quartiles {row.low:.2f} to {row.high:.2f}"
+    return Row(
+        row.name, seconds, seconds, seconds, per_reference=1 / row.ratio, note=spread
     )
+
+
+def _others(rounds: int) -> Bench:
+    nothing = gym.make(EnvSpec("Floor-v0", entry_point=DoNothing))
+    bursts = {
+        FLOOR: single_burst(nothing, random_driving),
+        REFERENCE: reference(),
+        "e-puck, random": single_burst(gym.make("TDAC-EPuck-v0"), random_driving),
+        **dict(steppers()),
+    }
+    taken = race.race(bursts, rounds)
+    rows = [row_of(name, seconds) for name, seconds in taken.items()]
+    return compared("The e-puck, and other simulators", rows, FLOOR, REFERENCE)

@@ -117,8 +117,8 @@ def show(bench: Bench) -> None:
     for row in bench.rows:
         table.add_row(
             row.case,
-            duration(row.seconds),
-            f"{duration(row.fastest)} to {duration(row.slowest)}",
+            duration(row.seconds) if row.seconds else "",
+            _range(row),
             _ratio(row.per_floor),
             _ratio(row.per_reference),
             _verdict(row),
@@ -136,6 +136,12 @@ def duration(seconds: float) -> str:
         if seconds * factor >= 1.0:
             return f"{seconds * factor:.3g} {unit}"
     return f"{seconds * 1e9:.3g} ns"
+
+
+def _range(row: Row) -> str:
+    if row.fastest == row.slowest:
+        return ""
+    return f"{duration(row.fastest)} to {duration(row.slowest)}"
 
 
 def _ratio(value: float | None) -> str:
