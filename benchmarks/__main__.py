@@ -26,7 +26,7 @@ from pathlib import Path
 
 from benchmarks.timing import Bench, show
 
-NAMES = ("steps", "growth", "preprocessing", "planning", "start_up")
+NAMES = ("steps", "preprocessing", "planning", "start_up")
 PROFILED = 25
 """Lines of a profile."""
 
