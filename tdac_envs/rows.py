@@ -13,24 +13,42 @@ import numpy as np
 
 from tdac_envs.compiled import Kernel, link, machine
 
+# Calls `entry` once a row, with `slots` of which some words are those of the row.
 _LOOP = """
-define i32 @tdac_rows(ptr %entry, ptr %slots, i64 %stride, i64 %count) {
+define i32 @tdac_rows(
+    ptr %entry, ptr %slots, ptr %columns, i64 %width, ptr %values, i64 %count
+) {
 start:
-  %any = icmp sgt i64 %count, 0
-  br i1 %any, label %each, label %end
+  br label %rows
+rows:
+  %row = phi i64 [0, %start], [%next, %call]
+  %failed = phi i32 [0, %start], [%either, %call]
+  %more = icmp slt i64 %row, %count
+  br i1 %more, label %each, label %end
 each:
-  %row = phi i64 [0, %start], [%next, %each]
-  %failed = phi i32 [0, %start], [%either, %each]
-  %offset = mul i64 %row, %stride
-  %address = getelementptr i8, ptr %slots, i64 %offset
-  %status = call i32 %entry(ptr %address)
+  %first = mul i64 %row, %width
+  br label %words
+words:
+  %word = phi i64 [0, %each], [%after, %copy]
+  %left = icmp slt i64 %word, %width
+  br i1 %left, label %copy, label %call
+copy:
+  %place = getelementptr i64, ptr %columns, i64 %word
+  %column = load i64, ptr %place
+  %which = add i64 %first, %word
+  %source = getelementptr i64, ptr %values, i64 %which
+  %value = load i64, ptr %source
+  %target = getelementptr i64, ptr %slots, i64 %column
+  store i64 %value, ptr %target
+  %after = add i64 %word, 1
+  br label %words
+call:
+  %status = call i32 %entry(ptr %slots)
   %either = or i32 %failed, %status
   %next = add i64 %row, 1
-  %more = icmp slt i64 %next, %count
-  br i1 %more, label %each, label %end
+  br label %rows
 end:
-  %result = phi i32 [0, %start], [%either, %each]
-  ret i32 %result
+  ret i32 %failed
 }
 """
 # A thread takes so many rows at a time: little waiting at the end, few calls.
@@ -57,6 +75,7 @@ class Rows:
         packed = [kernel.pack(each) for each in arguments]
         self._slots = np.array([slots for slots, _ in packed], np.int64)
         self._kept = [kept for _, kept in packed]
+        self._differ()
         self._entry = kernel.load()
         self._threads = threads or len(os.sched_getaffinity(0))
         self._pool: ThreadPoolExecutor | None = None
@@ -67,7 +86,19 @@ class Rows:
 
     def put(self, row: int, *args: Any) -> None:
         """Replaces the arguments of one call."""
-        self._slots[row], self._kept[row] = self._kernel.pack(args)
+        slots, self._kept[row] = self._kernel.pack(args)
+        changed = np.flatnonzero(slots != self._slots[row])
+        self._slots[row] = slots
+        if np.isin(changed, self._columns).all():
+            self._values[row] = slots[self._columns]
+        else:
+            self._differ()
+
+    def _differ(self) -> None:
+        """Finds the words in which the calls differ: only these are read for each."""
+        differs = (self._slots != self._slots[:1]).any(axis=0)
+        self._columns = np.flatnonzero(differs)
+        self._values = np.ascontiguousarray(self._slots[:, self._columns])
 
     def call(self, row: int) -> None:
         """Makes one of the calls."""
@@ -102,11 +133,12 @@ class Rows:
     def _work(self, begins: Iterator[int], share: int) -> int:
         """Makes calls until nobody has any left, `share` at a time."""
         loop, entry = _loop(), ctypes.cast(self._entry, ctypes.c_void_p)  # type: ignore[arg-type]
-        count, stride = len(self._slots), self._slots.strides[0]
-        address, status = self._slots.ctypes.data, 0
+        slots, columns, values = self._slots[0].copy(), self._columns, self._values
+        own, status = (slots.ctypes.data, columns.ctypes.data, len(columns)), 0
         for begin in begins:
-            rows = min(share, count - begin)
-            status |= loop(entry.value, address + begin * stride, stride, rows)
+            rows = min(share, len(values) - begin)
+            first = values.ctypes.data + begin * values.strides[0]
+            status |= loop(entry.value, *own, first, rows)
         return status
 
     def _workers(self) -> ThreadPoolExecutor:
@@ -122,20 +154,17 @@ class Rows:
 
 
 @functools.cache
-def _loop() -> Callable[[int | None, int, int, int], int]:
+def _loop() -> Callable[..., int]:
     """The compiled loop over rows; the engine that holds it lives as long as it."""
     import llvmlite.binding as llvm
 
-    target = machine()
-    engine, address = link(
-        [target.emit_object(llvm.parse_assembly(_LOOP))], "tdac_rows"
-    )
+    code = machine().emit_object(llvm.parse_assembly(_LOOP))
+    engine, address = link([code], "tdac_rows")
     pointer, number = ctypes.c_void_p, ctypes.c_int64
-    loop = ctypes.CFUNCTYPE(ctypes.c_int32, pointer, pointer, number, number)(address)
+    kinds = (pointer, pointer, pointer, number, pointer, number)
+    loop = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(address)
 
-    def run(
-        entry: int | None, slots: int, stride: int, count: int, _: Any = engine
-    ) -> int:
-        return int(loop(entry, slots, stride, count))
+    def run(*args: int | None, _: Any = engine) -> int:
+        return int(loop(*args))
 
     return run

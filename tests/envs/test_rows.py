@@ -42,6 +42,10 @@ def test_one_row_alone_and_with_other_arrays():
     rows.call(0)
     assert (first.tolist(), second.tolist()) == ([1, 1], [3, 3])
     assert other.tolist() == [5, 5, 5]
+    rows.put(1, first, np.array([7]))
+    rows.call_all()
+    assert (first.tolist(), second.tolist()) == ([7, 7], [3, 3])
+    assert other.tolist() == [25, 25, 25]
 
 
 @pytest.mark.parametrize("threads", [1, 2])
