@@ -121,7 +121,8 @@ def _scan(
     best, nearest = abs(forward), math.inf
     for n in range(begin, end):
         k = listed[n] if listed.shape[0] else n
-        off = math.hypot(extent[k, MID_X] - x, extent[k, MID_Y] - y)
+        off_x, off_y = extent[k, MID_X] - x, extent[k, MID_Y] - y
+        off = math.sqrt(off_x * off_x + off_y * off_y)
         if off - extent[k, REACH] - radius < best:
             gap = part_gap(points, first, extent, k, x, y)[0] - radius
             nearest = min(nearest, gap)

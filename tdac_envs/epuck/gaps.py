@@ -26,26 +26,39 @@ def part_gap(
         if far == 0.0:
             return -extent[part, ROUND], 1.0, 0.0
         return far - extent[part, ROUND], off_x / far, off_y / far
-    outside, out_x, out_y = -math.inf, 1.0, 0.0
-    square, near_x, near_y = math.inf, 0.0, 0.0
+    is_outside, square, near_x, near_y = False, math.inf, 0.0, 0.0
     for i in range(begin, end):
         j = i + 1 if i + 1 < end else begin
         edge_x, edge_y = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
         off_x, off_y = x - points[i, 0], y - points[i, 1]
-        length2 = edge_x * edge_x + edge_y * edge_y
-        length = math.sqrt(length2)
-        side = (edge_y * off_x - edge_x * off_y) / length
-        if side > outside:
-            outside, out_x, out_y = side, edge_y / length, -edge_x / length
-        share = min(max((off_x * edge_x + off_y * edge_y) / length2, 0.0), 1.0)
+        is_outside = is_outside or edge_y * off_x - edge_x * off_y > 0.0
+        along = off_x * edge_x + off_y * edge_y
+        share = min(max(along / (edge_x * edge_x + edge_y * edge_y), 0.0), 1.0)
         off_x, off_y = off_x - share * edge_x, off_y - share * edge_y
         distance2 = off_x * off_x + off_y * off_y
         if distance2 < square:
             square, near_x, near_y = distance2, off_x, off_y
+    if not is_outside or square == 0.0:
+        return _depth(points, begin, end, x, y)
     distance = math.sqrt(square)
-    if outside <= 0.0 or distance == 0.0:
-        return min(outside, 0.0), out_x, out_y
     return distance, near_x / distance, near_y / distance
+
+
+@kernel()
+def _depth(
+    points: Array, begin: int, end: int, x: float, y: float
+) -> tuple[float, float, float]:
+    """As `part_gap`, of a point that is not outside a polygon."""
+    outside, out_x, out_y = -math.inf, 1.0, 0.0
+    for i in range(begin, end):
+        j = i + 1 if i + 1 < end else begin
+        edge_x, edge_y = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+        length = math.sqrt(edge_x * edge_x + edge_y * edge_y)
+        off_x, off_y = x - points[i, 0], y - points[i, 1]
+        side = (edge_y * off_x - edge_x * off_y) / length
+        if side > outside:
+            outside, out_x, out_y = side, edge_y / length, -edge_x / length
+    return min(outside, 0.0), out_x, out_y
 
 
 @kernel("f8[:,:] i8[:] f8[:,:] f8 f8 -> f8")

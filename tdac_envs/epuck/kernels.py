@@ -72,7 +72,8 @@ def way_left(
         best = math.inf
         for j in range(max(row - ring, 0), min(row + ring + 2, height)):
             for i in range(max(column - ring, 0), min(column + ring + 2, width)):
-                hop = spacing * math.hypot(u - i, v - j)
+                off_u, off_v = u - i, v - j
+                hop = spacing * math.sqrt(off_u * off_u + off_v * off_v)
                 if ring == 0 or hop < constants[RADIUS]:
                     best = min(best, field[j, i] + hop)
         if best < math.inf:
@@ -113,7 +114,8 @@ def _observe(
         constants[FLOOR], state, readings, hits,
     )  # fmt: skip
     outcome[REMAINING] = way_left(field, constants, x, y, outcome[REMAINING])
-    gap = math.hypot(goal_x - x, goal_y - y)
+    off_x, off_y = goal_x - x, goal_y - y
+    gap = math.sqrt(off_x * off_x + off_y * off_y)
     begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
     room = nearest_of(points, first, extent, listed, begin, end, x, y)
     outcome[REACHED] = gap <= constants[TOLERANCE] and (
