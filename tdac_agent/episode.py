@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,19 @@ from tdac_envs.task2d import Pose
 SLOW_FACTOR = 2.0
 SLOW_AFTER_CALLS = 50
 LARGEST = 1e30
+
+
+class Driver(Protocol):
+    """What answers observations: a `Child`, or a policy of ours in this process."""
+
+    def reset(self, observation: Observation) -> object:
+        """Take the first observation of an episode."""
+
+    def policy(self, observation: Observation) -> Any:
+        """Return what should be wheel speeds."""
+
+    def waited(self) -> float:
+        """Return for how many seconds it has stood in line for a CPU so far."""
 
 
 @dataclass(slots=True)
@@ -53,6 +66,7 @@ class Record:
     _actions: list[NDArray[np.float32]] = field(default_factory=list)
     _distances: list[float] = field(default_factory=list)
     _ranges: list[NDArray[np.float32]] = field(default_factory=list)
+    _rooms: list[float] = field(default_factory=list)
     _collisions: int = 0
 
     def reset(self) -> tuple[Observation, dict[str, Any]]:
@@ -107,11 +121,16 @@ class Record:
             self.env.nominal.dt,
         )
 
+    def rooms(self) -> NDArray[np.float64]:
+        """Distance from the robot's centre to what is solid, as `Rollout` has it."""
+        return np.array(self._rooms, np.float64)
+
     def _note(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
         """Writes a moment down; returns what the controller may know of it."""
         self._poses.append(self.env.pose())
         self._distances.append(info["path_distance"])
         self._ranges.append(observation[self.env.readings])
+        self._rooms.append(info["clearance"])
         self._collisions = self.collisions_before + info["collisions"]
         return {**info, "collisions": self._collisions}
 
@@ -148,12 +167,12 @@ def wrong_action(action: Any) -> str:
 
 
 def run_policy(
-    child: Child, record: Record, name: str, *, held_out: bool, deadline: float
+    child: Driver, record: Record, name: str, *, held_out: bool, deadline: float
 ) -> Rollout:
     """Drives an episode by `policy(obs)`.
 
     Args:
-        child: With the controller imported.
+        child: With the controller imported, or a policy of ours.
         record: Steps the environment.
         name: Of the episode.
         held_out: Whether feedback may tell only pass or fail of it.
@@ -213,7 +232,9 @@ def _ended_early(record: Record, max_steps: int) -> str:
     )
 
 
-def _too_slow(calls: list[float], dt: float, child: Child, waited: float) -> str | None:
+def _too_slow(
+    calls: list[float], dt: float, child: Driver, waited: float
+) -> str | None:
     if len(calls) < SLOW_AFTER_CALLS or len(calls) % SLOW_AFTER_CALLS:
         return None
     if math.fsum(calls) <= SLOW_FACTOR * dt * len(calls):
@@ -224,7 +245,7 @@ def _too_slow(calls: list[float], dt: float, child: Child, waited: float) -> str
     return f"policy takes {1000 * mean:.0f} ms a call, {1000 * dt:.0f} ms are allowed"
 
 
-def _mean_call(calls: list[float], child: Child, waited: float) -> float:
+def _mean_call(calls: list[float], child: Driver, waited: float) -> float:
     """Seconds of a call, without what the child stood in line for a CPU.
 
     Args:
@@ -258,5 +279,7 @@ def _rollout(
         error=None if error is None else str(error),
         call_ms=(1000 * mean_call, float(np.percentile(times, 99))),
         returned=returned,
+        rooms=record.rooms(),
+        calls=np.array(calls, np.float64),
         timed_out=isinstance(error, ControllerTimeout) or mean_call > task.dt,
     )

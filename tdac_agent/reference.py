@@ -51,16 +51,28 @@ class Reference:
             self._waypoints.pop(0)
         if not self._waypoints:
             return 0.0, 0.0
-        to_x, to_y = self._waypoints[0]
-        robot = self.task.robot
-        step = robot.max_wheel_speed * self.task.dt
-        error = float(wrap_angle(math.atan2(to_y - y, to_x - x) - heading))
-        if abs(error) > _ALIGNED:
-            wheel = error * robot.axle_length / (2.0 * step)
-            wheel = min(max(wheel, -1.0), 1.0)
-            return wheel, -wheel
-        forward = min(math.hypot(to_x - x, to_y - y) / step, 1.0)
-        return forward, forward
+        step, axle = self.task.full_step, self.task.robot.axle_length
+        return steer((x, y, heading), self._waypoints[0], step, axle)
+
+
+def steer(
+    pose: tuple[float, float, float], point: Point, step: float, axle: float
+) -> tuple[float, float]:
+    """Wheel fractions (left, right) of a turn in place, or of a straight drive.
+
+    Args:
+        pose: x, y (down) and heading, rad.
+        point: Where to.
+        step: Way of one step at full speed.
+        axle: Distance of the wheels.
+    """
+    dx, dy = point[0] - pose[0], point[1] - pose[1]
+    error = float(wrap_angle(math.atan2(dy, dx) - pose[2]))
+    if abs(error) > _ALIGNED:
+        wheel = min(max(error * axle / (2.0 * step), -1.0), 1.0)
+        return wheel, -wheel
+    forward = min(math.hypot(dx, dy) / step, 1.0)
+    return forward, forward
 
 
 def oracle_path(task: Map2DTask, x: float, y: float) -> Path:

@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import contextlib
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
-from pydantic import ValidationError
-
+from tdac_agent.contenders import Contender
 from tdac_agent.disturbance import Disturbance
-from tdac_agent.errors import Fault
 from tdac_agent.files import write_atomic
 from tdac_agent.provenance import origin
 from tdac_agent.robust_report import RobustProvenance, RobustReport, summarise
 from tdac_agent.sandbox import Limits
-from tdac_agent.seeded import (
-    ENDING_FILE,
-    EPISODES_FILE,
-    Ending,
-    SeededEpisode,
-    SeededJob,
-)
+from tdac_agent.seeded import SeededEpisode, SeededJob
+from tdac_agent.seeded_run import lay_out, run_seeds
 from tdac_agent.sequential import MARGIN, SequentialTest
-from tdac_agent.task import Task, portable_task_file, write_workdir
-from tdac_agent.verification import DEADLINE_SECONDS, read_source
+from tdac_agent.task import Task
+from tdac_agent.verification import read_source
 from tdac_agent.warm import WarmJudge
 from tdac_envs.arguments import whole_number
 
 EPISODES = 200
-# A policy twice too slow is cut off, and a time-out is tried once more.
-SLOWEST = 4.0
 
 
 def verify_robust(
@@ -82,18 +71,21 @@ def verify_robust(
     source = read_source(controller)
     with tempfile.TemporaryDirectory(prefix="tdac-robust-") as name:
         folder = Path(name)
+        controller_file = folder / "controller.py"
+        write_atomic(controller_file, source)
         job = SeededJob(
-            task=folder / "work",
-            controller=folder / "controller.py",
+            task=lay_out(task, folder / "work"),
+            contender=Contender("controller", controller_file),
             disturbance=disturbance or Disturbance(),
-            first_seed=first_seed,
-            episodes=episodes,
+            variation="jitter",
+            seeds=tuple(range(first_seed, first_seed + episodes)),
             test=test,
+            measured=False,
             tier=tier,
             limits=limits or Limits(),
             out=folder / "results",
         )
-        ended, ending = _run(job, task, source, folder, judge, watch)
+        ended, ending = run_seeds(job, task.nominal, SeededEpisode, judge, watch)
         provenance = RobustProvenance(
             **origin(task, source, job.task, ending.tier, job.limits),
             disturbance=job.disturbance,
@@ -104,74 +96,3 @@ def verify_robust(
         out.mkdir(parents=True, exist_ok=True)
         write_atomic(out / "robust.json", report.model_dump_json(indent=2) + "\n")
     return report
-
-
-def _run(
-    job: SeededJob,
-    task: Task,
-    source: bytes,
-    folder: Path,
-    judge: WarmJudge | None,
-    watch: Callable[[int, int], None] | None,
-) -> tuple[list[SeededEpisode], Ending]:
-    """Has the job done; returns the episodes and what else was found."""
-    job.out.mkdir()
-    write_workdir(job.task, task)
-    write_atomic(job.task / "task.yaml", portable_task_file(task))
-    write_atomic(job.controller, source)
-    request = folder / "job.json"
-    request.write_text(job.model_dump_json(), encoding="utf-8")
-    nominal = task.nominal
-    seconds = SLOWEST * nominal.horizon * nominal.dt * job.episodes + DEADLINE_SECONDS
-    tail = Tail(job.out / EPISODES_FILE, watch)
-    with contextlib.ExitStack() as stack:
-        warm = judge or stack.enter_context(WarmJudge())
-        warm.run(request, seconds, tail.read)
-    tail.read()
-    return tail.episodes, _ending(job.out / ENDING_FILE, folder / "output.txt")
-
-
-def _ending(path: Path, output: Path) -> Ending:
-    try:
-        ending = Ending.model_validate_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValidationError) as error:
-        printed = output.read_text("utf-8", "replace") if output.is_file() else ""
-        lines = [line.strip() for line in printed.splitlines() if line.strip()]
-        said = " | ".join(lines[-4:]) or "no output"
-        raise Fault(f"the judge did not finish the episodes: {said}") from error
-    if ending.fault is not None:
-        raise Fault(ending.fault)
-    return ending
-
-
-@dataclass(slots=True)
-class Tail:
-    """Reads what the judge's process appends, as it comes.
-
-    Attributes:
-        path: File with a line for each episode; not there at first.
-        watch: Told the number of episodes and of successes, where both grew.
-        episodes: Those read so far.
-    """
-
-    path: Path
-    watch: Callable[[int, int], None] | None = None
-    episodes: list[SeededEpisode] = field(default_factory=list)
-    _offset: int = 0
-    _successes: int = 0
-
-    def read(self) -> None:
-        """Takes the lines that are whole by now."""
-        if not self.path.is_file():
-            return
-        with self.path.open("rb") as file:
-            file.seek(self._offset)
-            new = file.read()
-        whole = new[: new.rfind(b"\n") + 1]
-        self._offset += len(whole)
-        for line in whole.splitlines():
-            episode = SeededEpisode.model_validate_json(line)
-            self.episodes.append(episode)
-            self._successes += episode.success
-        if whole and self.watch is not None:
-            self.watch(len(self.episodes), self._successes)

@@ -1,44 +1,56 @@
-"""Disturbed episodes by seed, in the judge's process; what is kept of each."""
+"""Many episodes by seed, in the judge's process; what is kept of each."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from tdac_agent.contenders import Contender
 from tdac_agent.crew import SIZE, Crew
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.disturbance import Disturbance
-from tdac_agent.episode import Record, not_driven, run_policy
+from tdac_agent.driving import Driven, Stage, drive_seed, record_of
+from tdac_agent.episode import not_driven
 from tdac_agent.files import write_atomic
+from tdac_agent.measures import Measured, measure
 from tdac_agent.nursery import Nursery
 from tdac_agent.report import Cause
 from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
 from tdac_agent.sequential import SequentialTest
 from tdac_agent.task import Task, load_task
-from tdac_agent.trajectory import Outcome, Rollout
+from tdac_agent.trajectory import Outcome
 from tdac_agent.turns import Turns
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
+POSES_FILE, CALLS_FILE = "poses.npz", "calls.npy"
+# Of an evaluation: after so many time-outs the rest is not waited for.
+MOST_LATE = 3
 
 
 class SeededJob(BaseModel):
-    """Episodes that the judge's process is to run; all paths are absolute."""
+    """Episodes that the judge's process is to run; all paths are absolute.
+
+    `test` stops a robust verification early; `measured` is of an evaluation: figures
+    for a comparison in the place of a diagnosis, and poses and times beside them.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     task: Path
-    controller: Path
+    contender: Contender
     disturbance: Disturbance
-    first_seed: int
-    episodes: int
+    variation: str
+    seeds: tuple[int, ...]
     test: SequentialTest | None
+    measured: bool
     tier: str
     limits: Limits
     out: Path
@@ -81,57 +93,23 @@ class Ending(BaseModel):
     fault: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
-    """All that an episode depends on but its seed.
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """What the judge's process keeps of an episode.
 
     Attributes:
-        task: What the controller must do.
-        source: Bytes of `controller.py`.
-        workdir: Folder whose files the controller may read.
-        disturbance: Of the environment.
-        tier: Sandbox tier, or `auto`.
-        limits: Of each child, and so of each episode.
-        nursery: Where children come from.
+        figures: A line of the results.
+        tier: Sandbox tier; empty where nothing was started.
+        late: Whether it took too long.
+        poses: Shape (T + 1, 3), float32; of an evaluation, as is the next one.
+        calls: Shape (T,), float32, seconds.
     """
 
-    task: Task
-    source: bytes
-    workdir: Path
-    disturbance: Disturbance
+    figures: SeededEpisode | Measured
     tier: str
-    limits: Limits
-    nursery: Nursery
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Driven:
-    """An episode, the CPU seconds of its child, and the sandbox tier of that."""
-
-    rollout: Rollout
-    cpu_seconds: float
-    tier: str
-
-
-def drive_seed(stage: Stage, seed: int) -> Driven:
-    """The episode of a seed, in a fresh child.
-
-    Start and noise are what the environment draws after `reset(seed=seed)`.
-    """
-    env = stage.task.disturbed_env(stage.disturbance)
-    record = Record(env, None, stage.task.nominal.horizon, seed=seed)
-    name = f"seed {seed}"
-    child = stage.nursery.take(stage.tier, stage.limits)
-    try:
-        child.furnish(stage.workdir, stage.source)
-        child.load()
-        # Each call has its limit, and slow ones are cut off by their mean.
-        rollout = run_policy(child, record, name, held_out=False, deadline=math.inf)
-    except ControllerFault as fault:
-        rollout = not_driven(record, name, fault)
-    finally:
-        usage = child.close()
-    return Driven(rollout, usage.cpu_seconds, child.tier)
+    late: bool
+    poses: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), "f4"))
+    calls: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, "f4"))
 
 
 def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
@@ -143,65 +121,103 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
     job.out.mkdir(exist_ok=True)
     stage = Stage(
         load_task(job.task),
-        job.controller.read_bytes(),
+        job.contender,
         job.task,
         job.disturbance,
         job.tier,
         job.limits,
         nursery,
+        job.variation,
     )
     counts, tier, fault = [0, 0], job.tier, None
+    everything: list[Kept] = []
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
             with closing(_in_order(stage, job)) as episodes:
-                for episode, tier in episodes:  # noqa: B007
-                    file.write(episode.model_dump_json() + "\n")
+                for kept in episodes:
+                    tier = kept.tier or tier
+                    file.write(kept.figures.model_dump_json() + "\n")
                     file.flush()
-                    counts[not episode.success] += 1
+                    counts[not kept.figures.success] += 1
+                    if job.measured:
+                        everything.append(kept)
                     if job.test and job.test.decide(*counts) != "undecided":
                         break
         except SandboxError as error:
             fault = f"the sandbox failed: {error}"
+    if job.measured:
+        _write_arrays(everything, job.out)
     ending = Ending(tier=tier, fault=fault)
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 
 
-def _in_order(stage: Stage, job: SeededJob) -> Generator[tuple[SeededEpisode, str]]:
-    """Episodes and their tiers, several at a time; closing waits for the last."""
-    seeds = range(job.first_seed, job.first_seed + job.episodes)
-    size = min(SIZE, job.episodes)
-    turns = Turns(size)
+def _write_arrays(everything: list[Kept], out: Path) -> None:
+    np.savez(out / POSES_FILE, *(kept.poses for kept in everything))
+    calls = [kept.calls for kept in everything]
+    np.save(out / CALLS_FILE, np.concatenate([np.zeros(0, np.float32), *calls]))
+
+
+def _in_order(stage: Stage, job: SeededJob) -> Generator[Kept]:
+    """Episodes, several at a time; closing waits for the last."""
+    size = min(SIZE, len(job.seeds))
+    turns, late = Turns(size), list[int]()
+    work = partial(_kept, stage, job.measured)
     with (
-        closing(Crew(partial(_driven, stage), stage.nursery.close, size)) as crew,
+        closing(Crew(work, stage.nursery.close, size)) as crew,
         ThreadPoolExecutor(max_workers=size) as pool,
     ):
         try:
-            yield from pool.map(partial(_in_turn, crew, turns), seeds)
+            patience = MOST_LATE if job.measured else len(job.seeds)
+            yield from pool.map(
+                partial(_in_turn, crew, turns, late, patience), job.seeds
+            )
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def _driven(stage: Stage, seed: int) -> tuple[SeededEpisode, str, bool]:
-    """What is kept of an episode, its tier, and whether it took too long."""
-    driven = drive_seed(stage, seed)
+def _kept(stage: Stage, measured: bool, seed: int, given_up: bool) -> Kept:
+    """What is kept of the episode of a seed, or of one that is not waited for."""
+    driven = _given_up(stage, seed) if given_up else drive_seed(stage, seed)
     rollout = driven.rollout
     late = rollout.outcome == "error" and rollout.timed_out
-    return figures(driven, seed, stage.task), driven.tier, late
+    if not measured:
+        return Kept(figures(driven, seed, stage.task), driven.tier, late)
+    return Kept(
+        measure(rollout, seed, driven.task),
+        driven.tier,
+        late,
+        rollout.trajectory.poses.astype(np.float32),
+        rollout.calls.astype(np.float32),
+    )
+
+
+def _given_up(stage: Stage, seed: int) -> Driven:
+    reason = f"not driven, since {MOST_LATE} episodes before it timed out"
+    record = record_of(stage, seed)
+    rollout = not_driven(record, f"seed {seed}", ControllerFault(reason, "policy"))
+    return Driven(rollout, 0.0, "", record.env.task)
 
 
 def _in_turn(
-    crew: Crew[[int], tuple[SeededEpisode, str, bool]], turns: Turns, seed: int
-) -> tuple[SeededEpisode, str]:
-    """An episode and its tier.
+    crew: Crew[[int, bool], Kept],
+    turns: Turns,
+    late: list[int],
+    patience: int,
+    seed: int,
+) -> Kept:
+    """An episode.
 
     A time-out may be the machine's doing, so it is tried once more, alone.
     """
+    given_up = len(late) >= patience
     with turns.beside():
-        episode, tier, late = crew.do(seed)
-    if late:
+        kept = crew.do(seed, given_up)
+    if kept.late and len(late) < patience:
         with turns.alone():
-            episode, tier, _ = crew.do(seed)
-    return episode, tier
+            kept = crew.do(seed, False)
+        if kept.late:
+            late.append(seed)
+    return kept
 
 
 def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:

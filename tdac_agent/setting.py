@@ -76,6 +76,10 @@ class JudgedEnv(Protocol):
     def nominal(self) -> Nominal:
         """The task that it was made for."""
 
+    @property
+    def task(self) -> Nominal:
+        """The task of the episode: its start and goal as they were drawn."""
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:

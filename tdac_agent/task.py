@@ -65,9 +65,11 @@ class Task:
         """The environment of this task; options as for its class."""
         return self.setting.make_env(**options)
 
-    def disturbed_env(self, disturbance: Disturbance) -> JudgedEnv:
-        """The environment of this task, disturbed."""
-        options = disturbance.env_options()
+    def disturbed_env(
+        self, disturbance: Disturbance, variation: str = "jitter"
+    ) -> JudgedEnv:
+        """The environment of this task, disturbed; `variation` as it has it."""
+        options = {**disturbance.env_options(), "variation": variation}
         noise = self.setting.noise(options.pop("range_noise"))
         return self.make_env(**options, **noise)
 

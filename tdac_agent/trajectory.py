@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -116,6 +116,9 @@ class Rollout:
             line for a CPU, and 99th percentile with it, ms.
         returned: What `run_episode` returned, for an episode driven by it.
         timed_out: Whether the controller was too slow, in one call or on average.
+        rooms: Shape (T + 1,): distance from the robot's centre to what is solid, px (of
+            the pixel's centre) or m; empty where it was not recorded.
+        calls: Shape (T,): seconds that each policy call took; empty likewise.
     """
 
     name: str
@@ -129,6 +132,8 @@ class Rollout:
     call_ms: tuple[float, float] = (0.0, 0.0)
     returned: Any = None
     timed_out: bool = False
+    rooms: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    calls: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def reached(self) -> bool:

@@ -10,13 +10,14 @@ from pathlib import Path
 from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.robust_flags import DisturbanceFlags, refuse_without
 from tdac_agent.commands.verify import controller_and_task
+from tdac_agent.contenders import Contender
 from tdac_agent.disturbance import Disturbance
+from tdac_agent.driving import Driven, Stage, drive_seed
 from tdac_agent.errors import Fault
 from tdac_agent.judge import JITTERS, Judge
 from tdac_agent.nursery import Nursery
 from tdac_agent.pictures import pictures_of
 from tdac_agent.sandbox import Limits, SandboxError
-from tdac_agent.seeded import Driven, Stage, drive_seed
 from tdac_agent.task import Task, write_workdir
 from tdac_agent.trajectory import Rollout
 from tdac_agent.verification import read_source
@@ -86,9 +87,12 @@ def drive_disturbed(
 ) -> Driven:
     """The judged episode of a seed, as a robust verification runs it."""
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
-        work, nursery = Path(folder), Nursery(ahead=False)
+        work, nursery = Path(folder) / "work", Nursery(ahead=False)
         write_workdir(work, task)
-        stage = Stage(task, source, work, disturbance, tier, Limits(), nursery)
+        controller = Path(folder) / "controller.py"
+        controller.write_bytes(source)
+        driver = Contender("controller", controller)
+        stage = Stage(task, driver, work, disturbance, tier, Limits(), nursery)
         try:
             return drive_seed(stage, seed)
         except SandboxError as error:
