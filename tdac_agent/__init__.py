@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tdac_agent.disturbance import Disturbance
+    from tdac_agent.evaluation import evaluate
+    from tdac_agent.evaluation_report import Evaluation
     from tdac_agent.policy import Policy, load_controller
     from tdac_agent.records import Run, load_run
     from tdac_agent.report import Report
@@ -17,10 +19,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Disturbance",
+    "Evaluation",
     "Policy",
     "Report",
     "Run",
     "Task",
+    "evaluate",
     "load_controller",
     "load_run",
     "load_task",
@@ -31,10 +35,12 @@ __all__ = [
 
 _HOME = {
     "Disturbance": "disturbance",
+    "Evaluation": "evaluation_report",
     "Policy": "policy",
     "Report": "report",
     "Run": "records",
     "Task": "task",
+    "evaluate": "evaluation",
     "load_controller": "policy",
     "load_run": "records",
     "load_task": "task",

@@ -1,4 +1,4 @@
-"""The command line: `tdac map | world | synth | verify | play | webots | …`.
+"""The command line: `tdac map | world | synth | verify | play | evaluate | …`.
 
 Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastructure,
 4 budget, 130 interrupted.
@@ -340,6 +340,83 @@ def play(
     disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
     raise typer.Exit(
         command.run(controller, spec, video, episode, seed, disturbed, tier)
+    )
+
+
+@app.command(
+    epilog="Examples: `tdac evaluate reference builtin go-to-goal --task maze "
+    "--task epuck`; `tdac evaluate runs/maze-1 ppo.zip --task maze --out compared`"
+)
+def evaluate(
+    policies: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="POLICY...",
+            help="controller.py files, run folders, .zip files of stable-baselines3, "
+            "`reference`, `builtin`, `follow-guidance`, `go-to-goal`, `random`.",
+        ),
+    ],
+    tasks: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--task",
+            help="Bundled name, task.yaml, or run folder; repeatable.  [default: maze]",
+        ),
+    ] = None,
+    episodes: Annotated[
+        int, typer.Option(min=1, help="Of each policy on each task.")
+    ] = 100,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Of the episodes, the same for all policies.")
+    ] = 0,
+    variation: Annotated[
+        Literal["nominal", "jitter", "random"],
+        typer.Option(
+            help="Starts: the task's own, within a body radius of it, or anywhere, "
+            "with any goal."
+        ),
+    ] = "jitter",
+    wrappers: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--wrapper",
+            metavar="NAME",
+            help="Of a .zip that does not say it, innermost first; repeatable: "
+            "`goal-relative`, `guidance`, `flatten`, or `none`.",
+        ),
+    ] = None,
+    csv: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--csv", metavar="FILE", help="Write a row for each episode."),
+    ] = None,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Write evaluation.json, episodes.csv, timing.csv and, of each task, a "
+            "picture with the ways of all policies.",
+        ),
+    ] = None,
+    tier: Tier = "auto",
+    as_json: Json = False,
+) -> None:
+    """Compare policies of any kind: same tasks, same seeds, same judge."""
+    from tdac_agent.commands import evaluate as command
+
+    raise typer.Exit(
+        command.run(
+            policies,
+            tasks or ["maze"],
+            episodes,
+            seed,
+            variation,
+            wrappers,
+            csv,
+            out,
+            tier,
+            as_json,
+        )
     )
 
 

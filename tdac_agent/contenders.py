@@ -46,13 +46,13 @@ class Contender:
 
     @property
     def knows(self) -> str:
-        """What it may know, as the table says it."""
+        """What it may know: `sensors` (with pose and goal), and what beside them."""
         if self.kind == "controller":
-            return "sensors + map"
+            return "+ map"
         if self.kind == "follow-guidance" or "guidance" in self.wrappers:
-            return "sensors + guidance"
+            return "+ guidance"
         if self.kind == "reference":
-            return "everything"
+            return "privileged"
         return "nothing" if self.kind == "random" else "sensors"
 
 

@@ -44,7 +44,7 @@ def draw_trajectories(
         [outcomes.get(name, "") for name in trajectories],
         list(trajectories),
     )
-    _write(picture, path)
+    write_png(picture, path)
 
 
 def draw_failures(
@@ -71,7 +71,7 @@ def draw_failures(
         event = event_of(task.nominal, trajectory, episode, diagnosis)
         picture = run_picture(background, trajectory.poses, event)
         files.append(folder / f"{file_stem(episode.name)}.png")
-        _write(picture, files[-1])
+        write_png(picture, files[-1])
     return files
 
 
@@ -148,6 +148,7 @@ def _where(
     return places[-1:]
 
 
-def _write(picture: Image, path: Path) -> None:
+def write_png(picture: Image, path: Path) -> None:
+    """Writes an RGB picture."""
     encoded = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1]
     write_atomic(path, encoded.tobytes())

@@ -13,9 +13,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.contact import first_contact, wrap_angle
+from tdac_envs.contact import wrap_angle
 from tdac_envs.grid import BoolGrid, body_free
 from tdac_envs.plan import Path, descend, distance_field
+from tdac_envs.straight import gets_straight
 from tdac_envs.task2d import Map2DTask
 
 Point = tuple[float, float]
@@ -136,24 +137,8 @@ def taut(path: Path, is_free: Callable[[Point, Point], bool]) -> list[Point]:
 
 def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
     """Whether the body, grown by `safe` px, gets straight from one point to another."""
-    terrain = task.terrain
-    length = math.dist(begin, end)
-    heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
-    # Short pieces: the contact test looks at all squares of a piece's bounding box.
-    pieces = max(math.ceil(length / max(task.robot.radius, 4.0)), 1)
-    for k in range(pieces):
-        touch = first_contact(
-            terrain.padded_clear,
-            begin[0] + (end[0] - begin[0]) * k / pieces,
-            begin[1] + (end[1] - begin[1]) * k / pieces,
-            heading,
-            length / pieces,
-            0.0,
-            task.robot.radius + safe,
-        )
-        if touch <= 1.0:
-            return False
-    return True
+    clear = task.terrain.padded_clear
+    return gets_straight(clear, *begin, *end, task.robot.radius + safe)
 
 
 def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:

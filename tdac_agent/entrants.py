@@ -1,0 +1,128 @@
+"""The policies of an evaluation, from the words that name them."""
+
+from __future__ import annotations
+
+import difflib
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.contenders import Contender, Kind
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.learned import read_metadata
+from tdac_agent.provenance import sha256_of
+from tdac_agent.synthesis import synthesize
+from tdac_agent.task import Task
+from tdac_agent.verification import read_source
+from tdac_envs.errors import TaskError
+from tdac_envs.wrappers import WRAPPERS
+
+OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
+BUILTIN = "builtin"
+
+
+@dataclass(frozen=True, slots=True)
+class Entrant:
+    """A policy as the user named it.
+
+    Attributes:
+        name: In tables and files.
+        contender: Who drives; of `builtin`, whose file is written for each task, a
+            controller without a file.
+        sha256: Of its file.
+    """
+
+    name: str
+    contender: Contender
+    sha256: str | None = None
+
+    @property
+    def is_builtin(self) -> bool:
+        """Whether a controller is written for each task."""
+        return self.contender.kind == "controller" and self.contender.file is None
+
+
+def entrants_of(
+    policies: Sequence[str | Path], wrappers: Sequence[str] | None = None
+) -> tuple[Entrant, ...]:
+    """The entrants that some words or paths name.
+
+    Args:
+        policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
+            controller files, run folders, policies saved by stable-baselines3.
+        wrappers: Of saved policies that do not say which they were trained with.
+
+    Raises:
+        TaskError: There is none, one comes twice, or a wrapper is unknown.
+        ControllerFileError: A file is missing or is no policy.
+    """
+    for name in wrappers or ():
+        if name not in WRAPPERS:
+            known = ", ".join(WRAPPERS)
+            raise TaskError(f"unknown wrapper {name!r}; expected some of {known}")
+    found = tuple(_entrant(str(policy), wrappers) for policy in policies)
+    if not found:
+        raise TaskError("expected at least one policy to evaluate")
+    names = [entrant.name for entrant in found]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise TaskError(f"the policy {twice[0]!r} is given twice")
+    return found
+
+
+def _entrant(word: str, wrappers: Sequence[str] | None) -> Entrant:
+    if word in OURS:
+        return Entrant(word, Contender(word))
+    if word == BUILTIN:
+        return Entrant(word, Contender("controller"))
+    path = Path(word)
+    if path.is_dir():
+        return _controller(word, path / "controller.py")
+    if not path.is_file():
+        names = (*OURS, BUILTIN)
+        close = difflib.get_close_matches(word, names, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise ControllerFileError(
+            f"no policy {word!r}: expected a controller.py, a run folder, a .zip of "
+            f"stable-baselines3, or one of {', '.join(sorted(names))}{hint}"
+        )
+    if path.suffix == ".zip":
+        return _learned(word, path, wrappers)
+    return _controller(word, path)
+
+
+def _controller(word: str, file: Path) -> Entrant:
+    if not file.is_file():
+        raise ControllerFileError(f"no controller.py in {word!r}")
+    sha256 = sha256_of(read_source(file))
+    return Entrant(word, Contender("controller", file.resolve()), sha256)
+
+
+def _learned(word: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
+    saved = read_metadata(file)
+    if saved is not None:
+        names = saved.wrappers
+    elif wrappers is not None:
+        names = tuple(wrappers)
+    else:
+        known = ", ".join(WRAPPERS)
+        raise ControllerFileError(
+            f"{word!r} does not say which observations it was trained with: give "
+            f"--wrapper NAME for each of its wrappers ({known}), or --wrapper none"
+        )
+    sha256 = sha256_of(file.read_bytes())
+    return Entrant(word, Contender("sb3", file.resolve(), names), sha256)
+
+
+def write_builtin(task: Task) -> tuple[bytes, bool]:
+    """What `tdac synth` without a model writes for a task, and whether it is verified.
+
+    Where nothing is verified, it is the last candidate.
+    """
+    with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
+        run = synthesize(task, BUILTIN, out=Path(name) / "run")
+        if run.verified:
+            return run.controller.read_bytes(), True
+        candidates = sorted((run.folder / "iterations").rglob("controller.py"))
+        return candidates[-1].read_bytes(), False
