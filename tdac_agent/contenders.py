@@ -15,7 +15,7 @@ from tdac_agent.privileged.controllers import reference_way
 from tdac_agent.reference import Point, steer
 from tdac_agent.setting import JudgedEnv
 from tdac_envs.driven import Observation
-from tdac_envs.epuck.kernels import AXLE
+from tdac_envs.epuck.kernels import AXLE_LENGTH
 from tdac_envs.guidance import Route, route_to_goal
 from tdac_envs.task2d import Map2DTask
 from tdac_envs.wrappers import Frame
@@ -77,7 +77,7 @@ class Reference:
         """A turn in place, or a straight drive."""
         x, y, heading = self._env.pose().tolist()
         task = self._env.task
-        axle = task.robot.axle_length if isinstance(task, Map2DTask) else AXLE
+        axle = task.robot.axle_length if isinstance(task, Map2DTask) else AXLE_LENGTH
         near = _ARRIVED * task.body_radius
         while len(self._way) > 1 and math.dist((x, y), self._way[0]) < near:
             self._way.pop(0)

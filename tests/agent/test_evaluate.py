@@ -19,7 +19,9 @@ from scipy.stats import binom
 from small import QUICK, write_small_task
 
 import tdac_agent
-from tdac_agent.evaluation import evaluate
+from tdac_agent.contenders import Contender
+from tdac_agent.driving import Stage, drive_seed
+from tdac_agent.evaluation import NO_DISTURBANCE, evaluate
 from tdac_agent.evaluation_report import compare, mcnemar
 from tdac_agent.learned import (
     Learned,
@@ -27,7 +29,7 @@ from tdac_agent.learned import (
     read_metadata,
     write_metadata,
 )
-from tdac_agent.measures import shortest_way, spectral_arc_length
+from tdac_agent.measures import measure, shortest_way, spectral_arc_length
 from tdac_agent.overlay import COLOURS
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.task import load_task
@@ -97,6 +99,20 @@ def test_what_our_policies_are_worth(ours):
     assert best.spl == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.parametrize("kind", ["reference", "follow-guidance"])
+def test_who_knows_the_way_gets_there_in_a_world_too(kind, tmp_path):
+    """In metres, with y up: every seed reaches the goal and touches nothing."""
+    task = load_task("epuck-crates")
+    who = Contender(kind)
+    stage = Stage(task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
+    for seed in range(3):
+        driven = drive_seed(stage, seed)
+        figures = measure(driven.rollout, seed, driven.task)
+        assert figures.success
+        assert 0.97 <= figures.path_ratio <= 1.15
+        assert 1.0 <= figures.time_ratio <= 1.6
+
+
 def test_two_evaluations_with_one_seed_are_equal_to_the_last_byte(
     ours, small_task, warm
 ):
@@ -146,6 +162,19 @@ def test_controllers_drive_the_episodes_of_the_environment(
     )
     assert row(found, "go-to-goal").outcomes == {"collision": 8}
     assert row(found, str(files[0])).sandbox != "none"
+
+
+@pytest.mark.slow
+def test_a_saved_policy_competes_with_others(tmp_path, small_task, warm):
+    """In the judge's process, as in this one."""
+    sb3 = pytest.importorskip("stable_baselines3")
+    file = tmp_path / "model.zip"
+    save(file, sb3.PPO, wrap(small_task.make_env(), WRAPPERS))
+    found = evaluate(
+        [file, "reference"], [small_task], 2, wrappers=WRAPPERS, judge=warm
+    )
+    assert row(found, str(file)).outcomes.get("error", 0) == 0
+    assert row(found, "reference").successes == 2
 
 
 @pytest.mark.slow
@@ -200,11 +229,8 @@ def save(path, algo, env, **options):
     return model
 
 
-@pytest.mark.parametrize(
-    "algo",
-    ["PPO", *(pytest.param(a, marks=pytest.mark.slow) for a in ("SAC", "TD3"))],
-)
-def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task, warm):
+@pytest.mark.parametrize("algo", ["PPO", "SAC", "TD3"])
+def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task):
     """Step for step as `model.predict` in the wrapped environment."""
     sb3 = pytest.importorskip("stable_baselines3")
     torch = pytest.importorskip("torch")
@@ -215,9 +241,12 @@ def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task, war
     file = tmp_path / "model.zip"
     model = save(file, kind, env, **(options if algo == "PPO" else {}))
     write_metadata(file, SavedPolicy(algo=algo.lower(), wrappers=wrappers))
-    found = evaluate([file], [small_task], 3, judge=warm)
-    assert row(found, str(file)).knows == "+ guidance"
-    for seed, episode in zip(seeds_of(0, 3), found.results[0].episodes, strict=True):
+    who = Contender("sb3", file, read_metadata(file).wrappers)
+    assert who.knows == "+ guidance"
+    stage = Stage(small_task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
+    for seed in range(3):
+        driven = drive_seed(stage, seed)
+        episode = measure(driven.rollout, seed, driven.task)
         observation, _ = env.reset(seed=seed)
         places, ended = [env.unwrapped.pose()[:2]], False
         while not ended:
@@ -225,10 +254,10 @@ def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task, war
             observation, _, terminated, truncated, info = env.step(action)
             places.append(env.unwrapped.pose()[:2])
             ended = terminated or truncated
-        driven = sum(math.dist(one, two) for one, two in pairwise(places))
+        length = sum(math.dist(one, two) for one, two in pairwise(places))
         assert episode.steps == len(places) - 1
         assert episode.collisions == info["collisions"]
-        assert episode.driven == pytest.approx(driven, abs=1e-2)
+        assert episode.driven == pytest.approx(length, abs=1e-2)
 
 
 def test_nothing_of_a_saved_policy_is_run(tmp_path, small_task):
