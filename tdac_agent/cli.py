@@ -15,17 +15,14 @@ from typing import Annotated, Any, Literal, NoReturn, Optional
 import typer
 
 from tdac_agent.commands.options import (
-    BaseUrl,
     Delay,
     Goal,
     Heading,
     Ignore,
     Json,
-    Learner,
     MapOption,
     Metres,
     MotorLag,
-    Optimizer,
     Profile,
     Radius,
     RangeNoise,
@@ -37,6 +34,7 @@ from tdac_agent.commands.options import (
     WorldOption,
     with_heading,
 )
+from tdac_agent.commands.synth_flags import EPILOG, synth
 from tdac_agent.commands.webots_flags import export_app, webots_app
 
 app = typer.Typer(
@@ -113,77 +111,7 @@ def world_command(
     world.run(file, png, as_json)
 
 
-@app.command(
-    epilog="Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 "
-    "--goal 178 386 --robot-radius 12`; "
-    "`tdac synth --learner anthropic:claude-sonnet-5-5`"
-)
-def synth(
-    task: TaskOption = None,
-    map_image: MapOption = None,
-    world: WorldOption = None,
-    ignore: Ignore = None,
-    start: Start = None,
-    goal: Goal = None,
-    heading: Heading = None,
-    robot_radius: Radius = None,
-    robot_image: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option(help="Picture of the robot, nose to the right."),
-    ] = None,
-    snap: Snap = False,
-    metres: Metres = False,
-    instructions: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(help="Your own text to the model, or a file with it."),
-    ] = None,
-    from_: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--from", help="Controller to begin with."),
-    ] = None,
-    k: Annotated[int, typer.Option("-K", min=1, help="Iterations at most.")] = 20,
-    j: Annotated[int, typer.Option("-J", min=0, help="Edits per iteration.")] = 1,
-    learner: Learner = "builtin",
-    optimizer: Optimizer = None,
-    base_url: BaseUrl = None,
-    prompt: Annotated[
-        str,
-        typer.Option(
-            help="What is asked: `full`, `underspecified`, or your own template file."
-        ),
-    ] = "full",
-    dry_run: Annotated[
-        bool,
-        typer.Option(
-            "--dry-run",
-            help="Print the first prompt and the cost at most; asks nobody.",
-        ),
-    ] = False,
-    out: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--out", help="Run folder.  [default: runs/TASK-N]"),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
-    as_json: Json = False,
-) -> None:
-    """Write, test and repair a controller until it is verified."""
-    from tdac_agent.commands import synth as command
-
-    spec = _flags(
-        task, map_image, world, ignore, start, goal, heading, robot_radius, robot_image,
-        snap, metres, instructions,
-    )  # fmt: skip
-    if dry_run:
-        from tdac_agent.commands import dry_run as dry
-
-        raise typer.Exit(
-            dry.run(spec, prompt, k, j, learner, optimizer, base_url, as_json)
-        )
-    raise typer.Exit(
-        command.run(
-            spec, from_, k, j, learner, optimizer, base_url, prompt, out, seed, as_json
-        )
-    )
+app.command(epilog=EPILOG)(synth)
 
 
 @app.command(
@@ -465,6 +393,19 @@ def rules_command(
     from tdac_agent.commands import rules
 
     raise typer.Exit(rules.run(run, as_json))
+
+
+@app.command("runs", epilog="Examples: `tdac runs`; `tdac runs results --json`")
+def runs_command(
+    folder: Annotated[Path, typer.Argument(help="Where the run folders are.")] = Path(
+        "runs"
+    ),
+    as_json: Json = False,
+) -> None:
+    """List run folders: how far each came, what it took, how to go on with it."""
+    from tdac_agent.commands import runs
+
+    raise typer.Exit(runs.run(folder, as_json))
 
 
 @app.command(epilog="Example: `tdac doctor`")

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from tdac_agent.calls import ask
+from tdac_agent.calls import Calls
 from tdac_agent.extract import Answer, read_answer
 from tdac_agent.feedback import tell_attempt
 from tdac_agent.prompt import FULL, PromptTemplate, generate_prompt, repair_prompt
-from tdac_agent.provider import MAX_OUTPUT_TOKENS, Kind, Provider, Reply, Request
-from tdac_agent.records import Recorder
+from tdac_agent.provider import Kind, Provider, Reply, Request
 from tdac_agent.report import Report
-from tdac_agent.retry import RetryPolicy
 from tdac_agent.rule_answer import RuleAnswerError, apply, parse_operations
 from tdac_agent.rules import BEGIN, RuleBook
 from tdac_agent.task import Task
@@ -20,6 +18,7 @@ from tdac_agent.task import Task
 MAX_ASKS = 3
 MAX_EARLIER = 12
 _AGAIN = "\n## Your last answer could not be used\nThe reason: "
+_SAME = "the code of the attempt before came back"
 _ENDED = {"length": "it was cut off at its end", "refusal": "it was refused"}
 
 
@@ -38,9 +37,8 @@ class Dialogue:
         task: What the controller must do.
         learner: Generates controllers.
         optimizer: Edits them and writes rules.
-        recorder: Keeps every question and answer.
+        calls: Through which every question passes.
         book: Rules of this run, in force and ended.
-        retry: How patiently a model is asked.
         template: Of the question for a new controller.
         earlier: The attempts so far, a line each.
     """
@@ -48,12 +46,12 @@ class Dialogue:
     task: Task
     learner: Provider
     optimizer: Provider
-    recorder: Recorder
+    calls: Calls
     book: RuleBook = field(default_factory=RuleBook)
-    retry: RetryPolicy = field(default_factory=RetryPolicy)
     template: PromptTemplate = FULL
     earlier: tuple[str, ...] = ()
     _failed: int = 0
+    _unchanged: bool = False
 
     def generate(self, k: int) -> Candidate:
         """A new controller under the rules in force."""
@@ -63,6 +61,7 @@ class Dialogue:
             rules=self._texts(),
             sample=self._at(k, 0),
             stable=_stable(self._question()),
+            max_tokens=self.calls.max_output,
         )
         return self._code(self.learner, request)
 
@@ -79,25 +78,31 @@ class Dialogue:
         request = self._repair("summarise", source, report, self._at(k, j))
         evidence = tuple(failure.test for failure in report.failures)
         for _ in range(MAX_ASKS):
-            reply = self._ask(self.optimizer, request)
+            reply = self.calls.ask(self.optimizer, request)
             try:
                 if reply.stop != "end":
                     raise RuleAnswerError(_ENDED[reply.stop])
                 operations = parse_operations(reply.text)
             except RuleAnswerError as error:
-                request = _again(request, reply, str(error))
+                request = self._again(request, reply, str(error))
                 continue
             self.book, notes = apply(self.book, operations, k, evidence)
-            self.recorder.rules(k, self.book, notes)
+            self.calls.recorder.rules(k, self.book, notes)
             return
-        self.recorder.rules(k, self.book, ("no usable answer: the rules stay",))
+        self.calls.recorder.rules(k, self.book, ("no usable answer: the rules stay",))
+
+    def saw_no_change(self, k: int, j: int) -> None:
+        """Remembers that candidate (k, j) is the one before it."""
+        self.earlier = (*self.earlier, f"k={k} j={j}: no change: {_SAME}")
+        self._unchanged = True
 
     def saw(self, k: int, j: int, report: Report) -> None:
         """Remembers what came of candidate (k, j), and of the rules behind it."""
+        self._unchanged = False
         failed = tuple(failure.test for failure in report.failures)
         if j == 0 and self.book.in_force:
             self.book = self.book.observed(failed, self._failed)
-            self.recorder.rules(k, self.book)
+            self.calls.recorder.rules(k, self.book)
         self._failed = len(failed)
         if failed:
             self.earlier = (*self.earlier, tell_attempt(k, j, report))
@@ -116,10 +121,18 @@ class Dialogue:
             # The last one is what the question is about.
             earlier=self.earlier[:-1][-MAX_EARLIER:],
             rules=self.book.in_force,
+            unchanged=self._unchanged,
         )
         stable = _stable(question)
         return Request(
-            kind, question, source, report, self._texts(), sample, stable=stable
+            kind,
+            question,
+            source,
+            report,
+            self._texts(),
+            sample,
+            stable=stable,
+            max_tokens=self.calls.max_output,
         )
 
     def _code(self, model: Provider, request: Request) -> Candidate:
@@ -130,22 +143,28 @@ class Dialogue:
         """
         notes: tuple[str, ...] = ()
         for _ in range(MAX_ASKS):
-            reply = self._ask(model, request)
+            reply = self.calls.ask(model, request)
             answer = _file_in(reply)
             if answer.source is not None:
                 return Candidate(answer.source, reply.notes)
             notes = (*reply.notes, f"not used: {answer.problem}")
-            request = _again(request, reply, answer.problem)
+            request = self._again(request, reply, answer.problem)
         return Candidate(None, notes)
 
-    def _ask(self, model: Provider, request: Request) -> Reply:
-        return ask(model, request, self.recorder, self.retry)
+    def _again(self, request: Request, reply: Reply, problem: str) -> Request:
+        """The same question with what was wrong with the answer; the last word only."""
+        first = request.prompt.partition(_AGAIN)[0]
+        prompt = f"{first}{_AGAIN}{problem}. Give the whole answer anew.\n"
+        room = request.max_tokens
+        if reply.stop == "length":
+            room = 2 * self.calls.max_output
+        return replace(request, prompt=prompt, max_tokens=room)
 
     def _texts(self) -> tuple[str, ...]:
         return tuple(rule.text for rule in self.book.in_force)
 
     def _at(self, k: int, j: int) -> tuple[int, int, int]:
-        return (self.recorder.run.seed, k, j)
+        return (self.calls.recorder.run.index, k, j)
 
 
 def _stable(prompt: str) -> int:
@@ -158,11 +177,3 @@ def _file_in(reply: Reply) -> Answer:
     if reply.stop != "end":
         return Answer(None, _ENDED[reply.stop])
     return read_answer(reply.text, must_define="policy")
-
-
-def _again(request: Request, reply: Reply, problem: str) -> Request:
-    """The same question with what was wrong with the answer; the last word only."""
-    first = request.prompt.partition(_AGAIN)[0]
-    prompt = f"{first}{_AGAIN}{problem}. Give the whole answer anew.\n"
-    room = 2 * MAX_OUTPUT_TOKENS if reply.stop == "length" else request.max_tokens
-    return replace(request, prompt=prompt, max_tokens=room)

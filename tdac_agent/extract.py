@@ -85,6 +85,15 @@ def read_answer(text: str, must_define: str | None = None) -> Answer:
     return Answer(source)
 
 
+def same_code(one: str, other: str) -> bool:
+    """Whether two texts are the same program: comments and layout do not count."""
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            return ast.dump(ast.parse(one)) == ast.dump(ast.parse(other))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return one == other
+
+
 def fenced_blocks(text: str, languages: frozenset[str]) -> list[str]:
     """Texts of the fenced blocks in some languages, up to the next closing fence."""
     lines = text.replace("\r\n", "\n").split("\n")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
+
+UNFINISHED = ".unfinished"
 
 
 def write_atomic(path: Path, data: str | bytes) -> None:
@@ -16,9 +16,19 @@ def write_atomic(path: Path, data: str | bytes) -> None:
     Args:
         path: Where to; the folder must exist.
         data: Text (as UTF-8) or bytes.
+
+    Raises:
+        OSError: It names the file, whatever went wrong.
     """
     raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        _write(path, raw)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _write(path: Path, raw: bytes) -> None:
+    handle, name = tempfile.mkstemp(UNFINISHED, f".{path.name}.", path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(raw)
@@ -26,14 +36,21 @@ def write_atomic(path: Path, data: str | bytes) -> None:
             os.fsync(file.fileno())
         os.chmod(name, 0o644)
         os.replace(name, path)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     except BaseException:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(name)
         raise
 
 
-def _sync_folder(folder: Path) -> None:
+def keep(path: Path, text: str) -> None:
+    """Writes a file that does not hold this text already."""
+    raw = text.encode("utf-8", "surrogatepass")
+    if not path.is_file() or path.read_bytes() != raw:
+        write_atomic(path, raw)
+
+
+def sync_folder(folder: Path) -> None:
     """Forces the names in a folder to the disk, where the system can."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
@@ -43,10 +60,7 @@ def _sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def append_line(path: Path, record: dict[str, Any]) -> None:
-    """Appends one JSON line and forces it to the disk."""
-    line = json.dumps(record, sort_keys=True) + "\n"
-    with path.open("a", encoding="utf-8") as file:
-        file.write(line)
-        file.flush()
-        os.fsync(file.fileno())
+def clear_unfinished(folder: Path) -> None:
+    """Removes what was left by a program that was killed while it wrote."""
+    for path in folder.rglob(f".*{UNFINISHED}"):
+        path.unlink(missing_ok=True)

@@ -51,6 +51,7 @@ def foresee(
     patience: int = 1,
     template: PromptTemplate = FULL,
     base_url: str | None = None,
+    max_output: int = MAX_OUTPUT_TOKENS,
 ) -> Outlook:
     """The first prompt of a run and its worst case; no model is asked, no key needed.
 
@@ -63,6 +64,7 @@ def foresee(
         patience: J.
         template: Of the question for a new controller.
         base_url: Where the models are served, if not by the vendor.
+        max_output: Tokens that an answer may have.
 
     Raises:
         PromptError: The template cannot be used.
@@ -73,16 +75,16 @@ def foresee(
     first, second = (prices.price_of(m, base_url) for m in (learner, optimizer))
     once = most = first_cost = None
     if first is not None:
-        first_cost = first.most(tokens, MAX_OUTPUT_TOKENS)
+        first_cost = first.most(tokens, max_output)
     if first is not None and second is not None:
         asked = tokens + MAX_RULE_TOKENS
         # A controller that was cut off may have twice the tokens when it comes.
-        shown = asked + FEEDBACK_TOKENS + 2 * MAX_OUTPUT_TOKENS
-        said = MAX_OUTPUT_TOKENS * (1 + 2 * (MAX_ASKS - 1))
+        shown = asked + FEEDBACK_TOKENS + 2 * max_output
+        said = max_output * (1 + 2 * (MAX_ASKS - 1))
         once, most = (
             iterations
             * (first.most(n * asked, out) + repairs * second.most(n * shown, out))
-            for n, out in ((1, MAX_OUTPUT_TOKENS), (MAX_ASKS, said))
+            for n, out in ((1, max_output), (MAX_ASKS, said))
         )
     names = dict.fromkeys(
         name for name, price in ((learner, first), (optimizer, second)) if price is None
@@ -95,7 +97,7 @@ def foresee(
         patience=patience,
         prompt=prompt,
         prompt_tokens=tokens,
-        answer_tokens=MAX_OUTPUT_TOKENS,
+        answer_tokens=max_output,
         first_cost=first_cost,
         questions=iterations * (1 + repairs),
         cost_once=once,

@@ -10,6 +10,7 @@ from typing import Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from tdac_agent.provider import Reply
 from tdac_envs.errors import TdacError
 
 SHIPPED = Path(__file__).parent / "prices.yaml"
@@ -37,6 +38,18 @@ class Price(_Strict):
         """USD for so many tokens, whether or not they are written to a cache."""
         dearest = max(self.input, self.cache_write or 0.0)
         return (dearest * tokens_in + self.output * tokens_out) / 1e6
+
+    def cost(self, reply: Reply) -> float:
+        """USD of an answer, by what is reported of it; a cache costs its own price."""
+        read = self.input if self.cache_read is None else self.cache_read
+        written = self.input if self.cache_write is None else self.cache_write
+        plain = reply.tokens_in - reply.tokens_cached - reply.tokens_written
+        return (
+            self.input * max(0, plain)
+            + read * reply.tokens_cached
+            + written * reply.tokens_written
+            + self.output * reply.tokens_out
+        ) / 1e6
 
 
 class PriceList(_Strict):

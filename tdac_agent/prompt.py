@@ -135,6 +135,7 @@ def repair_prompt(
     *,
     earlier: tuple[str, ...] = (),
     rules: tuple[RepairRule, ...] = (),
+    unchanged: bool = False,
 ) -> str:
     """The question to `edit` a controller, or to `summarise` its failures as rules.
 
@@ -145,6 +146,7 @@ def repair_prompt(
         report: What failed.
         earlier: The attempts before this one, a line each.
         rules: Those in force, with what came of them.
+        unchanged: Whether the last edit gave the same code again.
     """
     return (
         _templates()
@@ -155,6 +157,7 @@ def repair_prompt(
             feedback=render_feedback(report),
             earlier=earlier,
             rules=rules,
+            unchanged=unchanged,
             most_operations=MAX_OPERATIONS,
             longest_rule=MAX_RULE_CHARS,
         )

@@ -28,7 +28,6 @@ def origin(
         limits: Of its processes.
     """
     weak = "this sandbox tier cannot withhold the network and other files"
-    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
     return {
         "task": task.name,
         "task_sha256": task.sha256(),
@@ -41,8 +40,14 @@ def origin(
         "sandbox": tier,
         "limits": asdict(limits),
         "warnings": (*((weak,) if tier == "rlimits" else ()), *task.params.notes),
-        "versions": {"python": platform.python_version(), **versions},
+        "versions": versions(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Of Python and of the packages that a verdict may depend on."""
+    packages = {name: importlib.metadata.version(name) for name in VERSIONED}
+    return {"python": platform.python_version(), **packages}
 
 
 def sha256_of(data: bytes) -> str:

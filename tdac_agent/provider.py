@@ -30,6 +30,8 @@ class Request:
             questions of a run; a provider may have them cached.
         max_tokens: That an answer may have.
         seconds: That an answer may take.
+        turn: How many questions of this kind for this candidate came before.
+        repeat: How many questions with this very prompt came before in the run.
     """
 
     kind: Kind
@@ -41,6 +43,8 @@ class Request:
     stable: int = 0
     max_tokens: int = MAX_OUTPUT_TOKENS
     seconds: float = ANSWER_SECONDS
+    turn: int = 0
+    repeat: int = 0
 
     @property
     def role(self) -> Role:
@@ -88,6 +92,9 @@ class Provider(Protocol):
         name: For people and records; holds no key.
         paid: Whether an answer costs money (or much else); before the first such
             call of a run the suite has to prove itself.
+
+    One may also have `served_at`, the address of its server if that is not the
+    vendor's own, without anything secret.
     """
 
     name: str
@@ -106,15 +113,25 @@ class Provider(Protocol):
         ...
 
 
+def served_at(model: Provider) -> str | None:
+    """Address of a model's server; None for the vendor's own, or without one."""
+    address: str | None = getattr(model, "served_at", None)
+    return address
+
+
 class ProviderFault(Exception):
     """An infrastructure fault of a provider that may be gone the next time.
 
     Args:
         message: One line.
         retry_after: Seconds after which the provider wants to be asked again.
+
+    Attributes:
+        billed: Whether there may have been an answer that has to be paid for.
     """
 
     kind = "transient"
+    billed = True
 
     def __init__(self, message: str, retry_after: float | None = None) -> None:
         super().__init__(message)
@@ -125,9 +142,11 @@ class RateLimited(ProviderFault):
     """Too many requests or tokens for now."""
 
     kind = "rate limit"
+    billed = False
 
 
 class PermanentFault(ProviderFault):
     """Asking again does not help: no access, no credit, no such model, too long."""
 
     kind = "permanent"
+    billed = False

@@ -1,30 +1,24 @@
-"""A run on disk: everything that happened, in one self-contained folder."""
+"""A run on disk: what it was asked for, how far it came, and what it took."""
 
 from __future__ import annotations
 
-import difflib
 import json
-import shutil
-import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.errors import RunError
-from tdac_agent.files import append_line, write_atomic
-from tdac_agent.provider import Reply, Request
-from tdac_agent.report import Report
-from tdac_agent.retry import Missed
 from tdac_agent.rules import RuleBook
-from tdac_agent.task import Task, portable_task_file, write_workdir
 
-Status = Literal["running", "verified", "not verified", "interrupted", "fault"]
-OWN_SUITE = "suite"
+Status = Literal[
+    "running", "verified", "not verified", "interrupted", "fault", "budget"
+]
+RUN_FILE = "run.json"
+JOURNAL = "journal.jsonl"
 RULES_FILE = "rules.json"
-Event = Callable[[dict[str, Any]], None]
+GIVEN_FILE = "given.py"
+PROMPT_FILE = "prompt.j2"
 
 
 class Attempt(BaseModel):
@@ -38,6 +32,9 @@ class Attempt(BaseModel):
     passed: bool
     failed_tests: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    unchanged: bool = Field(
+        False, description="The code of the attempt before, whose report stands."
+    )
 
 
 class Run(BaseModel):
@@ -61,15 +58,46 @@ class Run(BaseModel):
     tokens_out: int = 0
     tokens_cached: int = Field(0, description="Of tokens_in, read from a cache.")
     models: tuple[str, ...] = Field((), description="As the providers report them.")
-    base_url: str | None = None
+    base_url: str | None = Field(None, description="As given.")
+    served_at: dict[str, str] = Field(
+        {}, description="Address of each model's server that is not the vendor's."
+    )
     prompt: str = Field("full", description="Template of the first question.")
+    max_output: int = Field(0, description="Tokens that an answer may have.")
+    index: int = Field(0, description="Of several runs of the same.")
+    version: str = Field("", description="Of this program.")
+    suite_sha256: str = ""
+    prompt_sha256: str = Field("", description="Of the first question.")
+    given_sha256: str | None = Field(
+        None, description="Of the controller to begin with."
+    )
+    max_cost: float | None = Field(None, description="USD.")
+    max_tokens: int | None = None
+    cost: float | None = Field(None, description="USD of all answers; None if unknown.")
+    cost_lost: float = Field(
+        0.0, description="USD at most of calls whose answer was lost, on top."
+    )
+    id: str = ""
     started: str
     seconds: float = 0.0
+    reason: str = Field("", description="Why it ended, of a fault or the budget.")
+    enough: str = Field("", description="Flag with which it can go on, of the budget.")
+    censored: bool = Field(False, description="Ended by the budget, without a verdict.")
 
     @property
     def verified(self) -> bool:
         """Whether a controller passed."""
         return self.status == "verified"
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing left to do."""
+        return self.status in {"verified", "not verified"}
+
+    @property
+    def tokens(self) -> int:
+        """In and out together."""
+        return self.tokens_in + self.tokens_out
 
     @property
     def controller(self) -> Path:
@@ -83,7 +111,7 @@ def load_run(folder: Path) -> Run:
     Raises:
         RunError: It holds no readable `run.json`.
     """
-    path = folder / "run.json"
+    path = folder / RUN_FILE
     try:
         content = json.loads(path.read_bytes().decode("utf-8"))
         return Run.model_validate({**content, "folder": folder})
@@ -108,157 +136,3 @@ def load_rules(folder: Path) -> RuleBook:
     except (OSError, ValueError) as error:
         reason = str(error).partition("\n")[0]
         raise RunError(f"{path} holds no rules: {reason}") from error
-
-
-@dataclass(slots=True)
-class Recorder:
-    """Writes a run folder while the run goes on.
-
-    Attributes:
-        run: The record so far.
-        on_event: Called with each journal record, for live progress.
-    """
-
-    run: Run
-    on_event: Event | None
-    _clock: float = field(default_factory=time.monotonic)
-    _previous: str = ""
-
-    def start(self, task: Task) -> None:
-        """Makes the folder: task, original, suite, working files, empty journal."""
-        folder = self.run.folder
-        write_workdir(folder, task)
-        write_atomic(
-            folder / "task.yaml", portable_task_file(task, own_suite=OWN_SUITE)
-        )
-        if task.suite is not None:
-            ignored = shutil.ignore_patterns("__pycache__")
-            shutil.copytree(task.suite, folder / OWN_SUITE, ignore=ignored)
-        original = task.setting.original
-        if original is not None:
-            write_atomic(folder / original.name, original.file.read_bytes())
-        self.event("run.start", task=task.name, learner=self.run.learner)
-        self.save()
-
-    def event(self, name: str, /, **facts: Any) -> None:
-        """Appends to the journal."""
-        record = {"event": name, "seconds": round(self._elapsed(), 3), **facts}
-        append_line(self.run.folder / "journal.jsonl", record)
-        if self.on_event is not None:
-            self.on_event(record)
-
-    def asked(self, request: Request, model: str) -> None:
-        """Keeps a prompt before it is sent to a model."""
-        _, k, j = request.sample
-        write_atomic(self._unused(request, "prompt"), request.prompt)
-        self.event("call.intent", kind=request.kind, k=k, j=j, model=model)
-
-    def missed(self, request: Request, miss: Missed) -> None:
-        """Keeps a fault, and whether the question is put again."""
-        _, k, j = request.sample
-        wait = None if miss.wait is None else round(miss.wait, 3)
-        self.event(
-            "call.fault",
-            kind=request.kind,
-            k=k,
-            j=j,
-            attempt=miss.attempt,
-            fault=miss.fault.kind,
-            reason=str(miss.fault),
-            wait=wait,
-        )
-
-    def answered(self, request: Request, reply: Reply) -> None:
-        """Keeps an answer as it came, beside earlier ones to the same prompt."""
-        _, k, j = request.sample
-        write_atomic(self._unused(request, "reply"), reply.text)
-        self.run.tokens_in += reply.tokens_in
-        self.run.tokens_out += reply.tokens_out
-        self.run.tokens_cached += reply.tokens_cached
-        if reply.model is not None and reply.model not in self.run.models:
-            self.run.models = (*self.run.models, reply.model)
-        self.event(
-            "call.reply",
-            kind=request.kind,
-            k=k,
-            j=j,
-            stop=reply.stop,
-            tokens_in=reply.tokens_in,
-            tokens_out=reply.tokens_out,
-            tokens_cached=reply.tokens_cached,
-            tokens_written=reply.tokens_written,
-            model=reply.model,
-            request_id=reply.request_id,
-            notes=list(reply.notes),
-        )
-
-    def candidate(self, k: int, j: int, source: str) -> Path:
-        """Keeps a candidate's source and its difference from the last one."""
-        folder = self._folder(k, j)
-        write_atomic(folder / "controller.py", source)
-        difference = difflib.unified_diff(
-            self._previous.splitlines(keepends=True),
-            source.splitlines(keepends=True),
-            "previous",
-            "controller.py",
-        )
-        write_atomic(folder / "controller.diff", "".join(difference))
-        self._previous = source
-        self.event("verify.start", k=k, j=j)
-        return folder
-
-    def judged(
-        self, k: int, j: int, report: Report | None, notes: tuple[str, ...]
-    ) -> None:
-        """Keeps a candidate's report; None where the model gave no code."""
-        failed = () if report is None else tuple(f.test for f in report.failures)
-        passed = report is not None and report.passed
-        attempt = Attempt(
-            k=k,
-            j=j,
-            valid=report is not None,
-            passed=passed,
-            failed_tests=failed,
-            notes=notes,
-        )
-        self.run.attempts.append(attempt)
-        self.event("verify.end", **attempt.model_dump(mode="json"))
-        self.save()
-
-    def rules(self, k: int, book: RuleBook, notes: tuple[str, ...] = ()) -> None:
-        """Keeps the rules of the run, and what changed them in iteration k."""
-        rules = [rule.model_dump(mode="json") for rule in book.in_force]
-        self.event("rules", k=k, rules=rules, notes=list(notes))
-        text = book.model_dump_json(indent=2) + "\n"
-        write_atomic(self.run.folder / RULES_FILE, text)
-
-    def finish(self, status: Status, **facts: Any) -> None:
-        """Closes the run."""
-        self.run.status = status
-        self.event("run.end", status=status, **facts)
-        self.save()
-
-    def save(self) -> None:
-        """Writes `run.json`."""
-        self.run.seconds = round(self._elapsed(), 3)
-        write_atomic(
-            self.run.folder / "run.json", self.run.model_dump_json(indent=2) + "\n"
-        )
-
-    def _unused(self, request: Request, what: str) -> Path:
-        """`edit.reply.md`, or `edit.reply-2.md` where that is there already."""
-        _, k, j = request.sample
-        folder = self._folder(k, j)
-        path, number = folder / f"{request.kind}.{what}.md", 1
-        while path.exists():
-            number += 1
-            path = folder / f"{request.kind}.{what}-{number}.md"
-        return path
-
-    def _folder(self, k: int, j: int) -> Path:
-        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
-
-    def _elapsed(self) -> float:
-        return time.monotonic() - self._clock

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from tdac_agent.provider import (
     PermanentFault,
-    Provider,
     ProviderFault,
     RateLimited,
     Reply,
@@ -53,7 +52,7 @@ class Missed(NamedTuple):
 
 
 def answer(
-    model: Provider,
+    complete: Callable[[Request], Reply],
     request: Request,
     policy: RetryPolicy,
     on_fault: Callable[[Missed], None],
@@ -62,7 +61,7 @@ def answer(
     """The answer of a model that may have to be asked again.
 
     Args:
-        model: Whom to ask.
+        complete: Asks it once.
         request: What.
         policy: How patiently.
         on_fault: Called after each call that failed, before the wait.
@@ -77,7 +76,7 @@ def answer(
         attempt += 1
         left = max(0.0, end - time.monotonic())
         try:
-            return model.complete(replace(request, seconds=min(request.seconds, left)))
+            return complete(replace(request, seconds=min(request.seconds, left)))
         except ProviderFault as fault:
             wait = _wait(fault, attempt, policy, end - time.monotonic())
             on_fault(Missed(attempt, fault, wait))

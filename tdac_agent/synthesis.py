@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from contextlib import suppress
 from pathlib import Path
 
+from tdac_agent.beginning import account_of, describe, hold_folder, open_record
+from tdac_agent.budget import Budget, BudgetExhausted
+from tdac_agent.calls import Calls
 from tdac_agent.dialogue import Candidate, Dialogue
-from tdac_agent.errors import RunError
+from tdac_agent.extract import same_code
 from tdac_agent.figures import draw_trajectories
 from tdac_agent.files import write_atomic
-from tdac_agent.prompt import generate_prompt, load_template
-from tdac_agent.provider import Provider
+from tdac_agent.prompt import load_template
+from tdac_agent.provider import MAX_OUTPUT_TOKENS, Provider
 from tdac_agent.providers import choose_models
-from tdac_agent.records import Event, Recorder, Run
+from tdac_agent.recorder import Event, Recorder
+from tdac_agent.records import Run
 from tdac_agent.report import Report
+from tdac_agent.resume import check_same, run_there
 from tdac_agent.retry import RetryPolicy
 from tdac_agent.suite_check import prove_suite
 from tdac_agent.task import Task
-from tdac_agent.verification import load_trajectories, verify
+from tdac_agent.verification import kept_report, load_trajectories, verify
 from tdac_agent.warm import WarmJudge
 
 
@@ -33,17 +38,25 @@ def synthesize(
     start_from: str | None = None,
     base_url: str | None = None,
     prompt: str = "full",
+    max_output: int = MAX_OUTPUT_TOKENS,
+    max_cost: float | None = None,
+    max_tokens: int | None = None,
+    budget: Budget | None = None,
+    index: int = 0,
     retry: RetryPolicy | None = None,
     on_event: Event | None = None,
 ) -> Run:
     """Writes, tests and repairs controllers until one is verified.
+
+    Where `out` holds an unfinished run of the same, it goes on with that: answers and
+    verifications on record are not asked or made again (docs/models.md).
 
     Args:
         task: What the controller must do.
         learner: LLM1 of the paper, writes controllers: a provider, or its name as in
             `anthropic:MODEL` (docs/models.md).
         optimizer: LLM2, edits code and writes rules; the learner by default.
-        out: New or empty folder for the run.
+        out: New or empty folder for the run, or one with the same run.
         iterations: K.
         patience: J, edits per iteration.
         seed: Of the jittered starts.
@@ -51,6 +64,11 @@ def synthesize(
         base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
         prompt: Template of the question for a new controller: `full`,
             `underspecified`, or a file (docs/prompts.md).
+        max_output: Tokens that an answer may have; twice as many after a cut one.
+        max_cost: USD that the run may spend; by default what it was begun with, or 2.
+        max_tokens: That it may spend, in and out together; the same, or no limit.
+        budget: Shared with other runs, in the place of these limits.
+        index: Of several runs of the same, which keeps their samples apart.
         retry: How patiently a model is asked after faults.
         on_event: Called with each journal record, if given.
 
@@ -58,83 +76,137 @@ def synthesize(
         The run; `run.verified` tells whether `run.controller` was written.
 
     Raises:
-        RunError: The folder cannot be used.
-        ProviderError: A model cannot be chosen so, e.g. without its key.
+        RunError: The folder cannot be used, or holds another run.
+        ProviderError: A model cannot be chosen so, e.g. without its key, or nothing
+            bounds what it costs.
+        PriceError: The user's price file is broken.
         PromptError: The template cannot be used.
         Fault: Sandbox, suite or provider broken; the run's record says so, too.
     """
     template = load_template(prompt)
-    generate_prompt(task, (), template)  # refuses a broken one before a folder is made
-    first, second = choose_models(learner, optimizer, task.setting, base_url)
-    run = Run(
+    models = choose_models(learner, optimizer, task.setting, base_url)
+    run = describe(
+        task,
+        models,
+        template,
         folder=out,
-        task=task.name,
-        task_sha256=task.sha256(),
-        learner=first.name,
-        optimizer=second.name,
         base_url=base_url,
-        prompt=template.name,
+        max_output=max_output,
+        index=index,
+        start_from=start_from,
         iterations=iterations,
         patience=patience,
         seed=seed,
-        started=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    recorder = _recorder(task, run, on_event)
-    dialogue = Dialogue(
-        task, first, second, recorder, retry=retry or RetryPolicy(), template=template
-    )
-    given = Candidate(start_from) if start_from is not None else None
-    judge = WarmJudge()
+    account = account_of(models, run_there(out), max_cost, max_tokens, budget)
+    with hold_folder(out):
+        before = run_there(out)
+        if before is not None:
+            check_same(before, run)
+            if before.finished:
+                return before
+        recorder = open_record(
+            task, run, before, template, start_from, account, on_event
+        )
+        calls = Calls(
+            recorder,
+            account.budget,
+            account.tariffs,
+            retry or RetryPolicy(),
+            max_output,
+        )
+        dialogue = Dialogue(task, *models, calls, template=template)
+        return _run(dialogue, start_from, paid=any(model.paid for model in models))
+
+
+def _run(dialogue: Dialogue, given: str | None, *, paid: bool) -> Run:
+    """The loop, and how it ended on record."""
+    recorder, judge = dialogue.calls.recorder, WarmJudge()
     try:
-        if first.paid or second.paid:
-            _prove(task, seed, recorder, judge)
-        for k in range(1, iterations + 1):
-            candidate = given or dialogue.generate(k)
-            given = None
-            for j in range(patience + 1):
-                source, notes = candidate
-                if source is None:
-                    recorder.judged(k, j, None, notes)
-                    break
-                folder = recorder.candidate(k, j, source)
-                report = verify(
-                    folder / "controller.py", task, seed=seed, out=folder, judge=judge
-                )
-                recorder.judged(k, j, report, notes)
-                dialogue.saw(k, j, report)
-                if report.passed:
-                    return _deliver(recorder, task, k, source, report, folder)
-                if j < patience:
-                    candidate = dialogue.edit(k, j + 1, source, report)
-                else:
-                    dialogue.summarise(k, j, source, report)
-        recorder.finish("not verified")
+        if paid:
+            _prove(dialogue.task, recorder, judge)
+        _search(dialogue, given, judge)
+    except BudgetExhausted as error:
+        recorder.finish("budget", reason=str(error), enough=error.enough)
     except KeyboardInterrupt:
         recorder.finish("interrupted")
         raise
     except Exception as error:
-        recorder.finish("fault", reason=str(error))
+        # A disk that is full is told as it was met first.
+        with suppress(OSError):
+            recorder.finish("fault", reason=str(error))
         raise
     finally:
         judge.close()
     return recorder.run
 
 
-def _prove(task: Task, seed: int, recorder: Recorder, judge: WarmJudge) -> None:
-    """Has the suite prove itself before an answer is paid for.
+def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
+    """Algorithm 2, until a candidate has passed or K iterations are over."""
+    recorder = dialogue.calls.recorder
+    run = recorder.run
+    first = None if given is None else Candidate(given)
+    for k in range(1, run.iterations + 1):
+        candidate = (k == 1 and first) or dialogue.generate(k)
+        parent, report = "", None
+        for j in range(run.patience + 1):
+            source, notes = candidate
+            if source is None:
+                recorder.judged(k, j, None, notes)
+                break
+            folder = recorder.candidate(k, j, source)
+            if report is not None and same_code(source, parent):
+                recorder.judged(k, j, report, notes, unchanged=True)
+                dialogue.saw_no_change(k, j)
+            else:
+                report = _verify(dialogue.task, recorder, k, j, source, folder, judge)
+                recorder.judged(k, j, report, notes)
+                dialogue.saw(k, j, report)
+            if report.passed:
+                _deliver(recorder, dialogue.task, k, source, report, folder)
+                return
+            parent = source
+            if j < run.patience:
+                candidate = dialogue.edit(k, j + 1, source, report)
+            else:
+                dialogue.summarise(k, j, source, report)
+    recorder.finish("not verified")
+
+
+def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
+    """Has the suite prove itself before an answer is paid for, once in a run.
 
     Raises:
         Fault: It does not: no controller can pass it, or one that does nothing can.
     """
+    if recorder.past.proven:
+        return
     recorder.event("prove.start")
-    proof = prove_suite(task, seed=seed, judge=judge)
+    proof = prove_suite(task, seed=recorder.run.seed, judge=judge)
     facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
     recorder.event("prove.end", **facts)
 
 
+def _verify(
+    task: Task,
+    recorder: Recorder,
+    k: int,
+    j: int,
+    source: str,
+    folder: Path,
+    judge: WarmJudge,
+) -> Report:
+    """The report on a candidate; one on record is not made again."""
+    seed = recorder.run.seed
+    recorder.event("verify.start", k=k, j=j)
+    return kept_report(folder, task, source, seed) or verify(
+        folder / "controller.py", task, seed=seed, out=folder, judge=judge
+    )
+
+
 def _deliver(
     recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
-) -> Run:
+) -> None:
     """Puts the verified controller and its evidence at the top of the run."""
     folder = recorder.run.folder
     write_atomic(folder / "controller.py", source)
@@ -147,18 +219,3 @@ def _deliver(
     draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
     recorder.run.tau = k
     recorder.finish("verified", k=k)
-    return recorder.run
-
-
-def _recorder(task: Task, run: Run, on_event: Event | None) -> Recorder:
-    """The recorder of a run, its folder made."""
-    out = run.folder
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if any(out.iterdir()):
-            raise RunError(f"the folder {out} is not empty; give a new one with --out")
-        recorder = Recorder(run, on_event)
-        recorder.start(task)
-    except OSError as error:
-        raise RunError(f"cannot write to {out}: {error.strerror}") from error
-    return recorder

@@ -12,7 +12,7 @@ from tdac_agent.errors import ControllerFileError
 from tdac_agent.figures import draw_failures
 from tdac_agent.files import write_atomic
 from tdac_agent.jobs import Findings, Job
-from tdac_agent.provenance import origin, sha256_of
+from tdac_agent.provenance import origin, sha256_of, versions
 from tdac_agent.report import Provenance, Report
 from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
 from tdac_agent.sandbox import Limits
@@ -69,10 +69,7 @@ def verify(
     """
     began = time.monotonic()
     source = read_source(controller)
-    suites = {SHIPPED: _suite_folder(shipped or SHIPPED_SUITES / task.setting.suite)}
-    extra = suite or task.suite
-    if extra is not None:
-        suites[OWN] = _suite_folder(extra)
+    suites = _suites(task, suite, shipped)
     with tempfile.TemporaryDirectory(prefix="tdac-verify-") as name:
         folder = Path(name)
         job = Job(
@@ -104,6 +101,45 @@ def verify(
         if out is not None:
             _keep(report, task, job.out / "trajectories", out)
     return report
+
+
+def kept_report(folder: Path, task: Task, source: str, seed: int) -> Report | None:
+    """The report of a verification in a folder, if that is one of this very controller.
+
+    None where it is of other bytes, another task, suite, seed or version of a package.
+    """
+    try:
+        report = Report.model_validate_json((folder / "report.json").read_bytes())
+    except (OSError, ValueError):
+        return None
+    about = report.provenance
+    wanted = {
+        "controller_sha256": sha256_of(source.encode("utf-8", "surrogatepass")),
+        "task_sha256": task.sha256(),
+        "suite_sha256": suite_sha256(task),
+        "profile": task.spec.profile,
+        "paper": False,
+        "seed": seed,
+        "versions": versions(),
+    }
+    same = all(getattr(about, name) == value for name, value in wanted.items())
+    return report if same else None
+
+
+def suite_sha256(task: Task) -> str:
+    """Hash of all tests that a task's controllers are held to."""
+    return _hash(_suites(task))
+
+
+def _suites(
+    task: Task, suite: Path | None = None, shipped: Path | None = None
+) -> dict[str, Path]:
+    """The folders of tests: the shipped ones, and further ones where there are any."""
+    suites = {SHIPPED: _suite_folder(shipped or SHIPPED_SUITES / task.setting.suite)}
+    extra = suite or task.suite
+    if extra is not None:
+        suites[OWN] = _suite_folder(extra)
+    return suites
 
 
 def read_source(controller: str | bytes | Path) -> bytes:
@@ -175,16 +211,20 @@ def _run_judge(job: Job, folder: Path, judge: WarmJudge) -> str:
 def _provenance(
     task: Task, source: bytes, job: Job, suites: dict[str, Path], findings: Findings
 ) -> Provenance:
-    hashes = {name: _suite_hash(folder) for name, folder in suites.items()}
-    hashes[SHIPPED][EVERY_TASK.name] = sha256_of(EVERY_TASK.read_bytes())
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
         suite=" + ".join(folder.name for folder in suites.values()),
-        suite_sha256=sha256_of(json.dumps(hashes, sort_keys=True).encode()),
+        suite_sha256=_hash(suites),
         profile=job.profile,
         paper=job.paper,
         seed=job.seed,
     )
+
+
+def _hash(suites: dict[str, Path]) -> str:
+    hashes = {name: _suite_hash(folder) for name, folder in suites.items()}
+    hashes[SHIPPED][EVERY_TASK.name] = sha256_of(EVERY_TASK.read_bytes())
+    return sha256_of(json.dumps(hashes, sort_keys=True).encode())
 
 
 def _suite_hash(folder: Path) -> dict[str, str]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 
+from tdac_agent.budget import told_usd
 from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import SHIPPED, load_prices, price_file
@@ -14,29 +16,32 @@ from tdac_agent.prompt import load_template
 from tdac_agent.providers.choice import check_name
 
 
-def run(
-    flags: TaskFlags,
-    prompt: str,
-    k: int,
-    j: int,
-    learner: str,
-    optimizer: str | None,
-    base_url: str | None,
-    as_json: bool,
-) -> int:
-    """Prints the prompt, and nothing else, to stdout, the rest to stderr."""
-    for name in (learner, optimizer or learner):
+def run(flags: TaskFlags, models: dict[str, Any], k: int, j: int, as_json: bool) -> int:
+    """Prints the prompt, and nothing else, to stdout, the rest to stderr.
+
+    Args:
+        flags: That name the task.
+        models: `learner`, `optimizer`, `base_url`, `prompt` and `max_output`, as for
+            `synthesize`.
+        k: Iterations.
+        j: Edits per iteration.
+        as_json: Whether to print the outlook.
+    """
+    learner = models["learner"]
+    optimizer = models["optimizer"] or learner
+    for name in (learner, optimizer):
         check_name(name)
-    template, prices = load_template(prompt), load_prices()
+    template, prices = load_template(models["prompt"]), load_prices()
     outlook = foresee(
         flags.load(),
         learner,
-        optimizer or learner,
+        optimizer,
         prices,
         iterations=k,
         patience=j,
         template=template,
-        base_url=base_url,
+        base_url=models["base_url"],
+        max_output=models["max_output"],
     )
     if as_json:
         sys.stdout.write(outlook.model_dump_json(indent=2) + "\n")
@@ -66,16 +71,12 @@ def _lines(outlook: Outlook) -> list[str]:
     if outlook.cost_most == 0.0:
         return [*lines, "cost: none, no model is asked"]
     if outlook.first_cost is not None:
-        lines.append(f"first question: at most {_usd(outlook.first_cost)}")
+        lines.append(f"first question: at most {told_usd(outlook.first_cost)}")
     if outlook.cost_once is not None and outlook.cost_most is not None:
         lines.append(
-            f"whole run: {questions}: at most {_usd(outlook.cost_once)}, or "
-            f"{_usd(outlook.cost_most)} if every answer has to be asked for three times"
+            f"whole run: {questions}: at most {told_usd(outlook.cost_once)}, or "
+            f"{told_usd(outlook.cost_most)} if every answer is asked for three times"
         )
     else:
         lines.append(f"whole run: {questions}")
     return [*lines, f"prices of {outlook.prices_dated}: {price_file()}"]
-
-
-def _usd(amount: float) -> str:
-    return f"{amount:.2f} USD" if amount >= 0.1 or amount == 0 else f"{amount:.4f} USD"

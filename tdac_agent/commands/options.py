@@ -96,6 +96,40 @@ BaseUrl = Annotated[
         rich_help_panel=MODELS,
     ),
 ]
+MaxOutput = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--max-output",
+        min=1,
+        metavar="TOKENS",
+        help="Of an answer, thinking included; twice as many after a cut one.  "
+        "[default: 16000]",
+        rich_help_panel=MODELS,
+    ),
+]
+BUDGET = "Budget"
+MaxCost = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        "--max-cost",
+        min=0.0,
+        metavar="USD",
+        help="Of the whole run; the worst case of each question is reserved before it "
+        "is put.  [default: 2]",
+        rich_help_panel=BUDGET,
+    ),
+]
+MaxTokens = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--max-tokens",
+        min=0,
+        metavar="N",
+        help="Of the whole run, in and out together.  [default: no limit; 1000000 for "
+        "a server of your own without a price]",
+        rich_help_panel=BUDGET,
+    ),
+]
 DISTURBED = "Disturbance of --robust, and of play --seed"
 RangeNoise = Annotated[
     Optional[float],  # noqa: UP045

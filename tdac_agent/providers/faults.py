@@ -40,13 +40,31 @@ def fault_of(error: Exception) -> ProviderFault:
     status = getattr(error, "status_code", None) or 200
     words, told = _told(getattr(error, "body", None))
     message = _message(error, status, words, told, headers)
+    kind = _kind(status, words)
+    fault = kind(message, None if kind is PermanentFault else retry_after(headers))
+    # A server that was not reached, or that says no, has not begun an answer.
+    fault.billed = status == 200 and not _unsent(error)
+    return fault
+
+
+def _kind(status: int, words: set[str]) -> type[ProviderFault]:
     if words & PERMANENT_WORDS and status in {200, 429}:
-        return PermanentFault(message)
+        return PermanentFault
     if status == 429 or (status == 200 and words & LIMITED_WORDS):
-        return RateLimited(message, retry_after(headers))
+        return RateLimited
     if 300 <= status < 500 and status not in PASSING:
-        return PermanentFault(message)
-    return ProviderFault(message, retry_after(headers))
+        return PermanentFault
+    return ProviderFault
+
+
+def _unsent(error: BaseException | None) -> bool:
+    """Whether there was no connection on which a question could be sent."""
+    import httpx2
+
+    if error is None:
+        return False
+    unsent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
+    return unsent or _unsent(error.__cause__)
 
 
 def _told(body: object) -> tuple[set[str], str]:

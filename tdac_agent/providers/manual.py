@@ -35,8 +35,8 @@ def make(words: str, options: Options) -> Manual:
 class Manual:
     """A provider; see `Provider`. It waits for `NNN.reply.md` without end.
 
-    A question that is already in the folder, and was not put since this provider was
-    made, keeps its number: a run that is started again finds what was answered before.
+    A question that is already in the folder keeps its number: a run that is started
+    again finds what was answered before. Of equal questions the run says which it is.
 
     Args:
         folder: Where questions are put.
@@ -49,18 +49,15 @@ class Manual:
         self.name = f"manual:{folder}"
         self._folder = folder
         self._poll = poll
-        self._put: set[int] = set()
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
         try:
-            number = self._number(request.prompt)
-            self._put.add(number)
-            return Reply(self._wait(number))
+            return Reply(self._wait(self._number(request.prompt, request.repeat)))
         except OSError as error:
             raise PermanentFault(f"{error.filename}: {error.strerror}") from None
 
-    def _number(self, prompt: str) -> int:
+    def _number(self, prompt: str, repeat: int) -> int:
         """The number of a question; it is written down where it is a new one."""
         question = prompt.encode("utf-8", "surrogatepass")
         for number in itertools.count(1):
@@ -68,8 +65,10 @@ class Manual:
             if not path.exists():
                 write_atomic(path, question)
                 return number
-            if number not in self._put and path.read_bytes() == question:
-                return number
+            if path.read_bytes() == question:
+                if repeat == 0:
+                    return number
+                repeat -= 1
         raise AssertionError("unreachable")
 
     def _wait(self, number: int) -> str:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
-from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tdac_agent.errors import ProviderError, RunError
+from tdac_agent.journal import JournalRecord, read_records
+from tdac_agent.past import reply_of
 from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
-from tdac_agent.records import load_run
+from tdac_agent.records import JOURNAL, load_run
 
 Place = tuple[str, int, int]
 
@@ -27,12 +28,12 @@ def make(words: str, options: Options) -> Replay:
     folder = Path(words)
     try:
         load_run(folder)
-        lines = (folder / "journal.jsonl").read_bytes().splitlines()
+        records = read_records(folder / JOURNAL)
     except RunError as error:
         raise ProviderError(f"cannot replay: {error}") from error
     except OSError as error:
         raise ProviderError(f"cannot replay {folder}: {error.strerror}") from error
-    return Replay(folder, [line for line in map(_record, lines) if line])
+    return Replay(folder, records)
 
 
 class Replay:
@@ -45,22 +46,21 @@ class Replay:
 
     paid = False
 
-    def __init__(self, folder: Path, journal: list[dict[str, Any]]) -> None:
+    def __init__(self, folder: Path, journal: list[JournalRecord]) -> None:
         self.name = f"replay:{folder}"
         self._folder = folder
         self._replies = [r for r in journal if r.get("event") == "call.reply"]
-        self._asked: Counter[Place] = Counter()
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
         _, k, j = request.sample
         place = (request.kind, k, j)
-        number = self._asked[place]
+        number = request.turn
         at = f"{request.kind} k={k} j={j}"
         try:
-            prompt, reply = _files(self._folder, place, number + 1)
+            prompt, answer = _files(self._folder, place, number + 1)
             _compare(prompt.read_text("utf-8"), request.prompt, f"{at} in {prompt}")
-            text = reply.read_bytes().decode("utf-8", "surrogatepass")
+            text = answer.read_bytes().decode("utf-8", "surrogatepass")
             record = [r for r in self._replies if _place(r) == place][number]
         except (OSError, IndexError):
             raise PermanentFault(
@@ -68,8 +68,12 @@ class Replay:
             ) from None
         except ValueError:
             raise PermanentFault(f"{at} in {self._folder} is no text") from None
-        self._asked[place] += 1
-        return _reply(text, record)
+        reply = reply_of(record, text)
+        if reply is None:
+            raise PermanentFault(f"the journal of {self._folder} is damaged at {at}")
+        return replace(
+            reply, tokens_in=0, tokens_out=0, tokens_cached=0, tokens_written=0
+        )
 
 
 def _files(folder: Path, place: Place, number: int) -> tuple[Path, Path]:
@@ -97,27 +101,5 @@ def _compare(recorded: str, asked: str, where: str) -> None:
     raise PermanentFault(f"another question than {where}: line {same + 1} differs")
 
 
-def _reply(text: str, record: dict[str, Any]) -> Reply:
-    stop, model = record.get("stop"), record.get("model")
-    notes = record.get("notes")
-    if stop not in {"end", "length", "refusal"}:
-        raise PermanentFault(f"the journal tells no stop reason, but {stop!r}")
-    return Reply(
-        text,
-        stop,
-        model=model if isinstance(model, str) else None,
-        notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
-    )
-
-
-def _place(record: dict[str, Any]) -> tuple[Any, Any, Any]:
+def _place(record: JournalRecord) -> tuple[Any, Any, Any]:
     return record.get("kind"), record.get("k"), record.get("j")
-
-
-def _record(line: bytes) -> dict[str, Any]:
-    """A record of the journal; none where a line is torn."""
-    try:
-        record = json.loads(line.decode("utf-8"))
-    except (ValueError, RecursionError):
-        return {}
-    return record if isinstance(record, dict) else {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
+from urllib.parse import urlsplit, urlunsplit
 
 from tdac_agent.errors import ProviderError
 from tdac_agent.warm import SECRET
@@ -36,6 +37,16 @@ def without_secrets(text: str) -> str:
         if SECRET.search(name) and len(secret) >= SHORTEST_SECRET:
             text = text.replace(secret, f"[{name}]")
     return text
+
+
+def public_url(url: str) -> str:
+    """An address without user, password and query, for records."""
+    try:
+        parts = urlsplit(url)
+        host = parts.netloc.rpartition("@")[2]
+        return one_line(urlunsplit((parts.scheme, host, parts.path, "", "")))
+    except ValueError:
+        return "an address that is none"
 
 
 def one_line(text: str) -> str:

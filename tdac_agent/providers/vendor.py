@@ -12,7 +12,7 @@ from tdac_agent.errors import ProviderError
 from tdac_agent.provider import Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.providers.patience import CONNECT_SECONDS, STALL_SECONDS, within
-from tdac_agent.providers.secrets import read_key
+from tdac_agent.providers.secrets import public_url, read_key
 
 C = TypeVar("C")
 
@@ -54,6 +54,7 @@ class VendorModel(ABC, Generic[C]):
         self.name = f"{self.vendor.package}:{model}"
         self._model = model
         self._base_url = base_url
+        self.served_at = None if base_url is None else public_url(base_url)
         self._stall = stall
 
     @classmethod

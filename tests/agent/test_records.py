@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_agent.errors import RunError
-from tdac_agent.files import append_line, write_atomic
+from tdac_agent.files import write_atomic
 from tdac_agent.provider import Reply
 from tdac_agent.records import Attempt, Run, load_run
 from tdac_agent.synthesis import synthesize
@@ -70,18 +70,6 @@ def test_writing_is_atomic(tmp_path, monkeypatch):
     monkeypatch.setattr("os.fsync", full)
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
-
-
-def test_lines_are_on_the_disk_at_once(tmp_path, monkeypatch):
-    """Every appended line is forced out before the program goes on."""
-    synced = []
-    full = os.fsync
-    monkeypatch.setattr("os.fsync", lambda handle: synced.append(full(handle)))
-    for n in range(3):
-        append_line(tmp_path / "j", {"n": n})
-    assert len(synced) == 3
-    lines = (tmp_path / "j").read_text().splitlines()
-    assert [json.loads(line)["n"] for line in lines] == [0, 1, 2]
 
 
 @pytest.mark.parametrize(

@@ -39,11 +39,12 @@ class FaultServer:
             def do_POST(self):
                 body = json.loads(self.rfile.read(int(self.headers["content-length"])))
                 headers = {name.lower(): text for name, text in self.headers.items()}
-                server.seen.append(Seen(self.path, headers, body))
+                seen = Seen(self.path, headers, body)
+                server.seen.append(seen)
                 script = server.script
                 play = script.pop(0) if len(script) > 1 else script[0]
                 self.close_connection = True
-                play(Line(self, server.closing))
+                play(Line(self, server.closing, seen))
 
             do_GET = do_POST
 
@@ -75,6 +76,7 @@ class Line:
 
     handler: BaseHTTPRequestHandler
     closing: threading.Event
+    seen: Seen
 
     def start(self, status=200, content="text/event-stream", **headers):
         self.handler.send_response(status)
@@ -107,10 +109,11 @@ class Line:
                 return
 
 
-def events(vendor, text="Hello", stop=None, usage=True):
+def events(vendor, text="Hello", stop=None, usage=True, counts=(30, 5)):
     """The stream of a whole answer, as a list of events; the last ones end it."""
-    make = _anthropic_events if vendor == ANTHROPIC else _openai_events
-    return make(text, stop, usage)
+    if vendor == ANTHROPIC:
+        return _anthropic_events(text, stop, usage)
+    return _openai_events(text, stop, usage, *counts)
 
 
 def _event(kind, **facts):
@@ -148,7 +151,7 @@ def _anthropic_events(text, stop, usage):
     ]
 
 
-def _openai_events(text, stop, usage):
+def _openai_events(text, stop, usage, tokens_in, tokens_out):
     def chunk(choices, **facts):
         body = {"id": "c1", "object": "chat.completion.chunk", "created": 1}
         body |= {"model": MODEL, "choices": choices, **facts}
@@ -157,7 +160,8 @@ def _openai_events(text, stop, usage):
     def choice(delta, finish=None):
         return [{"index": 0, "delta": delta, "finish_reason": finish}]
 
-    counts = {"prompt_tokens": 30, "completion_tokens": 5, "total_tokens": 35}
+    counts = {"prompt_tokens": tokens_in, "completion_tokens": tokens_out}
+    counts["total_tokens"] = tokens_in + tokens_out
     counts |= {"prompt_tokens_details": {"cached_tokens": 20}}
     pieces = [text[at : at + 2] for at in range(0, len(text), 2)]
     return [

@@ -101,7 +101,8 @@ def test_a_person_answers(tmp_path):
     folder.mkdir()
     done = answer_in(folder, ["one", "two", "three"])
     model = Manual(folder, poll=0.005)
-    questions = [QUESTION, QUESTION, replace(QUESTION, prompt="other")]
+    other = replace(QUESTION, prompt="other")
+    questions = [QUESTION, replace(QUESTION, repeat=1), other]
     texts = [model.complete(question).text for question in questions]
     done()
     assert texts == ["one", "two", "three"]
@@ -110,6 +111,8 @@ def test_a_person_answers(tmp_path):
     again = Manual(folder, poll=0.005)
     assert [again.complete(question).text for question in questions] == texts
     assert len(list(folder.iterdir())) == 6
+    # Who remembers the first answer asks for the second alone, and gets that one.
+    assert Manual(folder, poll=0.005).complete(questions[1]).text == "two"
 
 
 def test_a_reply_that_is_being_written(tmp_path):

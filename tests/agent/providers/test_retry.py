@@ -37,7 +37,7 @@ def ask(model, policy):
     """The answer or the last fault; the waits; what was noted."""
     waits, missed = [], []
     try:
-        end = answer(model, QUESTION, policy, missed.append, waits.append).text
+        end = answer(model.complete, QUESTION, policy, missed.append, waits.append).text
     except ProviderFault as fault:
         end = fault
     assert [miss.wait for miss in missed if miss.wait is not None] == waits
@@ -114,7 +114,7 @@ def test_an_interrupt_ends_the_wait():
 
     model = Script(ProviderFault("503"))
     with pytest.raises(KeyboardInterrupt):
-        answer(model, QUESTION, RetryPolicy(), lambda miss: None, interrupted)
+        answer(model.complete, QUESTION, RetryPolicy(), lambda miss: None, interrupted)
     assert len(model.given) == 1
 
 

@@ -1,0 +1,174 @@
+"""What may be spent: the worst case of a call is reserved before the call is made.
+
+What is reserved and what is spent never exceeds the limits together, however many runs
+share them: threads share a `Budget`, processes a file that each has a `Budget` of.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.errors import RunError
+from tdac_agent.journal import append_record, mend, read_records
+from tdac_agent.locks import wait_for
+
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """Tokens and money.
+
+    Attributes:
+        tokens: In and out together.
+        usd: 0 for what is not counted in money.
+    """
+
+    tokens: int = 0
+    usd: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.tokens < 0 or not 0 <= self.usd < math.inf:
+            raise ValueError(f"expected an amount of 0 or more, got {self}")
+
+
+NOTHING = Amount()
+
+
+class BudgetExhausted(Exception):
+    """The worst case of a call is more than what is left.
+
+    Args:
+        message: One line.
+        enough: The flag with which a run can go on.
+    """
+
+    def __init__(self, message: str, enough: str) -> None:
+        super().__init__(message)
+        self.enough = enough
+
+
+class Budget:
+    """Limits, and what has been taken of them. For any number of threads.
+
+    Args:
+        max_cost: USD, None for no limit.
+        max_tokens: In and out together, None for no limit.
+        ledger: File that processes share; made where it is not there.
+    """
+
+    def __init__(
+        self,
+        max_cost: float | None = None,
+        max_tokens: int | None = None,
+        ledger: Path | None = None,
+    ) -> None:
+        self.max_cost = max_cost
+        self.max_tokens = max_tokens
+        self._ledger = ledger
+        self._lock = threading.Lock()
+        self._taken: dict[str, Amount] = {}
+
+    @property
+    def taken(self) -> Amount:
+        """What is reserved or spent."""
+        with self._open():
+            return _sum(self._taken)
+
+    def reserve(self, call: str, worst: Amount) -> None:
+        """Takes the most that a call can cost.
+
+        Args:
+            call: Its name, the same for the same call in another process.
+            worst: The most.
+
+        Raises:
+            BudgetExhausted: There is less left; nothing was taken.
+        """
+        with self._open():
+            others = {name: some for name, some in self._taken.items() if name != call}
+            self._check(_sum(others), worst)
+            self._take(call, worst)
+
+    def settle(self, call: str, spent: Amount) -> None:
+        """Replaces what was reserved for a call by what it took."""
+        with self._open():
+            self._take(call, spent)
+
+    def restore(self, calls: Mapping[str, Amount]) -> None:
+        """Takes over calls of an earlier process, also beyond the limits."""
+        with self._open():
+            for call, amount in calls.items():
+                if self._taken.get(call) != amount:
+                    self._take(call, amount)
+
+    def _check(self, taken: Amount, worst: Amount) -> None:
+        """Refuses what is more than what is left.
+
+        Raises:
+            BudgetExhausted: It says how much there was.
+        """
+        cost, tokens = taken.usd + worst.usd, taken.tokens + worst.tokens
+        if self.max_cost is not None and worst.usd and cost > self.max_cost + ROUNDING:
+            enough = max(2 * self.max_cost, math.ceil(100 * cost) / 100)
+            raise BudgetExhausted(
+                f"{told_usd(taken.usd)} of {told_usd(self.max_cost)} are spent or "
+                f"reserved, and the next question may cost {told_usd(worst.usd)}",
+                f"--max-cost {enough:g}",
+            )
+        if self.max_tokens is not None and worst.tokens and tokens > self.max_tokens:
+            raise BudgetExhausted(
+                f"{taken.tokens} of {self.max_tokens} tokens are spent or reserved, "
+                f"and the next question may take {worst.tokens}",
+                f"--max-tokens {max(2 * self.max_tokens, tokens)}",
+            )
+
+    def _take(self, call: str, amount: Amount) -> None:
+        if self._ledger is not None:
+            record = {"call": call, "tokens": amount.tokens, "usd": amount.usd}
+            append_record(self._ledger, record)
+        self._taken[call] = amount
+
+    @contextmanager
+    def _open(self) -> Generator[None]:
+        """What is taken, up to date, and not to be changed by others meanwhile."""
+        with self._lock:
+            if self._ledger is None:
+                yield
+                return
+            with wait_for(self._ledger):
+                mend(self._ledger)
+                self._taken = _read(self._ledger)
+                yield
+
+
+def told_usd(amount: float) -> str:
+    """An amount of money for people: two digits that matter at least."""
+    return f"{amount:.2f} USD" if amount >= 0.1 or amount == 0 else f"{amount:.4f} USD"
+
+
+def _sum(taken: Mapping[str, Amount]) -> Amount:
+    return Amount(
+        sum(amount.tokens for amount in taken.values()),
+        math.fsum(amount.usd for amount in taken.values()),
+    )
+
+
+def _read(ledger: Path) -> dict[str, Amount]:
+    """What the calls in a file take, by its last word on each of them.
+
+    Raises:
+        RunError: It is no such file.
+    """
+    try:
+        return {
+            record["call"]: Amount(record["tokens"], record["usd"])
+            for record in read_records(ledger)
+        }
+    except (KeyError, TypeError, ValueError) as error:
+        raise RunError(f"{ledger} is no record of a budget: {error}") from error

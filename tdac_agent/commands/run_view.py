@@ -1,0 +1,79 @@
+"""A run for people: its attempts, how it ended, what it took."""
+
+from __future__ import annotations
+
+import shlex
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.budget import told_usd
+from tdac_agent.records import Attempt, Run
+
+
+def show_run(run: Run, console: Console) -> None:
+    """Prints the attempts in a table, and what came of the run."""
+    if run.attempts:
+        console.print(_attempts(run))
+    took = f"{usage}\n" if (usage := _usage(run)) else ""
+    if run.verified:
+        ending = (
+            f"[bold green]verified[/] in iteration {run.tau}, {run.seconds:.1f} s: "
+            f"{run.controller}\n{took}"
+            f"  evidence: {run.folder / 'report.json'}, "
+            f"{run.folder / 'trajectory.png'}\n"
+            f"  see it drive: tdac play {run.folder} --video drive.mp4"
+        )
+    elif run.status == "budget":
+        ending = (
+            f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}\n{took}"
+            f"  go on: {way_on(run)}"
+        )
+    else:
+        ending = (
+            f"[bold red]not verified[/] after {run.iterations} iterations; "
+            f"the attempts are in {run.folder / 'iterations'}\n{took}".rstrip()
+        )
+    console.print(ending, soft_wrap=True)
+
+
+def _usage(run: Run) -> str:
+    """Tokens and money in a line; none where no model was asked."""
+    if run.tokens == 0 and run.cost == 0.0 and not run.cost_lost:
+        return ""
+    cached = f" ({run.tokens_cached} from a cache)" if run.tokens_cached else ""
+    tokens = f"{run.tokens_in} tokens in{cached}, {run.tokens_out} out"
+    cost = "cost unknown" if run.cost is None else told_usd(run.cost)
+    if run.cost_lost:
+        cost += f", and at most {told_usd(run.cost_lost)} for lost answers"
+    return f"  {tokens if run.tokens else 'no tokens reported'}; {cost}"
+
+
+def way_on(run: Run) -> str:
+    """The command that goes on with a run; empty where it has come to its end."""
+    if run.finished:
+        return ""
+    more = f" {run.enough}" if run.enough else ""
+    return f"tdac synth --resume {shlex.quote(str(run.folder))}{more}"
+
+
+def _attempts(run: Run) -> Table:
+    table = Table(title=escape(f"{run.task}: {run.learner}"), title_justify="left")
+    table.add_column("k", justify="right")
+    table.add_column("j", justify="right")
+    table.add_column("result")
+    table.add_column("failed tests")
+    for attempt in run.attempts:
+        names = [name.partition("::")[2] for name in attempt.failed_tests]
+        shown = ", ".join(names[:4]) + (" …" if len(names) > 4 else "")
+        table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(shown))
+    return table
+
+
+def _result(attempt: Attempt) -> str:
+    if not attempt.valid:
+        return "[yellow]invalid[/]"
+    if attempt.unchanged:
+        return "[yellow]no change[/]"
+    return "[green]verified[/]" if attempt.passed else "[red]failed[/]"

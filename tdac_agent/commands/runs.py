@@ -1,0 +1,148 @@
+"""`tdac runs [DIR]`: the run folders in a folder, and how to go on with them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.budget import told_usd
+from tdac_agent.commands.run_view import way_on
+from tdac_agent.errors import RunError
+from tdac_agent.locks import LOCK_FILE, is_held
+from tdac_agent.records import JOURNAL, RUN_FILE, Run, load_run
+
+_COLOURS = {
+    "verified": "green",
+    "not verified": "red",
+    "running": "cyan",
+    "unreadable": "red",
+}
+
+
+def run(folder: Path, as_json: bool) -> int:
+    """Prints the runs, the newest last; returns the exit code.
+
+    Raises:
+        RunError: There is no such folder.
+    """
+    try:
+        rows = sorted(map(_row, _folders(folder)), key=_age)
+    except OSError as error:
+        raise RunError(f"cannot read {folder}: {error.strerror}") from error
+    if as_json:
+        sys.stdout.write(json.dumps(rows, indent=2) + "\n")
+        return 0
+    console = Console()
+    if rows:
+        console.print(_table(rows))
+        for row in rows:
+            if row["status"] == "unreadable":
+                told = f"[red]{escape(row['run'])}: {escape(row['reason'])}[/]"
+                console.print(told, soft_wrap=True)
+            elif row["go_on"]:
+                console.print(f"go on: {escape(row['go_on'])}", soft_wrap=True)
+    else:
+        console.print(f"no runs in {folder}; `tdac synth` makes one", soft_wrap=True)
+    return 0
+
+
+def _folders(folder: Path) -> list[Path]:
+    """A run folder itself, or those in a folder; other things are not ours."""
+    places = [folder, *(path for path in folder.iterdir() if path.is_dir())]
+    return [place for place in places if _is_run(place)]
+
+
+def _is_run(place: Path) -> bool:
+    try:
+        return (place / RUN_FILE).is_file() or (place / JOURNAL).is_file()
+    except OSError:
+        return False
+
+
+def _row(folder: Path) -> dict[str, Any]:
+    """What there is to say of a run folder, also of a torn one."""
+    try:
+        run = load_run(folder)
+    except RunError as error:
+        reason = str(error).removeprefix(f"{folder} is not a run folder: ")
+        return {"run": str(folder), "status": "unreadable", "reason": reason}
+    held = is_held(folder / LOCK_FILE)
+    return {
+        "run": str(folder),
+        "task": run.task,
+        "learner": run.learner,
+        "optimizer": run.optimizer,
+        "status": _status(run, held=held),
+        "k": max((attempt.k for attempt in run.attempts), default=0),
+        "iterations": run.iterations,
+        "tau": run.tau,
+        "tokens_in": run.tokens_in,
+        "tokens_out": run.tokens_out,
+        "cost": run.cost,
+        "cost_lost": run.cost_lost,
+        "started": run.started,
+        "seconds": run.seconds,
+        "censored": run.censored,
+        "reason": run.reason,
+        "go_on": "" if held else way_on(run),
+    }
+
+
+def _status(run: Run, *, held: bool) -> str:
+    """A process that was killed could not say so; its lock is gone."""
+    if held:
+        return "running"
+    return "killed" if run.status == "running" else run.status
+
+
+def _age(row: dict[str, Any]) -> tuple[str, str]:
+    return row.get("started", ""), row["run"]
+
+
+def _table(rows: list[dict[str, Any]]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in ("run", "task", "learner"):
+        table.add_column(name, overflow="fold")
+    table.add_column("status", no_wrap=True)
+    for name in ("k", "tokens", "cost"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("started", no_wrap=True)
+    for row in rows:
+        status = row["status"]
+        table.add_row(
+            escape(row["run"]),
+            escape(row.get("task", "")),
+            escape(row.get("learner", "")),
+            f"[{_COLOURS.get(status, 'yellow')}]{status}[/]",
+            *_figures(row),
+        )
+    return table
+
+
+def _figures(row: dict[str, Any]) -> list[str]:
+    if "k" not in row:
+        return []
+    tokens = row["tokens_in"] + row["tokens_out"]
+    cost = "unknown" if row["cost"] is None else told_usd(row["cost"])
+    asked = tokens or row["cost"] != 0.0
+    return [
+        f"{row['k']}/{row['iterations']}",
+        str(tokens) if tokens else "–",
+        cost if asked else "–",
+        _when(row["started"]),
+    ]
+
+
+def _when(started: str) -> str:
+    try:
+        return f"{datetime.fromisoformat(started).astimezone():%m-%d %H:%M}"
+    except ValueError:
+        return started[:11]

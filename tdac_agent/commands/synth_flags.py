@@ -1,0 +1,161 @@
+"""The command `tdac synth`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from tdac_agent.commands.options import (
+    BaseUrl,
+    Goal,
+    Heading,
+    Ignore,
+    Json,
+    Learner,
+    MapOption,
+    MaxCost,
+    MaxOutput,
+    MaxTokens,
+    Metres,
+    Optimizer,
+    Radius,
+    Snap,
+    Start,
+    TaskOption,
+    WorldOption,
+)
+
+EPILOG = (
+    "Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 --goal 178 386 "
+    "--robot-radius 12`; `tdac synth --learner anthropic:claude-sonnet-5-5`; "
+    "`tdac synth --resume runs/maze-1`"
+)
+WITH_RESUME = frozenset({"resume", "max_cost", "max_tokens", "as_json"})
+
+
+def synth(
+    context: typer.Context,
+    task: TaskOption = None,
+    map_image: MapOption = None,
+    world: WorldOption = None,
+    ignore: Ignore = None,
+    start: Start = None,
+    goal: Goal = None,
+    heading: Heading = None,
+    robot_radius: Radius = None,
+    robot_image: Annotated[
+        Optional[Path],  # noqa: UP045 - typer reads it at run time
+        typer.Option(help="Picture of the robot, nose to the right."),
+    ] = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    instructions: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(help="Your own text to the model, or a file with it."),
+    ] = None,
+    from_: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--from", help="Controller to begin with."),
+    ] = None,
+    k: Annotated[int, typer.Option("-K", min=1, help="Iterations at most.")] = 20,
+    j: Annotated[int, typer.Option("-J", min=0, help="Edits per iteration.")] = 1,
+    learner: Learner = "builtin",
+    optimizer: Optimizer = None,
+    base_url: BaseUrl = None,
+    max_output: MaxOutput = None,
+    max_cost: MaxCost = None,
+    max_tokens: MaxTokens = None,
+    prompt: Annotated[
+        str,
+        typer.Option(
+            help="What is asked: `full`, `underspecified`, or your own template file."
+        ),
+    ] = "full",
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Print the first prompt and the cost at most; asks nobody.",
+        ),
+    ] = False,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--out",
+            help="Run folder; one with an unfinished run of the same goes on.  "
+            "[default: runs/TASK-N]",
+        ),
+    ] = None,
+    resume: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--resume", metavar="RUN", help="Go on with a run, as it was begun."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Write, test and repair a controller until it is verified."""
+    from tdac_agent.commands import synth as command
+    from tdac_agent.commands.flags import TaskFlags
+    from tdac_agent.errors import RunError
+    from tdac_agent.provider import MAX_OUTPUT_TOKENS
+
+    if max_cost is not None and not math.isfinite(max_cost):
+        raise RunError("expected --max-cost to be finite")
+    limits = {"max_cost": max_cost, "max_tokens": max_tokens}
+    if resume is not None:
+        _refuse_others(context)
+        raise typer.Exit(command.resume(resume, limits, as_json))
+    spec = TaskFlags(
+        task=task,
+        map_image=map_image,
+        world=world,
+        ignore=tuple(ignore or ()),
+        start=start,
+        goal=goal,
+        heading=heading,
+        robot_radius=robot_radius,
+        robot_image=robot_image,
+        snap=snap,
+        metres=metres,
+        instructions=instructions,
+    )
+    models = {
+        "learner": learner,
+        "optimizer": optimizer,
+        "base_url": base_url,
+        "prompt": prompt,
+        "max_output": MAX_OUTPUT_TOKENS if max_output is None else max_output,
+    }
+    if dry_run:
+        from tdac_agent.commands import dry_run as dry
+
+        raise typer.Exit(dry.run(spec, models, k, j, as_json))
+    wanted = {**models, **limits, "iterations": k, "patience": j, "seed": seed}
+    raise typer.Exit(command.run(spec, wanted, out, from_, as_json))
+
+
+def _refuse_others(context: typer.Context) -> None:
+    """Refuses flags beside --resume that the run folder answers already.
+
+    Raises:
+        RunError: It names them.
+    """
+    from tdac_agent.errors import RunError
+
+    others = [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name not in WITH_RESUME and _is_typed(context, str(parameter.name))
+    ]
+    if others:
+        raise RunError(f"a run goes on as it was begun: leave out {', '.join(others)}")
+
+
+def _is_typed(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"

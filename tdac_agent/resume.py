@@ -1,0 +1,101 @@
+"""Going on with a run: what a folder holds, and whether it is the run that is meant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.errors import RunError
+from tdac_agent.files import UNFINISHED
+from tdac_agent.locks import LOCK_FILE
+from tdac_agent.prompt import VARIANTS
+from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
+from tdac_agent.task import load_task
+
+# What decides the questions of a run and what becomes of the answers, in plain words;
+# two runs that differ in none of it are one run.
+CONFIGURATION = {
+    "version": "version of tdac",
+    "task": "task",
+    "task_sha256": "map, places or limits of the task",
+    "suite_sha256": "suite",
+    "learner": "learner",
+    "optimizer": "optimizer",
+    "served_at": "base URL",
+    "iterations": "K",
+    "patience": "J",
+    "seed": "seed",
+    "index": "index",
+    "max_output": "max output",
+    "given_sha256": "controller to begin with",
+    "prompt_sha256": "first question",
+}
+
+
+def run_there(folder: Path) -> Run | None:
+    """The run that a folder holds; None where the folder is empty or not there.
+
+    Raises:
+        RunError: It holds something else, or a run that cannot be read.
+    """
+    try:
+        names = [path.name for path in folder.iterdir()] if folder.exists() else []
+    except OSError as error:
+        raise RunError(f"cannot write to {folder}: {error.strerror}") from error
+    if RUN_FILE in names:
+        return load_run(folder)
+    # A process that was killed at once may have left these.
+    if any(name != LOCK_FILE and not name.endswith(UNFINISHED) for name in names):
+        raise RunError(f"the folder {folder} is not empty; give a new one with --out")
+    return None
+
+
+def check_same(before: Run, now: Run) -> None:
+    """Refuses to go on with another run than the one that is there.
+
+    Raises:
+        RunError: It names all that differs.
+    """
+    differences = [
+        _difference(words, getattr(before, name), getattr(now, name))
+        for name, words in CONFIGURATION.items()
+        if getattr(before, name) != getattr(now, name)
+    ]
+    if differences:
+        raise RunError(
+            f"{before.folder} holds another run ({'; '.join(differences)}): give a new "
+            f"folder with --out, or go on with that one: tdac synth --resume "
+            f"{before.folder}"
+        )
+
+
+def _difference(words: str, there: object, here: object) -> str:
+    """Short values are told; of hashes it is enough that they differ."""
+    if isinstance(there, int) or words in {"learner", "optimizer", "task"}:
+        return f"{words} {there} there, {here} here"
+    return f"another {words}"
+
+
+def asked_for(folder: Path) -> dict[str, Any]:
+    """The arguments of `synthesize` with which a run was begun.
+
+    Raises:
+        RunError: There is no run that can be read.
+        TaskError: Its task cannot be read.
+    """
+    run = load_run(folder)
+    given, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
+    return {
+        "task": load_task(folder),
+        "learner": run.learner,
+        "optimizer": run.optimizer,
+        "iterations": run.iterations,
+        "patience": run.patience,
+        "seed": run.seed,
+        "index": run.index,
+        "start_from": given.read_text("utf-8") if given.is_file() else None,
+        "base_url": run.base_url,
+        "prompt": run.prompt if run.prompt in VARIANTS else str(prompt),
+        "max_output": run.max_output,
+        "out": folder,
+    }
