@@ -253,7 +253,7 @@ class Recorder:
         self.run.status = status
         self.run.reason = str(facts.get("reason", ""))
         self.run.enough = str(facts.get("enough", ""))
-        self.run.censored = status == "budget"
+        self.run.censored = not self.run.finished
         self.event("run.end", status=status, **facts)
         self.save()
 

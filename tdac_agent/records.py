@@ -82,7 +82,7 @@ class Run(BaseModel):
     seconds: float = 0.0
     reason: str = Field("", description="Why it ended, of a fault or the budget.")
     enough: str = Field("", description="Flag with which it can go on, of the budget.")
-    censored: bool = Field(False, description="Ended by the budget, without a verdict.")
+    censored: bool = Field(False, description="Ended before success or K.")
 
     @property
     def verified(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from tdac_agent.files import UNFINISHED
 from tdac_agent.locks import LOCK_FILE
 from tdac_agent.prompt import VARIANTS
 from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
-from tdac_agent.task import load_task
+from tdac_agent.task import Task, load_task
 
 # What decides the questions of a run and what becomes of the answers, in plain words;
 # two runs that differ in none of it are one run.
@@ -86,7 +87,7 @@ def asked_for(folder: Path) -> dict[str, Any]:
     run = load_run(folder)
     given, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
     return {
-        "task": load_task(folder),
+        "task": _task(folder),
         "learner": run.learner,
         "optimizer": run.optimizer,
         "iterations": run.iterations,
@@ -99,3 +100,23 @@ def asked_for(folder: Path) -> dict[str, Any]:
         "max_output": run.max_output,
         "out": folder,
     }
+
+
+def _task(folder: Path) -> Task:
+    """A run's task with the parameters that it was begun with.
+
+    The map or world of the folder is the same, but was read from another file, which
+    the parameters tell.
+
+    Raises:
+        RunError: The parameters are damaged.
+    """
+    task = load_task(folder)
+    setting: Any = task.setting
+    try:
+        text = (folder / "params.json").read_bytes()
+        params = type(setting.params).model_validate_json(text)
+    except (OSError, ValueError) as error:
+        reason = str(error).partition("\n")[0]
+        raise RunError(f"cannot go on with {folder}: params.json: {reason}") from error
+    return replace(task, setting=replace(setting, params=params))

@@ -122,7 +122,7 @@ def _row(run: Run) -> Row:
         "done": done,
         "censored": run.status in STOPPED,
         "tokens": tokens or None,
-        "cost": getattr(run, "cost", None),
+        "cost": run.cost,
         "seconds": run.seconds,
     }
 
