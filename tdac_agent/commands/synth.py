@@ -14,6 +14,7 @@ from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.commands.progress import Progress
 from tdac_agent.commands.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault
+from tdac_agent.records import RUN_FILE, Run, load_run
 from tdac_agent.resume import asked_for, run_there
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
@@ -43,9 +44,8 @@ def run(
     with console.status("preparing the task …"):
         task = flags.load()
     folder = out if out is not None else _next_folder(task.name)
-    return _synthesize(
-        {**wanted, "task": task, "out": folder, "start_from": source}, console
-    )
+    wanted = {**wanted, "task": task, "out": folder, "start_from": source}
+    return _synthesize(wanted, console)
 
 
 def resume(folder: Path, limits: dict[str, Any], as_json: bool) -> int:
@@ -57,6 +57,9 @@ def resume(folder: Path, limits: dict[str, Any], as_json: bool) -> int:
         as_json: Whether to print the record.
     """
     console = Console(stderr=as_json)
+    before = load_run(folder)
+    if before.finished:
+        return _show(before, console, before=before)
     with console.status("preparing the task …"):
         wanted = asked_for(folder)
     return _synthesize({**wanted, **limits}, console)
@@ -76,16 +79,25 @@ def _synthesize(wanted: dict[str, Any], console: Console) -> int:
     except (Fault, OSError):
         console.print(_so_far(folder), soft_wrap=True)
         raise
+    return _show(result, console, before=before)
+
+
+def _show(run: Run, console: Console, *, before: Run | None) -> int:
+    """Prints a run, as JSON where the console is not for it; returns the exit code."""
     if console.stderr:
-        sys.stdout.write(result.model_dump_json(indent=2) + "\n")
-        return _EXIT.get(result.status, 1)
+        sys.stdout.write(run.model_dump_json(indent=2) + "\n")
+        return _EXIT.get(run.status, 1)
     if before is not None and before.finished:
-        console.print(f"{folder} has ended before; nothing was done", soft_wrap=True)
-    show_run(result, console)
-    return _EXIT.get(result.status, 1)
+        told = f"{run.folder} has ended before; nothing was done"
+        console.print(told, soft_wrap=True)
+    show_run(run, console)
+    return _EXIT.get(run.status, 1)
 
 
 def _so_far(folder: Path) -> str:
+    """What there is of a run that did not come to its end."""
+    if not (folder / RUN_FILE).is_file():
+        return "nothing was begun"
     return f"the run so far is in {folder}; go on: tdac synth --resume {folder}"
 
 

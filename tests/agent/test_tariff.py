@@ -1,0 +1,160 @@
+"""What a run may cost: prices, worst cases, and what bounds it without a price."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from small import write_small_task
+
+from tdac_agent.budget import NOTHING, Budget
+from tdac_agent.errors import ProviderError
+from tdac_agent.prices import SHIPPED, Price
+from tdac_agent.provider import Reply, Request
+from tdac_agent.records import load_run
+from tdac_agent.synthesis import synthesize
+from tdac_agent.tariff import UNPRICED_TOKENS, Tariff, bounds_of, tariffs_of
+from tdac_agent.task import load_task
+
+STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+PRICE = Price(input=2, output=10, cache_read=0.1, cache_write=2.5)
+
+
+class Model:
+    """A model that costs money, by its name."""
+
+    paid = True
+
+    def __init__(self, name, served_at=None, *answers):
+        self.name = name
+        self.served_at = served_at
+        self.answers = list(answers)
+
+    def complete(self, request):
+        return self.answers.pop(0)
+
+
+@pytest.fixture(autouse=True)
+def shipped_prices(monkeypatch):
+    monkeypatch.setenv("TDAC_PRICES", str(SHIPPED))
+
+
+COUNTS = st.integers(0, 10**6)
+
+
+@given(COUNTS, COUNTS, COUNTS, COUNTS)
+def test_a_cost_by_hand(plain, cached, written, out):
+    """Each kind of token at its own price; one that is not listed is the input's."""
+    reply = Reply(
+        "",
+        tokens_in=plain + cached + written,
+        tokens_out=out,
+        tokens_cached=cached,
+        tokens_written=written,
+    )
+    cents = 2 * plain + 0.1 * cached + 2.5 * written + 10 * out
+    assert PRICE.cost(reply) == pytest.approx(cents / 1e6)
+    simple = Price(input=2, output=10)
+    assert simple.cost(reply) == pytest.approx((2 * reply.tokens_in + 10 * out) / 1e6)
+    assert PRICE.cost(reply) <= PRICE.most(reply.tokens_in, out) + 1e-12
+
+
+@given(st.text(), st.integers(1, 10**5), st.data())
+def test_no_answer_costs_more_than_the_worst(prompt, room, data):
+    """However a tokenizer cuts the prompt, and whatever part of it is cached."""
+    tariff, request = Tariff(price=PRICE), Request("edit", prompt, max_tokens=room)
+    most = len(prompt.encode())
+    tokens_in = data.draw(st.integers(0, most))
+    cached = data.draw(st.integers(0, tokens_in))
+    written = data.draw(st.integers(0, tokens_in - cached))
+    out = data.draw(st.integers(1, room))
+    reply = Reply("x", "end", tokens_in, out, cached, written)
+    worst, spent = tariff.worst(request), tariff.spent(request, reply)
+    assert spent.tokens <= worst.tokens
+    assert spent.usd <= worst.usd + 1e-12
+    # What is not reported may have been all of it.
+    assert tariff.spent(request, Reply("x")) == worst
+    assert Tariff(free=True).worst(request) == NOTHING
+
+
+@pytest.mark.parametrize(
+    ("name", "served_at", "given", "limit"),
+    [
+        ("openai:gpt-4o", None, None, None),
+        ("command:llm", None, None, None),
+        ("manual:mail", None, None, None),
+        ("openai:qwen", "http://localhost:1/v1", None, UNPRICED_TOKENS),
+        ("openai:qwen", "http://localhost:1/v1", 77, 77),
+        ("openai:unheard-of", None, 77, 77),
+        ("mine:words", None, None, UNPRICED_TOKENS),
+    ],
+)
+def test_what_bounds_a_run(name, served_at, given, limit):
+    """A price, or tokens; where there is no price, that is said in one line."""
+    models = [Model(name, served_at)]
+    bounds = bounds_of(models, tariffs_of(models), None, given)
+    assert bounds.max_cost == 2.0
+    assert bounds.max_tokens == limit
+    assert len(bounds.notes) == (limit is not None)
+    for note in bounds.notes:
+        assert f"no price is known for {name}" in note
+        assert str(limit) in note
+
+
+def test_a_vendor_without_a_price(tmp_path):
+    """Nothing would bound the bill: refused before a folder is made."""
+    models = [Model("anthropic:unheard-of")]
+    with pytest.raises(ProviderError, match="give --max-tokens N, or enter its price"):
+        bounds_of(models, tariffs_of(models), 5.0, None)
+
+
+def code(source, *counts):
+    return Reply(f"```python\n{source}```\n", "end", *counts)
+
+
+def test_an_exhausted_budget_stops_a_run(tmp_path, good_source, tdac, monkeypatch):
+    """Censored, with what it took; more money and it goes on, spending counted on."""
+    task = load_task(write_small_task(tmp_path / "task", profile="policy"))
+    out = tmp_path / "run"
+    model = Model("openai:gpt-4o", None, code(STILL, 8000, 4000, 2000))
+    limits = {"max_output": 5000, "max_cost": 0.15}
+    run = synthesize(task, model, out=out, **limits)
+    assert (run.status, run.censored, run.tau) == ("budget", True, None)
+    price = 2.5 * 8000 + 10 * 4000
+    assert run.cost == pytest.approx(price / 1e6)
+    assert "0.0600 USD of 0.15 USD are spent or reserved" in run.reason
+    assert run.enough.startswith("--max-cost 0.3")
+    assert model.answers == []
+    # The same limit again asks nothing: exit 4, and what to do.
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-none")
+    exit_code, told, _ = tdac("synth", "--resume", out)
+    assert exit_code == 4
+    assert "stopped by the budget: 0.0600 USD of 0.15 USD are spent" in told
+    assert f"go on: tdac synth --resume {out} --max-cost 0.3" in told
+    assert "8000 tokens in (2000 from a cache), 4000 out; 0.0600 USD" in told
+    limits["max_cost"] = 0.5
+    model.answers = [code(good_source, 9000, 3000)]
+    run = synthesize(task, model, out=out, **limits)
+    assert (run.status, run.censored, run.reason) == ("verified", False, "")
+    price += 2.5 * 9000 + 10 * 3000
+    assert run.cost == pytest.approx(price / 1e6)
+    assert load_run(out) == run
+
+
+def test_a_shared_budget_has_limits_of_its_own(tmp_path, small_task):
+    """Limits of a run beside it would mean nothing."""
+    with pytest.raises(ValueError, match="a shared budget has limits of its own"):
+        synthesize(small_task, out=tmp_path / "r", max_cost=1.0, budget=Budget(1.0))
+
+
+def test_words_that_bound_nothing(tdac, monkeypatch):
+    """One clear line, and no folder."""
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-none")
+    words = ("synth", "--out", "r", "--learner")
+    exit_code, _, err = tdac(*words, "openai:unheard-of")
+    assert exit_code == 2
+    assert "no price is known for openai:unheard-of" in err
+    exit_code, _, err = tdac(*words, "openai:gpt-4o", "--max-cost", "inf")
+    assert exit_code == 2
+    assert "expected --max-cost to be finite" in err
+    assert not Path("r").exists()
