@@ -124,21 +124,5 @@ def wheel_speeds(action: Any) -> tuple[float, float]:
     raise ValueError(_not_an_action(action)) from None
 
 
-def wheel_command(action: Any) -> tuple[tuple[float, float], bool]:
-    """The wheel speeds of an action, clipped to [-1, 1], and whether they had to be.
-
-    Raises:
-        ValueError: The action is not two finite numbers.
-    """
-    left, right = wheels = wheel_speeds(action)
-    if -1.0 <= left <= 1.0 and -1.0 <= right <= 1.0:
-        return wheels, False
-    return (_clip(left), _clip(right)), True
-
-
 def _not_an_action(action: Any) -> str:
     return f"expected an action of two finite numbers in [-1, 1], got {action!r}"
-
-
-def _clip(value: float) -> float:
-    return min(max(value, -1.0), 1.0)

@@ -10,20 +10,20 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tdac_envs import kernels
+from tdac_envs import stepping
 from tdac_envs.errors import TaskError
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _INFOS: dict[str, tuple[int, type]] = {
-    "is_success": (kernels.REACHED, np.bool_),
-    "collision": (kernels.TOUCHED, np.bool_),
-    "collisions": (kernels.COLLISIONS, np.int64),
-    "clipped": (kernels.CLIPPED, np.int64),
-    "distance_to_goal": (kernels.GAP, np.float64),
-    "path_distance": (kernels.REMAINING, np.float64),
-    "clearance": (kernels.ROOM, np.float64),
+    "is_success": (stepping.REACHED, np.bool_),
+    "collision": (stepping.TOUCHED, np.bool_),
+    "collisions": (stepping.COLLISIONS, np.int64),
+    "clipped": (stepping.CLIPPED, np.int64),
+    "distance_to_goal": (stepping.GAP, np.float64),
+    "path_distance": (stepping.REMAINING, np.float64),
+    "clearance": (stepping.ROOM, np.float64),
 }
 
 

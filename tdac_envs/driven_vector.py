@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from tdac_envs import kernels
+from tdac_envs import stepping
 from tdac_envs.arguments import whole_number
 from tdac_envs.batching import (
     Array,
@@ -123,15 +123,15 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
                 f"expected reset(options={{'reset_mask': ...}}) of the robots whose "
                 f"episodes have ended: {resting[:10]}"
             )
-        self.robots.state[:, kernels.LEFT : kernels.RIGHT + 1] = wanted
+        self.robots.state[:, stepping.LEFT : stepping.RIGHT + 1] = wanted
         self._slip(resting)
         self._drive_rows.call_all()
         for i in resting:
             self._begin(i, {})
         outcome = self.robots.outcome.T.copy()
-        rewards = outcome[kernels.REWARD]
-        terminated = outcome[kernels.TERMINATED] == 1.0
-        truncated = outcome[kernels.TRUNCATED] == 1.0
+        rewards = outcome[stepping.REWARD]
+        terminated = outcome[stepping.TERMINATED] == 1.0
+        truncated = outcome[stepping.TRUNCATED] == 1.0
         self._over = terminated | truncated
         observations = self._observations()
         self._disturb(observations, range(self.num_envs))
@@ -148,7 +148,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     def pose(self) -> Array:
         """The true poses, shape (num_envs, 3)."""
-        poses: Array = self.robots.state[:, : kernels.HEADING + 1].copy()
+        poses: Array = self.robots.state[:, : stepping.HEADING + 1].copy()
         return poses
 
     @property  # type: ignore[misc]
@@ -220,7 +220,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         for i in self._slippery:
             if i not in still:
                 slip = self._random(i).normal(1.0, self.setups[i].wheel_slip, 2)
-                self.robots.state[i, kernels.SLIP_LEFT : kernels.SLIP_RIGHT + 1] = slip
+                state = self.robots.state[i]
+                state[stepping.SLIP_LEFT : stepping.SLIP_RIGHT + 1] = slip
 
     def _restart(self, observations: Observations, outcome: Array) -> dict[str, Any]:
         """Begins anew what has ended; returns what it ended with."""

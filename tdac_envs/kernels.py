@@ -15,25 +15,35 @@ from tdac_envs.compiled import kernel
 from tdac_envs.contact import first_contact, move, wrap_angle
 from tdac_envs.grid import FloatGrid
 from tdac_envs.rays import LeapGrid, cast_rays, sees
-from tdac_envs.rewards import RewardWeights, step_reward
+from tdac_envs.stepping import (
+    AXLE,
+    DT,
+    GAP,
+    GOAL_X,
+    GOAL_Y,
+    HEADING,
+    MAX_SPEED,
+    RADIUS,
+    RANGE_MAX,
+    REACHED,
+    REMAINING,
+    ROOM,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    TOLERANCE,
+    TOUCHED,
+    Array,
+    X,
+    Y,
+    apply_command,
+    settle,
+    within,
+)
+from tdac_envs.stepping import clear as forget
 
 # A body that was stopped by an obstacle goes back by this much of its way, px, so
 # that the next step starts outside it.
 CONTACT_GAP = 1e-6
-
-# Entries of `constants`.
-AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
-PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 17)
-N_CONSTANTS = 17
-# Entries of `state`.
-X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS = range(8)
-N_STATE = 8
-# Entries of `outcome`.
-REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
-GAP, REMAINING, ROOM = range(7, 10)
-N_OUTCOME = 10
-
-Array = NDArray[np.float64]
 
 
 @kernel("f4[:,:] f8[:] f8 f8 f8 f8 f8 -> b1")
@@ -159,28 +169,12 @@ def begin(
 
     `outcome[REMAINING]` is given: the length of the shortest path from there.
     """
-    state[LEFT] = state[RIGHT] = 0.0
-    state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
-    state[STEPS] = 0.0
-    queue[:] = 0.0
-    wheel_speeds[:] = 0.0
-    outcome[:REMAINING] = 0.0
+    forget(state, queue, wheel_speeds, outcome)
     remaining = outcome[REMAINING]
     _observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
     outcome[REACHED], outcome[REMAINING] = 0.0, remaining
-
-
-@kernel()
-def _wheel(wanted: float, before: float, lag: float) -> float:
-    """Speed of a wheel, as a fraction, that was `before` and is to be `wanted`."""
-    return wanted + lag * (before - wanted)
-
-
-@kernel()
-def _within(value: float) -> float:
-    return min(max(value, -1.0), 1.0)
 
 
 @kernel(_ARRAYS)
@@ -212,40 +206,18 @@ def drive(
         ranges: Overwritten.
         outcome: Overwritten.
     """
-    left, right = _within(state[LEFT]), _within(state[RIGHT])
-    if left != state[LEFT] or right != state[RIGHT]:
-        outcome[CLIPPED] += 1.0
-    delay = int(constants[DELAY])
-    if delay > 0:
-        late = int(state[STEPS]) % delay
-        wanted_left, wanted_right = left, right
-        left, right = queue[late, 0], queue[late, 1]
-        queue[late, 0], queue[late, 1] = wanted_left, wanted_right
-    lag, limit = constants[LAG], constants[MAX_SPEED]
-    wheel_speeds[0] = _wheel(left, wheel_speeds[0], lag)
-    wheel_speeds[1] = _wheel(right, wheel_speeds[1], lag)
-    touched = advance(
+    apply_command(constants, state, queue, wheel_speeds, outcome)
+    limit, before = constants[MAX_SPEED], outcome[REMAINING]
+    outcome[TOUCHED] = advance(
         clear,
         state,
-        limit * _within(wheel_speeds[0] * state[SLIP_LEFT]),
-        limit * _within(wheel_speeds[1] * state[SLIP_RIGHT]),
+        limit * within(wheel_speeds[0] * state[SLIP_LEFT]),
+        limit * within(wheel_speeds[1] * state[SLIP_RIGHT]),
         constants[AXLE],
         constants[DT],
         constants[RADIUS],
     )
-    before = outcome[REMAINING]
     _observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
-    reached = outcome[REACHED] == 1.0
-    weights = RewardWeights(
-        constants[PROGRESS], constants[GOAL], constants[COLLISION], constants[TIME]
-    )
-    progress = (before - outcome[REMAINING]) / constants[FULL_STEP]
-    outcome[REWARD] = step_reward(weights, progress, reached, touched)
-    state[STEPS] += 1.0
-    outcome[TOUCHED] = touched
-    outcome[COLLISIONS] += touched
-    over = reached or (touched and constants[STOPS] == 1.0)
-    outcome[TERMINATED] = over
-    outcome[TRUNCATED] = not over and state[STEPS] >= constants[HORIZON]
+    settle(constants, state, outcome, before)

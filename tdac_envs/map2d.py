@@ -10,13 +10,14 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from tdac_envs.arguments import not_negative, one_of, wheel_speeds
+from tdac_envs.arguments import not_negative, one_of
 from tdac_envs.driven import DrivenEnv, Observation
-from tdac_envs.kernels import LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, begin, drive
+from tdac_envs.kernels import begin, drive
 from tdac_envs.render import Scene, Status
-from tdac_envs.robot2d import Robot, info_of
+from tdac_envs.robot2d import Robot
 from tdac_envs.setup2d import Setup, override
 from tdac_envs.source2d import MapSource, prepare
+from tdac_envs.stepping import info_of
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
 
 VARIATIONS = ("nominal", "jitter", "random")
@@ -159,7 +160,6 @@ class Map2DEnv(DrivenEnv):
             wheel_slip=wheel_slip,
             motor_lag=motor_lag,
             delay=delay,
-            full_step=robot.max_wheel_speed * self.nominal.dt,
             dt=self.nominal.dt,
             render_mode=render_mode,
         )
@@ -209,32 +209,6 @@ class Map2DEnv(DrivenEnv):
             self.render()
         return self._observation(), info_of(robot.outcome.tolist())
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Applies wheel speeds for one `dt`.
-
-        Raises:
-            ValueError: The action is not two finite numbers.
-        """
-        state = self.robot.state
-        state[LEFT], state[RIGHT] = wheel_speeds(action)
-        if self.wheel_slip:
-            slip = self.np_random.normal(1.0, self.wheel_slip, 2)
-            state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
-        self._call_drive()
-        outcome = self.robot.outcome.tolist()
-        reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
-        info = info_of(outcome)
-        if self.render_mode is not None:
-            self._steps += 1
-            self._note(info["is_success"], info["collision"], truncated)
-        return self._observation(), reward, terminated, truncated, info
-
-    def pose(self) -> NDArray[np.float64]:
-        """The true pose, shape (3,): x, y (px), heading (rad)."""
-        return self.robot.state[:3].copy()
-
     def __getstate__(self) -> dict[str, Any]:
         return {
             **self.__dict__,
@@ -249,7 +223,7 @@ class Map2DEnv(DrivenEnv):
         """Makes the kernels' calls on this environment's own arrays."""
         arguments = self.setup.arguments(self.task, self.robot)
         self._call_begin: Callable[[], None] = begin.bind(*arguments)
-        self._call_drive: Callable[[], None] = drive.bind(*arguments)
+        self._call_drive = drive.bind(*arguments)
         robot = self.robot
         seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
         self._copies = [array.copy for array in seen]

@@ -10,8 +10,9 @@ from gymnasium.vector import AutoresetMode
 
 from tdac_envs.arguments import one_of
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
-from tdac_envs.kernels import GOAL_X, GOAL_Y, begin, drive
+from tdac_envs.kernels import begin, drive
 from tdac_envs.map2d import Map2DEnv, noisy
+from tdac_envs.stepping import GOAL_X, GOAL_Y
 
 
 class Map2DVectorEnv(DrivenVectorEnv):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs import kernels
+from tdac_envs import stepping
 from tdac_envs.rewards import RewardWeights
 from tdac_envs.task2d import Map2DTask
 
@@ -52,13 +52,13 @@ class Robot(NamedTuple):
     def blank(cls, n_rays: int, delay: int, *count: int) -> Robot:
         """One robot, or `count` of them, all zeros."""
         return cls(
-            np.zeros((*count, kernels.N_CONSTANTS)),
-            np.zeros((*count, kernels.N_STATE)),
+            np.zeros((*count, stepping.N_CONSTANTS)),
+            np.zeros((*count, stepping.N_STATE)),
             np.zeros((*count, delay, 2)),
             np.zeros((*count, 3), np.float32),
             np.zeros((*count, 2), np.float32),
             np.zeros((*count, n_rays), np.float32),
-            np.zeros((*count, kernels.N_OUTCOME)),
+            np.zeros((*count, stepping.N_OUTCOME)),
         )
 
     def row(self, index: int) -> Robot:
@@ -67,24 +67,10 @@ class Robot(NamedTuple):
 
     def place(self, task: Map2DTask) -> None:
         """Puts the robot at the start of a task; `kernels.begin` does the rest."""
-        goal = slice(kernels.GOAL_X, kernels.HORIZON + 1)
+        goal = slice(stepping.GOAL_X, stepping.HORIZON + 1)
         self.constants[goal] = *task.goal, task.goal_tolerance, task.horizon
-        self.state[: kernels.HEADING + 1] = task.start
-        self.outcome[kernels.REMAINING] = task.shortest
-
-
-def info_of(outcome: list[float]) -> dict[str, Any]:
-    """The `info` of a step; see `Robot.outcome`."""
-    _, _, _, reached, touched, collisions, clipped, gap, remaining, room = outcome
-    return {
-        "is_success": reached == 1.0,
-        "collision": touched == 1.0,
-        "collisions": int(collisions),
-        "clipped": int(clipped),
-        "distance_to_goal": gap,
-        "path_distance": remaining,
-        "clearance": room,
-    }
+        self.state[: stepping.HEADING + 1] = task.start
+        self.outcome[stepping.REMAINING] = task.shortest
 
 
 def constants_of(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.arguments import not_negative, one_of, wheel_speeds
+from tdac_envs.arguments import not_negative, one_of
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.driven import DrivenEnv, Observation
 from tdac_envs.epuck import kernels
@@ -27,7 +27,7 @@ from tdac_envs.epuck.setup import Setup
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
 from tdac_envs.render import Status
-from tdac_envs.stepping import LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, TOUCHED, info_of
+from tdac_envs.stepping import TOUCHED, info_of
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
@@ -172,7 +172,6 @@ class EPuckEnv(DrivenEnv):
             wheel_slip=wheel_slip,
             motor_lag=motor_lag,
             delay=delay,
-            full_step=self.nominal.full_step,
             dt=self.nominal.dt,
             render_mode=render_mode,
         )
@@ -240,33 +239,6 @@ class EPuckEnv(DrivenEnv):
             self.render()
         return self._observation(), info
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Applies wheel speeds for one `dt`.
-
-        Raises:
-            ValueError: The action is not two finite numbers.
-        """
-        state = self.robot.state
-        state[LEFT], state[RIGHT] = wheel_speeds(action)
-        if self.wheel_slip:
-            slip = self.np_random.normal(1.0, self.wheel_slip, 2)
-            state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
-        if not (self._pushes and self._pushed()):
-            self._call_drive()
-        outcome = self.robot.outcome.tolist()
-        reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
-        info = info_of(outcome)
-        if self.render_mode is not None:
-            self._steps += 1
-            self._note(info["is_success"], info["collision"], truncated)
-        return self._observation(), reward, terminated, truncated, info
-
-    def pose(self) -> NDArray[np.float64]:
-        """The true pose, shape (3,): x, y (m), heading (rad)."""
-        return self.robot.state[:3].copy()
-
     def things(self) -> NDArray[np.float64]:
         """Centre (m) and turn since the start (rad) of what can be pushed, (k, 3)."""
         if self._pushes:
@@ -275,7 +247,7 @@ class EPuckEnv(DrivenEnv):
         return np.column_stack([centres, np.zeros(len(centres))])
 
     def __getstate__(self) -> dict[str, Any]:
-        calls = {"_call_begin": None, "_call_drive": None}
+        calls = dict.fromkeys(("_call_begin", "_call_drive", "_call_alone"))
         return {**self.__dict__, **calls, "_scene": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -286,20 +258,23 @@ class EPuckEnv(DrivenEnv):
         """Makes the kernels' calls on this environment's own arrays."""
         arguments = self._arguments()
         self._call_begin: Callable[[], None] = kernels.begin.bind(*arguments)
-        self._call_drive: Callable[[], None] = kernels.drive.bind(*arguments)
+        self._call_drive = kernels.drive.bind(*arguments)
+        if self._pushes:
+            self._call_alone, self._call_drive = self._call_drive, self._push
 
     def _arguments(self) -> tuple[Any, ...]:
         return self.setup.arguments(self.task, self.robot, self._solid, self._seen)
 
-    def _pushed(self) -> bool:
-        """Takes the step with physics, if something that can be pushed is near."""
+    def _push(self) -> None:
+        """Takes the step, with physics if something that can be pushed is near."""
         from tdac_envs.epuck.pushing import Drive, is_near, push
 
         task, robot = self.task, self.robot
         ground, reach = task.ground, 1.5 * task.full_step
         if not is_near(self._solid, robot.state, self._things, reach):
             self._speed[:] = 0.0
-            return False
+            self._call_alone()
+            return
         constants, state, queue, _, speeds, *_, outcome = robot
         kernels.turn_wheels(constants, state, queue, speeds, outcome)
         forward, turn = outcome[kernels.FORWARD :].tolist()
@@ -309,7 +284,6 @@ class EPuckEnv(DrivenEnv):
         )  # fmt: skip
         self._carry()
         kernels.finish(*self._arguments())
-        return True
 
     def _carry(self) -> None:
         """Puts what is solid and what is seen where the things are."""
