@@ -44,6 +44,10 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         drive: Kernel that makes a step.
         autoreset_mode: When an episode that has ended begins anew.
         threads: How many work at a time; by default as many as there are cores.
+
+    Attributes:
+        last_poses: True poses in which the episodes ended that the last step began
+            anew, with `SAME_STEP`; shape (num_envs, 3), of the others as they are.
     """
 
     def __init__(
@@ -72,6 +76,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         )
         for constants, setup in zip(self.robots.constants, self.setups, strict=True):
             constants[:] = setup.constants()
+        self.last_poses = self.pose()
         self._kernels = begin, drive
         self._slippery = [i for i, s in enumerate(self.setups) if s.wheel_slip]
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
@@ -236,6 +241,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             "final_info": infos_of(np.where(ended, outcome, 0.0), ended),
             "_final_info": ended.copy(),
         }
+        self.last_poses = self.pose()
         for i in over:
             self._begin(i, {})
         for key, value in self._observations().items():

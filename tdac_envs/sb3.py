@@ -16,8 +16,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tdac_envs.driven_vector import DrivenVectorEnv, Observations
+from tdac_envs.driven_vector import DrivenVectorEnv
 from tdac_envs.errors import TaskError
+from tdac_envs.wrapped_vector import Seen, WrappedVectorEnv
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -37,27 +38,27 @@ class SB3VecEnv(VecEnv):
     `TimeLimit.truncated`: a thousand dictionaries would take longer than the step.
 
     Args:
-        batch: Made with `autoreset_mode="SameStep"`.
+        batch: Made with `autoreset_mode="SameStep"`; also in a `WrappedVectorEnv`.
 
     Raises:
         TaskError: It is no batched environment of this package, or of another mode.
     """
 
     def __init__(self, batch: Any) -> None:
-        inner = batch.unwrapped
-        if not isinstance(inner, DrivenVectorEnv) or inner is not batch:
+        if not isinstance(batch, DrivenVectorEnv | WrappedVectorEnv):
             raise TaskError(f"expected a batch made by gym.make_vec, got {batch}")
-        if inner.autoreset_mode is not AutoresetMode.SAME_STEP:
+        mode = batch.metadata["autoreset_mode"]
+        if mode is not AutoresetMode.SAME_STEP:
             raise TaskError(
                 "expected a batch made with autoreset_mode='SameStep', got "
-                f"{inner.autoreset_mode.value!r}"
+                f"{mode.value!r}"
             )
-        self.batch = inner
+        self.batch = batch
         super().__init__(
-            inner.num_envs, inner.single_observation_space, inner.single_action_space
+            batch.num_envs, batch.single_observation_space, batch.single_action_space
         )
 
-    def reset(self) -> Observations:
+    def reset(self) -> Seen:
         """Starts all episodes, with what `seed` and `set_options` said."""
         if any(options != self._options[0] for options in self._options):
             raise TaskError("expected the same options for all robots")
@@ -75,7 +76,7 @@ class SB3VecEnv(VecEnv):
 
     def step_wait(
         self,
-    ) -> tuple[Observations, NDArray[Any], NDArray[np.bool_], list[dict[str, Any]]]:
+    ) -> tuple[Seen, NDArray[Any], NDArray[np.bool_], list[dict[str, Any]]]:
         """Makes the step: observations, rewards, ends and infos."""
         observations, rewards, terminated, truncated, told = self.batch.step(
             self._actions

@@ -7,14 +7,15 @@ go next; both are Gymnasium wrappers for either environment:
     env = gym.make("TDAC-Map2D-v0", map="office", variation="jitter")
     env = wrap(env, ("goal-relative", "guidance", "flatten"))
 
-What they compute, they compute for one observation or for a batch of them.
+What they compute, they compute for one observation or for a batch of them;
+`tdac_envs.wrapped_vector` has the same for batched environments.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -26,7 +27,10 @@ from tdac_envs.driven import Observation
 from tdac_envs.epuck.infrared import LARGEST
 from tdac_envs.errors import TaskError
 from tdac_envs.guidance import REACH, Route, route_to_goal
-from tdac_envs.map2d import Map2DEnv
+from tdac_envs.task2d import Map2DTask
+
+if TYPE_CHECKING:
+    from tdac_envs.epuck.task import EPuckTask
 
 Env = gym.Env[Any, NDArray[np.float32]]
 
@@ -39,16 +43,16 @@ class Frame:
     """What an observation is told in: the robot's frame, and its sizes.
 
     Attributes:
-        radius: Of the body, px or m.
+        radius: Of the body, px or m; of a batch, shape (n, 1).
         up: Whether y points up, and headings are counter-clockwise.
         readings: Key of the distance sensors.
-        largest: Their largest reading.
+        largest: Their largest reading; of a batch, shape (n, 1).
     """
 
-    radius: float
+    radius: float | NDArray[np.float64]
     up: bool
     readings: str
-    largest: float
+    largest: float | NDArray[np.float64]
 
     @classmethod
     def of(cls, env: Env) -> Frame:
@@ -60,10 +64,14 @@ class Frame:
         plain: Any = env.unwrapped
         if not hasattr(plain, "nominal"):
             raise TaskError(f"expected an environment of tdac_envs, got {plain}")
-        is_map = isinstance(plain, Map2DEnv)
-        largest = plain.nominal.robot.range_max if is_map else LARGEST
-        radius = float(plain.nominal.body_radius)
-        return cls(radius, not is_map, plain.readings, float(largest))
+        return cls.of_task(plain.nominal)
+
+    @classmethod
+    def of_task(cls, task: Map2DTask | EPuckTask) -> Frame:
+        """The frame of a task's robot."""
+        if isinstance(task, Map2DTask):
+            return cls(task.body_radius, False, "ranges", float(task.robot.range_max))
+        return cls(task.body_radius, True, "ps", float(LARGEST))
 
     def seen(self, poses: ArrayLike, places: ArrayLike) -> NDArray[np.float64]:
         """Places as seen from the robot: how far ahead, and how far to its left.
@@ -84,7 +92,7 @@ class Frame:
         distance = np.hypot(seen[..., 0], seen[..., 1])[..., None]
         near = distance / (distance + MIDDLE * self.radius)
         bearing = seen / np.maximum(distance, 1e-9)
-        readings = observation[self.readings] / np.float32(self.largest)
+        readings = observation[self.readings] / np.asarray(self.largest, np.float32)
         return {
             "goal": np.concatenate([bearing, near], axis=-1).astype(np.float32),
             "wheel_speeds": observation["wheel_speeds"],
@@ -93,8 +101,46 @@ class Frame:
 
     def guidance(self, route: Route, poses: ArrayLike) -> NDArray[np.float32]:
         """What `Guidance` says at some poses, shape (n, 3), of one route."""
-        seen = self.seen(poses, route.ahead(poses)) / route.reach
+        return self.guidance_to(route.ahead(poses), poses, route.reach)
+
+    def guidance_to(
+        self, places: ArrayLike, poses: ArrayLike, reach: float | NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """The same of way-points that are known, shape (n, 2)."""
+        seen = self.seen(poses, places) / reach
         return np.clip(seen, -1.0, 1.0).astype(np.float32)
+
+    def relative_space(self, own: spaces.Space[Any]) -> spaces.Dict:
+        """The space of `goal_relative`.
+
+        Args:
+            own: Of what is observed.
+
+        Raises:
+            TaskError: It has no pose.
+        """
+        if not isinstance(own, spaces.Dict) or "pose" not in own.spaces:
+            raise TaskError(f"expected observations with a pose, got {own}")
+        readings = own[self.readings].shape
+        return spaces.Dict(
+            {
+                "goal": spaces.Box(-1.0, 1.0, (3,), np.float32),
+                "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
+                self.readings: spaces.Box(0.0, 1.0, readings, np.float32),
+            }
+        )
+
+
+def guided_space(own: spaces.Space[Any]) -> spaces.Dict:
+    """The space of what is observed, with `guidance`.
+
+    Raises:
+        TaskError: It is no `Dict`.
+    """
+    if not isinstance(own, spaces.Dict):
+        raise TaskError(f"expected observations in a Dict, got {own}")
+    more = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    return spaces.Dict({**own.spaces, "guidance": more})
 
 
 class GoalRelativeObservation(
@@ -122,17 +168,7 @@ class GoalRelativeObservation(
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.ObservationWrapper.__init__(self, env)
         self.frame = Frame.of(env)
-        own = env.observation_space
-        if not isinstance(own, spaces.Dict) or "pose" not in own.spaces:
-            raise TaskError(f"expected observations with a pose, got {own}")
-        readings = own[self.frame.readings].shape
-        space = spaces.Dict(
-            {
-                "goal": spaces.Box(-1.0, 1.0, (3,), np.float32),
-                "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
-                self.frame.readings: spaces.Box(0.0, 1.0, readings, np.float32),
-            }
-        )
+        space = self.frame.relative_space(env.observation_space)
         self.observation_space = space  # type: ignore[assignment]
 
     def observation(self, observation: Observation) -> Observation:
@@ -166,11 +202,7 @@ class Guidance(
         gym.ObservationWrapper.__init__(self, env)
         self.frame = Frame.of(env)
         self.reach = reach
-        own = env.observation_space
-        if not isinstance(own, spaces.Dict):
-            raise TaskError(f"expected observations in a Dict, got {own}")
-        more = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        space = spaces.Dict({**own.spaces, "guidance": more})
+        space = guided_space(env.observation_space)
         self.observation_space = space  # type: ignore[assignment]
         self._task: Any = None
         self._route: Route | None = None
@@ -195,6 +227,18 @@ WRAPPERS: dict[str, Callable[[Env], Env]] = {
 """By the names that `wrap`, `tdac train` and `tdac evaluate` take."""
 
 
+def check_wrappers(names: Sequence[str]) -> None:
+    """Refuses a name that is not of `WRAPPERS`.
+
+    Raises:
+        TaskError: There is one.
+    """
+    for name in names:
+        if name not in WRAPPERS:
+            known = ", ".join(WRAPPERS)
+            raise TaskError(f"unknown wrapper {name!r}; expected some of {known}")
+
+
 def wrap(env: Env, names: Sequence[str]) -> Env:
     """The environment in some wrappers, the first of them innermost.
 
@@ -205,9 +249,7 @@ def wrap(env: Env, names: Sequence[str]) -> Env:
     Raises:
         TaskError: A name is unknown, or a wrapper cannot be used on what is inside.
     """
+    check_wrappers(names)
     for name in names:
-        if name not in WRAPPERS:
-            known = ", ".join(WRAPPERS)
-            raise TaskError(f"unknown wrapper {name!r}; expected some of {known}")
         env = WRAPPERS[name](env)
     return env
