@@ -121,7 +121,9 @@ def check_claims(episode, task):
         f"speeds differ from the applied ones by up to {worst * units.scale:.2f} "
         f"{length}/s"
     )
-    assert result["collisions"] == record.collisions, "collisions differ"
+    assert result["collisions"] == record.collisions, (
+        f"collisions is {result['collisions']}, on record are {record.collisions}"
+    )
     assert math.isclose(result["dt"], record.dt), f"dt is {result['dt']}"
     goal = tuple(float(v) for v in result["goal"])
     assert np.allclose(goal, task.nominal.goal), f"goal is {goal}"
