@@ -96,8 +96,9 @@ class Recorder:
             **facts: For the journal.
         """
         past = self.past
-        going = {"status": "running", "reason": "", "censored": False}
-        self._write(before.model_copy(update=going))
+        limits = {name: getattr(self.run, name) for name in ("max_cost", "max_tokens")}
+        going = {"status": "running", "reason": "", "enough": "", "censored": False}
+        self._write(before.model_copy(update={**going, **limits}))
         self.run.cost_lost = past.lost_usd
         self.event(
             "run.resume",

@@ -200,6 +200,28 @@ def test_each_fault_is_what_it_is(server, canary):
     assert wrong == []
 
 
+BILLED = {"429": False, "401": False, "503": False, "307 to elsewhere": False}
+BILLED |= dict.fromkeys(
+    (
+        *("reset at once", "reset in mid-stream", "clean cut in mid-stream"),
+        *("error event, overloaded", "an unknown stop reason"),
+    ),
+    True,
+)
+
+
+@pytest.mark.parametrize("vendor", VENDORS)
+def test_what_may_have_been_billed(server, canary, vendor):
+    """A server that says no has not begun an answer; any other may have."""
+    found = {}
+    for name in BILLED:
+        server.script = [FAULTS[name][0](vendor)]
+        with pytest.raises(ProviderFault) as caught:
+            model_of(vendor, server, 30.0).complete(QUESTION)
+        found[name] = caught.value.billed
+    assert found == BILLED
+
+
 def _try(server, canary, vendor, fault, play):
     """What one fault of one vendor comes to; it was tried once, and told in a line."""
     server.script, server.seen = [play(vendor)], []
