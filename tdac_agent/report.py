@@ -10,6 +10,10 @@ from tdac_agent.units import Place
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
 GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
+SHIPPED, OWN = "shipped", "own"
+"""Folders of the suite that is shipped, and of a user's own."""
+MAX_MESSAGE = 4000
+"""Characters of a test's message."""
 Cause = Literal[
     "collision",
     "no motion",
@@ -153,6 +157,11 @@ class Report(_Record):
     def passed(self) -> bool:
         """Whether the controller is verified."""
         return self.verdict.passed
+
+
+def id_of(nodeid: str) -> str:
+    """A test's id: `test_unit.py::test_plan_path`, `own/test_mine.py::test_gap`."""
+    return nodeid.removeprefix(f"{SHIPPED}/")
 
 
 def group_of(test: str) -> Group:

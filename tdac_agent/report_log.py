@@ -10,8 +10,14 @@ from pydantic import BaseModel, BeforeValidator, Field, StrictInt, ValidationErr
 
 from tdac_agent.errors import Fault
 from tdac_agent.jobs import Findings
-from tdac_agent.report import Diagnosis, Failure, Verdict, group_of
-from tdac_agent.suite_plugin import MAX_MESSAGE, test_id
+from tdac_agent.report import (
+    MAX_MESSAGE,
+    Diagnosis,
+    Failure,
+    Verdict,
+    group_of,
+    id_of,
+)
 
 PHASES = frozenset({"setup", "call", "teardown"})
 NOT_RUN = "the test did not run to its end"
@@ -131,7 +137,7 @@ def read_outcomes(
     for record in log.records:
         if not isinstance(record, _Collected):
             continue
-        name = test_id(record.nodeid)
+        name = id_of(record.nodeid)
         if not isinstance(record, _Tested):
             if record.outcome != "passed":
                 raise Fault(f"the suite is broken: {_collect_error(name, record)}")

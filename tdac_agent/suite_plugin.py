@@ -15,13 +15,10 @@ from _pytest.runner import runtestprotocol
 from tdac_agent.contract import MAX_SOURCE_BYTES
 from tdac_agent.judge import Judge
 from tdac_agent.oracle import Oracle
-from tdac_agent.report import GROUPS, group_of
+from tdac_agent.report import GROUPS, MAX_MESSAGE, group_of, id_of
 from tdac_agent.sandbox import ControllerError
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Rollout
-
-SHIPPED, OWN = "shipped", "own"
-MAX_MESSAGE = 4000
 
 
 class Controller:
@@ -134,10 +131,8 @@ class JudgePlugin:
         """
         chosen = [i for i in items if not self._left_out & _marker_names(i)]
         # What costs little and explains most comes first.
-        items[:] = sorted(
-            chosen, key=lambda i: GROUPS.index(group_of(test_id(i.nodeid)))
-        )
-        self.expected = [test_id(item.nodeid) for item in items]
+        items[:] = sorted(chosen, key=lambda i: GROUPS.index(group_of(id_of(i.nodeid))))
+        self.expected = [id_of(item.nodeid) for item in items]
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
@@ -180,11 +175,3 @@ def rollout_key(name: str, steps: int | None, drive: str) -> str:
 
 def _marker_names(item: pytest.Item) -> set[str]:
     return {marker.name for marker in item.iter_markers()}
-
-
-def test_id(nodeid: str) -> str:
-    """A test's id: `test_unit.py::test_plan_path`, `own/test_mine.py::test_gap`."""
-    return nodeid.removeprefix(f"{SHIPPED}/")
-
-
-test_id.__test__ = False  # type: ignore[attr-defined]

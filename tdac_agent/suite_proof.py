@@ -12,8 +12,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.privileged import REFERENCE
-from tdac_agent.report import Report
-from tdac_agent.suite_plugin import OWN
+from tdac_agent.report import OWN, Report
 from tdac_agent.task_file import Profile
 
 CLOCK = frozenset({"call_ms_mean", "call_ms_p99"})

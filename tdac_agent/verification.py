@@ -9,14 +9,12 @@ import time
 from pathlib import Path
 
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.figures import draw_failures
 from tdac_agent.files import write_atomic
 from tdac_agent.jobs import Findings, Job
 from tdac_agent.provenance import origin, sha256_of, versions
-from tdac_agent.report import Provenance, Report
+from tdac_agent.report import OWN, SHIPPED, Provenance, Report
 from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
 from tdac_agent.sandbox import Limits
-from tdac_agent.suite_plugin import OWN, SHIPPED
 from tdac_agent.task import Task, portable_task_file, write_workdir
 from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Trajectory
@@ -244,5 +242,7 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
     for path in sorted(results.glob("*.npz")):
         write_atomic(folder / path.name, path.read_bytes())
     if not report.passed:
+        from tdac_agent.figures import draw_failures  # loads what draws
+
         draw_failures(task, report, load_trajectories(folder), folder)
     write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")
