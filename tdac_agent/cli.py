@@ -385,6 +385,19 @@ def check_suite(
     raise typer.Exit(command.run(spec, profile, suite, tier, seed, repeats, as_json))
 
 
+@app.command(epilog="Example: `tdac demo`")
+def demo(
+    out: Annotated[
+        Path | None, typer.Option(help="Run folder [default: runs/demo-N].")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Replay a recorded run of a language model: its answers, your machine's tests."""
+    from tdac_agent.commands import demo as command
+
+    raise typer.Exit(command.run(out, as_json))
+
+
 @app.command("rules", epilog="Example: `tdac rules runs/office-1`")
 def rules_command(
     run: Annotated[Path, typer.Argument(help="A run folder.")], as_json: Json = False

@@ -43,9 +43,9 @@ def run(
     source = None if start_from is None else read_text(start_from)
     with console.status("preparing the task …"):
         task = flags.load()
-    folder = out if out is not None else _next_folder(task.name)
+    folder = out if out is not None else next_folder(task.name)
     wanted = {**wanted, "task": task, "out": folder, "start_from": source}
-    return _synthesize(wanted, console)
+    return synthesise_and_show(wanted, console)
 
 
 def resume(folder: Path, limits: dict[str, Any], as_json: bool) -> int:
@@ -62,10 +62,16 @@ def resume(folder: Path, limits: dict[str, Any], as_json: bool) -> int:
         return _show(before, console, before=before)
     with console.status("preparing the task …"):
         wanted = asked_for(folder)
-    return _synthesize({**wanted, **limits}, console)
+    return synthesise_and_show({**wanted, **limits}, console)
 
 
-def _synthesize(wanted: dict[str, Any], console: Console) -> int:
+def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:
+    """Synthesises with live progress, and prints what came out; the exit code.
+
+    Args:
+        wanted: Arguments of `synthesize`, `optimizer` among them.
+        console: Where to; the record goes to stdout as JSON where this is stderr.
+    """
     task, folder = wanted["task"], wanted["out"]
     optimizer = wanted["optimizer"]
     heading = _heading(task, wanted["learner"], optimizer)
@@ -136,7 +142,8 @@ def _remarks(task: Task) -> list[str]:
     return lines + [f"\n[yellow]note: {escape(note)}[/]" for note in notes]
 
 
-def _next_folder(name: str) -> Path:
+def next_folder(name: str) -> Path:
+    """`runs/NAME-1`, or the first number that is free."""
     for number in itertools.count(1):
         folder = Path("runs") / f"{name}-{number}"
         if not folder.exists():

@@ -1,4 +1,7 @@
-"""`replay:RUN`: the answers of a recorded run; no model is asked, nothing is paid."""
+"""`replay:RUN`: the answers of a recorded run; no model is asked, nothing is paid.
+
+`replay:demo` is the run of `tdac demo`, which is shipped.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.records import JOURNAL, load_run
 
+DEMO = Path(__file__).parents[1] / "demo"
 Place = tuple[str, int, int]
 
 
@@ -25,7 +29,7 @@ def make(words: str, options: Options) -> Replay:
     del options
     if not words:
         raise ProviderError("which run? As in replay:runs/maze-1")
-    folder = Path(words)
+    folder = DEMO if words == "demo" else Path(words)
     try:
         load_run(folder)
         records = read_records(folder / JOURNAL)
@@ -33,21 +37,22 @@ def make(words: str, options: Options) -> Replay:
         raise ProviderError(f"cannot replay: {error}") from error
     except OSError as error:
         raise ProviderError(f"cannot replay {folder}: {error.strerror}") from error
-    return Replay(folder, records)
+    return Replay(words, folder, records)
 
 
 class Replay:
     """A provider; see `Provider`. A question that was not put in that run is a fault.
 
     Args:
+        words: What the user calls the run.
         folder: Of the run.
         journal: Its records.
     """
 
     paid = False
 
-    def __init__(self, folder: Path, journal: list[JournalRecord]) -> None:
-        self.name = f"replay:{folder}"
+    def __init__(self, words: str, folder: Path, journal: list[JournalRecord]) -> None:
+        self.name = f"replay:{words}"
         self._folder = folder
         self._replies = [r for r in journal if r.get("event") == "call.reply"]
 
