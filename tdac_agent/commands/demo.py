@@ -11,12 +11,13 @@ from tdac_agent.providers.replay import DEMO
 from tdac_agent.records import load_run
 from tdac_agent.task import load_task
 
-_ABOUT = """\
-A language model's answers to the [bold]{prompt}[/] prompt for the task [bold]{task}[/],
-recorded {date}: unedited, each from a fresh conversation that held the printed
-prompt alone. The controllers run, and every test is made, here and now. By hand:
-  tdac synth --task {task} --prompt {prompt} --learner replay:demo
-"""
+_ABOUT = (
+    "A language model's answers to the [bold]{prompt}[/] prompt for the task "
+    "[bold]{task}[/], recorded {date}: unedited, each from a fresh conversation that "
+    "held the printed prompt alone. The controllers run, and every test is made, here "
+    "and now. By hand:\n"
+    "  tdac synth --task {task} --prompt {prompt} --learner replay:demo\n"
+)
 
 
 def run(out: Path | None, as_json: bool) -> int:
