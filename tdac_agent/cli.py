@@ -408,6 +408,23 @@ def rules_command(
     raise typer.Exit(rules.run(run, as_json))
 
 
+@app.command(
+    "report",
+    epilog="Examples: `tdac report runs/office-1`; `tdac report runs --out all.html`",
+)
+def report_command(
+    place: Annotated[Path, typer.Argument(help="A run folder, or a folder of runs.")],
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--out", help="The file.  [default: report.html in the folder]"),
+    ] = None,
+) -> None:
+    """Make one HTML file of runs: verdicts, failures, code, rules, animations."""
+    from tdac_agent.commands import report
+
+    raise typer.Exit(report.run(place, out))
+
+
 @app.command("runs", epilog="Examples: `tdac runs`; `tdac runs results --json`")
 def runs_command(
     folder: Annotated[Path, typer.Argument(help="Where the run folders are.")] = Path(

@@ -109,18 +109,27 @@ def event_of(
         title = f"{episode.name}: {diagnosis.cause}"
         facts = _facts(diagnosis)
         where = _where(task, trajectory, diagnosis)
-    touch = None
-    if episode.outcome == "collision":
-        touch = around.touch(end, around.radius + 3.0)
     d_min, d0 = (units.scale * d for d in (episode.d_min, episode.d0))
     way = way_from(around, shown, trajectory.steps)
     return Event(
         title=title,
         facts=(*facts, f"path left: {d_min:.0f} of {d0:.0f} {units.length}"),
         where=where,
-        contact=None if touch is None else units.place_of(*touch.wall),
+        contact=contact_of(task, trajectory, episode.outcome),
         way=None if way is None else np.array([units.place_of(x, y) for x, y in way]),
     )
+
+
+def contact_of(
+    task: Nominal, trajectory: Trajectory, outcome: str
+) -> tuple[float, float] | None:
+    """Where the body touched something at the end of an episode, px or m."""
+    if outcome != "collision":
+        return None
+    around = surroundings_of(task)
+    end = Pose(*around.units.on_screen(trajectory.poses[-1:])[0].tolist())
+    touch = around.touch(end, around.radius + 3.0)
+    return None if touch is None else around.units.place_of(*touch.wall)
 
 
 def _facts(diagnosis: Diagnosis) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.errors import RunError
+from tdac_agent.locks import LOCK_FILE, is_held
 from tdac_agent.rules import RuleBook
 
 Status = Literal[
@@ -103,6 +104,13 @@ class Run(BaseModel):
     def controller(self) -> Path:
         """Path of the verified controller."""
         return self.folder / "controller.py"
+
+
+def status_now(run: Run) -> str:
+    """Its status; `killed` where the process that wrote `running` is gone."""
+    if is_held(run.folder / LOCK_FILE):
+        return "running"
+    return "killed" if run.status == "running" else run.status
 
 
 def load_run(folder: Path) -> Run:

@@ -16,8 +16,7 @@ from rich.table import Table
 from tdac_agent.budget import told_usd
 from tdac_agent.commands.run_view import way_on
 from tdac_agent.errors import RunError
-from tdac_agent.locks import LOCK_FILE, is_held
-from tdac_agent.records import JOURNAL, RUN_FILE, Run, load_run
+from tdac_agent.records import JOURNAL, RUN_FILE, load_run, status_now
 
 _COLOURS = {
     "verified": "green",
@@ -74,13 +73,13 @@ def _row(folder: Path) -> dict[str, Any]:
     except RunError as error:
         reason = str(error).removeprefix(f"{folder} is not a run folder: ")
         return {"run": str(folder), "status": "unreadable", "reason": reason}
-    held = is_held(folder / LOCK_FILE)
+    status = status_now(run)
     return {
         "run": str(folder),
         "task": run.task,
         "learner": run.learner,
         "optimizer": run.optimizer,
-        "status": _status(run, held=held),
+        "status": status,
         "k": max((attempt.k for attempt in run.attempts), default=0),
         "iterations": run.iterations,
         "tau": run.tau,
@@ -92,15 +91,8 @@ def _row(folder: Path) -> dict[str, Any]:
         "seconds": run.seconds,
         "censored": run.censored,
         "reason": run.reason,
-        "go_on": "" if held else way_on(run),
+        "go_on": "" if status == "running" else way_on(run),
     }
-
-
-def _status(run: Run, *, held: bool) -> str:
-    """A process that was killed could not say so; its lock is gone."""
-    if held:
-        return "running"
-    return "killed" if run.status == "running" else run.status
 
 
 def _age(row: dict[str, Any]) -> tuple[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import textwrap
 from collections.abc import Iterator
 from typing import Any
@@ -13,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from tdac_agent.errors import RunError
+from tdac_agent.journal import JournalRecord, read_records
 from tdac_agent.plots.style import (
     COLOURS,
     FAILED,
@@ -24,7 +24,7 @@ from tdac_agent.plots.style import (
     new_figure,
     title,
 )
-from tdac_agent.records import Attempt, Run
+from tdac_agent.records import JOURNAL, Attempt, Run
 
 MOST_TESTS = 40
 STEPS = {"generate": "writing", "edit": "editing", "summarise": "rules"}
@@ -123,29 +123,19 @@ def _stack(
         legend(axes, 4)
 
 
-def _journal(run: Run) -> list[dict[str, Any]]:
+def _journal(run: Run) -> list[JournalRecord]:
     """The whole records of a run's journal.
 
     Raises:
         RunError: There is none.
     """
-    path = run.folder / "journal.jsonl"
-    try:
-        lines = path.read_bytes().splitlines()
-    except OSError as error:
-        raise RunError(f"cannot read {path}: {error.strerror}") from error
-    records = []
-    for line in lines:
-        try:
-            record = json.loads(line)
-        except ValueError:  # torn by a crash
-            continue
-        if isinstance(record, dict):
-            records.append(record)
-    return records
+    path = run.folder / JOURNAL
+    if not path.is_file():
+        raise RunError(f"cannot read {path}: there is no such file")
+    return read_records(path)
 
 
-def _spent(records: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
+def _spent(records: list[JournalRecord]) -> dict[str, dict[str, float]]:
     """Seconds and tokens by candidate and use."""
     spent: dict[str, dict[str, float]] = {}
     began: dict[str, float] = {}
@@ -157,7 +147,8 @@ def _spent(records: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
         if event in ("call.intent", "verify.start"):
             began[event] = seconds
         elif event == "call.reply":
-            use = STEPS.get(record["kind"], record["kind"])
+            kind = str(record["kind"])
+            use = STEPS.get(kind, kind)
             took = seconds - began.get("call.intent", seconds)
             uses[use] = uses.get(use, 0.0) + took
             for name in ("tokens_in", "tokens_out"):
@@ -169,7 +160,7 @@ def _spent(records: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
     return spent
 
 
-def _story(records: list[dict[str, Any]]) -> Iterator[tuple[str, str, str, str]]:
+def _story(records: list[JournalRecord]) -> Iterator[tuple[str, str, str, str]]:
     """(where, what, text, colour) of what a reader wants to know."""
     for record in records:
         event = record["event"]
@@ -187,7 +178,7 @@ def _story(records: list[dict[str, Any]]) -> Iterator[tuple[str, str, str, str]]
             yield at, record["status"], "", FAILED
 
 
-def _verdict(record: dict[str, Any]) -> tuple[str, str, str]:
+def _verdict(record: JournalRecord) -> tuple[str, str, str]:
     notes = record["notes"][:3]
     if record["passed"]:
         return "verified", _wrapped(["all tests passed", *notes]), PASSED

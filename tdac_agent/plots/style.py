@@ -74,12 +74,16 @@ def legend(axes: Axes, count: int) -> None:
 def save_figure(figure: Figure, *paths: Path) -> None:
     """Writes a figure, in the format of each name (svg, pdf, png); same bytes again."""
     for path in paths:
-        stream = io.BytesIO()
-        kind = path.suffix.lstrip(".") or "svg"
-        stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-        with rc_context({"svg.hashsalt": "tdac"}):  # names of its parts
-            figure.savefig(stream, format=kind, dpi=150, metadata=stamp)
-        write_atomic(path, stream.getvalue())
+        write_atomic(path, figure_bytes(figure, path.suffix.lstrip(".") or "svg"))
+
+
+def figure_bytes(figure: Figure, kind: str = "svg") -> bytes:
+    """A figure as a file of some kind; the same bytes each time."""
+    stream = io.BytesIO()
+    stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    with rc_context({"svg.hashsalt": "tdac"}):  # names of its parts
+        figure.savefig(stream, format=kind, dpi=150, metadata=stamp)
+    return stream.getvalue()
 
 
 def spread(count: int, width: float = 0.8) -> Sequence[float]:

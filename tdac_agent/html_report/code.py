@@ -1,0 +1,58 @@
+"""Source code and differences as HTML; nothing in them is taken for markup."""
+
+from __future__ import annotations
+
+import itertools
+
+from markupsafe import Markup, escape
+from pygments import highlight
+from pygments.formatters import HtmlFormatter
+from pygments.lexers import PythonLexer
+
+MOST_LINE = 400
+MOST_SOURCE = 200_000
+_KINDS = {"+": "ins", "-": "del", "@": "b"}
+
+
+def highlighted(source: str) -> Markup:
+    """Python source with a `<span>` per line and per token; CSS numbers the lines."""
+    shown = source[:MOST_SOURCE]
+    lexer = PythonLexer(stripnl=False, ensurenl=False)
+    # Tokens never go beyond a line, so that each line is whole by itself.
+    marked = highlight(shown, lexer, HtmlFormatter(nowrap=True))
+    lines = [Markup('<span class="l">{}</span>').format(Markup(line)) for line in
+             marked.rstrip("\n").split("\n")]  # fmt: skip
+    more = len(source) - len(shown)
+    if more:
+        lines.append(Markup("<em>… {} more characters</em>").format(more))
+    return Markup("\n").join(lines)
+
+
+def shown_diff(diff: str, most: int) -> Markup:
+    """A unified diff: added lines in `<ins>`, removed ones in `<del>`.
+
+    Args:
+        diff: As `difflib` writes it; its two lines of file names are left out.
+        most: Lines to show at most.
+    """
+    lines = diff.splitlines()
+    lines = lines[2:] if diff.startswith("---") else lines
+    blocks = [
+        _block(_KINDS.get(mark, "span"), list(group))
+        for mark, group in itertools.groupby(lines[:most], key=lambda line: line[:1])
+    ]
+    more = len(lines) - most
+    if more > 0:
+        blocks.append(Markup("<em>… {} more lines</em>").format(more))
+    return Markup().join(blocks)
+
+
+def count_changes(diff: str) -> tuple[int, int]:
+    """How many lines a unified diff adds and removes."""
+    marks = [line[:1] for line in diff.splitlines()[2:]]
+    return marks.count("+"), marks.count("-")
+
+
+def _block(tag: str, lines: list[str]) -> Markup:
+    text = escape("\n".join(line[:MOST_LINE] for line in lines))
+    return Markup("<{0}>{1}</{0}>").format(Markup(tag), text)

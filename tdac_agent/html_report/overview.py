@@ -1,0 +1,115 @@
+"""The summary of all runs: rates with their intervals, and figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from tdac_agent.html_report.scene import data_address
+from tdac_agent.metrics import (
+    ASSUMPTIONS,
+    Frames,
+    Rate,
+    first_pass,
+    frames_of,
+    success_rate,
+    summarise,
+)
+from tdac_agent.metrics.table import KIND
+from tdac_agent.plots import figure_bytes, plot_cumulative_success, plot_success_rates
+from tdac_agent.records import Run
+
+MOST_CURVES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Overview:
+    """What the runs say together.
+
+    Attributes:
+        kinds: A row per kind of run: its names, and each metric in words.
+        assumptions: What the intervals take for granted, a line each.
+        figures: Title and address of each figure; none for a single run.
+    """
+
+    kinds: tuple[dict[str, Any], ...]
+    assumptions: tuple[str, ...]
+    figures: tuple[tuple[str, str], ...]
+
+
+def overview_of(runs: list[Run]) -> Overview:
+    """The overview of some runs of any kinds."""
+    frames = frames_of(runs)
+    table = summarise(frames).to_dict("records")
+    kinds = tuple(_kind(row) for row in table)
+    groups = [frames.only(**{name: row[name] for name in KIND}) for row in table]
+    return Overview(kinds, _assumptions(groups), _figures(frames))
+
+
+def _kind(row: dict[str, Any]) -> dict[str, Any]:
+    return row | {
+        "sr": _rate(row, "sr"),
+        "first_pass": _rate(row, "first_pass"),
+        "cs_K": _rate(row, "cs_K"),
+        "tau_mean": _number(row["tau_mean"], ".1f"),
+        "tokens_per_verified": _number(row["tokens_per_verified"], ",.0f"),
+        "cost_per_verified": _number(row["cost_per_verified"], ".3f"),
+        "seconds_mean": _number(row["seconds_mean"], ",.0f"),
+    }
+
+
+def _rate(row: dict[str, Any], name: str) -> str:
+    ends = row[f"{name}_low"], row[f"{name}_high"]
+    return str(Rate(row[name], 0, 0, *ends, ""))
+
+
+def _number(value: float, form: str) -> str:
+    return "–" if pd.isna(value) else format(value, form)
+
+
+def _assumptions(groups: list[Frames]) -> tuple[str, ...]:
+    """Which metric has which kind of interval, and what that assumes."""
+    found = [("SR", success_rate(group).method) for group in groups]
+    found += [("CS(K), first pass", first_pass(group).method) for group in groups]
+    return tuple(
+        f"{name}: {ASSUMPTIONS[method]}"
+        if method == "none"
+        else f"{name}: {method}: {ASSUMPTIONS[method]}"
+        for name, method in dict.fromkeys(found)
+    )
+
+
+def _figures(frames: Frames) -> tuple[tuple[str, str], ...]:
+    names = frames.runs["learner"].nunique()
+    if len(frames.runs) < 2 or names > MOST_CURVES:
+        return ()
+    told = f"{len(frames.runs)} runs"
+    if frames.runs["task"].nunique() > 1:
+        told += ", all tasks together"
+    figures = {
+        "Success rate SR": plot_success_rates({told: frames}, provenance=told),
+        "Cumulative success CS(k)": plot_cumulative_success(
+            frames, provenance=f"{told}; pointwise 95 % intervals"
+        ),
+    }
+    return tuple((name, drawn(figure)) for name, figure in figures.items())
+
+
+def drawn(figure: Figure) -> str:
+    """A figure as an address; within `<img>` nothing in it is ever run."""
+    return data_address(figure_bytes(figure), "image/svg+xml")
+
+
+def told_seconds(seconds: float) -> str:
+    """A duration in words."""
+    if not math.isfinite(seconds):
+        return "–"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{seconds:.1f} s"

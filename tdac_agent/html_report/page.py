@@ -1,0 +1,167 @@
+"""The page as a whole: one file, no network, and no script but its own."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from tdac_agent.budget import told_usd
+from tdac_agent.errors import RunError
+from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
+from tdac_agent.html_report.gather import Told, gather_run, run_folders
+from tdac_agent.html_report.overview import overview_of, told_seconds
+from tdac_agent.html_report.scene import Scene, scene_of
+from tdac_agent.html_report.section import broken, learner_named, section_of
+from tdac_agent.records import status_now
+
+MOST_BYTES = 24 << 20
+"""Of the details of all runs; those beyond it are only listed."""
+MOST_TEXT = 2_000
+# Characters that hide or turn around the text beside them are shown by their names.
+_HIDDEN = {
+    code: f"⟨U+{code:04X}⟩"
+    for code in (*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x200E, 0x200F, 0x61C)
+} | {code: chr(0x2400 + code) for code in range(32) if chr(code) not in "\t\n"}
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A report.
+
+    Attributes:
+        html: The file.
+        runs: How many there are.
+        verified: How many of them.
+        unreadable: A line for each folder that could not be read.
+    """
+
+    html: bytes
+    runs: int
+    verified: int
+    unreadable: tuple[str, ...]
+
+
+def make_page(place: Path) -> Page:
+    """The report on a run folder, or on all runs at or below a folder.
+
+    Raises:
+        RunError: There is no run that can be read.
+    """
+    place = place.resolve()
+    runs: list[tuple[str, Told]] = []
+    unreadable: list[str] = []
+    for folder in run_folders(place):
+        name = place.name if folder == place else str(folder.relative_to(place))
+        try:
+            runs.append((name, gather_run(folder)))
+        except RunError as error:
+            unreadable.append(str(error).replace(str(folder), name))
+    if not runs:
+        raise RunError(unreadable[0])
+    details, scenes = _details(runs)
+    script = _text("page.js")
+    told = [one for _, one in runs]
+    html = _environment().get_template("page.html.j2").render(
+        name=place.name,
+        runs=runs,
+        unreadable=unreadable,
+        overview=overview_of([one.run for one in told]),
+        details=details,
+        scenes={key: _for_player(scene) for key, scene in scenes.items()},
+        style=Markup(_text("page.css")),
+        script=Markup(script),
+        script_hash=_hash(script),
+    )  # fmt: skip
+    return Page(
+        html.translate(_HIDDEN).encode("utf-8", "replace"),
+        len(runs),
+        sum(one.run.verified for one in told),
+        tuple(unreadable),
+    )
+
+
+def _details(runs: list[tuple[str, Told]]) -> tuple[list[Markup], dict[str, Scene]]:
+    """The sections of as many runs as there is room for, and the scenes they show."""
+    template = _environment().get_template("run.html.j2")
+    scenes: dict[str, Scene] = {}
+    details: list[Markup] = []
+    size = 0
+    for number, (name, told) in enumerate(runs, 1):
+        scene = _scene(told, scenes)
+        section = template.render(section_of(told, number, name, scene))
+        size += len(section)
+        if details and size > MOST_BYTES:
+            break
+        details.append(Markup(section))
+    return details, scenes
+
+
+def _scene(told: Told, scenes: dict[str, Scene]) -> tuple[str, Scene] | None:
+    """The scene of a run's task, which runs of the same task share."""
+    if told.task is None:
+        return None
+    key = told.task.sha256()
+    if key not in scenes:
+        scenes[key] = scene_of(told.task)
+    return key, scenes[key]
+
+
+def _for_player(scene: Scene) -> dict[str, Any]:
+    return {
+        "picture": scene.picture,
+        "width": scene.width,
+        "height": scene.height,
+        "radius": round(scene.radius, 2),
+    }
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("tdac_agent", "html_report/templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )
+    environment.filters |= {
+        "broken": broken,
+        "changes": count_changes,
+        "diff": shown_diff,
+        "duration": told_seconds,
+        "learner": learner_named,
+        "python": highlighted,
+        "shortened": shortened,
+        "status": status_now,
+        "test": short_test,
+        "usd": told_usd,
+    }
+    return environment
+
+
+def shortened(text: str) -> str:
+    """A text of bounded length."""
+    return text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]} …"
+
+
+def short_test(test: str) -> str:
+    """A test's name without its file."""
+    name, bracket, case = test.partition("::")[2].partition("[")
+    return name.removeprefix("test_").replace("_", " ") + bracket + case
+
+
+def _text(name: str) -> str:
+    return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
+
+
+def _hash(script: str) -> str:
+    """What a content security policy calls a script by."""
+    digest = hashlib.sha256(script.encode()).digest()
+    return f"sha256-{base64.b64encode(digest).decode()}"

@@ -1,0 +1,83 @@
+"""The background of an animation: the map or the world as a small picture."""
+
+from __future__ import annotations
+
+import base64
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from tdac_agent.pictures import pictures_of
+from tdac_agent.task import Task
+from tdac_envs.canvas import Image as Picture
+from tdac_envs.closeup import Chart
+
+LARGEST = 880
+COLOURS = 48
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A picture of a task, and where on it a pose is.
+
+    Attributes:
+        picture: PNG as a data address.
+        width: px.
+        height: px.
+        radius: Of the body, px.
+        chart: Of the drawing that the picture was made from.
+        zoom: Picture px in a px of the drawing.
+    """
+
+    picture: str
+    width: int
+    height: int
+    radius: float
+    chart: Chart
+    zoom: float
+
+    def at(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Poses in px of the picture, headings clockwise and without jumps.
+
+        Args:
+            poses: Shape (n, 3), or (n, 2) for places.
+        """
+        frame = self.chart.canvas.to_frame(self.chart.at(poses[:, :2]))
+        places = (frame + 0.5) * self.zoom
+        if poses.shape[1] == 2:
+            return places
+        turn = 1.0 if self.chart.turned(1.0) > 0 else -1.0
+        return np.column_stack([places, turn * np.unwrap(poses[:, 2])])
+
+
+def scene_of(task: Task) -> Scene:
+    """The map or the world with start, goal and shortest path."""
+    backdrop = pictures_of(task.setting).backdrop()
+    chart = backdrop.whole()
+    drawn = chart.canvas.image[: chart.canvas.strip_top]
+    zoom = min(1.0, LARGEST / max(drawn.shape[:2]))
+    height, width = (max(1, round(zoom * side)) for side in drawn.shape[:2])
+    return Scene(
+        data_address(_png(drawn, width, height), "image/png"),
+        width,
+        height,
+        backdrop.radius * chart.scale * zoom,
+        chart,
+        zoom,
+    )
+
+
+def data_address(content: bytes, kind: str) -> str:
+    """A file as an address that holds it."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def _png(drawn: Picture, width: int, height: int) -> bytes:
+    small = Image.fromarray(drawn).resize((width, height), Image.Resampling.BOX)
+    stream = io.BytesIO()
+    # Few colours make it several times smaller, and nobody sees it.
+    small.quantize(COLOURS).save(stream, "PNG", optimize=True)
+    return stream.getvalue()

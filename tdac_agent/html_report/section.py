@@ -1,0 +1,190 @@
+"""What the page says of one run: names and values for its template."""
+
+from __future__ import annotations
+
+import itertools
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from tdac_agent.budget import told_usd
+from tdac_agent.errors import RunError
+from tdac_agent.html_report.animation import animations
+from tdac_agent.html_report.gather import Told, Tried
+from tdac_agent.html_report.overview import drawn, told_seconds
+from tdac_agent.html_report.scene import Scene
+from tdac_agent.plots import plot_breakdown
+from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, status_now
+from tdac_agent.report import Diagnosis, Report
+from tdac_agent.units import UNITS
+
+DIFF_LINES = (100, 600)
+ALL_DIFF_LINES = 20_000
+MOST_ROWS = 60
+"""Of tests that ever failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """Tests that failed in one way, and why.
+
+    Attributes:
+        message: What was expected and what came.
+        tests: Their ids.
+        diagnoses: Of the episodes behind it.
+    """
+
+    message: str
+    tests: tuple[str, ...]
+    diagnoses: tuple[Diagnosis, ...]
+
+
+def section_of(
+    told: Told, number: int, name: str, scene: tuple[str, Scene] | None
+) -> dict[str, Any]:
+    """Everything that the template of a run asks for.
+
+    Args:
+        told: The run.
+        number: Of its section in the page, from 1.
+        name: Of its folder, for people.
+        scene: Of its task, and the scene's name in the page.
+    """
+    least, most = DIFF_LINES
+    episodes = []
+    if scene is not None and told.task is not None:
+        episodes = animations(told, told.task, scene[1])
+    return {
+        "number": number,
+        "name": name,
+        "told": told,
+        "run": told.run,
+        "status": status_now(told.run),
+        "learner": learner_named(told.run.learner),
+        "iterations": _iterations(told),
+        "failures": list(_failures(told)),
+        "scene": scene,
+        "episodes": episodes,
+        "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
+        "most_lines": max(least, min(most, ALL_DIFF_LINES // max(1, len(told.tried)))),
+        "breakdown": _breakdown(told),
+        "seconds": told_seconds(told.run.seconds),
+        "spent": spent(told),
+        "origin": list(_origin(told)),
+        "commands": list(_commands(told, name)),
+        "units": None if told.report is None else UNITS[told.report.provenance.unit],
+    }
+
+
+def _breakdown(told: Told) -> str | None:
+    """Where time and tokens went; None where the journal does not tell."""
+    if not told.run.attempts:
+        return None
+    try:
+        return drawn(plot_breakdown(told.run))
+    except (RunError, KeyError, TypeError, ValueError):
+        return None
+
+
+def learner_named(learner: str) -> str:
+    """A learner for people: what is no language model says so."""
+    plain = learner == "builtin"
+    return f"{learner} (a tuned template, no language model)" if plain else learner
+
+
+def broken(report: Report) -> list[Broken]:
+    """What failed, tests with the same message together."""
+    found: dict[str, list[Any]] = {}
+    for failure in report.failures:
+        found.setdefault(failure.message, []).append(failure)
+    seen: set[str] = set()
+    rows = []
+    for message, failures in found.items():
+        told = {f.diagnosis.text: f.diagnosis for f in failures if f.diagnosis}
+        fresh = tuple(told[text] for text in told if text not in seen)
+        seen.update(told)
+        rows.append(Broken(message, tuple(f.test for f in failures), fresh))
+    return rows
+
+
+def spent(told: Told) -> str:
+    """Tokens and cost of a run, in words."""
+    run = told.run
+    if not run.tokens:
+        return "none counted"
+    cost = "cost unknown" if run.cost is None else told_usd(run.cost)
+    if run.cost_lost:
+        cost += f", and at most {told_usd(run.cost_lost)} for lost answers"
+    return f"{run.tokens_in:,} in, {run.tokens_out:,} out; {cost}"
+
+
+def _iterations(told: Told) -> list[tuple[int, list[Tried]]]:
+    groups = itertools.groupby(told.tried, key=lambda one: one.k)
+    return [(k, list(group)) for k, group in groups]
+
+
+def _failures(told: Told) -> Iterator[tuple[str, list[bool]]]:
+    """Each test that ever failed, and which of the candidates failed it."""
+    names = dict.fromkeys(test for one in told.tried for test in one.failed)
+    for name in itertools.islice(names, MOST_ROWS):
+        yield name, [name in one.failed for one in told.tried]
+
+
+def _origin(told: Told) -> Iterator[tuple[str, str]]:
+    """Where the verdict is from: a line per fact."""
+    run = told.run
+    yield "began", run.started
+    yield "task", f"{run.task}, sha256 {run.task_sha256}"
+    yield "Learner", learner_named(run.learner)
+    yield "Optimizer", learner_named(run.optimizer)
+    if run.models:
+        yield "models, as reported", ", ".join(run.models)
+    for model, address in run.served_at.items():
+        yield f"served at ({model})", address
+    yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
+    yield "loop", f"K = {run.iterations}, J = {run.patience}, seed {run.seed}"
+    yield "tokens and cost", spent(told)
+    if told.report is not None:
+        yield from _verified_with(told.report)
+
+
+def _verified_with(report: Report) -> Iterator[tuple[str, str]]:
+    about = report.provenance
+    yield "controller", f"sha256 {about.controller_sha256}"
+    yield "map or world", f"sha256 {about.map_sha256}"
+    yield "params.json", f"sha256 {about.params_sha256}"
+    yield "sensors.py", f"sha256 {about.sensors_sha256}"
+    yield "suite", f"{about.suite}, sha256 {about.suite_sha256}"
+    yield "profile", about.profile + (" (nominal start only)" if about.paper else "")
+    yield "seed of the starts", str(about.seed)
+    yield "sandbox", about.sandbox
+    yield "limits", ", ".join(f"{k} {v:g}" for k, v in about.limits.items())
+    yield "versions", ", ".join(f"{k} {v}" for k, v in about.versions.items())
+    for warning in (*about.warnings, *about.left_out):
+        yield "remark", warning
+
+
+def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
+    """Commands, as typed beside the run's folder, and what each does."""
+    run = told.run
+    words = ["tdac", "synth", "--task", name, "--learner", run.learner]
+    if run.optimizer != run.learner:
+        words += ["--optimizer", run.optimizer]
+    if run.base_url is not None:
+        words += ["--base-url", run.base_url]
+    if run.prompt != "full":
+        kept = (run.folder / PROMPT_FILE).is_file()
+        words += ["--prompt", f"{name}/{PROMPT_FILE}" if kept else run.prompt]
+    if run.given_sha256 is not None:
+        words += ["--from", f"{name}/{GIVEN_FILE}"]
+    words += ["-K", str(run.iterations), "-J", str(run.patience)]
+    yield shlex.join([*words, "--seed", str(run.seed)]), "asks anew"
+    again = ["tdac", "synth", "--task", name, "--learner", f"replay:{name}"]
+    yield shlex.join(again), "the answers on record again; nobody is asked"
+    if not run.finished:
+        more = run.enough.split()
+        yield shlex.join(["tdac", "synth", "--resume", name, *more]), "goes on with it"
+    if run.verified:
+        yield shlex.join(["tdac", "verify", name]), "judges the controller again"
+        yield shlex.join(["tdac", "play", name, "--video", "drive.mp4"]), "as a video"

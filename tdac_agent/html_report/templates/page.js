@@ -1,0 +1,192 @@
+"use strict";
+(() => {
+  const TRAIL = "#5848c6", CONTACT = "#d55e00", FINENESS = 4, TURNS = 100;
+  const scenes = read("scenes");
+  const players = new Map();
+
+  for (const section of document.querySelectorAll("section.run")) {
+    const player = section.querySelector(".player");
+    if (player) players.set(section.id, watch(player));
+    openAll(section);
+  }
+  for (const button of document.querySelectorAll("button.watch")) {
+    button.addEventListener("click", () => {
+      const place = `run-${button.dataset.run}`;
+      players.get(place).show(Number(button.dataset.episode), true);
+      document.getElementById(`watch-${button.dataset.run}`).scrollIntoView();
+    });
+  }
+  addEventListener("hashchange", reveal);
+  for (const cell of document.querySelectorAll("a.cell")) {
+    // Also where the address is the same as before, and nothing changes.
+    cell.addEventListener("click", () => unfold(cell.hash));
+  }
+  reveal();
+
+  function read(id) {
+    return JSON.parse(document.getElementById(id).textContent);
+  }
+
+  function reveal() {
+    if (unfold(location.hash)) document.querySelector(location.hash).scrollIntoView();
+  }
+
+  function unfold(hash) {
+    const target = /^#[\w-]+$/.test(hash) ? document.querySelector(hash) : null;
+    for (let part = target; part; part = part.parentElement) {
+      if (part.tagName === "DETAILS") part.open = true;
+    }
+    return target;
+  }
+
+  function openAll(section) {
+    const button = section.querySelector("button.all");
+    if (!button) return;
+    const parts = section.querySelectorAll("details.iteration");
+    button.hidden = parts.length < 2;
+    button.addEventListener("click", () => {
+      const open = button.textContent === "open all";
+      for (const part of parts) part.open = open;
+      button.textContent = open ? "close all" : "open all";
+    });
+  }
+
+  // One row [step, x, y, heading] for each step that was kept.
+  function rows(points) {
+    const at = [0, 0, 0, 0], found = [];
+    for (let n = 0; n < points.length; n += 4) {
+      for (let i = 0; i < 4; i++) at[i] += points[n + i];
+      found.push([at[0], at[1] / FINENESS, at[2] / FINENESS, at[3] / TURNS]);
+    }
+    return found;
+  }
+
+  // The row at a step, and how many of the kept ones are not after it.
+  function poseAt(path, step) {
+    let low = 0, high = path.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (path[middle][0] <= step) low = middle; else high = middle;
+    }
+    const a = path[low], b = path[high];
+    const share = b[0] > a[0] ? Math.min(1, (step - a[0]) / (b[0] - a[0])) : 1;
+    return [a.map((value, i) => value + share * (b[i] - value)), low + 1];
+  }
+
+  function watch(player) {
+    const scene = scenes[player.dataset.scene], episodes = read(player.dataset.episodes);
+    const part = (name) => player.querySelector(`.${name}`);
+    const canvas = player.querySelector("canvas"), pen = canvas.getContext("2d");
+    const play = part("play"), scrub = part("scrub"), clock = part("clock");
+    const ofCandidate = part("candidate"), ofEpisode = part("episode"), speed = part("speed");
+    const sharp = Math.min(2, window.devicePixelRatio || 1);
+    canvas.width = scene.width * sharp;
+    canvas.height = scene.height * sharp;
+    canvas.style.aspectRatio = `${scene.width} / ${scene.height}`;
+    canvas.style.width = `${Math.min(720, scene.width)}px`;
+    pen.scale(sharp, sharp);
+    const background = new Image();
+    let episode, path, step = 0, before = null;
+
+    function line(points, colour, width) {
+      pen.beginPath();
+      points.forEach(([, x, y], n) => (n ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+      pen.strokeStyle = colour;
+      pen.lineWidth = width;
+      pen.lineJoin = pen.lineCap = "round";
+      pen.stroke();
+    }
+
+    function disc(x, y, radius, fill, stroke, width) {
+      pen.beginPath();
+      pen.arc(x, y, radius, 0, 2 * Math.PI);
+      if (fill) { pen.fillStyle = fill; pen.fill(); }
+      if (stroke) { pen.strokeStyle = stroke; pen.lineWidth = width; pen.stroke(); }
+    }
+
+    function draw() {
+      pen.clearRect(0, 0, scene.width, scene.height);
+      if (background.complete) pen.drawImage(background, 0, 0, scene.width, scene.height);
+      const [pose, passed] = poseAt(path, step), [, x, y, heading] = pose;
+      line(path, `${TRAIL}38`, 2);
+      line([...path.slice(0, passed), pose], TRAIL, 3);
+      const radius = Math.max(scene.radius, 5);
+      disc(x, y, radius, `${TRAIL}59`, TRAIL, 2);
+      pen.beginPath();
+      for (const turn of [0, 2.6, -2.6]) {
+        const angle = heading + turn;
+        pen.lineTo(x + 0.7 * radius * Math.cos(angle), y + 0.7 * radius * Math.sin(angle));
+      }
+      pen.fillStyle = TRAIL;
+      pen.fill();
+      if (episode.contact) {
+        const [at, to] = episode.contact, size = Math.max(0.35 * radius, 6);
+        disc(at, to, size, null, "#fffc", 6);
+        disc(at, to, size, null, CONTACT, 3);
+      }
+      const seconds = (n) => `${(n * episode.dt).toFixed(1)} s`;
+      const now = Math.round(step), end = now >= episode.steps;
+      clock.textContent = `step ${now} of ${episode.steps}, ${seconds(now)} of `
+        + `${seconds(episode.steps)}${end ? ` – ${episode.outcome}` : ""}`;
+      scrub.value = now;
+    }
+
+    function pause() {
+      before = null;
+      play.textContent = "▶";
+      play.setAttribute("aria-label", "Play");
+    }
+
+    function start() {
+      if (step >= episode.steps) step = 0;
+      before = performance.now();
+      play.textContent = "❚❚";
+      play.setAttribute("aria-label", "Pause");
+      requestAnimationFrame(tick);
+    }
+
+    function tick(now) {
+      if (before === null) return;
+      const passed = Math.max(0, now - before) / 1000;
+      before = Math.max(before, now);
+      step = Math.min(episode.steps, step + passed * Number(speed.value) / episode.dt);
+      draw();
+      if (step >= episode.steps) pause(); else requestAnimationFrame(tick);
+    }
+
+    function fill(select, entries) {
+      select.replaceChildren(...entries.map(([text, value]) => new Option(text, value)));
+    }
+
+    function show(number, playing) {
+      pause();
+      episode = episodes[number];
+      path = rows(episode.points);
+      const same = (e) => e.candidate === episode.candidate;
+      fill(ofEpisode, episodes.map((e, n) => [e, n]).filter(([e]) => same(e))
+        .map(([e, n]) => [`${e.name}: ${e.outcome}`, n]));
+      ofEpisode.value = number;
+      ofCandidate.value = episodes.findIndex(same);
+      scrub.max = episode.steps;
+      step = playing ? 0 : episode.steps;
+      draw();
+      if (playing) start();
+    }
+
+    const first = new Map();
+    episodes.forEach((e, n) => first.has(e.candidate) || first.set(e.candidate, n));
+    fill(ofCandidate, [...first].map(([name, n]) => {
+      const [k, j] = name.split(".");
+      return [`k=${k} j=${j}`, n];
+    }));
+    ofCandidate.addEventListener("change", () => show(Number(ofCandidate.value), false));
+    ofEpisode.addEventListener("change", () => show(Number(ofEpisode.value), false));
+    play.addEventListener("click", () => (before === null ? start() : pause()));
+    scrub.addEventListener("input", () => { pause(); step = Number(scrub.value); draw(); });
+    background.addEventListener("load", draw);
+    background.src = scene.picture;
+    // The last candidate is the one that was verified, or came last.
+    show([...first.values()].at(-1), false);
+    return { show };
+  }
+})();

@@ -1,0 +1,122 @@
+"""The page in a real browser: no errors, controls that work, no word cut off."""
+
+import shutil
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select, WebDriverWait
+
+WIDTHS = {"desktop": 1280, "phone": 390}
+PICTURE = "return document.querySelector(arguments[0] + ' canvas').toDataURL()"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """Chromium without a window."""
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
+    if not chromium or not driver:
+        pytest.skip("needs chromium and chromedriver: apt-get install chromium-driver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for flag in (
+        *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
+        f"--user-data-dir={tmp_path_factory.mktemp('profile')}",
+    ):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    opened = webdriver.Chrome(options=options, service=Service(driver))
+    yield opened
+    opened.quit()
+
+
+@pytest.fixture(params=WIDTHS)
+def opened(request, browser, page, tmp_path):
+    """The report in a window of some width; afterwards nothing was complained about."""
+    width = WIDTHS[request.param]
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1}
+    mobile = {"mobile": request.param == "phone"}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size | mobile)
+    file = tmp_path / "report.html"
+    file.write_text(page)
+    browser.get_log("browser")  # of the page before
+    browser.get(file.as_uri())
+    yield browser
+    assert browser.get_log("browser") == []
+    assert browser.execute_script("return typeof window.hacked") == "undefined"
+
+
+def find(browser, selector):
+    return browser.find_element(By.CSS_SELECTOR, selector)
+
+
+def click(browser, selector):
+    browser.execute_script(
+        "arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})",
+        found := find(browser, selector),
+    )
+    found.click()
+
+
+def until(browser, condition):
+    return WebDriverWait(browser, 30, poll_frequency=0.05).until(condition)
+
+
+def test_it_fits(opened):
+    """Nothing makes the page wider than the window, and text is not tiny."""
+    for part in opened.find_elements(By.CSS_SELECTOR, "details"):
+        opened.execute_script("arguments[0].open = true", part)
+    width = opened.execute_script("return document.documentElement.scrollWidth")
+    assert width == opened.execute_script("return document.documentElement.clientWidth")
+    size = "return parseFloat(getComputedStyle(arguments[0]).fontSize)"
+    for selector in ("p", "td", "pre.code", "button", ".diagnosis", ".message"):
+        assert opened.execute_script(size, find(opened, selector)) >= 12
+
+
+def test_the_player(opened):
+    """Plays, pauses, is dragged, and shows the episode that is chosen."""
+    player = "#run-2 .player"
+
+    def step():
+        return int(find(opened, f"{player} .scrub").get_property("value"))
+
+    def picture():
+        return opened.execute_script(PICTURE, player)
+
+    steps = int(find(opened, f"{player} .scrub").get_attribute("max"))
+    assert step() == steps
+    assert "– reached" in find(opened, f"{player} .clock").text
+    at_the_end = picture()
+    Select(find(opened, f"{player} .speed")).select_by_value("0.5")
+    click(opened, f"{player} .play")
+    until(opened, lambda _: 0 < step() < steps)
+    click(opened, f"{player} .play")
+    assert find(opened, f"{player} .play").get_attribute("aria-label") == "Play"
+    assert picture() != at_the_end
+    drag = "arguments[0].value = 20; arguments[0].dispatchEvent(new Event('input'))"
+    opened.execute_script(drag, find(opened, f"{player} .scrub"))
+    assert find(opened, f"{player} .clock").text.startswith("step 20 of ")
+    Select(find(opened, f"{player} .candidate")).select_by_visible_text("k=1 j=0")
+    names = Select(find(opened, f"{player} .episode")).options
+    assert [name.text for name in names] == ["nominal: collision"]
+    assert "– collision" in find(opened, f"{player} .clock").text
+    Select(find(opened, f"{player} .speed")).select_by_value("16")
+    click(opened, f"{player} .play")
+    until(opened, lambda _: "collision" in find(opened, f"{player} .clock").text)
+
+
+def test_ways_through_the_page(opened):
+    """A cell of the timeline opens its candidate, whose episodes can be watched."""
+    click(opened, '#run-1 a.cell[href="#c-1-1-1"]')
+    assert until(opened, lambda _: find(opened, "#c-1-1-1").is_displayed())
+    click(opened, "#run-1 button.all")
+    parts = opened.find_elements(By.CSS_SELECTOR, "#run-1 details.iteration")
+    assert all(part.get_attribute("open") for part in parts)
+    click(opened, "#run-1 button.all")
+    assert not any(part.get_attribute("open") for part in parts)
+    click(opened, '#run-2 button.watch[aria-label="Watch jitter 2 of k=1 j=1"]')
+    chosen = Select(find(opened, "#run-2 .episode")).first_selected_option.text
+    assert chosen == "jitter 2: reached"
+    until(opened, lambda _: "reached" in find(opened, "#run-2 .clock").text)
