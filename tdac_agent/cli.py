@@ -35,6 +35,7 @@ from tdac_agent.commands.options import (
     with_heading,
 )
 from tdac_agent.commands.synth_flags import EPILOG, synth
+from tdac_agent.commands.train_flags import train
 from tdac_agent.commands.webots_flags import export_app, webots_app
 
 app = typer.Typer(
@@ -52,6 +53,10 @@ app = typer.Typer(
 )
 app.add_typer(webots_app, name="webots")
 app.add_typer(export_app, name="export")
+app.command(
+    epilog="Examples: `tdac train --task maze`; `tdac train --task epuck --algo sac "
+    "--seed 1`; `tdac train --task maze --task office --variation random`"
+)(train)
 
 
 @app.callback(invoke_without_command=True)

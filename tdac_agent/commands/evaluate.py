@@ -37,7 +37,7 @@ def run(
 ) -> int:
     """Evaluates and prints; returns the exit code."""
     check_tier(tier)
-    names = None if wrappers is None else _wrappers(wrappers)
+    names = None if wrappers is None else wrapper_names(wrappers)
     entrants_of(policies, names)  # before anything is started
     _check_places(csv, out)
     console = Console(stderr=as_json)
@@ -90,7 +90,7 @@ def run(
     return 0
 
 
-def _wrappers(words: list[str]) -> list[str]:
+def wrapper_names(words: list[str]) -> list[str]:
     """The names that are given; `none` stands for no wrapper.
 
     Raises:

@@ -15,7 +15,7 @@ import pytest
 from small import small_cells, write_small_task
 
 COMMANDS = [
-    "map", "world", "synth", "verify", "play", "check-suite", "doctor",
+    "map", "world", "synth", "verify", "play", "check-suite", "doctor", "train",
     "webots run", "export webots",
 ]  # fmt: skip
 ENDS = ["--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6"]

@@ -1,0 +1,72 @@
+"""The learning curve of a training: a row for each evaluation."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from tdac_agent.errors import RunError
+from tdac_agent.files import write_atomic
+
+CURVE_FILE = "learning_curve.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """An evaluation by the most likely actions, and what was seen in training.
+
+    Attributes:
+        steps: Of training so far, of all robots together.
+        seconds: Wall time so far, evaluations included.
+        success_rate: Share of the evaluation's episodes in which the goal was reached.
+        collision_rate: Share in which something was touched.
+        mean_return: Of an episode.
+        mean_length: Of an episode, steps.
+        train_success_rate: Of the last 100 episodes of training, with exploration; nan
+            before there is one.
+    """
+
+    steps: int
+    seconds: float
+    success_rate: float
+    collision_rate: float
+    mean_return: float
+    mean_length: float
+    train_success_rate: float
+
+    @property
+    def worth(self) -> tuple[float, float, float]:
+        """By which the best policy is chosen: successes, then what they are worth."""
+        return self.success_rate, -self.collision_rate, self.mean_return
+
+
+def write_curve(folder: Path, points: list[Point]) -> None:
+    """Writes `learning_curve.csv`."""
+    text = io.StringIO()
+    names = [field.name for field in fields(Point)]
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(point) for point in points)
+    write_atomic(folder / CURVE_FILE, text.getvalue())
+
+
+def read_curve(folder: Path) -> list[Point]:
+    """The points of a training; none where nothing was evaluated yet.
+
+    Raises:
+        RunError: The file cannot be read.
+    """
+    file = folder / CURVE_FILE
+    if not file.is_file():
+        return []
+    try:
+        with file.open(newline="", encoding="utf-8") as lines:
+            rows = list(csv.DictReader(lines))
+        return [
+            Point(int(row["steps"]), *(float(row[f.name]) for f in fields(Point)[1:]))
+            for row in rows
+        ]
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise RunError(f"cannot read {file}: {error}") from error

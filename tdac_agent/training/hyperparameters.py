@@ -1,0 +1,126 @@
+"""Hyperparameters of the baselines, from files in the form of rl-zoo3."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+
+from tdac_envs.errors import TaskError
+from tdac_envs.wrappers import WRAPPERS
+
+Algo = Literal["ppo", "sac", "td3"]
+# In a wheel the files are beside this package's modules, in a clone at its top.
+_HERE = Path(__file__).parent.parent
+_FOLDERS = (_HERE / "configs" / "sb3", _HERE.parent / "configs" / "sb3")
+_LINEAR = "lin_"
+
+
+@dataclass(frozen=True, slots=True)
+class Hyperparameters:
+    """What a file says for one algorithm and one environment.
+
+    Attributes:
+        wrappers: Names of `WRAPPERS`, innermost first.
+        n_envs: Robots that are driven at a time.
+        steps: Of training, of all robots together.
+        policy: Of stable-baselines3.
+        model: Further arguments of the algorithm's class, as the file has them.
+    """
+
+    wrappers: tuple[str, ...]
+    n_envs: int
+    steps: int
+    policy: str
+    model: dict[str, Any]
+
+
+def config_file(algo: Algo) -> Path:
+    """The file that is shipped for an algorithm."""
+    files = [folder / f"{algo}.yml" for folder in _FOLDERS]
+    return next((file for file in files if file.is_file()), files[0])
+
+
+def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
+    """What a file says for an environment.
+
+    Args:
+        file: In the form of rl-zoo3.
+        env: Its id, a key of the file.
+
+    Raises:
+        TaskError: The file cannot be read, or lacks or misuses a key.
+    """
+    try:
+        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = " ".join(str(error).split())
+        raise TaskError(f"cannot read hyperparameters: {reason}") from error
+    if not isinstance(data, dict) or not isinstance(data.get(env), dict):
+        raise TaskError(f"{file} has no hyperparameters for {env}")
+    model = dict(data[env])
+    try:
+        return Hyperparameters(
+            _names(model.pop("env_wrapper", [])),
+            int(model.pop("n_envs", 1)),
+            int(model.pop("n_timesteps")),
+            str(model.pop("policy", "MlpPolicy")),
+            model,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise TaskError(f"{file}, {env}: {error}") from error
+
+
+def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
+    """Arguments as stable-baselines3 takes them.
+
+    Args:
+        model: As in the file: rates that fall to zero are told as `lin_1e-3`, the
+            noise of actions as `noise_type: normal` and `noise_std`.
+
+    Raises:
+        TaskError: A rate or a noise is told otherwise.
+    """
+    found = {key: _scheduled(key, value) for key, value in model.items()}
+    kind, spread = found.pop("noise_type", None), found.pop("noise_std", 0.0)
+    if kind is not None and kind != "normal":
+        raise TaskError(f"expected noise_type: normal, got {kind!r}")
+    if kind is not None:
+        from stable_baselines3.common.noise import NormalActionNoise
+
+        zeros = np.zeros(2)  # of both wheels
+        found["action_noise"] = NormalActionNoise(zeros, zeros + float(spread))
+    return found
+
+
+def _names(paths: list[str] | str) -> tuple[str, ...]:
+    known = {f"{w.__module__}.{w.__qualname__}": name for name, w in WRAPPERS.items()}
+    # Gymnasium offers its wrappers in one place, and has them in another.
+    known |= {
+        f"gymnasium.wrappers.{w.__qualname__}": name
+        for name, w in WRAPPERS.items()
+        if w.__module__.startswith("gymnasium.wrappers.")
+    }
+    wanted = [paths] if isinstance(paths, str) else paths
+    wrong = [path for path in wanted if path not in known]
+    if wrong:
+        raise ValueError(f"env_wrapper: expected some of {list(known)}, got {wrong[0]}")
+    return tuple(known[path] for path in wanted)
+
+
+def _scheduled(key: str, value: Any) -> Any:
+    if not isinstance(value, str) or not value.startswith(_LINEAR):
+        return value
+    try:
+        return linear(float(value.removeprefix(_LINEAR)))
+    except ValueError:
+        raise TaskError(f"expected {key} as in lin_1e-3, got {value!r}") from None
+
+
+def linear(first: float) -> Callable[[float], float]:
+    """A value that falls to zero with the share of the training that is left."""
+    return lambda left: left * first

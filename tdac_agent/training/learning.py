@@ -1,0 +1,200 @@
+"""A training with stable-baselines3: steps, evaluations, checkpoints.
+
+Needs the extra `tdac[sb3]`: import it where it is used.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecMonitor
+
+from tdac_agent.errors import RunError
+from tdac_agent.files import write_atomic
+from tdac_agent.training.curve import Point, read_curve, write_curve
+from tdac_agent.training.hyperparameters import model_arguments
+from tdac_agent.training.plan import TrainingPlan, make_batch
+from tdac_agent.training.policy_files import write_policy
+
+ALGOS = {"ppo": PPO, "sac": SAC, "td3": TD3}
+CHECKPOINT, REPLAY = "checkpoint.zip", "replay.pkl"
+EVALUATION_SEED = 1_000_000
+"""Added to a training's seed; `tdac evaluate` draws other episodes."""
+Watch = Callable[[int, Point | None, Point | None], None]
+"""Told the steps so far, an evaluation where there is a new one, and the best."""
+
+
+def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
+    """Trains to the end of a plan, from the folder's last checkpoint if it has one.
+
+    Every evaluation is followed by a checkpoint, so that no more than what came after
+    the last one is lost, whatever ends the process. Who goes on begins new episodes.
+
+    Args:
+        plan: What is to be done.
+        folder: Of the training.
+        watch: Told of what goes on.
+
+    Returns:
+        The learning curve.
+
+    Raises:
+        RunError: The checkpoint cannot be read.
+    """
+    # More threads than one make networks of this size slower.
+    torch.set_num_threads(1)
+    envs = VecMonitor(make_batch(plan, plan.n_envs), info_keywords=("is_success",))
+    trials = VecMonitor(make_batch(plan, plan.episodes), info_keywords=("collision",))
+    try:
+        model = _model(plan, folder, envs)
+        done = int(model.num_timesteps)
+        points = [point for point in read_curve(folder) if point.steps <= done]
+        envs.seed(plan.seed + done * plan.n_envs)
+        callback = _Evaluations(plan, folder, trials, points, watch)
+        if done < plan.steps:
+            model.learn(plan.steps - done, callback, reset_num_timesteps=False)
+            callback.finish()
+        return callback.points
+    finally:
+        envs.close()
+        trials.close()
+
+
+def evaluate_batch(model: Any, envs: VecMonitor, seed: int) -> Point:
+    """One episode of each robot of a batch, by the most likely actions.
+
+    Args:
+        model: With `predict`.
+        envs: Of which each robot drives its first episode.
+        seed: Of the episodes.
+
+    Returns:
+        What is known from the episodes; steps, seconds and training are nought.
+    """
+    envs.seed(seed)
+    observations: Any = envs.reset()
+    ended: list[dict[str, Any] | None] = [None] * envs.num_envs
+    while None in ended:
+        actions, _ = model.predict(observations, deterministic=True)
+        observations, _, over, infos = envs.step(actions)
+        for i in np.flatnonzero(over).tolist():
+            ended[i] = ended[i] or infos[i]
+    episodes = [info for info in ended if info is not None]
+
+    def mean(values: list[Any]) -> float:
+        return round(float(np.mean(values)), 6)
+
+    return Point(
+        0,
+        0.0,
+        mean([info["is_success"] for info in episodes]),
+        mean([info["collision"] for info in episodes]),
+        mean([info["episode"]["r"] for info in episodes]),
+        mean([info["episode"]["l"] for info in episodes]),
+        float("nan"),
+    )
+
+
+class _Evaluations(BaseCallback):
+    """Evaluates now and then, keeps the best policy, and writes checkpoints."""
+
+    def __init__(
+        self,
+        plan: TrainingPlan,
+        folder: Path,
+        trials: VecMonitor,
+        points: list[Point],
+        watch: Watch,
+    ) -> None:
+        super().__init__()
+        self.points = points
+        self._plan, self._folder, self._trials = plan, folder, trials
+        self._watch = watch
+        before = points[-1].seconds if points else 0.0
+        self._began = time.perf_counter() - before
+        self._best = max(points, key=lambda point: point.worth, default=None)
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        steps = int(self.model.num_timesteps)
+        self._watch(steps, None, self._best)
+        last = self.points[-1].steps if self.points else 0
+        if steps - last >= self._plan.evaluate_every:
+            self._evaluate(steps)
+
+    def finish(self) -> None:
+        """Evaluates what was learnt since the last time."""
+        steps = int(self.model.num_timesteps)
+        if not self.points or self.points[-1].steps < steps:
+            self._evaluate(steps)
+
+    def _evaluate(self, steps: int) -> None:
+        found = evaluate_batch(
+            self.model, self._trials, EVALUATION_SEED + self._plan.seed
+        )
+        seen = [info["is_success"] for info in self.model.ep_info_buffer or ()]
+        point = replace(
+            found,
+            steps=steps,
+            seconds=round(time.perf_counter() - self._began, 3),
+            train_success_rate=round(float(np.mean(seen)), 6) if seen else float("nan"),
+        )
+        if self._best is None or point.worth >= self._best.worth:
+            self._best = point
+            write_policy(self.model, self._folder, self._plan, point)
+        self.points.append(point)
+        write_curve(self._folder, self.points)
+        _write_checkpoint(self.model, self._folder)
+        self._watch(steps, point, self._best)
+
+
+def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
+    """The model of the last checkpoint, or a new one."""
+    kind: Any = ALGOS[plan.algo]
+    log = None
+    if importlib.util.find_spec("tensorboard") is not None:
+        log = str(folder / "tensorboard")
+    file = folder / CHECKPOINT
+    if not file.is_file():
+        given = model_arguments(plan.hyperparameters)
+        try:
+            return kind(
+                plan.policy,
+                envs,
+                **{"seed": plan.seed, "device": "cpu", "tensorboard_log": log, **given},
+            )
+        except (TypeError, ValueError, AssertionError) as error:
+            reason = " ".join(str(error).split())
+            raise RunError(f"hyperparameters of {plan.algo}: {reason}") from error
+    try:
+        model = kind.load(file, envs, device="cpu", tensorboard_log=log)
+        if (folder / REPLAY).is_file():
+            model.load_replay_buffer(folder / REPLAY)
+    # A torn or foreign file raises whatever the pickles in it do.
+    except Exception as error:
+        reason = " ".join(str(error).split())[:160]
+        raise RunError(f"cannot go on from {file}: {reason}") from error
+    return model
+
+
+def _write_checkpoint(model: Any, folder: Path) -> None:
+    if hasattr(model, "replay_buffer"):
+        draft = folder / f".{REPLAY}"
+        model.save_replay_buffer(draft)
+        os.replace(draft, folder / REPLAY)
+    content = io.BytesIO()
+    model.save(content)
+    write_atomic(folder / CHECKPOINT, content.getvalue())

@@ -1,0 +1,181 @@
+"""What a training is to do: all that a folder needs to go on with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tdac_agent.disturbance import Disturbance
+from tdac_agent.errors import RunError
+from tdac_agent.files import write_atomic
+from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import EPUCK, bundled_task
+from tdac_agent.training.hyperparameters import (
+    Algo,
+    Hyperparameters,
+    config_file,
+    read_hyperparameters,
+)
+from tdac_envs.errors import TaskError
+from tdac_envs.wrappers import check_wrappers
+
+PLAN_FILE = "training.json"
+Variation = Literal["nominal", "jitter", "random"]
+EVALUATIONS, EPISODES = 20, 100
+
+
+class TrainingPlan(BaseModel):
+    """`training.json` of a training's folder."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    schema_version: Literal[1] = 1
+    algo: Algo
+    tasks: tuple[str, ...] = Field(description="Robot i has the task i modulo these.")
+    task_sha256: tuple[str, ...]
+    wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
+    variation: Variation = "jitter"
+    disturbance: Disturbance
+    steps: int = Field(description="Of all robots together.")
+    seed: int = 0
+    n_envs: int
+    policy: str = "MlpPolicy"
+    hyperparameters: dict[str, Any]
+    evaluate_every: int = Field(description="Steps.")
+    episodes: int = Field(EPISODES, description="Of each evaluation.")
+
+
+def make_plan(
+    tasks: tuple[str, ...],
+    algo: Algo = "ppo",
+    *,
+    steps: int | None = None,
+    seed: int = 0,
+    variation: Variation = "jitter",
+    disturbance: Disturbance | None = None,
+    wrappers: tuple[str, ...] | None = None,
+    n_envs: int | None = None,
+    episodes: int = EPISODES,
+    config: Path | None = None,
+) -> TrainingPlan:
+    """The plan of a training, with what is not given from the hyperparameters' file.
+
+    Args:
+        tasks: Names or files of tasks of one environment.
+        algo: Algorithm.
+        steps: Of all robots together.
+        seed: Of networks, starts and noise.
+        variation: Of the starts.
+        disturbance: Noise and lateness; none by default.
+        wrappers: Names of wrappers, innermost first.
+        n_envs: Robots that are driven at a time.
+        episodes: Of each evaluation.
+        config: File with hyperparameters, in the form of rl-zoo3.
+
+    Raises:
+        TaskError: A task or a wrapper cannot be used, or the tasks are of several
+            environments.
+    """
+    loaded = [load_task(name) for name in tasks]
+    if len({task.spec.env for task in loaded}) != 1:
+        raise TaskError("expected tasks of one environment: all maps, or all worlds")
+    given = read_hyperparameters(config or config_file(algo), loaded[0].spec.env)
+    names = given.wrappers if wrappers is None else wrappers
+    check_wrappers(names)
+    if len(loaded) > 1 and "goal-relative" not in names:
+        raise TaskError(
+            "several tasks need --wrapper goal-relative: places on one map mean "
+            "nothing on another"
+        )
+    count = n_envs or given.n_envs
+    wanted = steps or given.steps
+    return TrainingPlan(
+        algo=algo,
+        tasks=tuple(map(_lasting, tasks)),
+        task_sha256=tuple(task.sha256() for task in loaded),
+        wrappers=names,
+        variation=variation,
+        disturbance=disturbance or Disturbance(0.0, 0.0, 0.0, 0),
+        steps=wanted,
+        seed=seed,
+        n_envs=max(count, len(tasks)),
+        policy=_policy(given, names),
+        hyperparameters=given.model,
+        evaluate_every=max(wanted // EVALUATIONS, 1),
+        episodes=max(episodes, len(tasks)),
+    )
+
+
+def write_plan(folder: Path, plan: TrainingPlan) -> None:
+    """Writes `training.json`."""
+    write_atomic(folder / PLAN_FILE, plan.model_dump_json(indent=2) + "\n")
+
+
+def read_plan(folder: Path) -> TrainingPlan:
+    """The plan of a training that was begun.
+
+    Raises:
+        RunError: There is none, or it cannot be read.
+    """
+    file = folder / PLAN_FILE
+    try:
+        return TrainingPlan.model_validate_json(file.read_bytes())
+    except OSError as error:
+        reason = error.strerror
+        raise RunError(f"no training in {str(folder)!r}: {file}: {reason}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise RunError(f"{file}: {where}: {first['msg']}") from error
+
+
+def tasks_of(plan: TrainingPlan) -> list[Task]:
+    """The tasks of a plan, as they were when it was made.
+
+    Raises:
+        TaskError: One has changed since, or cannot be used.
+    """
+    tasks = [load_task(name) for name in plan.tasks]
+    for name, task, sha256 in zip(plan.tasks, tasks, plan.task_sha256, strict=True):
+        if task.sha256() != sha256:
+            raise TaskError(f"the task {name!r} has changed since the training began")
+    return tasks
+
+
+def make_batch(plan: TrainingPlan, count: int) -> Any:
+    """Robots on a plan's tasks, seen through its wrappers, in one batch for SB3."""
+    from tdac_envs.sb3 import SB3VecEnv
+    from tdac_envs.wrapped_vector import WrappedVectorEnv
+
+    each = []
+    tasks = tasks_of(plan)
+    for task in tasks:
+        options = plan.disturbance.env_options()
+        noise = task.setting.noise(options.pop("range_noise"))
+        varied = {**options, **noise, "variation": plan.variation}
+        each.append({**task.env_kwargs(), **varied})
+    batch = _batch_class(tasks[0])(count, autoreset_mode="SameStep", each=each)
+    return SB3VecEnv(WrappedVectorEnv(batch, plan.wrappers))
+
+
+def _batch_class(task: Task) -> Any:
+    if task.spec.env == EPUCK:
+        from tdac_envs.epuck.vector import EPuckVectorEnv
+
+        return EPuckVectorEnv
+    from tdac_envs.map2d_vector import Map2DVectorEnv
+
+    return Map2DVectorEnv
+
+
+def _policy(given: Hyperparameters, wrappers: tuple[str, ...]) -> str:
+    """The network's class, for one array or for several."""
+    flat = given.policy.replace("MultiInput", "Mlp")
+    return flat if "flatten" in wrappers else flat.replace("Mlp", "MultiInput")
+
+
+def _lasting(name: str) -> str:
+    """The name of a task that means the same in every folder."""
+    return name if bundled_task(name) is not None else str(Path(name).resolve())

@@ -1,0 +1,67 @@
+"""The files of a trained policy: its weights, and all that is to be known of it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import math
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.files import write_atomic
+from tdac_agent.learned import SavedPolicy, write_metadata
+from tdac_agent.provenance import versions
+from tdac_agent.training.curve import Point
+from tdac_agent.training.plan import TrainingPlan
+
+POLICY, FACTS = "policy.zip", "policy.json"
+LEARNERS = ("stable_baselines3", "torch")
+
+
+def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> None:
+    """Writes `policy.zip`, as `tdac evaluate` takes it, and `policy.json`.
+
+    Args:
+        model: Of stable-baselines3.
+        folder: Of the training.
+        plan: Of the training.
+        found: Its evaluation.
+    """
+    saved = SavedPolicy(
+        algo=plan.algo,
+        tasks=plan.tasks,
+        wrappers=plan.wrappers,
+        variation=plan.variation,
+        steps=found.steps,
+        seed=plan.seed,
+    )
+    draft = folder / f".{POLICY}"
+    model.save(draft)
+    write_metadata(draft, saved)
+    os.replace(draft, folder / POLICY)
+    facts = {
+        **plan.model_dump(mode="json"),
+        "steps_planned": plan.steps,
+        "steps": found.steps,
+        "seconds": found.seconds,
+        "evaluation": asdict(found),
+        "cores": os.cpu_count(),
+        "versions": {**versions(), **_of_learners()},
+    }
+    # JSON has no nan: there was no episode in training yet.
+    told = json.dumps(_without_nan(facts), indent=2, allow_nan=False)
+    write_atomic(folder / FACTS, told + "\n")
+
+
+def _of_learners() -> dict[str, str]:
+    return {name: importlib.metadata.version(name) for name in LEARNERS}
+
+
+def _without_nan(facts: dict[str, Any]) -> dict[str, Any]:
+    evaluation = {
+        key: None if math.isnan(value) else value
+        for key, value in facts["evaluation"].items()
+    }
+    return {**facts, "evaluation": evaluation}

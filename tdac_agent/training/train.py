@@ -1,0 +1,66 @@
+"""`train`: a baseline of stable-baselines3 on some tasks, in a folder of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tdac_agent.errors import RunError
+from tdac_agent.locks import LOCK_FILE, hold
+from tdac_agent.training.curve import Point
+from tdac_agent.training.plan import PLAN_FILE, TrainingPlan, read_plan, write_plan
+from tdac_envs.errors import TaskError
+
+if TYPE_CHECKING:
+    from tdac_agent.training.learning import Watch
+
+
+def train(plan: TrainingPlan, folder: Path, watch: Watch | None = None) -> list[Point]:
+    """Trains, and leaves the best policy and its learning curve in a folder.
+
+    Where the folder has the same training already, interrupted or killed, it goes on
+    from its last checkpoint; where it is finished, nothing is done.
+
+    Args:
+        plan: See `make_plan`.
+        folder: Is made if it is missing.
+        watch: Told the steps so far, new evaluations, and the best one.
+
+    Returns:
+        The learning curve.
+
+    Raises:
+        RunError: The folder holds another training or something else, or cannot be
+            used, or another process trains in it.
+        TaskError: The extra is missing, or a task has changed.
+    """
+    try:
+        from tdac_agent.training.learning import learn
+    except ImportError as error:
+        raise TaskError('training needs an extra: pip install "tdac[sb3]"') from error
+    _prepare(folder, plan)
+    with hold(folder / LOCK_FILE) as held:
+        if not held:
+            raise RunError(f"another process trains in {folder}")
+        return learn(plan, folder, watch or (lambda *_: None))
+
+
+def _prepare(folder: Path, plan: TrainingPlan) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        used = any(folder.iterdir())
+    except OSError as error:
+        raise RunError(f"cannot use {folder}: {error.strerror}") from error
+    if (folder / PLAN_FILE).is_file():
+        before = read_plan(folder)
+        longer = before.model_copy(
+            update={"steps": plan.steps, "evaluate_every": plan.evaluate_every}
+        )
+        if longer != plan:
+            raise RunError(
+                f"{folder} holds another training: give another --out, or go on with "
+                f"it as it was begun by --resume {folder}"
+            )
+    elif used:
+        raise RunError(f"{folder} is not empty, and holds no training")
+    write_plan(folder, plan)

@@ -1,0 +1,307 @@
+"""Training of baselines: what it leaves, how it goes on, what it refuses."""
+
+import csv
+import json
+import re
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import yaml
+from small import write_small_task
+
+from tdac_agent.errors import RunError
+from tdac_agent.learned import Learned, read_metadata
+from tdac_agent.task import load_task
+from tdac_agent.training.curve import Point, read_curve, write_curve
+from tdac_agent.training.hyperparameters import (
+    config_file,
+    model_arguments,
+    read_hyperparameters,
+)
+from tdac_agent.training.plan import make_batch, make_plan, read_plan
+from tdac_agent.training.train import train
+from tdac_envs.errors import TaskError
+from tdac_envs.wrappers import wrap
+
+pytest.importorskip("stable_baselines3")
+torch = pytest.importorskip("torch")
+
+WRAPPERS = ("goal-relative", "guidance", "flatten")
+ENVS = ("TDAC-Map2D-v0", "TDAC-EPuck-v0")
+SMALL = {
+    "ppo": {"n_envs": 8, "n_steps": 16, "batch_size": 64, "n_epochs": 2},
+    "sac": {"n_envs": 8, "learning_starts": 64, "buffer_size": 500},
+    "td3": {"n_envs": 8, "learning_starts": 64, "buffer_size": 500},
+}
+
+
+@pytest.fixture(autouse=True)
+def threads():
+    """Training sets the number of threads of the whole process."""
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture
+def config(tmp_path):
+    """Files with the shipped hyperparameters, made small."""
+
+    def write(algo="ppo", **changes):
+        shipped = yaml.safe_load(config_file(algo).read_text())
+        small = {**SMALL[algo], "policy_kwargs": {"net_arch": [8]}, **changes}
+        file = tmp_path / f"{algo}.yml"
+        file.write_text(yaml.safe_dump({e: shipped[e] | small for e in ENVS}))
+        return file
+
+    return write
+
+
+@pytest.fixture
+def small(tmp_path):
+    return str(write_small_task(tmp_path / "small", horizon=60))
+
+
+def without_seconds(points):
+    return [str(replace(point, seconds=0.0)) for point in points]
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "td3"])
+def test_a_training_leaves_a_policy_its_facts_and_a_curve(
+    algo, tmp_path, small, config
+):
+    """The policy says how it sees, and drives as a wrapped environment is answered."""
+    plan = make_plan((small,), algo, steps=512, episodes=4, seed=3, config=config(algo))
+    told = []
+    points = train(plan, tmp_path / "out", lambda *news: told.append(news))
+    assert points[-1].steps == 512
+    assert [point for _, point, _ in told if point is not None] == points
+    assert without_seconds(read_curve(tmp_path / "out")) == without_seconds(points)
+    assert all(a.seconds < b.seconds for a, b in pairwise(points))
+    facts = json.loads((tmp_path / "out" / "policy.json").read_text())
+    best = max(points, key=lambda point: point.worth)
+    assert facts["evaluation"]["mean_return"] == best.mean_return
+    assert facts["algo"] == algo
+    assert facts["seed"] == 3
+    assert facts["versions"]["torch"] == torch.__version__
+    file = tmp_path / "out" / "policy.zip"
+    saved = read_metadata(file)
+    assert (saved.algo, saved.wrappers, saved.seed) == (algo, WRAPPERS, 3)
+    assert saved.steps == best.steps
+    env = load_task(small).make_env(variation="jitter")
+    driver = Learned(file, saved.wrappers, env)
+    observation, _ = env.reset(seed=0)
+    assert driver.policy(observation) in env.action_space
+
+
+def test_equal_seeds_learn_alike(tmp_path, small, config):
+    """The same plan gives the same curve, another seed another one."""
+
+    def curve(name, seed):
+        plan = make_plan((small,), steps=256, episodes=3, seed=seed, config=config())
+        return without_seconds(train(plan, tmp_path / name))
+
+    one, two, other = curve("one", 0), curve("two", 0), curve("other", 1)
+    assert one == two
+    assert one != other
+
+
+def test_a_finished_training_goes_on_to_another_end(tmp_path, small, config):
+    """What was learnt stays; there is nothing to do for a training that is finished."""
+    given = {"episodes": 3, "config": config()}
+    first = train(make_plan((small,), steps=256, **given), tmp_path / "out")
+    longer = make_plan((small,), steps=512, **given)
+    points = train(longer, tmp_path / "out")
+    assert without_seconds(points[: len(first)]) == without_seconds(first)
+    assert points[-1].steps == 512
+    assert points[-1].seconds > first[-1].seconds
+    before = (tmp_path / "out" / "checkpoint.zip").read_bytes()
+    assert without_seconds(train(longer, tmp_path / "out")) == without_seconds(points)
+    assert (tmp_path / "out" / "checkpoint.zip").read_bytes() == before
+    with pytest.raises(RunError, match="holds another training"):
+        train(make_plan((small,), steps=512, seed=1, **given), tmp_path / "out")
+
+
+def test_points_after_the_checkpoint_are_learnt_again(tmp_path, small, config):
+    """Of a process that dies between an evaluation and its checkpoint."""
+    plan = make_plan((small,), steps=512, episodes=3, config=config())
+    first = train(plan.model_copy(update={"steps": 256}), tmp_path / "out")
+    write_curve(tmp_path / "out", [*first, replace(first[-1], steps=384)])
+    points = train(plan, tmp_path / "out")
+    assert [p.steps for p in points[: len(first)]] == [p.steps for p in first]
+    assert len({point.steps for point in points}) == len(points)
+    assert points[-1].steps == 512
+
+
+def start(*words):
+    run = [sys.executable, "-m", "tdac_agent.cli", "train", *map(str, words)]
+    return subprocess.Popen(
+        run, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_killed_training_loses_little(number, tmp_path, small, config, tdac):
+    """It goes on from its last checkpoint, with all that was evaluated till then."""
+    out = tmp_path / "out"
+    words = ["--task", small, "--config", config(), "--episodes", 3, "--out", out]
+    process = start(*words, "--steps", 20_480)
+    with process:
+        for line in process.stdout:
+            if re.match(r" +[23],\d+ steps", line):
+                process.send_signal(number)
+                break
+        rest = process.stdout.read()
+    assert process.wait() == (130 if number == signal.SIGINT else -number)
+    if number == signal.SIGINT:
+        assert f"tdac train --resume {out}" in rest
+        assert "Traceback" not in rest
+    before = read_curve(out)
+    assert before[-1].steps >= 2048
+    code, told, _ = tdac("train", "--resume", out, "--steps", before[-1].steps + 1024)
+    assert code == 1
+    assert "not learnt" in told
+    after = read_curve(out)
+    kept = before if len(after) > len(before) else before[:-1]
+    assert without_seconds(after[: len(kept)]) == without_seconds(kept)
+    assert after[-1].steps >= before[-1].steps + 1024
+
+
+def test_a_torn_checkpoint_is_told(tmp_path, small, config):
+    """By one line; the files stay as they are."""
+    plan = make_plan((small,), steps=256, episodes=3, config=config())
+    train(plan, tmp_path / "out")
+    file = tmp_path / "out" / "checkpoint.zip"
+    file.write_bytes(file.read_bytes()[:1000])
+    with pytest.raises(RunError, match=r"cannot go on from .*checkpoint"):
+        train(plan, tmp_path / "out")
+    assert file.stat().st_size == 1000
+
+
+def test_several_tasks_and_noise_reach_the_robots(tmp_path, config):
+    """Robot i drives the task i modulo their number, disturbed as was asked for."""
+    names = ["rooms", str(write_small_task(tmp_path / "small", robot={"radius": 15}))]
+    goals = [load_task(name).nominal.goal for name in names]
+    plan = make_plan(tuple(names), variation="random", n_envs=5, config=config())
+    envs = make_batch(plan, 5)
+    batch = envs.batch.unwrapped
+    assert [s.nominal.goal for s in batch.setups] == [goals[i % 2] for i in range(5)]
+    assert {setup.variation for setup in batch.setups} == {"random"}
+    envs.seed(0)
+    assert envs.reset().shape == (5, 25)
+    envs.close()
+
+
+def test_the_batch_is_told_what_single_environments_are_told(small, config):
+    """Trained on the batch, a policy drives in the wrapped environment of its task."""
+    plan = make_plan((small,), config=config())
+    envs = make_batch(plan, 3)
+    envs.seed(5)
+    batch = envs.reset()
+    for i in range(3):
+        one = wrap(load_task(small).make_env(variation="jitter"), WRAPPERS)
+        np.testing.assert_array_equal(one.reset(seed=5 + i)[0], batch[i])
+    envs.close()
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "td3"])
+@pytest.mark.parametrize("env", ENVS)
+def test_the_shipped_hyperparameters_are_whole(algo, env):
+    """Each algorithm takes them, and a rate falls to zero."""
+    import stable_baselines3
+
+    found = read_hyperparameters(config_file(algo), env)
+    assert found.wrappers == WRAPPERS
+    arguments = model_arguments(found.model)
+    assert arguments["learning_rate"](0.0) == 0.0
+    assert arguments["learning_rate"](0.5) == pytest.approx(0.5e-3)
+    kind = getattr(stable_baselines3, algo.upper())
+    task = "rooms" if env == ENVS[0] else "epuck"
+    envs = make_batch(make_plan((task,), algo), found.n_envs)
+    arguments["policy_kwargs"] = {"net_arch": [8]}
+    assert kind(found.policy, envs, **arguments).gamma < 1.0
+    envs.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--task", "maez"], "no task 'maez'"),
+        (["--task", "maze", "--task", "epuck"], "expected tasks of one environment"),
+        (["--wrapper", "relative"], "unknown wrapper 'relative'"),
+        (["--wrapper", "none", "--wrapper", "flatten"], "contradict each other"),
+        (["--task", "rooms", "--task", "maze", "--wrapper", "guidance"], "several"),
+        (["--range-noise", "-1"], "expected a range noise from 0 to 1"),
+        (["--algo", "dqn"], "'dqn' is not one of 'ppo', 'sac', 'td3'"),
+        (["--steps", "0"], "greater than or equal to 1"),
+        (["--config", "none.yml"], "cannot read hyperparameters"),
+        (["--resume", "nowhere"], "no training in 'nowhere'"),
+        (["--resume", "nowhere", "--seed", "1"], "leave out --seed"),
+    ],
+)
+def test_wrong_flags_are_refused_in_one_line(words, message, tdac):
+    """With exit code 2, before anything is trained."""
+    code, _, error = tdac("train", *words)
+    assert code == 2
+    assert message in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_wrong_hyperparameters_are_refused(tmp_path, small, config):
+    """What the file lacks, and what the algorithm does not know."""
+    given = {"steps": 64, "episodes": 2}
+    plan = make_plan((small,), **given, config=config(depth=3))
+    with pytest.raises(RunError, match=r"hyperparameters of ppo: .*'depth'"):
+        train(plan, tmp_path / "depth")
+    plan = make_plan((small,), **given, config=config(learning_rate="lin_x"))
+    with pytest.raises(TaskError, match="expected learning_rate as in lin_1e-3"):
+        train(plan, tmp_path / "rate")
+    with pytest.raises(TaskError, match="env_wrapper: expected some of"):
+        make_plan((small,), config=config(env_wrapper=["gymnasium.wrappers.Other"]))
+    file = tmp_path / "empty.yml"
+    file.write_text("{}")
+    with pytest.raises(TaskError, match="no hyperparameters for TDAC-Map2D-v0"):
+        make_plan((small,), config=file)
+
+
+def test_folders_and_tasks_of_others_are_left_alone(tmp_path, small, config):
+    """A folder with other files is refused, and so is a task that has changed."""
+    plan = make_plan((small,), steps=64, episodes=2, config=config())
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.txt").touch()
+    with pytest.raises(RunError, match="is not empty, and holds no training"):
+        train(plan, tmp_path / "full")
+    with pytest.raises(RunError, match="cannot use"):
+        train(plan, tmp_path / "full" / "thesis.txt")
+    write_small_task(tmp_path / "small", horizon=61)
+    with pytest.raises(TaskError, match="has changed since the training began"):
+        train(plan, tmp_path / "out")
+    assert read_plan(tmp_path / "out") == plan
+
+
+def test_a_curve_is_read_as_it_was_written(tmp_path):
+    """Also where no episode of training had ended yet; damage is told."""
+    points = [Point(64, 1.5, 0.25, 0.5, -3.0, 41.5, float("nan"))]
+    write_curve(tmp_path, points)
+    assert str(read_curve(tmp_path)) == str(points)
+    file = tmp_path / "learning_curve.csv"
+    with file.open() as lines:
+        assert next(csv.DictReader(lines))["success_rate"] == "0.25"
+    file.write_text("steps\n64\n")
+    with pytest.raises(RunError, match="cannot read"):
+        read_curve(tmp_path)
+
+
+@pytest.mark.slow
+def test_ppo_with_guidance_learns(tmp_path):
+    """The shipped hyperparameters lead around a wall, from all of the moved starts."""
+    small = str(write_small_task(tmp_path / "small"))
+    points = train(make_plan((small,), steps=300_000, seed=0), tmp_path / "out")
+    best = max(points, key=lambda point: point.worth)
+    assert best.success_rate >= 0.95
+    assert best.collision_rate <= 0.05
