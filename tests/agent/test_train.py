@@ -145,7 +145,9 @@ def start(*words):
     )
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
+)
 def test_a_killed_training_loses_little(number, tmp_path, small, config, tdac):
     """It goes on from its last checkpoint, with all that was evaluated till then."""
     out = tmp_path / "out"

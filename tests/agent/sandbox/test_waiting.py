@@ -36,11 +36,12 @@ LIMITS = Limits(call_seconds=1.0, import_seconds=60.0, start_seconds=60.0)
 def crowded(launch):
     """Starts children on a CPU for which others compete all the time."""
     cpu = min(os.sched_getaffinity(0))
+    command = [sys.executable, "-c", "print(flush=True)\nwhile True: pass"]
     others = [
-        subprocess.Popen([sys.executable, "-c", "while True: pass"])
-        for _ in range(OTHERS)
+        subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(OTHERS)
     ]
     for other in others:
+        other.stdout.readline()  # it is at work
         os.sched_setaffinity(other.pid, {cpu})
 
     def start(source):
@@ -52,7 +53,7 @@ def crowded(launch):
     yield start
     for other in others:
         other.kill()
-        other.wait()
+        other.communicate()
 
 
 def test_standing_in_line_for_a_cpu_is_not_the_controllers_time(crowded):
@@ -60,7 +61,7 @@ def test_standing_in_line_for_a_cpu_is_not_the_controllers_time(crowded):
     child = crowded(BUSY)
     before = child.waited()
     assert child.policy(0.6) == (0.0, 0.0)
-    assert child.waited() - before > 0.6
+    assert child.waited() - before > 0.2
 
 
 def test_on_a_busy_machine_too_much_work_is_too_much(crowded):
