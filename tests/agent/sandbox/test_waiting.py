@@ -37,9 +37,7 @@ def crowded(launch):
     """Starts children on a CPU for which others compete all the time."""
     cpu = min(os.sched_getaffinity(0))
     command = [sys.executable, "-c", "print(flush=True)\nwhile True: pass"]
-    others = [
-        subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(OTHERS)
-    ]
+    others = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(OTHERS)]
     for other in others:
         other.stdout.readline()  # it is at work
         os.sched_setaffinity(other.pid, {cpu})
