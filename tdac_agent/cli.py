@@ -10,7 +10,7 @@ import signal
 import sys
 import traceback
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn, Optional
+from typing import Annotated, Literal, NoReturn, Optional
 
 import typer
 
@@ -32,6 +32,7 @@ from tdac_agent.commands.options import (
     Tier,
     WheelSlip,
     WorldOption,
+    task_flags,
     with_heading,
 )
 from tdac_agent.commands.synth_flags import EPILOG, synth
@@ -199,7 +200,7 @@ def verify(
     from tdac_agent.commands import verify as command
     from tdac_agent.commands.robust_flags import DisturbanceFlags, RobustFlags
 
-    spec = _flags(
+    spec = task_flags(
         task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
         metres, None,
     )  # fmt: skip
@@ -266,7 +267,7 @@ def play(
     from tdac_agent.commands import play as command
     from tdac_agent.commands.robust_flags import DisturbanceFlags
 
-    spec = _flags(
+    spec = task_flags(
         task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
         metres, None,
     )  # fmt: skip
@@ -383,7 +384,7 @@ def check_suite(
     """Let a suite prove itself: a reference must pass it, bad controllers must not."""
     from tdac_agent.commands import check_suite as command
 
-    spec = _flags(
+    spec = task_flags(
         task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
         metres, None,
     )  # fmt: skip
@@ -449,38 +450,6 @@ def doctor(as_json: Json = False) -> None:
     from tdac_agent.commands import doctor as command
 
     raise typer.Exit(command.run(as_json))
-
-
-def _flags(
-    task: str | None,
-    map_image: str | None,
-    world: str | None,
-    ignore: list[str] | None,
-    start: tuple[float, float] | None,
-    goal: tuple[float, float] | None,
-    heading: float | None,
-    robot_radius: float | None,
-    robot_image: Path | None,
-    snap: bool,
-    metres: bool,
-    instructions: str | None,
-) -> Any:
-    from tdac_agent.commands.flags import TaskFlags
-
-    return TaskFlags(
-        task=task,
-        map_image=map_image,
-        world=world,
-        ignore=tuple(ignore or ()),
-        start=start,
-        goal=goal,
-        heading=heading,
-        robot_radius=robot_radius,
-        robot_image=robot_image,
-        snap=snap,
-        metres=metres,
-        instructions=instructions,
-    )
 
 
 def main() -> None:

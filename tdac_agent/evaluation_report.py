@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.stats import binomtest
 
 from tdac_agent.contenders import Kind
+from tdac_agent.exact import sign_test
 from tdac_agent.measures import Measured
 from tdac_agent.robust_report import Interval, success_interval
 from tdac_agent.trajectory import Outcome
@@ -238,15 +238,8 @@ def compare(one: Result, other: Result) -> Comparison:
         only_one=first,
         only_other=second,
         neither=table[False, False],
-        p=mcnemar(first, second),
+        p=sign_test(first, second),
     )
-
-
-def mcnemar(only_one: int, only_other: int) -> float:
-    """Two-sided p-value of McNemar's exact test; 1 where the two never differ."""
-    if only_one + only_other == 0:
-        return 1.0
-    return float(binomtest(only_one, only_one + only_other, 0.5).pvalue)
 
 
 def timing_of(task: str, policy: str, calls: NDArray[np.float32]) -> Timing:

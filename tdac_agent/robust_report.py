@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.stats import binomtest
 
 from tdac_agent.disturbance import Disturbance
+from tdac_agent.exact import CONFIDENCE, exact_interval
 from tdac_agent.seeded import SeededEpisode
 from tdac_agent.sequential import Characteristics, Decision, SequentialTest
 from tdac_agent.trajectory import Outcome
 from tdac_agent.units import Place
 
 WORST = 20
-CONFIDENCE = 0.95
 
 
 class _Record(BaseModel):
@@ -118,8 +117,8 @@ def summarise(
 
 def success_interval(successes: int, episodes: int) -> Interval:
     """The exact interval of a success rate."""
-    found = binomtest(successes, episodes).proportion_ci(CONFIDENCE, method="exact")
-    return Interval(low=float(found.low), high=float(found.high), confidence=CONFIDENCE)
+    low, high = exact_interval(successes, episodes)
+    return Interval(low=low, high=high, confidence=CONFIDENCE)
 
 
 def badness(episode: SeededEpisode) -> tuple[bool, float, int]:

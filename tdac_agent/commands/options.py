@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Optional
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, Optional
 
 import typer
+
+if TYPE_CHECKING:
+    from tdac_agent.commands.flags import TaskFlags
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 TaskOption = Annotated[
@@ -176,3 +180,36 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def task_flags(
+    task: str | None,
+    map_image: str | None,
+    world: str | None,
+    ignore: list[str] | None,
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+    heading: float | None,
+    robot_radius: float | None,
+    robot_image: Path | None,
+    snap: bool,
+    metres: bool,
+    instructions: str | None,
+) -> TaskFlags:
+    """The task that these flags of a command name."""
+    from tdac_agent.commands.flags import TaskFlags
+
+    return TaskFlags(
+        task=task,
+        map_image=map_image,
+        world=world,
+        ignore=tuple(ignore or ()),
+        start=start,
+        goal=goal,
+        heading=heading,
+        robot_radius=robot_radius,
+        robot_image=robot_image,
+        snap=snap,
+        metres=metres,
+        instructions=instructions,
+    )

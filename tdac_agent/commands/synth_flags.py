@@ -26,6 +26,7 @@ from tdac_agent.commands.options import (
     Start,
     TaskOption,
     WorldOption,
+    task_flags,
 )
 
 EPILOG = (
@@ -100,7 +101,6 @@ def synth(
 ) -> None:
     """Write, test and repair a controller until it is verified."""
     from tdac_agent.commands import synth as command
-    from tdac_agent.commands.flags import TaskFlags
     from tdac_agent.errors import RunError
     from tdac_agent.provider import MAX_OUTPUT_TOKENS
 
@@ -110,20 +110,10 @@ def synth(
     if resume is not None:
         _refuse_others(context)
         raise typer.Exit(command.resume(resume, limits, as_json))
-    spec = TaskFlags(
-        task=task,
-        map_image=map_image,
-        world=world,
-        ignore=tuple(ignore or ()),
-        start=start,
-        goal=goal,
-        heading=heading,
-        robot_radius=robot_radius,
-        robot_image=robot_image,
-        snap=snap,
-        metres=metres,
-        instructions=instructions,
-    )
+    spec = task_flags(
+        task, map_image, world, ignore, start, goal, heading, robot_radius, robot_image,
+        snap, metres, instructions,
+    )  # fmt: skip
     models = {
         "learner": learner,
         "optimizer": optimizer,

@@ -4,6 +4,7 @@ Everything goes in and out as pandas frames with one row per thing (`RUN_COLUMNS
 `CANDIDATE_COLUMNS`); each interval says what it assumes in `ASSUMPTIONS`.
 """
 
+from tdac_agent.exact import exact_interval
 from tdac_agent.metrics.compare import (
     Comparison,
     best_of_n,
@@ -25,7 +26,6 @@ from tdac_agent.metrics.rates import (
     ASSUMPTIONS,
     Rate,
     candidate_rate,
-    exact_interval,
     first_pass,
     success_rate,
     unbiased_success_rate,

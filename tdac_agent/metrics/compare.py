@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
 
 from tdac_agent.errors import RunError
+from tdac_agent.exact import sign_test
 from tdac_agent.metrics.frames import Frames
 from tdac_agent.metrics.rates import solved
 
@@ -77,15 +77,6 @@ def compare_paired(
         later,
         sign_test(sooner, later),
     )
-
-
-def sign_test(ups: int, downs: int) -> float:
-    """Two-sided p of so many ups and downs, if both are equally likely; exact.
-
-    Of discordant pairs this is McNemar's exact test.
-    """
-    total = ups + downs
-    return float(binomtest(ups, total).pvalue) if total else 1.0
 
 
 def pass_at_n(tried: int, passed: int, n: int) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import CensoredData, ecdf
 
-from tdac_agent.metrics.rates import CONFIDENCE, exact_interval, solved
+from tdac_agent.exact import CONFIDENCE, exact_interval
+from tdac_agent.metrics.rates import solved
 
 
 def cumulative_success(runs: pd.DataFrame, most: int | None = None) -> pd.DataFrame:

@@ -37,7 +37,6 @@ CANDIDATE_COLUMNS = {
     "failed": "Number of failed tests; missing where there was no controller.",
 }
 Row = dict[str, object]
-STOPPED = frozenset({"running", "interrupted", "fault", "budget"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +119,7 @@ def _row(run: Run) -> Row:
         "status": run.status,
         "tau": run.tau,
         "done": done,
-        "censored": run.status in STOPPED,
+        "censored": not run.finished,
         "tokens": tokens or None,
         "cost": run.cost,
         "seconds": run.seconds,

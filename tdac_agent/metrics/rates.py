@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest, bootstrap
+from scipy.stats import bootstrap
 
+from tdac_agent.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.frames import Frames, iterations_of
 
-CONFIDENCE = 0.95
 RESAMPLES = 9_999
 ASSUMPTIONS = {
     "Clopper-Pearson": (
@@ -57,16 +57,6 @@ class Rate:
         if math.isnan(self.low):
             return f"{self.value:.2f}"
         return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
-
-
-def exact_interval(
-    successes: int, trials: int, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
-    """Interval of Clopper and Pearson (1934); [0, 1] without a trial."""
-    if trials == 0:
-        return 0.0, 1.0
-    found = binomtest(successes, trials).proportion_ci(confidence, method="exact")
-    return float(found.low), float(found.high)
 
 
 def success_rate(frames: Frames, *, invalid: bool = False, seed: int = 0) -> Rate:

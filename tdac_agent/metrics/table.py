@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from tdac_agent.exact import exact_interval
 from tdac_agent.metrics.frames import Frames
 from tdac_agent.metrics.rates import (
     Rate,
     candidate_rate,
-    exact_interval,
     first_pass,
     solved,
     success_rate,

@@ -22,7 +22,8 @@ import tdac_agent
 from tdac_agent.contenders import Contender
 from tdac_agent.driving import Stage, drive_seed
 from tdac_agent.evaluation import NO_DISTURBANCE, evaluate
-from tdac_agent.evaluation_report import compare, mcnemar
+from tdac_agent.evaluation_report import compare
+from tdac_agent.exact import sign_test
 from tdac_agent.learned import (
     Learned,
     SavedPolicy,
@@ -338,8 +339,8 @@ def test_mcnemar_is_exact(one, other):
     """Twice the smaller tail of a fair coin, at most 1."""
     total = one + other
     tail = binom.cdf(min(one, other), total, 0.5)
-    assert mcnemar(one, other) == pytest.approx(min(1.0, 2.0 * tail))
-    assert mcnemar(one, other) == mcnemar(other, one)
+    assert sign_test(one, other) == pytest.approx(min(1.0, 2.0 * tail))
+    assert sign_test(one, other) == sign_test(other, one)
 
 
 def test_pairs_are_compared_on_the_same_seeds(ours):
@@ -347,7 +348,7 @@ def test_pairs_are_compared_on_the_same_seeds(ours):
     assert len(ours.comparisons) == 6
     for pair in ours.comparisons:
         assert pair.both + pair.only_one + pair.only_other + pair.neither == 6
-        assert pair.p == mcnemar(pair.only_one, pair.only_other)
+        assert pair.p == sign_test(pair.only_one, pair.only_other)
         assert pair.equal_information is None
     twin = ours.results[0].model_copy(update={"policy": "twin"})
     assert compare(ours.results[0], twin).equal_information == "privileged"
