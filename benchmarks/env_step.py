@@ -10,12 +10,8 @@ arrays take for each pixel. All take turns in short bursts.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import os
 from collections.abc import Callable
-from dataclasses import asdict
 from itertools import cycle, islice
 from typing import Any
 
@@ -24,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tdac_envs  # noqa: F401 - registers the env
-from benchmarks.race import Burst, Row, compared, race, show
+from benchmarks.race import Burst, Row, compared, main, race
 
 Actions = list[Any]
 Env = gym.Env[Any, Any]
@@ -219,21 +215,5 @@ BENCHES: dict[str, Callable[[int], list[Row]]] = {
 }
 
 
-def main() -> None:
-    """Prints the rows of all benches."""
-    about = (__doc__ or "").partition("\n")[0]
-    parser = argparse.ArgumentParser(prog="benchmarks.env_step", description=about)
-    parser.add_argument("--rounds", type=int, default=60)
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args()
-    load = f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
-    found = {title: bench(options.rounds) for title, bench in BENCHES.items()}
-    if options.json:
-        print(json.dumps({k: [asdict(row) for row in v] for k, v in found.items()}))
-        return
-    for title, rows in found.items():
-        show(f"{title} ({load})", rows, REFERENCE)
-
-
 if __name__ == "__main__":
-    main()
+    main("benchmarks.env_step", __doc__, BENCHES, REFERENCE)

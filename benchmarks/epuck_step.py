@@ -9,11 +9,7 @@ number of solid parts of a world grows. All take turns in short bursts.
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any
 
 import gymnasium as gym
@@ -28,7 +24,7 @@ from benchmarks.env_step import (
     reference,
     single_burst,
 )
-from benchmarks.race import Burst, Row, compared, race, show
+from benchmarks.race import Burst, Row, compared, main, race
 from tdac_envs import World
 from tdac_envs.footprint import Rectangle
 from tdac_envs.world import EPuck, Obstacle, Part
@@ -129,21 +125,5 @@ BENCHES: dict[str, Callable[[int], list[Row]]] = {
 }
 
 
-def main() -> None:
-    """Prints the rows of all benches."""
-    about = (__doc__ or "").partition("\n")[0]
-    parser = argparse.ArgumentParser(prog="benchmarks.epuck_step", description=about)
-    parser.add_argument("--rounds", type=int, default=60)
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    options = parser.parse_args()
-    load = f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
-    found = {title: bench(options.rounds) for title, bench in BENCHES.items()}
-    if options.json:
-        print(json.dumps({k: [asdict(row) for row in v] for k, v in found.items()}))
-        return
-    for title, rows in found.items():
-        show(f"{title} ({load})", rows, REFERENCE)
-
-
 if __name__ == "__main__":
-    main()
+    main("benchmarks.epuck_step", __doc__, BENCHES, REFERENCE)

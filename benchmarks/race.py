@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
+import json
+import os
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from rich.console import Console
 from rich.table import Table
@@ -76,3 +79,31 @@ def show(title: str, rows: Sequence[Row], reference: str) -> None:
             ratio, spread = f"{row.ratio:.2f}", f"{row.low:.2f} to {row.high:.2f}"
         table.add_row(row.name, f"{row.value:.3g}", row.unit, ratio, spread)
     Console().print(table)
+
+
+def main(
+    name: str,
+    about: str | None,
+    benches: Mapping[str, Callable[[int], list[Row]]],
+    reference: str,
+) -> None:
+    """Prints the rows of some benches, by the flags of their command.
+
+    Args:
+        name: Of the command.
+        about: What it says of itself, in its first line.
+        benches: By title; each takes a number of rounds.
+        reference: Case that the others are compared with.
+    """
+    told = (about or "").partition("\n")[0]
+    parser = argparse.ArgumentParser(prog=name, description=told)
+    parser.add_argument("--rounds", type=int, default=60)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    options = parser.parse_args()
+    load = f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
+    found = {title: bench(options.rounds) for title, bench in benches.items()}
+    if options.json:
+        print(json.dumps({k: [asdict(row) for row in v] for k, v in found.items()}))
+        return
+    for title, rows in found.items():
+        show(f"{title} ({load})", rows, reference)
