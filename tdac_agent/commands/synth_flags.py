@@ -29,14 +29,16 @@ from tdac_agent.commands.options import (
     task_flags,
 )
 
-EPILOG = (
-    "Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 --goal 178 386 "
-    "--robot-radius 12`; `tdac synth --learner anthropic:claude-sonnet-5-5`; "
-    "`tdac synth --resume runs/maze-1`"
-)
+app = typer.Typer()
 WITH_RESUME = frozenset({"resume", "max_cost", "max_tokens", "as_json"})
 
 
+@app.command(
+    epilog="Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 "
+    "--goal 178 386 --robot-radius 12`; "
+    "`tdac synth --learner anthropic:claude-sonnet-5-5`; "
+    "`tdac synth --resume runs/maze-1`"
+)
 def synth(
     context: typer.Context,
     task: TaskOption = None,

@@ -9,9 +9,14 @@ import typer
 
 from tdac_agent.commands.options import Json
 
+app = typer.Typer()
 TRAINING, DISTURBED = "Training", "Variation and noise"
 
 
+@app.command(
+    epilog="Examples: `tdac train --task maze`; `tdac train --task epuck --algo sac "
+    "--seed 1`; `tdac train --task maze --task office --variation random`"
+)
 def train(
     tasks: Annotated[
         Optional[list[str]],  # noqa: UP045

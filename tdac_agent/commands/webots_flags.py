@@ -13,6 +13,9 @@ webots_app = typer.Typer(
     no_args_is_help=True, help="Run Webots controllers in worlds of Webots."
 )
 export_app = typer.Typer(no_args_is_help=True, help="Take a controller elsewhere.")
+app = typer.Typer()
+app.add_typer(webots_app, name="webots")
+app.add_typer(export_app, name="export")
 
 
 @webots_app.command(

@@ -15,8 +15,8 @@ import pytest
 from small import small_cells, write_small_task
 
 COMMANDS = [
-    "map", "world", "synth", "verify", "play", "check-suite", "doctor", "train",
-    "webots run", "export webots",
+    "map", "world", "synth", "verify", "play", "evaluate", "train", "check-suite",
+    "demo", "rules", "report", "runs", "webots run", "export webots", "doctor",
 ]  # fmt: skip
 ENDS = ["--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6"]
 

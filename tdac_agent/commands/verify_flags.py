@@ -1,0 +1,134 @@
+"""The command `tdac verify`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from tdac_agent.commands.options import (
+    Delay,
+    Goal,
+    Heading,
+    Ignore,
+    Json,
+    MapOption,
+    Metres,
+    MotorLag,
+    Profile,
+    Radius,
+    RangeNoise,
+    Snap,
+    Start,
+    TaskOption,
+    Tier,
+    WheelSlip,
+    WorldOption,
+    task_flags,
+)
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Examples: `tdac verify controller.py --task maze`; "
+    "`tdac verify runs/maze-1`; `tdac verify runs/maze-1 --robust 200`"
+)
+def verify(
+    controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
+    task: TaskOption = None,
+    map_image: MapOption = None,
+    world: WorldOption = None,
+    ignore: Ignore = None,
+    start: Start = None,
+    goal: Goal = None,
+    heading: Heading = None,
+    robot_radius: Radius = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    profile: Profile = None,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="Nominal start only, as in the paper.")
+    ] = False,
+    suite: Annotated[
+        Optional[Path],  # noqa: UP045 - typer reads it at run time
+        typer.Option(help="Folder with your own test_*.py files, run as well."),
+    ] = None,
+    tier: Tier = "auto",
+    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
+    junit: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Write a JUnit XML report."),
+    ] = None,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--out",
+            help="Folder for report.json (and robust.json), the trajectories, and a "
+            "picture of each episode that failed.",
+        ),
+    ] = None,
+    as_json: Json = False,
+    robust: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Once verified, run N disturbed episodes and give the success rate.",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    first_seed: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            min=0,
+            help="Seed of the first disturbed episode.  [default: 0]",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    accept_at: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            metavar="RATE",
+            help="Stop as soon as a sequential test tells this success rate from one "
+            "that is --margin lower; exit 0 only if accepted.",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    margin: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            help="See --accept-at.  [default: 0.05]", rich_help_panel="Robustness"
+        ),
+    ] = None,
+    range_noise: RangeNoise = None,
+    wheel_slip: WheelSlip = None,
+    motor_lag: MotorLag = None,
+    delay: Delay = None,
+) -> None:
+    """Test a controller in the sandbox; exit 0 only if every test passed."""
+    from tdac_agent.commands import verify as command
+    from tdac_agent.commands.robust_flags import DisturbanceFlags, RobustFlags
+
+    spec = task_flags(
+        task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
+        metres, None,
+    )  # fmt: skip
+    disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+    wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
+    raise typer.Exit(
+        command.run(
+            controller,
+            spec,
+            profile,
+            paper,
+            suite,
+            tier,
+            seed,
+            junit,
+            out,
+            as_json,
+            wanted,
+        )
+    )
