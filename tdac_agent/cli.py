@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import signal
 import sys
-import traceback
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
@@ -25,6 +24,7 @@ from tdac_agent.commands import (
     verify_flags,
     webots_flags,
 )
+from tdac_agent.commands.mistakes import explain, fail
 from tdac_agent.commands.options import with_heading
 
 app = typer.Typer(
@@ -80,36 +80,10 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Exception as error:
-        _explain(error)
+        explain(error)
     if code == 130:
-        _fail("interrupted", 130)
+        fail("interrupted", 130)
     sys.exit(code or 0)
-
-
-def _explain(error: Exception) -> NoReturn:
-    from tdac_agent.errors import Fault
-    from tdac_envs.errors import TdacError
-
-    if hasattr(error, "format_message"):  # usage, as typer found it
-        # Without any word there is help, and nothing more to say.
-        reason = error.format_message().rstrip(".")
-        if not reason:
-            sys.exit(2)
-        _fail(f"error: {reason}; see tdac --help", 2)
-    if isinstance(error, TdacError):
-        _fail(f"error: {error}", 2)
-    if isinstance(error, Fault):
-        _fail(f"infrastructure fault: {error}", 3)
-    if isinstance(error, OSError) and error.filename:
-        _fail(f"error: {error.filename}: {error.strerror}", 3)
-    traceback.print_exception(error)
-    _fail("internal error: please report the lines above", 3)
-
-
-def _fail(message: str, code: int) -> NoReturn:
-    sys.stdout.flush()
-    print(" ".join(message.split()), file=sys.stderr)
-    sys.exit(code)
 
 
 if __name__ == "__main__":

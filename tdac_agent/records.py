@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from pathlib import Path
 from typing import Literal
@@ -125,9 +126,22 @@ def load_run(folder: Path) -> Run:
         return Run.model_validate({**content, "folder": folder})
     # Not all of a damaged file is a JSONDecodeError: wrong encodings, endless numbers
     # and deep nesting are not. A ValidationError is a ValueError.
+    except FileNotFoundError as error:
+        raise RunError(f"{folder} is not a run folder: {_missing(folder)}") from error
     except (OSError, ValueError, TypeError, RecursionError) as error:
-        reason = str(error).partition("\n")[0]
+        told = error.strerror if isinstance(error, OSError) else str(error)
+        reason = str(told).partition("\n")[0]
         raise RunError(f"{folder} is not a run folder: {reason}") from error
+
+
+def _missing(folder: Path) -> str:
+    """Why there is no `run.json`, and which run beside it may be meant."""
+    if folder.is_dir():
+        return f"it has no {RUN_FILE}"
+    beside = [path.parent.name for path in folder.parent.glob(f"*/{RUN_FILE}")]
+    near = difflib.get_close_matches(folder.name, beside, n=1)
+    hint = f"; did you mean {folder.parent / near[0]}?" if near else ""
+    return f"there is no such folder{hint}"
 
 
 def load_rules(folder: Path) -> RuleBook:

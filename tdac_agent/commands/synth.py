@@ -79,10 +79,7 @@ def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:
     try:
         with Progress(console, heading) as progress:
             result = synthesize(**wanted, on_event=progress)
-    except KeyboardInterrupt:
-        console.print(f"interrupted; {_so_far(folder)}", soft_wrap=True)
-        raise
-    except (Fault, OSError):
+    except (KeyboardInterrupt, Fault, OSError):
         console.print(_so_far(folder), soft_wrap=True)
         raise
     return _show(result, console, before=before)

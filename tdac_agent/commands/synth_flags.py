@@ -63,8 +63,12 @@ def synth(
         Optional[Path],  # noqa: UP045
         typer.Option("--from", help="Controller to begin with."),
     ] = None,
-    k: Annotated[int, typer.Option("-K", min=1, help="Iterations at most.")] = 20,
-    j: Annotated[int, typer.Option("-J", min=0, help="Edits per iteration.")] = 1,
+    k: Annotated[
+        int, typer.Option("-K", "--iterations", min=1, help="Iterations at most.")
+    ] = 20,
+    j: Annotated[
+        int, typer.Option("-J", "--patience", min=0, help="Edits per iteration.")
+    ] = 1,
     learner: Learner = "builtin",
     optimizer: Optimizer = None,
     base_url: BaseUrl = None,

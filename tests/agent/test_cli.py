@@ -75,6 +75,28 @@ def test_the_help_is_quick():
     assert process.stdout.splitlines()[-1] == "HEAVY []"
 
 
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("synth --k 3", "No such option: --k; did you mean -K?; see tdac synth --help"),
+        ("synth -k 3", "did you mean -K?; see tdac synth --help"),
+        ("synth --max-iterations 3", "did you mean --iterations?"),
+        ("synth --Learner builtin", "did you mean --learner?"),
+        ("synth --xyzzy", "No such option: --xyzzy; see tdac synth --help"),
+        ("webots run", "see tdac webots run --help"),
+        ("syth", "No such command 'syth'"),
+        ("verify", "Missing argument 'controller'; see tdac verify --help"),
+    ],
+)
+def test_words_that_are_not_understood(tdac, words, expected):
+    """The option that may be meant, and the help of the command it was typed for."""
+    code, _, err = tdac(*words.split())
+    assert code == 2
+    assert err.startswith("error: ")
+    assert expected in err
+    assert err.count("\n") == 1
+
+
 def is_one_clear_line(code, out, err, place):
     """Exit 2, nothing on stdout, one line on stderr, nothing written."""
     assert code == 2, err

@@ -88,6 +88,18 @@ def test_what_is_no_run(tmp_path, content):
     assert "\n" not in str(caught.value)
 
 
+def test_a_run_that_is_not_there(tmp_path):
+    """What is missing is said in words, with the run that may be meant."""
+    with pytest.raises(RunError, match=r"run folder: it has no run\.json$"):
+        load_run(tmp_path)
+    with pytest.raises(RunError, match=r"run folder: there is no such folder$"):
+        load_run(tmp_path / "runs" / "maze-1")
+    (tmp_path / "maze-1").mkdir()
+    (tmp_path / "maze-1" / "run.json").touch()
+    with pytest.raises(RunError, match=rf"did you mean {tmp_path / 'maze-1'}\?$"):
+        load_run(tmp_path / "maz-1")
+
+
 RUN = Run(
     folder=Path("run"),
     task="maze",

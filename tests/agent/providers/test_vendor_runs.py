@@ -115,9 +115,11 @@ def test_an_interrupt_in_a_call(server, task_file, tmp_path, no_traces, vendor):
     out, url = tmp_path / "run", server.url(vendor)
     words = ["synth", "--task", task_file, "--learner", f"{vendor}:m"]
     process = start([*words, "--base-url", url, "--out", out])
-    _, stderr = process.communicate(timeout=120)
+    stdout, stderr = process.communicate(timeout=120)
     assert process.returncode == 130
     assert stderr.splitlines()[-1] == "interrupted"
+    assert "interrupted" not in stdout
+    assert f"go on: tdac synth --resume {out}" in stdout
     assert "Traceback" not in stderr
     assert load_run(out).status == "interrupted"
     assert len(server.seen) == 1

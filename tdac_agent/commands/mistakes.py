@@ -1,0 +1,54 @@
+"""What goes wrong as one clear line on stderr, and the exit code that says so."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+import traceback
+from typing import Any, NoReturn
+
+
+def explain(error: Exception) -> NoReturn:
+    """Ends the process with one line on what was wrong; a traceback only for a bug."""
+    from tdac_agent.errors import Fault
+    from tdac_envs.errors import TdacError
+
+    if hasattr(error, "format_message"):  # usage, as typer found it
+        _explain_usage(error)
+    if isinstance(error, TdacError):
+        fail(f"error: {error}", 2)
+    if isinstance(error, Fault):
+        fail(f"infrastructure fault: {error}", 3)
+    if isinstance(error, OSError) and error.filename:
+        fail(f"error: {error.filename}: {error.strerror}", 3)
+    traceback.print_exception(error)
+    fail("internal error: please report the lines above", 3)
+
+
+def fail(message: str, code: int) -> NoReturn:
+    """Ends the process with a line on stderr."""
+    sys.stdout.flush()
+    print(" ".join(message.split()), file=sys.stderr)
+    sys.exit(code)
+
+
+def _explain_usage(error: Any) -> NoReturn:
+    """What is wrong with the words typed, and whose help says more."""
+    context = getattr(error, "ctx", None)
+    option = getattr(error, "option_name", None)
+    reason = error.format_message().rstrip(".")
+    # Without any word there is help, and nothing more to say.
+    if not reason:
+        sys.exit(2)
+    if option is not None and hasattr(error, "possibilities") and context is not None:
+        near = _nearest(option, [o for p in context.command.params for o in p.opts])
+        reason = error.message + (f"; did you mean {near}?" if near else "")
+    command = "tdac" if context is None else context.command_path
+    fail(f"error: {reason}; see {command} --help", 2)
+
+
+def _nearest(typed: str, options: list[str]) -> str | None:
+    """The option that may be meant, whatever its case and number of dashes."""
+    bare = {option.lstrip("-").lower(): option for option in options}
+    found = difflib.get_close_matches(typed.lstrip("-").lower(), bare, n=1)
+    return bare[found[0]] if found else None
