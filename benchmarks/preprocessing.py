@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.timing import Bench, Call, Row, compared, in_turn
-from tdac_envs.preprocess import preprocess
+from tdac_envs.preprocessing import preprocess
 
 Picture = NDArray[np.uint8]
 Point = tuple[int, int]

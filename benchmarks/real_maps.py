@@ -35,7 +35,7 @@ from tdac_envs.errors import TdacError
 from tdac_envs.grid import BoolGrid, body_free, clearance
 from tdac_envs.image import ColourImage, load_image, luminance
 from tdac_envs.plan import path_length, plan_path
-from tdac_envs.preprocess import preprocess, rank_candidates
+from tdac_envs.preprocessing import preprocess, rank_candidates
 
 Point = tuple[int, int]
 Entry = dict[str, Any]

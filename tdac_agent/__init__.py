@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from tdac_agent.disturbance import Disturbance
     from tdac_agent.evaluation import evaluate
     from tdac_agent.evaluation_report import Evaluation
+    from tdac_agent.history import Told, gather_run
     from tdac_agent.policy import Policy, load_controller
     from tdac_agent.records import Run, load_run
     from tdac_agent.report import Report
@@ -24,7 +25,9 @@ __all__ = [
     "Report",
     "Run",
     "Task",
+    "Told",
     "evaluate",
+    "gather_run",
     "load_controller",
     "load_run",
     "load_task",
@@ -40,7 +43,9 @@ _HOME = {
     "Report": "report",
     "Run": "records",
     "Task": "task",
+    "Told": "history",
     "evaluate": "evaluation",
+    "gather_run": "history",
     "load_controller": "policy",
     "load_run": "records",
     "load_task": "task",

@@ -82,6 +82,11 @@ class Trajectory:
         return loaded
 
 
+def nominal_first(path: Path) -> tuple[bool, str]:
+    """Sorts the files of episodes: the nominal one first."""
+    return path.stem != "nominal", path.stem
+
+
 def _check_shapes(trajectory: Trajectory) -> None:
     """Refuses arrays that do not belong together."""
     length = len(trajectory.poses)

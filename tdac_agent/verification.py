@@ -17,7 +17,7 @@ from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
 from tdac_agent.sandbox import Limits
 from tdac_agent.task import Task, portable_task_file, write_workdir
 from tdac_agent.task_file import Profile
-from tdac_agent.trajectory import Trajectory
+from tdac_agent.trajectory import Trajectory, nominal_first
 from tdac_agent.warm import WarmJudge
 
 SHIPPED_SUITES = Path(__file__).parent / "suites"
@@ -184,11 +184,6 @@ def load_trajectories(folder: Path) -> dict[str, Trajectory]:
         path.stem.replace("_", " "): Trajectory.load(path)
         for path in sorted(folder.glob("*.npz"), key=nominal_first)
     }
-
-
-def nominal_first(path: Path) -> tuple[bool, str]:
-    """Sorts the files of episodes: the nominal one first."""
-    return path.stem != "nominal", path.stem
 
 
 def _suite_folder(path: Path) -> Path:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tdac_envs.grid import OccupancyGrid
     from tdac_envs.maps import bundled_map, bundled_maps
     from tdac_envs.params import MapParams, RobotParams
-    from tdac_envs.preprocess import preprocess
+    from tdac_envs.preprocessing import preprocess
     from tdac_envs.wbt.reader import load_world, read_world
     from tdac_envs.wbt.writer import write_world
     from tdac_envs.world import World
@@ -49,7 +49,7 @@ _HOME = {
     "bundled_maps": "tdac_envs.maps",
     "bundled_worlds": "tdac_envs.worlds",
     "load_world": "tdac_envs.wbt.reader",
-    "preprocess": "tdac_envs.preprocess",
+    "preprocess": "tdac_envs.preprocessing",
     "read_world": "tdac_envs.wbt.reader",
     "write_world": "tdac_envs.wbt.writer",
 }

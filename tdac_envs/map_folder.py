@@ -15,7 +15,7 @@ from tdac_envs.errors import MapError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.params import MapParams
 from tdac_envs.plan import plan_path
-from tdac_envs.preprocess import Source, as_image
+from tdac_envs.preprocessing import Source, as_image
 from tdac_envs.preview import draw_preview
 
 FILES = ("occupancy.npy", "occupancy.png", "params.json", "preview.png")

@@ -21,7 +21,7 @@ from tdac_envs.image import load_image, read_bytes
 from tdac_envs.maps import BundledMap, bundled_map, bundled_maps
 from tdac_envs.metric import Point, resolution_of, to_pixels
 from tdac_envs.params import MapParams, RobotParams
-from tdac_envs.preprocess import preprocess
+from tdac_envs.preprocessing import preprocess
 from tdac_envs.score import nearest_free
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]

@@ -17,7 +17,7 @@ from tdac_envs.image import load_image
 from tdac_envs.map_folder import write_map
 from tdac_envs.maps import bundled_map, bundled_maps
 from tdac_envs.params import MapParams, RobotParams
-from tdac_envs.preprocess import Candidate, Preset, preprocess, rank_candidates
+from tdac_envs.preprocessing import Candidate, Preset, preprocess, rank_candidates
 
 SHOWN = 8
 Point = tuple[float, float]

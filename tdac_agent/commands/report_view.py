@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.report import Report
+from tdac_agent.trajectory import nominal_first
 from tdac_agent.units import UNITS
-from tdac_agent.verification import nominal_first
 
 
 def show_report(report: Report, console: Console, out: Path | None = None) -> None:

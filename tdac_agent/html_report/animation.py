@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.figures import contact_of
-from tdac_agent.html_report.gather import Told, Tried
+from tdac_agent.history import Told, Tried
 from tdac_agent.html_report.scene import Scene
 from tdac_agent.report import Episode
 from tdac_agent.task import Task

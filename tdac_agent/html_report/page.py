@@ -14,11 +14,11 @@ from markupsafe import Markup
 
 from tdac_agent.budget import told_usd
 from tdac_agent.errors import RunError
+from tdac_agent.history import Told, gather_run, learner_named, run_folders
 from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
-from tdac_agent.html_report.gather import Told, gather_run, run_folders
 from tdac_agent.html_report.overview import overview_of, told_seconds
 from tdac_agent.html_report.scene import Scene, scene_of
-from tdac_agent.html_report.section import broken, learner_named, section_of
+from tdac_agent.html_report.section import broken, section_of
 from tdac_agent.records import status_now
 
 MOST_BYTES = 24 << 20

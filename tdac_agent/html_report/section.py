@@ -10,8 +10,8 @@ from typing import Any
 
 from tdac_agent.budget import told_usd
 from tdac_agent.errors import RunError
+from tdac_agent.history import Told, Tried, learner_named
 from tdac_agent.html_report.animation import animations
-from tdac_agent.html_report.gather import Told, Tried
 from tdac_agent.html_report.overview import drawn, told_seconds
 from tdac_agent.html_report.scene import Scene
 from tdac_agent.plots import plot_breakdown
@@ -85,12 +85,6 @@ def _breakdown(told: Told) -> str | None:
         return drawn(plot_breakdown(told.run))
     except (RunError, KeyError, TypeError, ValueError):
         return None
-
-
-def learner_named(learner: str) -> str:
-    """A learner for people: what is no language model says so."""
-    plain = learner == "builtin"
-    return f"{learner} (a tuned template, no language model)" if plain else learner
 
 
 def broken(report: Report) -> list[Broken]:

@@ -20,13 +20,13 @@ ASSUMPTIONS = {
     ),
     "runs resampled": (
         "independent runs of one kind, whatever goes on within each (percentile "
-        "bootstrap; too narrow with few runs, and of no width where all are alike)"
+        "bootstrap; too narrow with few runs)"
     ),
     "Kaplan-Meier": (
         "independent runs; that money or time ended some of them has nothing to do "
         "with how near they were (Greenwood, log-log)"
     ),
-    "none": "one run, or none: no interval",
+    "none": "one run, none, or runs that are all alike: no interval",
 }
 
 
@@ -65,7 +65,8 @@ def success_rate(frames: Frames, *, invalid: bool = False, seed: int = 0) -> Rat
     A run stops at its first success, so that without censoring and invalid iterations
     this is R / (tau_1 + ... + tau_R). Iterations of a run are not independent (they
     share its rules, and the last one is the one that passed), so its interval comes
-    from resampling runs.
+    from resampling runs; where each run had just one iteration, they are independent,
+    and the interval is exact.
 
     Args:
         frames: The runs.
@@ -123,6 +124,8 @@ def _over_runs(tries: pd.DataFrame, seed: int) -> Rate:
     passed, tried = per_run["sum"].to_numpy(int), per_run["size"].to_numpy(int)
     successes, trials = int(passed.sum()), int(tried.sum())
     value = successes / trials if trials else math.nan
+    if trials and (tried == 1).all():
+        return _exact(successes, trials)
     low, high, method = _resampled(passed, tried, seed)
     return Rate(value, successes, trials, low, high, method)
 
@@ -131,7 +134,8 @@ def _resampled(
     passed: np.ndarray, tried: np.ndarray, seed: int
 ) -> tuple[float, float, str]:
     """Percentile interval of a ratio of sums over runs."""
-    if len(passed) < 2:
+    # Of runs that are alike every resample is the same: that is no certainty.
+    if len(passed) < 2 or len({*zip(passed.tolist(), tried.tolist(), strict=True)}) < 2:
         return math.nan, math.nan, "none"
 
     def ratio(passed: np.ndarray, tried: np.ndarray, axis: int = -1) -> np.ndarray:

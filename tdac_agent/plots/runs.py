@@ -1,32 +1,36 @@
-"""Figures of one run: what failed when, where time and tokens went, its timeline."""
+"""Figures of one run: what failed when, where time and tokens went."""
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import StrMethodFormatter
 
 from tdac_agent.errors import RunError
+from tdac_agent.history import learner_named
 from tdac_agent.journal import JournalRecord, read_records
 from tdac_agent.plots.style import (
     COLOURS,
     FAILED,
     NOTHING,
-    PASSED,
+    PALE,
     TEXT,
     dress,
     legend,
     new_figure,
+    new_plot,
     title,
 )
 from tdac_agent.records import JOURNAL, Attempt, Run
 
 MOST_TESTS = 40
+CELL = 0.36
+"""Width of a candidate, inches."""
+MOST_LEVEL = 20
+"""Candidates whose names fit in side by side."""
 STEPS = {"generate": "writing", "edit": "editing", "summarise": "rules"}
 
 
@@ -40,29 +44,33 @@ def plot_failures(run: Run) -> Figure:
             for test in shown
         ]
     ).reshape(len(shown), len(run.attempts))
-    width = 3.6 + 0.34 * max(4, len(run.attempts))
-    figure, axes = new_figure(width, 1.5 + 0.21 * max(3, len(shown)))
-    colours = ListedColormap([PASSED, FAILED, NOTHING])
+    width = 4.0 + CELL * max(6, len(run.attempts))
+    figure, axes = new_figure(width, 1.7 + 0.21 * max(3, len(shown)))
     axes.grid(visible=False)
+    axes.spines[:].set_visible(False)
     if cells.size:
+        colours = ListedColormap([PALE, FAILED, NOTHING])
         axes.pcolormesh(cells, cmap=colours, vmin=0, vmax=2, edgecolor="w", linewidth=1)
         # Not by colour alone.
         for y, x in np.argwhere(cells == 1):
             axes.text(x + 0.5, y + 0.5, "×", ha="center", va="center", color="w")
-    axes.set_yticks(np.arange(len(shown)) + 0.5, [_short(test) for test in shown])
-    axes.tick_params(axis="y", labelsize=7.5, length=0)
-    labels = [f"{a.k}.{a.j}" for a in run.attempts]
-    axes.set_xticks(np.arange(len(labels)) + 0.5, labels, rotation=90, fontsize=7.5)
-    axes.set_xlabel("candidate k.j", color=TEXT)
+    for place in _begins(run.attempts)[1:]:
+        axes.axvline(place, color="w", linewidth=5)
+        axes.axvline(place, color="#999999", linewidth=0.8)
+    axes.set_xlim(0, max(6, len(run.attempts)))
     axes.invert_yaxis()
+    _label_tests(axes, shown)
+    _label_candidates(axes, run.attempts)
     more = f"; {len(left_out)} further tests left out" if left_out else ""
     told = "no test ever failed" if not failed else f"{len(failed)} tests ever failed"
-    title(axes, f"What failed in {run.folder.name}", f"{run.learner}; {told}{more}")
-    names = zip((PASSED, FAILED, NOTHING), ("passed", "failed", "no code"), strict=True)
-    axes.legend(
-        handles=[Patch(color=colour, label=name) for colour, name in names],
-        loc="upper left",
-        bbox_to_anchor=(1.0, 1.0),
+    learner = learner_named(run.learner)
+    title(axes, f"What failed in {run.folder.name}", f"{learner}; {told}{more}")
+    names = {PALE: "passed", FAILED: "× failed", NOTHING: "no code"}
+    there = [colour for number, colour in enumerate(names) if (cells == number).any()]
+    figure.legend(
+        handles=[Patch(color=colour, label=names[colour]) for colour in there],
+        loc="outside lower right",
+        ncols=3,
         frameon=False,
         fontsize=8,
     )
@@ -71,59 +79,73 @@ def plot_failures(run: Run) -> Figure:
 
 def plot_breakdown(run: Run) -> Figure:
     """Seconds and tokens of each candidate, by what they were used for."""
-    spent = _spent(_journal(run))
-    figure = Figure(figsize=(7.0, 3.2), layout="constrained")
-    left, right = (dress(axes) for axes in figure.subplots(1, 2))
-    names = list(spent)
-    _stack(left, names, spent, ("writing", "editing", "rules", "testing"), "seconds")
-    _stack(right, names, spent, ("tokens in", "tokens out"), "tokens")
-    title(left, f"Time in {run.folder.name}", run.learner)
-    title(right, "Tokens", "" if run.tokens_in else "none were counted")
+    spent = _spent(journal_of(run))
+    figure = new_plot(7.2 if run.tokens else 4.6, 3.2)
+    panels = [
+        dress(axes)
+        for axes in figure.subplots(1, 2 if run.tokens else 1, squeeze=False).flat
+    ]
+    _stack(panels[0], spent, ("writing", "editing", "rules", "testing"), "seconds")
+    counted = "" if run.tokens else "; no tokens were counted"
+    about = learner_named(run.learner) + counted
+    title(panels[0], f"Time in {run.folder.name}", about)
+    if run.tokens:
+        _stack(panels[1], spent, ("tokens in", "tokens out"), "tokens")
+        panels[1].yaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
+        cost = "" if run.cost is None else f"; {run.cost:.3f} USD"
+        title(panels[1], "Tokens", f"{run.tokens:,} in all{cost}")
     return figure
 
 
-def plot_timeline(run: Run) -> Figure:
-    """The run from above to below: what was found, what was changed, what it knew."""
-    lines = list(_story(_journal(run)))
-    height = 0.9 + 0.2 * sum(text.count("\n") + 1.6 for _, _, text, _ in lines)
-    figure, axes = new_figure(7.6, max(2.0, height))
-    axes.set_axis_off()
-    row = 0.0
-    for at, head, text, colour in lines:
-        axes.plot([0], [row], "o", color=colour, markersize=7)
-        axes.text(-0.15, row, at, ha="right", va="center", fontsize=8.5, color=TEXT)
-        axes.text(
-            0.2, row, head, va="center", fontsize=9, color=colour, fontweight="bold"
-        )
-        axes.text(2.2, row - 0.35, text, va="top", fontsize=8.5, color=TEXT)
-        row += text.count("\n") + 1.6
-    axes.plot([0, 0], [0, row - 1.6], color="#CCCCCC", zorder=0)
-    axes.set_xlim(-1.0, 11.5)
-    axes.set_ylim(row, -1.0)
-    title(axes, f"Timeline of {run.folder.name}", f"{run.task}, {run.learner}")
-    return figure
+def _begins(attempts: list[Attempt]) -> list[int]:
+    """Numbers of the first candidates of all iterations."""
+    return [n for n, a in enumerate(attempts) if n == 0 or attempts[n - 1].k != a.k]
+
+
+def _label_tests(axes: Axes, shown: list[str]) -> None:
+    axes.set_yticks(np.arange(len(shown)) + 0.5, [short_name(test) for test in shown])
+    axes.tick_params(axis="y", labelsize=7.5, length=0)
+
+
+def _label_candidates(axes: Axes, attempts: list[Attempt]) -> None:
+    """Below each column (k, j), and how many tests failed."""
+    many = len(attempts) > MOST_LEVEL
+    between = "   " if many else "\n"
+    counts = [str(len(a.failed_tests)) if a.valid else "–" for a in attempts]
+    labels = [
+        f"{a.k}.{a.j}{between}{'✓' if a.passed else count}"
+        for a, count in zip(attempts, counts, strict=True)
+    ]
+    places = np.arange(len(attempts)) + 0.5
+    axes.set_xticks(places, labels, rotation=90 if many else 0, fontsize=8)
+    axes.tick_params(axis="x", length=0)
+    axes.set_xlabel("candidate k.j, and how many tests it failed", color=TEXT, size=9)
 
 
 def _stack(
-    axes: Any,
-    names: list[str],
-    spent: dict[str, dict[str, float]],
-    parts: tuple[str, ...],
-    unit: str,
+    axes: Axes, spent: dict[str, dict[str, float]], parts: tuple[str, ...], unit: str
 ) -> None:
+    """A bar per candidate, in parts; one that nobody could see is left out."""
+    names = list(spent)
+    values = {
+        part: np.array([uses.get(part, 0.0) for uses in spent.values()])
+        for part in parts
+    }
+    most = sum(values.values(), np.zeros(len(names))).max(initial=0.0)
     below = np.zeros(len(names))
-    for number, part in enumerate(parts):
-        values = np.array([spent[name].get(part, 0.0) for name in names])
-        if values.any():
-            axes.bar(names, values, bottom=below, color=COLOURS[number], label=part)
-        below += values
+    for part, colour in zip(parts, COLOURS, strict=False):
+        if values[part].max(initial=0.0) > 0.005 * most:
+            axes.bar(names, values[part], bottom=below, color=colour, label=part)
+            below += values[part]
     axes.set_xlabel("candidate k.j", color=TEXT)
     axes.set_ylabel(unit, color=TEXT)
+    if len(names) > MOST_LEVEL:
+        axes.tick_params(axis="x", rotation=90, labelsize=7.5)
     if below.any():
         legend(axes, 4)
 
 
-def _journal(run: Run) -> list[JournalRecord]:
+def journal_of(run: Run) -> list[JournalRecord]:
     """The whole records of a run's journal.
 
     Raises:
@@ -160,43 +182,10 @@ def _spent(records: list[JournalRecord]) -> dict[str, dict[str, float]]:
     return spent
 
 
-def _story(records: list[JournalRecord]) -> Iterator[tuple[str, str, str, str]]:
-    """(where, what, text, colour) of what a reader wants to know."""
-    for record in records:
-        event = record["event"]
-        at = f"k={record['k']}" if "k" in record else ""
-        if "j" in record:
-            at += f" j={record['j']}"
-        if event == "verify.end":
-            yield (at, *_verdict(record))
-        elif event == "rules" and record["notes"]:
-            rules = [f"{rule['id']}: {rule['text']}" for rule in record["rules"]]
-            yield at, "rules", _wrapped(rules or ["none are in force"]), COLOURS[0]
-        elif event == "call.fault":
-            yield at, "fault", _wrapped([record["reason"]]), COLOURS[4]
-        elif event == "run.end" and record["status"] != "verified":
-            yield at, record["status"], "", FAILED
-
-
-def _verdict(record: JournalRecord) -> tuple[str, str, str]:
-    notes = record["notes"][:3]
-    if record["passed"]:
-        return "verified", _wrapped(["all tests passed", *notes]), PASSED
-    if not record["valid"]:
-        return "no code", _wrapped(notes), COLOURS[4]
-    failed = [_short(test) for test in record["failed_tests"]]
-    return f"{len(failed)} failed", _wrapped([", ".join(failed), *notes]), FAILED
-
-
-def _wrapped(texts: list[str], most: int = 4) -> str:
-    lines = [line for text in texts for line in textwrap.wrap(text, 96)]
-    more = len(lines) - most
-    return "\n".join(lines[:most] + ([f"… {more} more lines"] if more > 0 else []))
-
-
 def _ever_failed(attempts: list[Attempt]) -> list[str]:
     return list(dict.fromkeys(t for a in attempts for t in a.failed_tests))
 
 
-def _short(test: str) -> str:
+def short_name(test: str) -> str:
+    """A test without its file and `test_`."""
     return test.rpartition("::")[2].removeprefix("test_")

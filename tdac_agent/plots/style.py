@@ -17,16 +17,29 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LINES = ("-", "--", "-.", ":")
 PASSED, FAILED, NOTHING = "#009E73", "#D55E00", "#D9D9D9"
+PALE = "#D8EEE6"  # of what passed, where what failed is looked for
 TEXT = "#333333"
 
 
-def new_figure(width: float, height: float) -> tuple[Figure, Axes]:
-    """A figure with one pair of axes, sizes in inches.
+class Plot(Figure):
+    """A figure that notebooks show as it is.
 
     It belongs to no window and no global list, so that nobody has to close it.
     """
-    figure = Figure(figsize=(width, height), layout="constrained")
+
+    def _repr_svg_(self) -> str:
+        return figure_bytes(self).decode("utf-8")
+
+
+def new_figure(width: float, height: float) -> tuple[Plot, Axes]:
+    """A figure with one pair of axes, sizes in inches."""
+    figure = new_plot(width, height)
     return figure, dress(figure.add_subplot())
+
+
+def new_plot(width: float, height: float) -> Plot:
+    """A figure without axes, sizes in inches."""
+    return Plot(figsize=(width, height), layout="constrained")
 
 
 def dress(axes: Axes) -> Axes:
@@ -62,10 +75,11 @@ def colours_of(names: Iterable[str]) -> dict[str, str]:
 
 def legend(axes: Axes, count: int) -> None:
     """A legend below the axes, where it covers nothing."""
+    rows = -(-count // 4)
     axes.legend(
         loc="upper center",
         bbox_to_anchor=(0.5, -0.18),
-        ncols=min(count, 4),
+        ncols=-(-count // max(1, rows)),
         frameon=False,
         fontsize=9,
     )

@@ -5,7 +5,7 @@ import pytest
 from benchmarks.plain_grid import best_score
 from benchmarks.preprocessing import RADIUS, floor_plan
 from benchmarks.timing import Row, compared, duration, row_of
-from tdac_envs.preprocess import rank_candidates
+from tdac_envs.preprocessing import rank_candidates
 
 
 def test_the_straightforward_version_does_the_same_work():

@@ -21,7 +21,7 @@ from tdac_envs.grid import body_free, clearance
 from tdac_envs.image import load_image, luminance
 from tdac_envs.map_folder import FILES, shortest_path, write_map
 from tdac_envs.params import MapParams
-from tdac_envs.preprocess import preprocess, rank_candidates
+from tdac_envs.preprocessing import preprocess, rank_candidates
 from tdac_envs.score import nearest_free, score, widest_radius
 
 START, GOAL = (40, 40), (260, 40)

@@ -11,8 +11,8 @@ import pytest
 from hostile_model import EVIL
 
 from tdac_agent.errors import RunError
+from tdac_agent.history import gather_run
 from tdac_agent.html_report import make_page
-from tdac_agent.html_report.gather import gather_run
 from tdac_agent.html_report.page import shortened
 from tdac_agent.records import load_rules, load_run
 from tdac_agent.report import Report

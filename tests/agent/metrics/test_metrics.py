@@ -172,6 +172,16 @@ def kaplan_meier(runs, most):
     return values
 
 
+def test_runs_that_are_alike_are_no_certainty():
+    """Resampling them has no width: exact where each is one trial, else no interval."""
+    once = success_rate(frames_from_tau([1] * 10, 20))
+    assert (once.value, once.method) == (1.0, "Clopper-Pearson")
+    assert (once.low, once.high) == exact_interval(10, 10)
+    twice = success_rate(frames_from_tau([2] * 10, 20))
+    assert (str(twice), twice.method) == ("0.50", "none")
+    assert success_rate(frames_from_tau([1, 2], 20)).method == "runs resampled"
+
+
 def test_the_unbiased_rate():
     """(R-1)/(N-1), where each run ended with a success; else there is none."""
     assert unbiased_success_rate(frames_from_tau([1, 1, 2, 2, 5], 20)) == 4 / 10

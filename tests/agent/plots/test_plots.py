@@ -12,11 +12,18 @@ from tdac_agent.plots import (
     plot_breakdown,
     plot_cumulative_success,
     plot_failures,
+    plot_preprocessing,
     plot_success_rates,
     plot_timeline,
+    plot_trajectories,
     save_figure,
 )
 from tdac_agent.records import Attempt, Run
+from tdac_agent.task import load_task
+from tdac_agent.trajectory import Trajectory
+from tdac_agent.verification import verify
+from tdac_envs import preprocess
+from tdac_envs.errors import TdacError
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +132,29 @@ def test_the_timeline_tells_what_happened(run):
     assert "not used: no code" in told
 
 
+def test_the_timeline_tells_why(run, small_task, good_source):
+    """The cause of a failure is that of its report, said once for all its tests."""
+    broken = good_source.replace("def policy(obs):", "def policy(obs):\n    1 / 0\n", 1)
+    report = verify(broken, small_task, out=run.folder / "iterations" / "k01" / "j0")
+    assert len(report.failures) > 3
+    told = texts(plot_timeline(run))
+    assert told.count("ZeroDivisionError") == 1
+
+
+def test_rules_are_told_where_they_came_from(run):
+    """By what changed, once; a fault and an end without success, too."""
+    rule = {"event": "rules", "seconds": 9, "k": 1, "notes": ["added R1: keep away"]}
+    fault = {"event": "call.fault", "seconds": 9, "k": 2, "reason": "status 503"}
+    end = {"event": "run.end", "seconds": 9, "status": "budget", "reason": "too dear"}
+    more = [rule | {"rules": []}, fault, end]
+    lines = "".join("\n" + json.dumps(one) for one in more)
+    with (run.folder / "journal.jsonl").open("a") as file:
+        file.write(lines + "\n")
+    told = texts(plot_timeline(run))
+    for words in ("added R1: keep away", "status 503", "budget", "too dear"):
+        assert told.count(words) == 1
+
+
 def test_a_run_without_journal(run):
     """One line says what is missing."""
     (run.folder / "journal.jsonl").unlink()
@@ -139,3 +169,62 @@ def test_a_figure_is_the_same_file_again(frames, tmp_path, kind):
     save_figure(plot_cumulative_success(frames), one)
     save_figure(plot_cumulative_success(frames), two)
     assert one.read_bytes() == two.read_bytes()
+
+
+def test_notebooks_show_figures_by_themselves(frames):
+    """As a vector picture, without a magic command."""
+    assert plot_cumulative_success(frames)._repr_svg_().startswith("<?xml")
+
+
+@pytest.mark.parametrize("name", ["small", "epuck-crates"])
+def test_ways_lie_where_they_were_driven(name, small_task):
+    """In the unit of the task, over a picture of it that has the goal in its place."""
+    task = small_task if name == "small" else load_task(name)
+    start, goal = np.array(task.nominal.start[:2]), np.array(task.nominal.goal)
+    poses = np.vstack([np.append(start, 0.0), np.append(goal, 0.0)])
+    ends = {"one": "collision"}
+    axes = plot_trajectories(task, {"one": poses, "two": poses[:, :2]}, ends).axes[0]
+    lines = [line for line in axes.lines if line.get_label()[0] != "_"]
+    assert [line.get_label() for line in lines] == ["one: collision", "two"]
+    np.testing.assert_array_equal(lines[0].get_xydata(), poses[:, :2])
+    picture = axes.images[0]
+    left, right, low, high = picture.get_extent()
+    rows, columns = picture.get_array().shape[:2]
+    column = int((goal[0] - left) / (right - left) * columns)
+    row = int((goal[1] - high) / (low - high) * rows)
+    red, green, _ = picture.get_array()[row, column].astype(int)
+    assert green > red + 40
+
+
+def test_a_recorded_trajectory_is_drawn_by_its_poses(small_task):
+    """The judge's record, as it comes from a folder."""
+    poses = np.array([[30.0, 30.0, 0.0], [32.0, 31.0, 0.1]])
+    none = np.zeros((1, 2), np.float32)
+    way = Trajectory(poses, none, np.zeros(2), np.zeros((2, 18), np.float32), 0, 0.05)
+    axes = plot_trajectories(small_task, {"nominal": way}).axes[0]
+    np.testing.assert_array_equal(axes.lines[1].get_xydata(), poses[:, :2])
+
+
+def test_what_are_no_poses_is_refused(small_task):
+    """One line tells the shape that was expected."""
+    with pytest.raises(TdacError, match=r"expected poses of shape \(T \+ 1, 3\)"):
+        plot_trajectories(small_task, {"flat": np.zeros(4)})
+
+
+def test_the_stages_of_preprocessing():
+    """The threshold, what it alone does not say, and a way through free pixels."""
+    picture = np.full((60, 80), 230, np.uint8)
+    picture[:, 38:42] = 20
+    picture[40:, 38:42] = 230
+    picture[10:12, 10:12] = 20
+    grid, params = preprocess(picture, (15, 30), (65, 30), 4.0)
+    figure = plot_preprocessing(picture, grid, params)
+    _, threshold, cells, room = figure.axes
+    assert threshold.lines[0].get_xdata()[0] == params.threshold
+    assert sum(bar.get_height() for bar in threshold.patches if bar.get_height() >= 1)
+    shown = np.asarray(cells.images[0].get_array())
+    np.testing.assert_array_equal(np.isin(shown, (1, 3)), grid.cells)
+    plain = picture <= params.threshold
+    np.testing.assert_array_equal(shown == 2, plain & ~grid.cells)
+    x, y = np.rint(room.lines[0].get_xydata()).astype(int).T
+    assert not grid.cells[y, x].any()

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from tdac_agent.errors import RunError
-from tdac_agent.html_report.learnt import Learnt, what_was_learnt
 from tdac_agent.journal import read_records
+from tdac_agent.learnt import Learnt, what_was_learnt
 from tdac_agent.records import JOURNAL, RUN_FILE, Attempt, Run, load_rules, load_run
 from tdac_agent.report import Report
 from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, load_task
-from tdac_agent.trajectory import Trajectory
+from tdac_agent.trajectory import Trajectory, nominal_first
 from tdac_envs.errors import TdacError
 
 MOST_BYTES = 8 << 20
@@ -55,7 +55,8 @@ class Tried:
 
     def trajectories(self) -> Iterator[tuple[str, Trajectory]]:
         """Episode names and trajectories; one that is damaged is left out."""
-        for path in sorted((self.folder / "trajectories").glob("*.npz")):
+        files = (self.folder / "trajectories").glob("*.npz")
+        for path in sorted(files, key=nominal_first):
             try:
                 yield path.stem.replace("_", " "), Trajectory.load(path)
             except RunError:
@@ -85,14 +86,23 @@ class Told:
     problems: tuple[str, ...]
 
 
-def gather_run(folder: Path) -> Told:
+def learner_named(learner: str) -> str:
+    """A learner for people: what is no language model says so."""
+    plain = learner == "builtin"
+    return f"{learner} (a tuned template, no language model)" if plain else learner
+
+
+def gather_run(source: Path | Run) -> Told:
     """A run, also one that is torn, or still going on.
 
+    Args:
+        source: Its folder, or its record.
+
     Raises:
-        RunError: It has no readable `run.json`.
+        RunError: The folder has no readable `run.json`.
     """
-    run = load_run(folder)
-    problems: list[str] = []
+    run = source if isinstance(source, Run) else load_run(source)
+    folder, problems = run.folder, list[str]()
     tried = tuple(_candidates(run, problems))
     reports = [one.report for one in tried if one.report is not None]
     sources = [one.source for one in tried if one.source is not None]

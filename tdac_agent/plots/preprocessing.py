@@ -1,0 +1,113 @@
+"""The stages of preprocessing: from a picture to what the robot may drive on."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, dress, new_plot
+from tdac_envs.grid import BoolGrid, OccupancyGrid, body_free, clearance
+from tdac_envs.image import luminance
+from tdac_envs.map_folder import shortest_path
+from tdac_envs.params import MapParams
+from tdac_envs.preprocessing import Source, as_image
+
+SIDE = 3.7
+"""Width of a panel, inches."""
+FREE, WALL, CLOSED = "#FAF9F5", "#384151", "#6E9FC4"
+_SHADES = {"dark": "dark is occupied", "light": "light is occupied"}
+
+
+def plot_preprocessing(image: Source, grid: OccupancyGrid, params: MapParams) -> Figure:
+    """Four stages: the picture, its threshold, the grid, and room for the robot.
+
+    Args:
+        image: What `tdac_envs.preprocess` got.
+        grid: What it gave.
+        params: What it chose.
+    """
+    source = as_image(image)
+    shape = grid.height / grid.width
+    figure = new_plot(2 * SIDE + 0.4, 2 * SIDE * min(1.4, shape) + 1.2)
+    first, second, third, last = figure.subplots(2, 2).flat
+    first.imshow(source.colour, interpolation="antialiased")
+    _name(first, "1  the picture", f"{source.name}, {grid.width} × {grid.height} px")
+    _plot_threshold(dress(second), luminance(source.colour), params)
+    _plot_grid(third, grid.cells, luminance(source.colour), params)
+    _plot_room(last, grid, params)
+    for axes in (first, third, last):
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.spines[:].set_color("#BBBBBB")
+    return figure
+
+
+def _plot_threshold(axes: Axes, grey: np.ndarray, params: MapParams) -> None:
+    """How many pixels have each luminance, and where they are cut."""
+    counts = np.bincount(grey.ravel(), minlength=256)
+    axes.bar(np.arange(256), np.maximum(counts, 0.5), width=1.0, color="#7A8494")
+    axes.set_yscale("log")
+    axes.set_ylim(0.8, 3 * counts.max())
+    axes.set_xlim(-2, 257)
+    axes.set_xlabel("luminance", color=TEXT)
+    axes.set_ylabel("pixels", color=TEXT)
+    if params.threshold is not None:
+        axes.axvline(params.threshold, color=FAILED, linewidth=1.5)
+    shade = _SHADES.get(params.polarity, params.method)
+    cut = "" if params.threshold is None else f"cut at {params.threshold:g}; "
+    _name(axes, "2  the threshold", f"{cut}{shade}")
+
+
+def _plot_grid(
+    axes: Axes, cells: BoolGrid, grey: np.ndarray, params: MapParams
+) -> None:
+    """What is occupied; in colour where the threshold alone says something else."""
+    shown, about = cells.astype(int), params.method
+    if params.threshold is not None:
+        light = grey > params.threshold
+        plain = light if params.polarity == "light" else ~light
+        shown = shown + 2 * (plain & ~cells) + 2 * (cells & ~plain)
+        freed, filled = int((plain & ~cells).sum()), int((cells & ~plain).sum())
+        if freed or filled:
+            about = f"{freed:,} px freed (orange), {filled:,} closed (blue)"
+    colours = ListedColormap([FREE, WALL, COLOURS[4], CLOSED])
+    axes.imshow(shown, cmap=colours, vmin=0, vmax=3, interpolation="nearest")
+    _name(axes, "3  the occupancy grid", about)
+
+
+def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
+    """Where the body's centre may be, how far from walls that is, and the way."""
+    clear = clearance(grid.cells)
+    room = body_free(clear, params.robot.radius + params.inflation)
+    axes.imshow(grid.cells, cmap=ListedColormap([FREE, WALL]), interpolation="nearest")
+    axes.imshow(
+        np.ma.masked_array(clear, ~room),
+        cmap="YlGnBu",
+        vmin=-0.3 * float(clear.max()),  # no place of it is as pale as the rest
+        interpolation="nearest",
+    )
+    way = shortest_path(grid, params)
+    axes.plot(way[:, 0], way[:, 1], color=COLOURS[1], linewidth=1.8)
+    for place, mark in ((params.start, "o"), (params.goal, "*")):
+        if place is not None:
+            axes.plot(*place, mark, color=PASSED, markeredgecolor="w", markersize=11)
+    margin = f" + {params.inflation:g} px" if params.inflation else ""
+    about = f"for a disc of {params.robot.radius:g} px{margin}"
+    if params.score_terms is not None:
+        about += f"; path {params.score_terms.path_length:.0f} px"
+    _name(axes, "4  room for the robot", about)
+
+
+def _name(axes: Axes, text: str, about: str) -> None:
+    axes.set_title(f"{text}\n", loc="left", fontsize=10.5, color=TEXT)
+    axes.annotate(
+        about,
+        (0, 1),
+        (0, 5),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        fontsize=8,
+        color="#666666",
+    )

@@ -1,0 +1,116 @@
+"""Episodes over the map or the world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from tdac_agent.errors import RunError
+from tdac_agent.pictures import pictures_of
+from tdac_agent.plots.style import (
+    COLOURS,
+    FAILED,
+    LINES,
+    TEXT,
+    colours_of,
+    dress,
+    new_plot,
+    title,
+)
+from tdac_agent.task import Task
+from tdac_agent.trajectory import Trajectory
+from tdac_envs.closeup import Chart
+
+WIDTH = 7.0
+"""Of the map, inches; less where it is higher than wide."""
+
+
+def plot_trajectories(
+    task: Task,
+    ways: Mapping[str, Trajectory | ArrayLike],
+    outcomes: Mapping[str, str] | None = None,
+    *,
+    heading: str | None = None,
+    provenance: str = "",
+) -> Figure:
+    """Ways driven over the map or the world, with start, goal and shortest path.
+
+    Args:
+        task: Whose map or world.
+        ways: By what the legend calls them: trajectories as a judge recorded them,
+            or poses of shape (T + 1, 3), or places of shape (T + 1, 2), px or m.
+        outcomes: How each ended, as in a report: `reached`, `collision` ….
+        heading: Title; the task's name by default.
+        provenance: A line below it.
+
+    Raises:
+        RunError: What is to be drawn are no poses.
+    """
+    chart = pictures_of(task.setting).backdrop().whole()
+    picture = chart.canvas.image[: chart.canvas.strip_top]
+    left, right, low, high = extent = _extent(chart)
+    shape = abs((high - low) / (right - left))
+    width = WIDTH * min(1.0, 0.8 / shape)
+    figure = new_plot(width + 0.6, width * shape + 1.0 + 0.2 * -(-len(ways) // 3))
+    axes = dress(figure.add_subplot())
+    axes.grid(visible=False)
+    axes.imshow(picture, extent=extent, interpolation="antialiased")
+    colours = colours_of(ways)
+    for number, (name, way) in enumerate(ways.items()):
+        outcome = (outcomes or {}).get(name, "")
+        line = LINES[number // len(COLOURS) % len(LINES)]
+        label = f"{name}: {outcome}" if outcome else name
+        _draw(axes, _places(way), colours[name], line, label, outcome)
+    unit = task.setting.units.place
+    axes.set_xlabel(f"x, {unit}", color=TEXT)
+    axes.set_ylabel(f"y, {unit}", color=TEXT)
+    title(axes, task.name if heading is None else heading, provenance)
+    if ways:
+        figure.legend(
+            loc="outside lower center", ncols=min(3, len(ways)), frameon=False
+        )
+    return figure
+
+
+def _extent(chart: Chart) -> tuple[float, float, float, float]:
+    """Left, right, low and high edge of the picture, in the environment's unit."""
+    (x0, y0), (x1, y1) = chart.canvas.to_frame(chart.at(np.array([[0, 0], [1, 1]])))
+    columns, rows = chart.canvas.image.shape[1], chart.canvas.strip_top
+    left, right = ((edge - x0) / (x1 - x0) for edge in (-0.5, columns - 0.5))
+    high, low = ((edge - y0) / (y1 - y0) for edge in (-0.5, rows - 0.5))
+    return left, right, low, high
+
+
+def _places(way: Trajectory | ArrayLike) -> NDArray[np.float64]:
+    poses = way.poses if isinstance(way, Trajectory) else np.asarray(way, np.float64)
+    if poses.ndim != 2 or poses.shape[1] not in (2, 3):
+        raise RunError(f"expected poses of shape (T + 1, 3), got {poses.shape}")
+    return np.asarray(poses[:, :2])
+
+
+def _draw(
+    axes: Axes,
+    places: NDArray[np.float64],
+    colour: str,
+    line: str,
+    label: str,
+    outcome: str,
+) -> None:
+    """A line with light edges, and a mark where it ended."""
+    x, y = places.T
+    axes.plot(x, y, color="w", linewidth=3.6, alpha=0.5, zorder=2)
+    axes.plot(x, y, line, color=colour, linewidth=1.8, alpha=0.8, label=label, zorder=3)
+    marks = {"reached": ("o", colour), "collision": ("X", FAILED)}
+    mark, fill = marks.get(outcome, ("s", colour))
+    end: dict[str, Any] = {
+        "color": fill,
+        "markeredgecolor": "w",
+        "markersize": 8,
+        "zorder": 4,
+    }
+    axes.plot(x[-1:], y[-1:], mark, **end)
