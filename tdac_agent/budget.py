@@ -12,6 +12,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from tdac_agent.errors import RunError
 from tdac_agent.journal import append_record, mend, read_records
@@ -36,8 +37,17 @@ class Amount:
         if self.tokens < 0 or not 0 <= self.usd < math.inf:
             raise ValueError(f"expected an amount of 0 or more, got {self}")
 
+    def plus(self, other: Amount) -> Amount:
+        """Both together."""
+        return Amount(self.tokens + other.tokens, self.usd + other.usd)
+
+    def times(self, count: int) -> Amount:
+        """So many of it."""
+        return Amount(count * self.tokens, count * self.usd)
+
 
 NOTHING = Amount()
+Limit = Literal["--max-cost", "--max-tokens"]
 
 
 class BudgetExhausted(Exception):
@@ -45,12 +55,44 @@ class BudgetExhausted(Exception):
 
     Args:
         message: One line.
-        enough: The flag with which a run can go on.
+        limit: What it would go beyond.
+        before: That limit.
+        taken: All that is reserved or spent without the call.
     """
 
-    def __init__(self, message: str, enough: str) -> None:
+    def __init__(
+        self, message: str, limit: Limit, before: Amount, taken: Amount
+    ) -> None:
         super().__init__(message)
-        self.enough = enough
+        self.limit = limit
+        self.before = before
+        self.taken = taken
+
+    def flag(self, more: Amount) -> str:
+        """The flag with which so much more could be taken."""
+        return _flag(self.limit, self.taken.plus(more))
+
+    def way_on(self, next_one: Amount, rest: Amount) -> str:
+        """The flag to go on with: twice the limit, or what makes more sense.
+
+        Args:
+            next_one: The least that is needed more.
+            rest: The most that the rest of the run can take.
+        """
+        doubled = self.before.times(2)
+        least, most = self.taken.plus(next_one), self.taken.plus(rest)
+        wanted = Amount(
+            min(max(doubled.tokens, least.tokens), most.tokens),
+            min(max(doubled.usd, least.usd), most.usd),
+        )
+        return _flag(self.limit, wanted)
+
+
+def _flag(limit: Limit, amount: Amount) -> str:
+    """A flag with an amount, cents rounded up."""
+    if limit == "--max-tokens":
+        return f"{limit} {amount.tokens}"
+    return f"{limit} {math.ceil(100 * amount.usd - ROUNDING) / 100:.12g}"
 
 
 class Budget:
@@ -113,19 +155,22 @@ class Budget:
         Raises:
             BudgetExhausted: It says how much there was.
         """
-        cost, tokens = taken.usd + worst.usd, taken.tokens + worst.tokens
-        if self.max_cost is not None and worst.usd and cost > self.max_cost + ROUNDING:
-            enough = max(2 * self.max_cost, math.ceil(100 * cost) / 100)
+        both, cost, tokens = taken.plus(worst), self.max_cost, self.max_tokens
+        if cost is not None and worst.usd and both.usd > cost + ROUNDING:
             raise BudgetExhausted(
-                f"{told_usd(taken.usd)} of {told_usd(self.max_cost)} are spent or "
-                f"reserved, and the next question may cost {told_usd(worst.usd)}",
-                f"--max-cost {enough:g}",
+                f"{told_usd(taken.usd)} of {told_usd(cost)} are spent or reserved, and "
+                f"the next question may cost {told_usd(worst.usd)}",
+                "--max-cost",
+                Amount(usd=cost),
+                taken,
             )
-        if self.max_tokens is not None and worst.tokens and tokens > self.max_tokens:
+        if tokens is not None and worst.tokens and both.tokens > tokens:
             raise BudgetExhausted(
-                f"{taken.tokens} of {self.max_tokens} tokens are spent or reserved, "
-                f"and the next question may take {worst.tokens}",
-                f"--max-tokens {max(2 * self.max_tokens, tokens)}",
+                f"{taken.tokens} of {tokens} tokens are spent or reserved, and the "
+                f"next question may take {worst.tokens}",
+                "--max-tokens",
+                Amount(tokens),
+                taken,
             )
 
     def _take(self, call: str, amount: Amount) -> None:

@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from tdac_agent.budget import NOTHING, Budget
+from tdac_agent.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.errors import Fault
 from tdac_agent.past import call_key
 from tdac_agent.provider import (
@@ -24,9 +24,36 @@ from tdac_agent.provider import (
 from tdac_agent.recorder import Recorder
 from tdac_agent.retry import Missed, RetryPolicy, answer
 from tdac_agent.tariff import Tariff
+from tdac_agent.workload import Rest, rest_of
 
 MIN_FREE_BYTES = 16 << 20
 """On the disk before a question: what an answer and its verification may need."""
+
+
+class OutOfBudget(Exception):
+    """The worst case of a question is more than what is left; the run ends here.
+
+    Args:
+        error: Of the budget.
+        worst: That the question can take.
+        rest: Of the run, the question included.
+
+    Attributes:
+        way_on: The flag with which the run can go on.
+        outlook: What that is to be measured by, in a line.
+    """
+
+    def __init__(self, error: BudgetExhausted, worst: Amount, rest: Rest) -> None:
+        super().__init__(str(error))
+        self.way_on = error.way_on(worst, rest.most)
+        left = f"at most {rest.questions} questions are left"
+        if rest.questions == 1:
+            self.outlook = f"at most this one question is left: {error.flag(worst)}"
+        else:
+            self.outlook = (
+                f"{left}: {error.flag(worst)} is the least that lets the next one be "
+                f"put, {error.flag(rest.most)} all of them"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +81,7 @@ class Calls:
         before: where that is refused, it is asked for one of the usual length.
 
         Raises:
-            BudgetExhausted: There is not enough left for the worst case.
+            OutOfBudget: There is not enough left for the worst case.
             Fault: It did not answer; the run ends, and no iteration is used up.
         """
         request = self.recorder.numbered(request)
@@ -93,7 +120,10 @@ class Calls:
         recorder, tariff = self.recorder, self.tariffs[model.name]
         key, worst = call_key(model, request), tariff.worst(request)
         name = f"{recorder.run.id}/{recorder.past.next_call(key)}"
-        self.budget.reserve(name, worst)
+        try:
+            self.budget.reserve(name, worst)
+        except BudgetExhausted as error:
+            raise OutOfBudget(error, worst, self._rest(request, worst)) from error
         recorder.asked(request, model.name, key, worst)
         try:
             reply = model.complete(request)
@@ -105,6 +135,10 @@ class Calls:
         recorder.answered(request, reply, key, spent, tariff.cost(spent))
         self.budget.settle(name, spent)
         return reply
+
+    def _rest(self, request: Request, worst: Amount) -> Rest:
+        run = self.recorder.run
+        return rest_of(run, self.tariffs, request, worst, self.max_output)
 
     def _check_disk(self) -> None:
         """Refuses to ask where an answer could not be kept.

@@ -8,12 +8,10 @@ from tdac_agent.dialogue import MAX_ASKS
 from tdac_agent.prices import PriceList
 from tdac_agent.prompt import FULL, PromptTemplate, generate_prompt
 from tdac_agent.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.rules import MAX_RULE_TOKENS
+from tdac_agent.tariff import OWN_MATTER
 from tdac_agent.task import Task
-from tdac_agent.tokens import estimate_tokens
-
-FEEDBACK_TOKENS = 12_000
-"""Room for what failed, the earlier attempts and the words around them."""
+from tdac_agent.tokens import estimate_tokens, most_tokens
+from tdac_agent.workload import tokens_asked, whole
 
 
 class Outlook(BaseModel):
@@ -29,7 +27,9 @@ class Outlook(BaseModel):
     prompt: str = Field(description="The first prompt, exactly.")
     prompt_tokens: int = Field(description="Estimated from its length in bytes.")
     answer_tokens: int = Field(description="That the first answer may have.")
-    first_cost: float | None = Field(description="USD at most; None if unknown.")
+    first_cost: float | None = Field(
+        description="USD that are reserved for the first question; None if unknown."
+    )
     questions: int = Field(description="Of the whole run, if nothing ever passes.")
     cost_once: float | None = Field(
         description="USD at most, each question being answered at once."
@@ -38,6 +38,9 @@ class Outlook(BaseModel):
         description="USD at most, each answer being cut off, and asked for three times."
     )
     unknown_prices: tuple[str, ...] = Field(description="Models without a price.")
+    uncounted: tuple[str, ...] = Field(
+        description="Programs and people, whose cost is not for this program to know."
+    )
     prices_dated: str
 
 
@@ -71,24 +74,25 @@ def foresee(
     """
     prompt = generate_prompt(task, (), template)
     tokens = estimate_tokens(prompt)
-    repairs = patience + 1  # the edits, and the rules
-    first, second = (prices.price_of(m, base_url) for m in (learner, optimizer))
+    work, sizes = whole(iterations, patience), tokens_asked(tokens, max_output)
+    prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
+    first, second = prices_of
     once = most = first_cost = None
     if first is not None:
-        first_cost = first.most(tokens, max_output)
+        first_cost = first.most(most_tokens(prompt), max_output)
     if first is not None and second is not None:
-        asked = tokens + MAX_RULE_TOKENS
-        # A controller that was cut off may have twice the tokens when it comes.
-        shown = asked + FEEDBACK_TOKENS + 2 * max_output
         said = max_output * (1 + 2 * (MAX_ASKS - 1))
         once, most = (
-            iterations
-            * (first.most(n * asked, out) + repairs * second.most(n * shown, out))
-            for n, out in ((1, max_output), (MAX_ASKS, said))
+            work.learner * first.most(times * sizes.learner, out)
+            + work.optimizer * second.most(times * sizes.optimizer, out)
+            for times, out in ((1, max_output), (MAX_ASKS, said))
         )
-    names = dict.fromkeys(
-        name for name, price in ((learner, first), (optimizer, second)) if price is None
-    )
+    without = [
+        name
+        for name, price in zip((learner, optimizer), prices_of, strict=True)
+        if price is None
+    ]
+    own = [name for name in without if name.partition(":")[0] in OWN_MATTER]
     return Outlook(
         task=task.name,
         learner=learner,
@@ -99,9 +103,10 @@ def foresee(
         prompt_tokens=tokens,
         answer_tokens=max_output,
         first_cost=first_cost,
-        questions=iterations * (1 + repairs),
+        questions=work.questions,
         cost_once=once,
         cost_most=most,
-        unknown_prices=tuple(names),
+        unknown_prices=tuple(dict.fromkeys(n for n in without if n not in own)),
+        uncounted=tuple(dict.fromkeys(own)),
         prices_dated=prices.dated.isoformat(),
     )

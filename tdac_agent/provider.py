@@ -94,7 +94,8 @@ class Provider(Protocol):
             call of a run the suite has to prove itself.
 
     One may also have `served_at`, the address of its server if that is not the
-    vendor's own, without anything secret.
+    vendor's own, without anything secret; and `missing`, what has to be had before it
+    can be asked, a line each.
     """
 
     name: str
@@ -117,6 +118,12 @@ def served_at(model: Provider) -> str | None:
     """Address of a model's server; None for the vendor's own, or without one."""
     address: str | None = getattr(model, "served_at", None)
     return address
+
+
+def missing_for(model: Provider) -> tuple[str, ...]:
+    """What has to be had before a model can be asked; nothing for most."""
+    missing: tuple[str, ...] = getattr(model, "missing", ())
+    return missing
 
 
 class ProviderFault(Exception):

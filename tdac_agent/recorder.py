@@ -97,8 +97,9 @@ class Recorder:
         """
         past = self.past
         limits = {name: getattr(self.run, name) for name in ("max_cost", "max_tokens")}
-        going = {"status": "running", "reason": "", "enough": "", "censored": False}
-        self._write(before.model_copy(update={**going, **limits}))
+        going = {"status": "running", "censored": False}
+        ended = dict.fromkeys(("reason", "enough", "outlook"), "")
+        self._write(before.model_copy(update={**going, **ended, **limits}))
         self.run.cost_lost = past.lost_usd
         self.event(
             "run.resume",
@@ -254,6 +255,7 @@ class Recorder:
         self.run.status = status
         self.run.reason = str(facts.get("reason", ""))
         self.run.enough = str(facts.get("enough", ""))
+        self.run.outlook = str(facts.get("outlook", ""))
         self.run.censored = not self.run.finished
         self.event("run.end", status=status, **facts)
         self.save()

@@ -84,6 +84,7 @@ class Run(BaseModel):
     seconds: float = 0.0
     reason: str = Field("", description="Why it ended, of a fault or the budget.")
     enough: str = Field("", description="Flag with which it can go on, of the budget.")
+    outlook: str = Field("", description="How much is enough for what, of the budget.")
     censored: bool = Field(False, description="Ended before success or K.")
 
     @property

@@ -6,8 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from tdac_agent.beginning import account_of, describe, hold_folder, open_record
-from tdac_agent.budget import Budget, BudgetExhausted
-from tdac_agent.calls import Calls
+from tdac_agent.budget import Budget
+from tdac_agent.calls import Calls, OutOfBudget
 from tdac_agent.dialogue import Candidate, Dialogue
 from tdac_agent.extract import same_code
 from tdac_agent.figures import draw_trajectories
@@ -126,8 +126,9 @@ def _run(dialogue: Dialogue, given: str | None, *, paid: bool) -> Run:
         if paid:
             _prove(dialogue.task, recorder, judge)
         _search(dialogue, given, judge)
-    except BudgetExhausted as error:
-        recorder.finish("budget", reason=str(error), enough=error.enough)
+    except OutOfBudget as error:
+        facts = {"enough": error.way_on, "outlook": error.outlook}
+        recorder.finish("budget", reason=str(error), **facts)
     except KeyboardInterrupt:
         recorder.finish("interrupted")
         raise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -37,13 +37,12 @@ class Tariff:
         """The most that an answer can cost."""
         if self.free:
             return NOTHING
-        tokens_in = most_tokens(request.prompt)
-        usd = (
-            0.0
-            if self.price is None
-            else self.price.most(tokens_in, request.max_tokens)
-        )
-        return Amount(tokens_in + request.max_tokens, usd)
+        return self.most(most_tokens(request.prompt), request.max_tokens)
+
+    def most(self, tokens_in: int, tokens_out: int) -> Amount:
+        """What so many tokens can cost, cached or not."""
+        usd = self.price.most(tokens_in, tokens_out) if self.price else 0.0
+        return Amount(tokens_in + tokens_out, usd)
 
     def spent(self, request: Request, reply: Reply) -> Amount:
         """What an answer took; the worst case where that is not reported."""
@@ -82,7 +81,7 @@ def _tariff(model: Provider) -> Tariff:
 
 def bounds_of(
     models: Iterable[Provider],
-    tariffs: dict[str, Tariff],
+    tariffs: Mapping[str, Tariff],
     max_cost: float | None,
     max_tokens: int | None,
 ) -> Bounds:

@@ -29,7 +29,7 @@ def run(
 ) -> int:
     """Checks a suite and prints; returns the exit code."""
     check_tier(tier)
-    console = Console(stderr=as_json)
+    console = Console(stderr=as_json, emoji=False)
     with WarmJudge() as judge, console.status("preparing the task …") as status:
         task = flags.load()
         check = check_suite(

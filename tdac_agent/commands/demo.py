@@ -27,7 +27,7 @@ def run(out: Path | None, as_json: bool) -> int:
         out: Run folder; the next free one by default.
         as_json: Whether to print the record.
     """
-    console = Console(stderr=as_json)
+    console = Console(stderr=as_json, emoji=False)
     recorded = load_run(DEMO)
     about = {"prompt": recorded.prompt, "task": recorded.task}
     console.print(_ABOUT.format(date=recorded.started[:10], **about))

@@ -118,7 +118,7 @@ def _versions() -> dict[str, str]:
 
 
 def _show(checks: list[Check]) -> None:
-    console = Console()
+    console = Console(emoji=False)
     for check in checks:
         mark = "[green]✔[/]" if check.works else "[yellow]–[/]"
         if check.needed and not check.works:

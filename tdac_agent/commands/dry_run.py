@@ -13,7 +13,7 @@ from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import SHIPPED, load_prices, price_file
 from tdac_agent.prompt import load_template
-from tdac_agent.providers.choice import check_name
+from tdac_agent.providers.choice import Options, check_name, missing_before
 
 
 def run(flags: TaskFlags, models: dict[str, Any], k: int, j: int, as_json: bool) -> int:
@@ -32,8 +32,13 @@ def run(flags: TaskFlags, models: dict[str, Any], k: int, j: int, as_json: bool)
     for name in (learner, optimizer):
         check_name(name)
     template, prices = load_template(models["prompt"]), load_prices()
+    task = flags.load()
+    options = Options(task.setting, models["base_url"])
+    missing = [
+        m for name in (learner, optimizer) for m in missing_before(name, options)
+    ]
     outlook = foresee(
-        flags.load(),
+        task,
         learner,
         optimizer,
         prices,
@@ -48,35 +53,49 @@ def run(flags: TaskFlags, models: dict[str, Any], k: int, j: int, as_json: bool)
         return 0
     sys.stdout.write(outlook.prompt)
     sys.stdout.flush()
-    console = Console(stderr=True, highlight=False)
-    for line in _lines(outlook):
+    console = Console(stderr=True, highlight=False, emoji=False)
+    for line in [*_lines(outlook), *_needed(missing)]:
         console.print(escape(line), soft_wrap=True)
     return 0
 
 
 def _lines(outlook: Outlook) -> list[str]:
     k, j = outlook.iterations, outlook.patience
-    questions = f"{outlook.questions} questions (K={k}, J={j}) if nothing ever passes"
     lines = [
         f"prompt: about {outlook.prompt_tokens} tokens (an estimate: a third of its "
         "bytes; models count differently)",
         f"answer: at most {outlook.answer_tokens} tokens",
     ]
-    if outlook.unknown_prices:
-        names = " and ".join(outlook.unknown_prices)
-        lines.append(
-            f"price: unknown for {names}; enter it in a copy of {SHIPPED} at "
-            "~/.config/tdac/prices.yaml (or where $TDAC_PRICES says) to see the cost"
-        )
     if outlook.cost_most == 0.0:
         return [*lines, "cost: none, no model is asked"]
     if outlook.first_cost is not None:
-        lines.append(f"first question: at most {told_usd(outlook.first_cost)}")
+        told = told_usd(outlook.first_cost)
+        lines.append(f"first question: at most {told}, which are reserved for it")
+    asked = f"whole run: {outlook.questions} questions (K={k}, J={j}) if nothing passes"
     if outlook.cost_once is not None and outlook.cost_most is not None:
-        lines.append(
-            f"whole run: {questions}: at most {told_usd(outlook.cost_once)}, or "
+        asked += (
+            f": at most {told_usd(outlook.cost_once)}, or "
             f"{told_usd(outlook.cost_most)} if every answer is asked for three times"
         )
-    else:
-        lines.append(f"whole run: {questions}")
-    return [*lines, f"prices of {outlook.prices_dated}: {price_file()}"]
+    return [*lines, asked, *_prices(outlook)]
+
+
+def _prices(outlook: Outlook) -> list[str]:
+    """Where the prices are from, and what has none."""
+    lines = []
+    if outlook.uncounted:
+        names = " and ".join(outlook.uncounted)
+        lines.append(f"cost of {names}: not counted, a matter of your own")
+    if outlook.unknown_prices:
+        names = " and ".join(outlook.unknown_prices)
+        lines.append(
+            f"price of {names}: unknown; enter it in a copy of {SHIPPED} at "
+            "~/.config/tdac/prices.yaml (or where $TDAC_PRICES says) to see the cost"
+        )
+    if outlook.unknown_prices or outlook.first_cost is not None:
+        lines.append(f"prices of {outlook.prices_dated}: {price_file()}")
+    return lines
+
+
+def _needed(missing: list[str]) -> list[str]:
+    return [f"still needed: {line}" for line in dict.fromkeys(missing)]

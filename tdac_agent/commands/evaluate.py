@@ -40,7 +40,7 @@ def run(
     names = None if wrappers is None else wrapper_names(wrappers)
     entrants_of(policies, names)  # before anything is started
     _check_places(csv, out)
-    console = Console(stderr=as_json)
+    console = Console(stderr=as_json, emoji=False)
     columns = (
         TextColumn("{task.fields[doing]}"),
         BarColumn(),

@@ -28,7 +28,7 @@ def run(run_folder: Path, out: Path, tier: str, as_json: bool) -> int:
     if as_json:
         sys.stdout.write(json.dumps(_record(project, done.report), indent=2) + "\n")
     else:
-        _show(project, done.report, Console())
+        _show(project, done.report, Console(emoji=False))
     return 0 if done.report.passed else 1
 
 

@@ -61,7 +61,7 @@ def run(
         }
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
         return
-    console = Console()
+    console = Console(emoji=False)
     console.print(_table(ranked))
     _print_choice(console, params, folder)
 

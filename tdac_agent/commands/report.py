@@ -29,7 +29,7 @@ def run(place: Path, out: Path | None) -> int:
         write_atomic(file, page.html)
     except OSError as error:
         raise RunError(f"cannot write {file}: {error.strerror}") from error
-    console = Console()
+    console = Console(emoji=False)
     for line in page.unreadable:
         console.print(f"[yellow]not readable: {escape(line)}[/]", soft_wrap=True)
     runs = "1 run" if page.runs == 1 else f"{page.runs} runs"

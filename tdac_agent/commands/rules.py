@@ -21,7 +21,7 @@ def run(folder: Path, as_json: bool) -> int:
     if as_json:
         sys.stdout.write(book.model_dump_json(indent=2) + "\n")
         return 0
-    console = Console()
+    console = Console(emoji=False)
     title = f"{record.task}: rules by {record.optimizer}, {record.status}"
     if book.rules:
         console.print(_table(book, title))

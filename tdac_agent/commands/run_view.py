@@ -28,7 +28,7 @@ def show_run(run: Run, console: Console) -> None:
     elif run.status == "budget":
         ending = (
             f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}\n{took}"
-            f"  go on: {way_on(run)}"
+            f"  {run.outlook}\n  go on: {way_on(run)}"
         )
     else:
         ending = (
@@ -47,7 +47,11 @@ def _usage(run: Run) -> str:
     cost = "cost unknown" if run.cost is None else told_usd(run.cost)
     if run.cost_lost:
         cost += f", and at most {told_usd(run.cost_lost)} for lost answers"
-    return f"  {tokens if run.tokens else 'no tokens reported'}; {cost}"
+    if not run.tokens:
+        tokens = "no tokens reported"
+        if run.max_tokens is not None:
+            tokens += ": each answer counts with all that was reserved for it"
+    return f"  {tokens}; {cost}"
 
 
 def way_on(run: Run) -> str:

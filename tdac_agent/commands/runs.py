@@ -39,7 +39,7 @@ def run(folder: Path, as_json: bool) -> int:
     if as_json:
         sys.stdout.write(json.dumps(rows, indent=2) + "\n")
         return 0
-    console = Console()
+    console = Console(emoji=False)
     if rows:
         console.print(_table(rows))
         for row in rows:

@@ -39,7 +39,7 @@ def run(
         start_from: Controller to begin with.
         as_json: Whether to print the record.
     """
-    console = Console(stderr=as_json)
+    console = Console(stderr=as_json, emoji=False)
     source = None if start_from is None else read_text(start_from)
     with console.status("preparing the task …"):
         task = flags.load()
@@ -56,7 +56,7 @@ def resume(folder: Path, limits: dict[str, Any], as_json: bool) -> int:
         limits: `max_cost` and `max_tokens`, None where they stay.
         as_json: Whether to print the record.
     """
-    console = Console(stderr=as_json)
+    console = Console(stderr=as_json, emoji=False)
     before = load_run(folder)
     if before.finished:
         return _show(before, console, before=before)

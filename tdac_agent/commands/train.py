@@ -50,7 +50,7 @@ def run(
         resume: Folder of a training to go on with.
         as_json: Whether to print JSON.
     """
-    console = Console(stderr=as_json)
+    console = Console(stderr=as_json, emoji=False)
     with console.status("preparing the tasks …"):
         plan, folder = _asked_for(given, steps, out, resume)
     console.print(_heading(plan, folder), soft_wrap=True, highlight=False)

@@ -43,7 +43,7 @@ def run(
     robust.check()
     if out is not None:
         _make_folder(out)
-    console = Console(stderr=as_json)
+    console = Console(stderr=as_json, emoji=False)
     # The judge warms up while the map is preprocessed.
     with WarmJudge(forked=True) as judge:
         with console.status("preparing the task …") as status:

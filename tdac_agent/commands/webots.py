@@ -58,7 +58,7 @@ def run(
         record = {"schema_version": 1, **asdict(done.report)}
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
     else:
-        _show(done.report, Console())
+        _show(done.report, Console(emoji=False))
     if video is not None:
         _film(done, stage.make_env(**options, render_mode="rgb_array"), video)
         if not as_json:

@@ -33,7 +33,7 @@ def run(file: str, png: Path | None, as_json: bool) -> None:
     if as_json:
         sys.stdout.write(json.dumps(_record(world), indent=2) + "\n")
         return
-    console = Console()
+    console = Console(emoji=False)
     console.print(f"[bold]{escape(world.source)}[/], Webots {world.version}", end="")
     console.print(f", step {world.time_step:g} ms")
     console.print(_people(world))

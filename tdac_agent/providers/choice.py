@@ -10,7 +10,7 @@ from pkgutil import resolve_name
 from urllib.parse import urlsplit
 
 from tdac_agent.errors import ProviderError
-from tdac_agent.provider import Provider
+from tdac_agent.provider import Provider, missing_for
 from tdac_agent.setting import Setting
 
 GROUP = "tdac.providers"
@@ -62,7 +62,7 @@ def choose_models(
         base_url: Of the models that are served somewhere.
 
     Raises:
-        ProviderError: A name is unknown, or something is missing that it needs.
+        ProviderError: A name is unknown, or cannot be used.
     """
     named = [name for name in (learner, optimizer) if isinstance(name, str)]
     if base_url is not None:
@@ -79,8 +79,10 @@ def choose_models(
 def choose_model(name: str, options: Options) -> Provider:
     """The provider that a name such as `anthropic:MODEL` stands for.
 
+    What it may lack before it can be asked is for `missing_for`.
+
     Raises:
-        ProviderError: The name is unknown, or something is missing that it needs.
+        ProviderError: The name is unknown, or cannot be used.
     """
     kind, _, words = name.partition(":")
     if kind in OWN:
@@ -89,6 +91,20 @@ def choose_model(name: str, options: Options) -> Provider:
     check_name(name)
     others = {point.name: point for point in entry_points(group=GROUP)}
     return _load(others[kind])(words, options)
+
+
+def missing_before(name: str, options: Options) -> tuple[str, ...]:
+    """What a run with a model would still need; no folder is made, nobody is asked.
+
+    Raises:
+        ProviderError: The name is unknown, or no run could begin with it.
+    """
+    check_name(name)
+    kind, _, words = name.partition(":")
+    # A provider of others may need its key, and `manual` makes its folder.
+    if kind not in OWN or (kind == "manual" and words):
+        return ()
+    return missing_for(choose_model(name, options))
 
 
 def check_name(name: str) -> None:

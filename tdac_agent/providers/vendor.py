@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
 from tdac_agent.errors import ProviderError
-from tdac_agent.provider import Reply, Request
+from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.providers.patience import CONNECT_SECONDS, STALL_SECONDS, within
-from tdac_agent.providers.secrets import public_url, read_key
+from tdac_agent.providers.secrets import one_line, public_url, read_key
 
 C = TypeVar("C")
 
@@ -57,32 +58,39 @@ class VendorModel(ABC, Generic[C]):
         self.served_at = None if base_url is None else public_url(base_url)
         self._stall = stall
 
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What has to be had before it can be asked: package and key, a line each."""
+        vendor, found = self.vendor, []
+        # To import them takes a second or two: that is done beside the first question.
+        if importlib.util.find_spec(vendor.package) is None:
+            install = f'pip install "tdac[{vendor.package}]"'
+            found.append(f"{self.name} needs a package: {install}")
+        try:
+            self._read_key()
+        except ProviderError as error:
+            found.append(str(error))
+        return tuple(found)
+
     @classmethod
     def make(cls, words: str, options: Options) -> VendorModel[C]:
         """A model of the vendor, or of a server that speaks its language.
 
+        Package and key may be missing; a run is not begun without them.
+
         Raises:
-            ProviderError: The package, the key or the model's name is missing.
+            ProviderError: The model's name is missing.
         """
         vendor = cls.vendor
         if not words:
             example = f"{vendor.package}:{vendor.example}"
             raise ProviderError(f"which model? As in {example}")
-        try:
-            importlib.import_module(vendor.package)
-        except ImportError as error:
-            raise ProviderError(
-                f"{vendor.package}:{words} needs a package: "
-                f'pip install "tdac[{vendor.package}]"'
-            ) from error
         base_url = options.base_url or os.environ.get(vendor.base_url) or None
-        model = cls(words, base_url)
-        model._read_key()
-        return model
+        return cls(words, base_url)
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
-        package: Any = importlib.import_module(self.vendor.package)
+        package = self._package()
         client = self._client(
             api_key=self._read_key(),
             base_url=self._base_url,
@@ -103,6 +111,12 @@ class VendorModel(ABC, Generic[C]):
     @abstractmethod
     def _ask(self, client: C, request: Request) -> Reply:
         """Asks, and gathers the stream's answer."""
+
+    def _package(self) -> Any:
+        try:
+            return importlib.import_module(self.vendor.package)
+        except ImportError as error:
+            raise PermanentFault(one_line(f"{self.vendor.package}: {error}")) from error
 
     def _read_key(self) -> str:
         vendor = self.vendor

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from tdac_agent.budget import NOTHING, Amount, Budget, BudgetExhausted
-from tdac_agent.calls import Calls
+from tdac_agent.budget import NOTHING, Amount, Budget
+from tdac_agent.calls import Calls, OutOfBudget
 from tdac_agent.errors import Fault
 from tdac_agent.journal import read_records
 from tdac_agent.past import call_key, read_past
@@ -123,7 +123,7 @@ def test_a_process_that_dies_in_a_call(make):
     assert calls.ask(Script(ANSWER), QUESTION) == ANSWER
     assert budget.taken.usd == pytest.approx(WORST.usd + 0.01)
     small = Budget(max_cost=1.9 * WORST.usd)
-    with pytest.raises(BudgetExhausted):
+    with pytest.raises(OutOfBudget):
         make(small).ask(Script(ANSWER), replace(QUESTION, prompt="Other?"))
 
 

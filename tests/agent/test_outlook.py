@@ -1,7 +1,9 @@
 """Before a run: the prompt as it will be asked, and the cost at most."""
 
 import json
+import sys
 from datetime import date
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -11,7 +13,8 @@ from small import write_small_task
 from tdac_agent.outlook import foresee
 from tdac_agent.prices import SHIPPED, Price, PriceError, PriceList, load_prices
 from tdac_agent.prompt import generate_prompt
-from tdac_agent.provider import MAX_OUTPUT_TOKENS
+from tdac_agent.provider import MAX_OUTPUT_TOKENS, Request
+from tdac_agent.tariff import Tariff
 from tdac_agent.task import load_task
 from tdac_agent.tokens import estimate_tokens
 
@@ -43,9 +46,9 @@ def test_the_worst_case(small_task):
     assert told.questions == 3 * (1 + 2 + 1)
     tokens = estimate_tokens(told.prompt)
     assert told.prompt_tokens == tokens
-    assert told.first_cost == pytest.approx(
-        (12 * tokens + 50 * MAX_OUTPUT_TOKENS) / 1e6
-    )
+    first = Request("generate", told.prompt)
+    reserved = Tariff(price=PRICES.models["openai:dear"]).worst(first)
+    assert told.first_cost == reserved.usd
     output = 3 * (50 + 3 * 2) * MAX_OUTPUT_TOKENS / 1e6
     inputs = told.cost_once - output
     assert inputs >= 3 * (12 + 3 * 1) * tokens / 1e6
@@ -77,15 +80,40 @@ def test_a_dry_run_prints_the_prompt_and_nothing_else(tmp_path, tdac):
     code, out_2, told = tdac("synth", "--task", folder, "--dry-run", "--json", *learner)
     assert json.loads(out_2)["prompt"] == out
     code, _, told = tdac(
-        "synth", "--task", folder, "--dry-run", "--learner", "manual:x"
+        "synth", "--task", folder, "--dry-run", "--learner", "openai:unheard-of"
     )
     assert code == 0
-    assert "price: unknown for manual:x" in told
-    code, _, told = tdac(
-        "synth", "--task", folder, "--dry-run", "--learner", "antropic:x"
-    )
-    assert code == 2
-    assert "did you mean 'anthropic'" in told
+    assert "price of openai:unheard-of: unknown" in told
+
+
+def test_a_dry_run_with_models_of_ones_own(tmp_path, tdac):
+    """What a program or a person costs is not told, and no folder is made."""
+    folder = write_small_task(tmp_path / "task")
+    words = ("synth", "--task", folder, "--dry-run", "--learner")
+    for name in ("manual:x", f"command:{sys.executable} -V"):
+        code, _, told = tdac(*words, name)
+        assert code == 0
+        assert f"cost of {name}: not counted" in told
+        assert "price" not in told
+        assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("antropic:x", "did you mean 'anthropic'"),
+        ("command:none-such", "there is no program 'none-such'"),
+        ("replay:none", "cannot replay: none is not a run folder"),
+        ("manual:", "which folder"),
+        ("openai:", "which model"),
+    ],
+)
+def test_a_dry_run_of_what_cannot_be(tmp_path, tdac, name, reason):
+    """It is refused as the run would be."""
+    folder = write_small_task(tmp_path / "task")
+    code, out, told = tdac("synth", "--task", folder, "--dry-run", "--learner", name)
+    assert (code, out) == (2, "")
+    assert reason in told
 
 
 def test_a_price_file_of_ones_own(tmp_path, monkeypatch, tdac):

@@ -1,5 +1,7 @@
 """What a run may cost: prices, worst cases, and what bounds it without a price."""
 
+import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -131,20 +133,59 @@ def test_an_exhausted_budget_stops_a_run(tmp_path, good_source, tdac, monkeypatc
     assert exit_code == 4
     assert "stopped by the budget: 0.0600 USD of 0.15 USD are spent" in told
     assert f"go on: tdac synth --resume {out} --max-cost 0.3" in told
+    assert "at most 59 questions are left: --max-cost 0." in told
     assert "8000 tokens in (2000 from a cache), 4000 out; 0.0600 USD" in told
     limits["max_cost"] = 0.5
     model.answers = [code(good_source, 9000, 3000)]
     run = synthesize(task, model, out=out, **limits)
-    assert (run.status, run.censored, run.reason) == ("verified", False, "")
+    assert (run.status, run.censored) == ("verified", False)
+    assert (run.reason, run.enough, run.outlook) == ("", "", "")
     price += 2.5 * 9000 + 10 * 3000
     assert run.cost == pytest.approx(price / 1e6)
     assert load_run(out) == run
+
+
+def test_answers_that_report_no_tokens(tmp_path, tdac):
+    """They count with what was reserved, which is said beside what was reported."""
+    folder = write_small_task(tmp_path / "task", profile="policy")
+    program = tmp_path / "model.py"
+    program.write_text("import sys; sys.stdin.read(); print('I would rather not.')")
+    model = f"command:{sys.executable} {program}"
+    words = ("--task", folder, "--learner", model, "--out", tmp_path / "run")
+    exit_code, told, _ = tdac("synth", *words, "--max-tokens", 60_000)
+    assert exit_code == 4
+    assert re.search(r"\d+ of 60000 tokens are spent or reserved", told)
+    assert "no tokens reported: each answer counts with all that was reserved" in told
 
 
 def test_a_shared_budget_has_limits_of_its_own(tmp_path, small_task):
     """Limits of a run beside it would mean nothing."""
     with pytest.raises(ValueError, match="a shared budget has limits of its own"):
         synthesize(small_task, out=tmp_path / "r", max_cost=1.0, budget=Budget(1.0))
+
+
+def test_all_that_is_missing_is_said_at_once(tdac, monkeypatch):
+    """Keys, a package and a price, in one line; a dry run says it, too."""
+    for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
+        monkeypatch.delenv(name, raising=False)
+        monkeypatch.delenv(name.replace("API_KEY", "BASE_URL"), raising=False)
+    monkeypatch.setitem(sys.modules, "anthropic", None)
+    words = ("synth", "--learner", "openai:unheard-of", "--optimizer", "anthropic:x")
+    exit_code, _, err = tdac(*words, "--out", "r")
+    assert exit_code == 2
+    assert err.count("\n") == 1
+    needed = [
+        "set the environment variable OPENAI_API_KEY",
+        'anthropic:x needs a package: pip install "tdac[anthropic]"',
+        "set the environment variable ANTHROPIC_API_KEY",
+    ]
+    for line in [*needed, "no price is known for openai:unheard-of"]:
+        assert line in err
+    exit_code, _, err = tdac(*words, "--dry-run")
+    assert exit_code == 0
+    for line in needed:
+        assert re.search(f"still needed: .*{re.escape(line)}", err)
+    assert not Path("r").exists()
 
 
 def test_words_that_bound_nothing(tdac, monkeypatch):

@@ -1,0 +1,138 @@
+"""What a run may still ask, and what that may take, before it is asked."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tdac_agent.budget import NOTHING, Amount, Budget, BudgetExhausted
+from tdac_agent.calls import OutOfBudget
+from tdac_agent.prices import Price
+from tdac_agent.provider import Request
+from tdac_agent.records import Run
+from tdac_agent.tariff import Tariff
+from tdac_agent.workload import Rest, from_here, rest_of, whole
+
+TARIFFS = {
+    "dear": Tariff(price=Price(input=10, output=50)),
+    "cheap": Tariff(price=Price(input=1, output=2)),
+    "unknown": Tariff(),
+    "free": Tariff(free=True),
+}
+
+
+def all_questions(iterations, patience):
+    """Kind, k and j of every question, as the loop puts them if nothing passes."""
+    for k in range(1, iterations + 1):
+        yield "generate", k, 0
+        yield from (("edit", k, j) for j in range(1, patience + 1))
+        yield "summarise", k, patience
+
+
+def request(kind, k, j, prompt="x" * 300):
+    return Request(kind, prompt, sample=(0, k, j), stable=200, max_tokens=1000)
+
+
+def run_of(learner, optimizer, iterations, patience):
+    return Run(
+        folder=Path("run"),
+        task="t",
+        task_sha256="",
+        learner=learner,
+        optimizer=optimizer,
+        iterations=iterations,
+        patience=patience,
+        seed=0,
+        started="",
+    )
+
+
+@given(st.integers(1, 6), st.integers(0, 4))
+def test_the_questions_that_are_left(iterations, patience):
+    """From each question on, those that the loop would put; from the first, all."""
+    questions = list(all_questions(iterations, patience))
+    assert whole(iterations, patience).questions == len(questions)
+    for number, place in enumerate(questions):
+        left = questions[number:]
+        learner = sum(kind == "generate" for kind, _, _ in left)
+        expected = (learner, len(left) - learner)
+        assert from_here(request(*place), iterations, patience) == expected
+
+
+names = st.sampled_from(list(TARIFFS))
+
+
+@given(names, names, st.integers(1, 4), st.integers(0, 3), st.data())
+def test_the_rest_of_a_run(learner, optimizer, iterations, patience, data):
+    """It is at least the next question, shrinks to it, and is free where all is."""
+    run = run_of(learner, optimizer, iterations, patience)
+    rests = []
+    for place in all_questions(iterations, patience):
+        asked = request(*place)
+        model = learner if asked.role == "learner" else optimizer
+        worst = TARIFFS[model].worst(asked)
+        rest = rest_of(run, TARIFFS, asked, worst, 1000)
+        assert rest.most.usd >= worst.usd
+        assert rest.most.tokens >= worst.tokens
+        rests.append(rest)
+    assert [rest.questions for rest in rests] == list(range(len(rests), 0, -1))
+    last_kind = TARIFFS[optimizer].worst(request("summarise", 1, 0))
+    assert rests[-1].most == last_kind
+    if learner == optimizer == "free":
+        assert {rest.most for rest in rests} == {NOTHING}
+
+
+def exhausted(limit, taken, worst, rest):
+    """What is said where a budget is too small for a question."""
+    budget = Budget(**limit)
+    budget.restore({"before": taken})
+    with pytest.raises(BudgetExhausted) as caught:
+        budget.reserve("next", worst)
+    return OutOfBudget(caught.value, worst, rest)
+
+
+MONEY = {"max_cost": 0.15}
+SPENT, NEXT = Amount(12000, 0.06), Amount(9000, 0.113)
+
+
+def test_what_is_enough_for_what():
+    """The least for the next question, all for the rest, and something between."""
+    told = exhausted(MONEY, SPENT, NEXT, Rest(58, Amount(10**6, 12.111)))
+    assert told.way_on == "--max-cost 0.3"
+    assert told.outlook == (
+        "at most 58 questions are left: --max-cost 0.18 is the least that lets the "
+        "next one be put, --max-cost 12.18 all of them"
+    )
+    told = exhausted({"max_tokens": 20_000}, SPENT, NEXT, Rest(2, Amount(30_000, 0)))
+    assert told.way_on == "--max-tokens 40000"
+    assert "--max-tokens 21000 is the least" in told.outlook
+    assert "--max-tokens 42000 all of them" in told.outlook
+
+
+def test_a_way_on_is_neither_too_little_nor_too_much():
+    """It lets the next question be put, and no more is asked for than can be taken."""
+    told = exhausted(MONEY, SPENT, Amount(1, 0.5), Rest(9, Amount(9, 3.0)))
+    assert told.way_on == "--max-cost 0.56"
+    told = exhausted(MONEY, SPENT, NEXT, Rest(1, NEXT))
+    assert told.way_on == "--max-cost 0.18"
+    assert told.outlook == "at most this one question is left: --max-cost 0.18"
+
+
+amounts = st.floats(0.0001, 5)
+
+
+@given(amounts, amounts, amounts, amounts)
+def test_what_is_said_to_be_enough_is(limit, spent, worst, more):
+    """With either flag the question fits, to the last cent."""
+    if spent + worst <= limit + 1e-6:
+        return
+    taken, next_one = Amount(usd=spent), Amount(usd=worst)
+    rest = Rest(2, Amount(usd=worst + more))
+    told = exhausted({"max_cost": limit}, taken, next_one, rest)
+    for flag in (told.way_on, *told.outlook.split("--max-cost ")[1:]):
+        enough = float(flag.removeprefix("--max-cost ").split()[0])
+        assert enough <= max(2 * limit, spent + worst + more) + 0.011
+        budget = Budget(max_cost=enough)
+        budget.restore({"before": taken})
+        budget.reserve("next", next_one)
