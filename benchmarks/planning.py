@@ -71,7 +71,8 @@ def _maps(
 def scenarios(file: Path, count: int = SCENARIOS) -> Iterator[Trip]:
     """Up to `count` of a file's scenarios, spread over all of them."""
     rows = [line.split() for line in file.read_text().splitlines()[1:] if line.strip()]
-    for row in rows[:: max(-(-len(rows) // count), 1)]:
+    count = min(count, len(rows))
+    for row in (rows[k * len(rows) // count] for k in range(count)):
         x, y, to_x, to_y = map(int, row[4:8])
         yield Trip((x, y), (to_x, to_y), float(row[8]))
 

@@ -7,23 +7,18 @@ set it up costs over half a second a process, to load the code a few thousandths
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import functools
-import hashlib
-import os
 import struct
-import sys
-import tempfile
 import threading
 from collections.abc import Callable
-from importlib.metadata import version
-from pathlib import Path
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tdac_envs.machine_code import assembled, kept, link
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -38,18 +33,6 @@ _DTYPES = {
     "i4": np.int32,
 }
 _DTYPES["i8"] = np.int64
-# numba's helpers that only a failing function calls, and no kernel's caller needs.
-_HELPERS = (
-    "NRT_Allocate",
-    "NRT_Free",
-    "NRT_MemInfo_call_dtor",
-    "NRT_adapt_ndarray_from_python",
-    "numba_unpickle",
-    "numba_do_raise",
-    "numba_gil_ensure",
-    "numba_gil_release",
-    "numba_runtime_build_excinfo_struct",
-)
 _RESULT, _ERROR, _FIRST = 0, 1, 2
 _LOCK = threading.RLock()
 
@@ -139,7 +122,9 @@ class Kernel(Generic[P, R]):
         if self._entry is None:
             with _LOCK:
                 if self._entry is None:
-                    objects = _read(self._file()) or self._compile()
+                    module = self.__module__.rpartition(".")[2]
+                    name = f"{module}.{self.name}"
+                    objects = kept(name, self._about(), self._compile)
                     self._engine, address = link(objects, self._symbol())
                     kind = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
                     self._entry = kind(address)
@@ -148,38 +133,20 @@ class Kernel(Generic[P, R]):
     def _symbol(self) -> str:
         return f"tdac_{self.name}"
 
-    def _file(self) -> Path:
-        module = self.__module__.rpartition(".")[2]
-        return _cache_folder() / f"{module}.{self.name}-{self._key()}.obj"
-
-    def _key(self) -> str:
-        import llvmlite.binding as llvm
-
-        features = ",".join(
-            f"{k}{v}" for k, v in sorted(llvm.get_host_cpu_features().items())
-        )
-        facts = [
-            *_facts(self, set()),
-            *(str(kind) for kind in self._types),
-            self._result,
-            sys.version,
-            version("numba"),
-            llvm.get_host_cpu_name(),
-            repr(features),
-        ]
-        return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:20]
+    def _about(self) -> list[str]:
+        """Everything that the machine code follows from, but the machine."""
+        types = [str(kind) for kind in self._types]
+        return [*_facts(self, set()), *types, self._result]
 
     def _compile(self) -> list[bytes]:
-        """Objects with the compiled function and with the entry to it; kept on disk."""
+        """Objects with the compiled function and with the entry to it."""
         dispatcher = _jitted(self)
         signature = tuple(kind.numba() for kind in self._types)
         dispatcher.compile(signature)
         result = dispatcher.overloads[signature]
         code = result.library._get_compiled_object()
         name = result.fndesc.llvm_func_name
-        objects = [code, _entry_object(self._symbol(), name, self._types)]
-        _write(self._file(), objects)
-        return objects
+        return [code, _entry_object(self._symbol(), name, self._types)]
 
 
 def kernel(signature: str | None = None) -> Callable[[Callable[P, R]], Kernel[P, R]]:
@@ -232,7 +199,7 @@ class _Type:
 
 
 def _facts(kernel: Kernel[Any, Any], seen: set[int]) -> list[str]:
-    """Everything that a kernel's machine code follows from, but the machine."""
+    """What a kernel's code, those it calls and its constants say."""
     seen.add(id(kernel))
     code, scope = kernel.function.__code__, kernel.function.__globals__
     constants = code.co_consts[1:] if kernel.function.__doc__ else code.co_consts
@@ -266,8 +233,6 @@ def _jitted(kernel: Kernel[Any, Any]) -> Any:
 
 def _entry_object(symbol: str, target: str, types: list[_Type]) -> bytes:
     """An object with a function that reads all arguments of `target` from memory."""
-    import llvmlite.binding as llvm
-
     lines, given = [], []
     kinds = [kind for each in types for kind in each.llvm()]
     for number, kind in enumerate(kinds):
@@ -287,72 +252,4 @@ define i32 @{symbol}(ptr %slots) {{
 ret i32 %status
 }}
 """
-    return bytes(machine().emit_object(llvm.parse_assembly(text)))
-
-
-def machine() -> Any:
-    """The processor that this process runs on; an engine takes it for its own."""
-    import llvmlite.binding as llvm
-
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), opt=3, reloc="default", codemodel="jitdefault"
-    )
-
-
-def link(objects: list[bytes], symbol: str) -> tuple[Any, int]:
-    """An engine that holds the code, which must outlive it, and the entry's address."""
-    import llvmlite.binding as llvm
-
-    target = machine()
-    stub = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value
-    for name in _HELPERS:
-        if not llvm.address_of_symbol(name):
-            llvm.add_symbol(name, stub)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target)
-    for data in objects:
-        engine.add_object_file(llvm.ObjectFileRef.from_data(data))
-    engine.finalize_object()
-    return (engine, objects), int(engine.get_function_address(symbol))
-
-
-@functools.cache
-def _cache_folder() -> Path:
-    """Where machine code is kept: beside the byte code, else in the user's cache."""
-    beside = Path(__file__).parent / "__pycache__"
-    own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tdac"
-    for folder in (beside, own):
-        with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-    return Path(tempfile.mkdtemp(prefix="tdac-cache-"))
-
-
-def _write(path: Path, objects: list[bytes]) -> None:
-    """Keeps objects, whole or not at all; a full disk is no reason to stop."""
-    data = b"".join(struct.pack("<Q", len(each)) + each for each in objects)
-    digest = hashlib.sha256(data).digest()
-    with contextlib.suppress(OSError):
-        handle, name = tempfile.mkstemp(dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(digest + data)
-        os.replace(name, path)
-
-
-def _read(path: Path) -> list[bytes] | None:
-    """What `_write` kept, or None."""
-    try:
-        data = path.read_bytes()
-    except OSError:
-        return None
-    digest, data = data[:32], data[32:]
-    if hashlib.sha256(data).digest() != digest:
-        return None
-    objects = []
-    while data:
-        (size,) = struct.unpack_from("<Q", data)
-        objects.append(data[8 : 8 + size])
-        data = data[8 + size :]
-    return objects
+    return assembled(text)

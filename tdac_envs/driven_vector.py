@@ -24,7 +24,7 @@ from tdac_envs.batching import (
     seeds_of,
 )
 from tdac_envs.compiled import Kernel
-from tdac_envs.rows import Rows
+from tdac_envs.rows import Index, Rows
 
 Observations = dict[str, NDArray[np.float32]]
 Result = tuple[Observations, Array, Flags, Flags, dict[str, Any]]
@@ -77,11 +77,14 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         for constants, setup in zip(self.robots.constants, self.setups, strict=True):
             constants[:] = setup.constants()
         self.last_poses = self.pose()
-        self._kernels = begin, drive
+        self._kernels = drive, begin
         self._slippery = [i for i, s in enumerate(self.setups) if s.wheel_slip]
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
+        self._vary = [setup.variation != "nominal" for setup in self.setups]
         self._over = np.zeros(num_envs, np.bool_)
+        self.goals = np.array([task.goal for task in self.tasks], np.float32)
+        self._starts = np.array([(*task.start, task.shortest) for task in self.tasks])
         self._bind()
 
     def reset(
@@ -106,12 +109,12 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         for i, one in enumerate(seeds_of(seed, self.num_envs)):
             if one is not None and mask[i]:
                 self._randoms[i], self._seeds[i] = seeding.np_random(one)
-        chosen = np.flatnonzero(mask).tolist()
-        for i in chosen:
-            self._begin(i, rest)
+        chosen = np.flatnonzero(mask)
+        self._place(chosen, rest)
+        self._rows.call(mask, chosen)
         self._over[mask] = False
-        observations = self._observations()
-        self._disturb(observations, chosen)
+        observations = {key: seen.copy() for key, seen in self._seen().items()}
+        self._complete(observations, chosen.tolist())
         return observations, infos_of(np.where(mask, self.robots.outcome.T, 0.0), mask)
 
     def step(self, actions: NDArray[np.float32]) -> Result:
@@ -122,34 +125,33 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             ResetNeeded: The mode is `DISABLED` and an episode has ended.
         """
         wanted = self._wanted(actions)
-        resting = np.flatnonzero(self._over).tolist()
-        if resting and self.autoreset_mode is AutoresetMode.DISABLED:
+        resting = np.flatnonzero(self._over)
+        if resting.size and self.autoreset_mode is AutoresetMode.DISABLED:
             raise gym.error.ResetNeeded(
                 f"expected reset(options={{'reset_mask': ...}}) of the robots whose "
-                f"episodes have ended: {resting[:10]}"
+                f"episodes have ended: {resting[:10].tolist()}"
             )
-        self.robots.state[:, stepping.LEFT : stepping.RIGHT + 1] = wanted
-        self._slip(resting)
-        self._drive_rows.call_all()
-        for i in resting:
-            self._begin(i, {})
-        outcome = self.robots.outcome.T.copy()
+        self._slip()
+        self._place(resting, {})
+        observations = {k: np.empty_like(seen) for k, seen in self._seen().items()}
+        told = np.empty_like(self.robots.outcome)
+        copies = *observations.values(), told
+        self._rows.call(self._over, given=(wanted,), returned=copies)
+        outcome = told.T.copy()
         rewards = outcome[stepping.REWARD]
         terminated = outcome[stepping.TERMINATED] == 1.0
         truncated = outcome[stepping.TRUNCATED] == 1.0
         self._over = terminated | truncated
-        observations = self._observations()
-        self._disturb(observations, range(self.num_envs))
+        self._complete(observations, range(self.num_envs))
         infos: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
             infos = self._restart(observations, outcome)
-            outcome = self.robots.outcome.T.copy()
         infos |= infos_of(outcome, np.ones(self.num_envs, np.bool_))
         return observations, rewards, terminated, truncated, infos
 
     def close_extras(self, **_: Any) -> None:
         """Ends the threads."""
-        self._drive_rows.close()
+        self._rows.close()
 
     def pose(self) -> Array:
         """The true poses, shape (num_envs, 3)."""
@@ -167,48 +169,54 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return tuple(self._seeds)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            **self.__dict__,
-            "_rows": None,
-            "_begin_rows": None,
-            "_drive_rows": None,
-        }
+        return {**self.__dict__, "_rows": None, "_each": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._bind()
 
-    def _observations(self) -> Observations:
-        """What the robots observe, without noise; the caller's own arrays."""
+    def _seen(self) -> Observations:
+        """What the kernels let the robots observe, in their own arrays."""
         raise NotImplementedError
 
-    def _disturb(self, observations: Observations, robots: Sequence[int]) -> None:
-        """Adds the sensors' noise to the observations of these robots."""
+    def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
+        """Adds what no kernel does; noise is drawn anew for these robots."""
         raise NotImplementedError
 
     def _bind(self) -> None:
         """Makes the kernels' calls on the robots' own arrays."""
-        self._rows = [self.robots.row(i) for i in range(self.num_envs)]
-        arguments = [
-            setup.arguments(task, robot)
-            for setup, task, robot in zip(
-                self.setups, self.tasks, self._rows, strict=True
-            )
-        ]
-        begin, drive = self._kernels
-        self._begin_rows = Rows(begin, arguments, 1)
-        self._drive_rows = Rows(drive, arguments, self.threads)
+        self._each = [self.robots.row(i) for i in range(self.num_envs)]
+        several = zip(self.setups, self.tasks, self._each, strict=True)
+        arguments = [setup.arguments(task, robot) for setup, task, robot in several]
+        self._rows = Rows(
+            self._kernels,
+            arguments,
+            self.threads,
+            inputs=(self.robots.state[:, stepping.LEFT : stepping.RIGHT + 1],),
+            outputs=(*self._seen().values(), self.robots.outcome),
+        )
 
-    def _begin(self, i: int, options: dict[str, Any]) -> None:
-        """Begins an episode of one robot."""
-        setup, before, robot = self.setups[i], self.tasks[i], self._rows[i]
-        task = self.tasks[i] = setup.draw(options, self._random(i))
+    def _place(self, robots: Index, options: dict[str, Any]) -> None:
+        """Puts robots where their next episodes begin; the kernel `begin` does more."""
+        drawn = [
+            (i, self.setups[i].draw(options, self._random(i)))
+            for i in robots.tolist()
+            if options or self._vary[i] or self.tasks[i] is not self.setups[i].nominal
+        ]
+        for i, task in drawn:
+            self._give(i, task)
+        starts = self._starts[robots]
+        self.robots.state[robots, : stepping.HEADING + 1] = starts[:, :3]
+        self.robots.outcome[robots, stepping.REMAINING] = starts[:, 3]
+
+    def _give(self, i: int, task: Any) -> None:
+        """Gives a robot another task."""
+        robot, before = self._each[i], self.tasks[i]
+        self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
+        self.goals[i] = task.goal
         if task.field is not before.field:
-            arguments = setup.arguments(task, robot)
-            self._begin_rows.put(i, *arguments)
-            self._drive_rows.put(i, *arguments)
+            self._rows.put(i, *self.setups[i].arguments(task, robot))
         robot.place(task)
-        self._begin_rows.call(i)
 
     def _random(self, i: int) -> np.random.Generator:
         random = self._randoms[i]
@@ -217,22 +225,22 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             self._randoms[i] = random
         return random
 
-    def _slip(self, resting: Sequence[int]) -> None:
+    def _slip(self) -> None:
         """Draws the wheels' slip of the robots that move."""
-        if not self._slippery:
-            return
-        still = set(resting)
         for i in self._slippery:
-            if i not in still:
+            if not self._over[i]:
                 slip = self._random(i).normal(1.0, self.setups[i].wheel_slip, 2)
                 state = self.robots.state[i]
                 state[stepping.SLIP_LEFT : stepping.SLIP_RIGHT + 1] = slip
 
     def _restart(self, observations: Observations, outcome: Array) -> dict[str, Any]:
-        """Begins anew what has ended; returns what it ended with."""
-        over = np.flatnonzero(self._over).tolist()
+        """Begins anew what has ended; returns what it ended with.
+
+        Overwrites what the robots observe and what their infos say.
+        """
+        over = np.flatnonzero(self._over)
         final = np.full(self.num_envs, None, object)
-        for i in over:
+        for i in over.tolist():
             final[i] = {key: value[i].copy() for key, value in observations.items()}
         ended = self._over.copy()
         infos = {
@@ -242,17 +250,19 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             "_final_info": ended.copy(),
         }
         self.last_poses = self.pose()
-        for i in over:
-            self._begin(i, {})
-        for key, value in self._observations().items():
-            observations[key][over] = value[over]
-        self._disturb(observations, over)
+        self._place(over, {})
+        self._rows.call(ended, over)
+        for key, seen in self._seen().items():
+            observations[key][over] = seen[over]
+        told = slice(stepping.REACHED, None)
+        outcome[told, over] = self.robots.outcome[over, told].T
+        self._complete(observations, over.tolist())
         self._over = np.zeros(self.num_envs, np.bool_)
         return infos
 
     def _wanted(self, actions: Any) -> Array:
         try:
-            wanted = np.asarray(actions, np.float64)
+            wanted = np.ascontiguousarray(actions, np.float64)
         except (TypeError, ValueError):
             wanted = np.empty(0)
         if wanted.shape != (self.num_envs, 2) or not np.isfinite(wanted).all():

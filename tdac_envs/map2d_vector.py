@@ -12,7 +12,6 @@ from tdac_envs.arguments import one_of
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
 from tdac_envs.kernels import begin, drive
 from tdac_envs.map2d import Map2DEnv, noisy
-from tdac_envs.stepping import GOAL_X, GOAL_Y
 
 
 class Map2DVectorEnv(DrivenVectorEnv):
@@ -54,28 +53,24 @@ class Map2DVectorEnv(DrivenVectorEnv):
             autoreset_mode=autoreset_mode,
             threads=threads,
         )
-        self._noisy = {i for i, setup in enumerate(self.setups) if setup.range_noise}
+        noises = [setup.range_noise for setup in self.setups]
+        self._noisy = np.flatnonzero(noises)
         # As observed last: a robot that is not reset keeps its noise, too.
-        self._ranges = self.robots.ranges.copy() if self._noisy else self.robots.ranges
+        self._ranges = self.robots.ranges.copy()
 
-    def _observations(self) -> Observations:
+    def _seen(self) -> Observations:
         robots = self.robots
-        if self._noisy:
-            exact = [i for i in range(self.num_envs) if i not in self._noisy]
-            self._ranges[exact] = robots.ranges[exact]
-        goals = robots.constants[:, GOAL_X : GOAL_Y + 1]
         return {
-            "pose": robots.pose.copy(),
-            "goal": goals.astype(np.float32),
-            "wheel_speeds": robots.wheel_speeds.copy(),
-            "ranges": self._ranges.copy(),
+            "pose": robots.pose,
+            "goal": self.goals,
+            "wheel_speeds": robots.wheel_speeds,
+            "ranges": robots.ranges,
         }
 
-    def _disturb(self, observations: Observations, robots: Sequence[int]) -> None:
-        if not self._noisy:
+    def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
+        if not self._noisy.size:
             return
-        for i in robots:
-            if i in self._noisy:
-                exact, random = self.robots.ranges[i], self._random(i)
-                self._ranges[i] = noisy(exact, self.setups[i], random)
-                observations["ranges"][i] = self._ranges[i]
+        for i in np.intersect1d(self._noisy, robots).tolist():
+            exact, random = self.robots.ranges[i], self._random(i)
+            self._ranges[i] = noisy(exact, self.setups[i], random)
+        observations["ranges"][self._noisy] = self._ranges[self._noisy]

@@ -1,92 +1,83 @@
-"""Many calls of one kernel, each with arrays of its own, in one go and on all cores."""
+"""Many calls of kernels, each with arrays of its own, in one go and on all cores."""
 
 from __future__ import annotations
 
 import ctypes
-import functools
 import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+import weakref
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tdac_envs.compiled import Kernel, link, machine
+from tdac_envs import row_loop
+from tdac_envs.compiled import Kernel
+from tdac_envs.team import Team
 
-# Calls `entry` once a row, with `slots` of which some words are those of the row.
-_LOOP = """
-define i32 @tdac_rows(
-    ptr %entry, ptr %slots, ptr %columns, i64 %width, ptr %values, i64 %count
-) {
-start:
-  br label %rows
-rows:
-  %row = phi i64 [0, %start], [%next, %call]
-  %failed = phi i32 [0, %start], [%either, %call]
-  %more = icmp slt i64 %row, %count
-  br i1 %more, label %each, label %end
-each:
-  %first = mul i64 %row, %width
-  br label %words
-words:
-  %word = phi i64 [0, %each], [%after, %copy]
-  %left = icmp slt i64 %word, %width
-  br i1 %left, label %copy, label %call
-copy:
-  %place = getelementptr i64, ptr %columns, i64 %word
-  %column = load i64, ptr %place
-  %which = add i64 %first, %word
-  %source = getelementptr i64, ptr %values, i64 %which
-  %value = load i64, ptr %source
-  %target = getelementptr i64, ptr %slots, i64 %column
-  store i64 %value, ptr %target
-  %after = add i64 %word, 1
-  br label %words
-call:
-  %status = call i32 %entry(ptr %slots)
-  %either = or i32 %failed, %status
-  %next = add i64 %row, 1
-  br label %rows
-end:
-  ret i32 %failed
-}
-"""
-# A thread takes so many rows at a time: little waiting at the end, few calls.
-_SHARES = 4
+Index = NDArray[np.int64]
+Kinds = NDArray[np.uint8] | NDArray[np.bool_]
+Arrays = Sequence[NDArray[Any]]
+
+# Rows that a thread takes at a time: little waiting at the end, few that share a line
+# of the cache with another thread's.
+_SHARE = 16
+# Rows for which it pays to wake a thread.
 _LEAST = 64
+# Where the ends of a copy are in its words.
+_TO, _FROM = 0, 2
 
 
 class Rows:
-    """Calls of a kernel, ready to be made again and again; see `Kernel.bind`.
+    """Calls of some kernels, ready to be made again and again; see `Kernel.bind`.
+
+    What goes into a row and comes out of it can be copied by the thread that makes its
+    call: memory that one core alone touches stays in its cache.
 
     Args:
-        kernel: What is called. No two calls may write to the same memory.
-        arguments: Of each call; all of the same types.
+        kernels: What is called; all take the same arguments.
+        arguments: Of each row; all of the same types. No two rows may write to the
+            same memory.
         threads: How many work at a time; by default as many as there are cores.
+        inputs: Arrays with a row for each row, written to before its call.
+        outputs: Arrays with a row for each row, read after its call.
     """
 
     def __init__(
         self,
-        kernel: Kernel[Any, Any],
+        kernels: Sequence[Kernel[Any, Any]],
         arguments: Iterable[tuple[Any, ...]],
         threads: int | None = None,
+        *,
+        inputs: Arrays = (),
+        outputs: Arrays = (),
     ) -> None:
-        self._kernel = kernel
-        packed = [kernel.pack(each) for each in arguments]
+        self._kernels = kernels
+        packed = [kernels[0].pack(each) for each in arguments]
         self._slots = np.array([slots for slots, _ in packed], np.int64)
         self._kept = [kept for _, kept in packed]
-        self._differ()
-        self._entry = kernel.load()
+        self._all = np.arange(len(packed))
+        self._firsts = np.zeros(len(packed), np.uint8)
         self._threads = threads or len(os.sched_getaffinity(0))
-        self._pool: ThreadPoolExecutor | None = None
-        self._process = os.getpid()
+        self._kept.append([inputs, outputs])
+        self._copied = _pieces(inputs, _TO), _pieces(outputs, _FROM)
+        calls: list[Any] = [kernel.load() for kernel in kernels]
+        entries = [ctypes.cast(call, ctypes.c_void_p).value for call in calls]
+        self._entries = np.array(entries, np.int64)
+        self._plan = np.zeros(row_loop.THREADS, np.int64)
+        self._plan[row_loop.SHARE] = _SHARE
+        self._plan[row_loop.ENTRIES] = self._entries.ctypes.data
+        self._plan[row_loop.GIVEN] = _address(self._copied[0])
+        self._plan[row_loop.RETURNED] = _address(self._copied[1])
+        self._differ()
+        self._team: Team | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         raise TypeError("calls with addresses of memory cannot be copied or pickled")
 
     def put(self, row: int, *args: Any) -> None:
-        """Replaces the arguments of one call."""
-        slots, self._kept[row] = self._kernel.pack(args)
+        """Replaces the arguments of one row."""
+        slots, self._kept[row] = self._kernels[0].pack(args)
         changed = np.flatnonzero(slots != self._slots[row])
         self._slots[row] = slots
         if np.isin(changed, self._columns).all():
@@ -99,72 +90,76 @@ class Rows:
         differs = (self._slots != self._slots[:1]).any(axis=0)
         self._columns = np.flatnonzero(differs)
         self._values = np.ascontiguousarray(self._slots[:, self._columns])
+        self._plan[row_loop.COLUMNS] = self._columns.ctypes.data
+        self._plan[row_loop.WIDTH] = len(self._columns)
+        self._plan[row_loop.VALUES] = self._values.ctypes.data
 
-    def call(self, row: int) -> None:
-        """Makes one of the calls."""
-        self._check(self._entry(self._slots[row].ctypes.data))
+    def call(
+        self,
+        kinds: Kinds | None = None,
+        rows: Index | None = None,
+        *,
+        given: Arrays = (),
+        returned: Arrays = (),
+    ) -> None:
+        """Makes the calls of some rows, in any order.
 
-    def call_all(self) -> None:
-        """Makes all calls, in any order.
+        Args:
+            kinds: Number of the kernel of each row, also of those that are not called;
+                by default the first.
+            rows: By default all.
+            given: What the inputs become in these rows; of their types, each row in
+                one piece. They stay as they are without.
+            returned: What the outputs are copied to in these rows; likewise.
 
         Raises:
             ArithmeticError: One of them failed.
         """
-        count = len(self._slots)
-        share = max(_LEAST, -(-count // (_SHARES * self._threads)))
-        begins = iter(range(0, count, share))
-        helpers = min(self._threads, -(-count // share)) - 1
-        if helpers <= 0:
-            self._check(self._work(begins, share))
-            return
-        pool = self._workers()
-        waiting = [pool.submit(self._work, begins, share) for _ in range(helpers)]
-        status = self._work(begins, share)
-        for each in waiting:
-            status |= each.result()
-        self._check(status)
+        order = self._all if rows is None else np.ascontiguousarray(rows, np.int64)
+        which = self._firsts
+        if kinds is not None:
+            which = np.ascontiguousarray(kinds, np.uint8)
+        if given:
+            _join(self._copied[0], _FROM, given)
+        if returned:
+            _join(self._copied[1], _TO, returned)
+        self._plan[row_loop.N_GIVEN] = len(given)
+        self._plan[row_loop.N_RETURNED] = len(returned)
+        self._plan[row_loop.ORDER] = _address(order)
+        self._plan[row_loop.KINDS] = _address(which)
+        count = len(order)
+        threads = max(min(self._threads, -(-count // _LEAST)), 1)
+        if self._at_work().make(self._plan, self._slots[0], count, threads):
+            names = " or ".join(kernel.name for kernel in self._kernels)
+            raise ArithmeticError(f"{names} failed")
 
     def close(self) -> None:
         """Ends the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
-            self._pool = None
+        if self._team is not None:
+            self._team.end()
+            self._team = None
 
-    def _work(self, begins: Iterator[int], share: int) -> int:
-        """Makes calls until nobody has any left, `share` at a time."""
-        loop, entry = _loop(), ctypes.cast(self._entry, ctypes.c_void_p)  # type: ignore[arg-type]
-        slots, columns, values = self._slots[0].copy(), self._columns, self._values
-        own, status = (slots.ctypes.data, columns.ctypes.data, len(columns)), 0
-        for begin in begins:
-            rows = min(share, len(values) - begin)
-            first = values.ctypes.data + begin * values.strides[0]
-            status |= loop(entry.value, *own, first, rows)
-        return status
-
-    def _workers(self) -> ThreadPoolExecutor:
+    def _at_work(self) -> Team:
         # Threads do not outlive a fork.
-        if self._pool is None or self._process != os.getpid():
-            self._pool = ThreadPoolExecutor(self._threads - 1, "tdac-rows")
-            self._process = os.getpid()
-        return self._pool
-
-    def _check(self, status: int) -> None:
-        if status:
-            raise ArithmeticError(f"{self._kernel.name} failed")
+        if self._team is None or self._team.process != os.getpid():
+            self._team = Team(self._threads, self._slots.shape[1])
+            weakref.finalize(self, self._team.end)
+        return self._team
 
 
-@functools.cache
-def _loop() -> Callable[..., int]:
-    """The compiled loop over rows; the engine that holds it lives as long as it."""
-    import llvmlite.binding as llvm
+def _address(array: NDArray[Any]) -> int:
+    return int(array.__array_interface__["data"][0])
 
-    code = machine().emit_object(llvm.parse_assembly(_LOOP))
-    engine, address = link([code], "tdac_rows")
-    pointer, number = ctypes.c_void_p, ctypes.c_int64
-    kinds = (pointer, pointer, pointer, number, pointer, number)
-    loop = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(address)
 
-    def run(*args: int | None, _: Any = engine) -> int:
-        return int(loop(*args))
+def _pieces(arrays: Arrays, end: int) -> Index:
+    """Copies from or to the rows of these arrays, whose other ends are open."""
+    pieces = np.zeros((len(arrays), row_loop.N_PIECE), np.int64)
+    pieces[:, -1] = [array[0].nbytes for array in arrays]
+    _join(pieces, end, arrays)
+    return pieces
 
-    return run
+
+def _join(pieces: Index, end: int, arrays: Arrays) -> None:
+    """Has these arrays be one end of the copies."""
+    pieces[:, end] = [_address(array) for array in arrays]
+    pieces[:, end + 1] = [array.strides[0] for array in arrays]

@@ -42,7 +42,7 @@ class Routes:
         arguments = [
             self._arguments(i, routes[id(task)]) for i, task in enumerate(self._tasks)
         ]
-        self._rows = Rows(look_ahead, arguments, batch.threads)
+        self._rows = Rows((look_ahead,), arguments, batch.threads)
 
     def refresh(self) -> None:
         """Has the routes lead to the goals of the episodes that have begun."""
@@ -57,7 +57,7 @@ class Routes:
     def ahead(self, poses: Array) -> Array:
         """The next way-point of each robot, shape (n, 2), as of `Route.ahead`."""
         np.divide(poses[:, :2] - self._corners, self._spacings, out=self._cells)
-        self._rows.call_all()
+        self._rows.call()
         at = self._found * self._spacings + self._corners
         return np.where(np.isfinite(self._found), at, self._goals)
 

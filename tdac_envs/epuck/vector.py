@@ -14,7 +14,6 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import begin, drive
 from tdac_envs.epuck.observed import Observed, ground_readings, noisy, north, position
 from tdac_envs.errors import TaskError
-from tdac_envs.stepping import GOAL_X, GOAL_Y
 
 
 class EPuckVectorEnv(DrivenVectorEnv):
@@ -74,34 +73,31 @@ class EPuckVectorEnv(DrivenVectorEnv):
         self._last_ps = self.robots.readings.copy()
         self._last_ground = np.zeros((num_envs, 3), np.float32)
 
-    def _observations(self) -> Observations:
-        robots, one = self.robots, self._kinds[0]
-        goals = robots.constants[:, GOAL_X : GOAL_Y + 1]
-        observations = {
-            "pose": robots.pose.copy(),
-            "goal": goals.astype(np.float32),
-            "wheel_speeds": robots.wheel_speeds.copy(),
-            "ps": robots.readings.copy(),
-            "wheel_positions": robots.turned.copy(),
+    def _seen(self) -> Observations:
+        robots = self.robots
+        return {
+            "pose": robots.pose,
+            "goal": self.goals,
+            "wheel_speeds": robots.wheel_speeds,
+            "ps": robots.readings,
+            "wheel_positions": robots.turned,
         }
-        if one.ground_sensors:
-            observations["ground"] = np.zeros((self.num_envs, 3), np.float32)
-        if one.gps:
-            observations["gps"] = position(robots, self._floors)
-        if one.compass:
-            observations["compass"] = north(robots)
-        return observations
 
-    def _disturb(self, observations: Observations, robots: Sequence[int]) -> None:
+    def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
+        one = self._kinds[0]
         if self._noisy:
             self._add_noise([i for i in robots if i in self._noisy])
             observations["ps"][:] = np.where(
                 self._factors[:, None], self._last_ps, observations["ps"]
             )
-        if "ground" in observations:
+        if one.ground_sensors:
             for i in robots:
                 self._last_ground[i] = self._ground(i)
-            observations["ground"][:] = self._last_ground
+            observations["ground"] = self._last_ground.copy()
+        if one.gps:
+            observations["gps"] = position(self.robots, self._floors)
+        if one.compass:
+            observations["compass"] = north(self.robots)
 
     def _add_noise(self, robots: Sequence[int]) -> None:
         """Draws the readings of these robots anew; the others keep theirs."""

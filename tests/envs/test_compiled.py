@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from tdac_envs import compiled, contact, grid, kernels, plan, rays
+from tdac_envs import contact, grid, kernels, machine_code, plan, rays
 from tdac_envs.compiled import Kernel, kernel
 from tdac_envs.contact import first_contact
 from tdac_envs.grid import clearance
@@ -41,7 +41,7 @@ def _divide(a, b):
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     """An empty cache, and kernels that are not loaded yet."""
-    monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -94,7 +94,7 @@ def test_machine_code_is_kept(cache, monkeypatch):
     monkeypatch.setattr(Kernel, "_compile", lambda _: pytest.fail("compiled again"))
     assert fresh(_divide)(9, 3) == 3
     monkeypatch.undo()
-    monkeypatch.setattr(compiled, "_cache_folder", lambda: cache)
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: cache)
     file.write_bytes(whole[: len(whole) // 2])
     assert fresh(_divide)(9, 3) == 3
     assert len(file.read_bytes()) == len(whole)
@@ -102,14 +102,14 @@ def test_machine_code_is_kept(cache, monkeypatch):
 
 def test_a_changed_constant_is_other_code(monkeypatch):
     """The key depends on what inner kernels and constants say."""
-    before = _sum._key()
+    before = _sum._about()
     monkeypatch.setitem(globals(), "HALF", 0.25)
-    assert _sum._key() != before
+    assert _sum._about() != before
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(monkeypatch, tmp_path):
     """A full or read-only disk is no reason to stop."""
-    monkeypatch.setattr(compiled, "_cache_folder", lambda: tmp_path / "missing")
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "missing")
     assert fresh(_divide)(9, 2) == 4
 
 

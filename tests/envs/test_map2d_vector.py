@@ -170,6 +170,27 @@ def test_a_pickle_goes_on_where_the_batch_was():
             assert_same(a, b)
 
 
+@pytest.mark.parametrize("lay", [np.asfortranarray, np.ndarray.tolist, np.float32])
+def test_actions_of_any_layout_are_the_same(lay):
+    """Lists, and arrays in any order and of any type."""
+    one, two = (Map2DVectorEnv(100, threads=2) for _ in range(2))
+    for env in (one, two):
+        env.reset(seed=0)
+    action = actions(100, 1)[0].astype(np.float64)
+    for a, b in zip(one.step(action), two.step(lay(action)), strict=True):
+        assert_same(a, b)
+
+
+def test_a_mask_of_any_layout_is_the_same():
+    """Also one that is a part of a larger array."""
+    one, two = (Map2DVectorEnv(4, variation="jitter") for _ in range(2))
+    mask = np.array([True, False, False, True])
+    for env, given in ((one, mask), (two, np.repeat(mask, 2)[::2])):
+        env.reset(seed=0)
+        env.reset(seed=9, options={"reset_mask": given})
+    np.testing.assert_array_equal(one.pose(), two.pose())
+
+
 @pytest.mark.parametrize(
     "given",
     [np.ones((2, 2)), np.ones((3, 3)), np.full((3, 2), np.nan), None, "ab", [[1]]],

@@ -1,7 +1,11 @@
 """Many calls of one kernel, in one go."""
 
 import copy
+import gc
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +20,12 @@ def _scaled(values, factor):
         values[i] *= factor[0]
 
 
+@kernel("f8[:] i8[:] ->")
+def _raised(values, summand):
+    for i in range(values.shape[0]):
+        values[i] += summand[0]
+
+
 @kernel("i8[:] ->")
 def _inverted(value):
     value[0] = 100 // value[0]
@@ -26,8 +36,8 @@ def _inverted(value):
 def test_each_row_is_called_once(count, threads):
     """With arrays of any length; whatever the number of threads."""
     arrays = [np.arange(1.0 + k % 7) for k in range(count)]
-    rows = Rows(_scaled, [(a, np.array([k])) for k, a in enumerate(arrays)], threads)
-    rows.call_all()
+    rows = Rows((_scaled,), [(a, np.array([k])) for k, a in enumerate(arrays)], threads)
+    rows.call()
     rows.close()
     for k, array in enumerate(arrays):
         np.testing.assert_array_equal(array, k * np.arange(1.0 + k % 7))
@@ -36,14 +46,14 @@ def test_each_row_is_called_once(count, threads):
 def test_one_row_alone_and_with_other_arrays():
     """Only that one is written to; what was put in its place counts."""
     first, second, other = np.ones(2), np.ones(2), np.ones(3)
-    rows = Rows(_scaled, [(first, np.array([2])), (second, np.array([3]))])
-    rows.call(1)
+    rows = Rows((_scaled,), [(first, np.array([2])), (second, np.array([3]))])
+    rows.call(rows=np.array([1]))
     rows.put(0, other, np.array([5]))
-    rows.call(0)
+    rows.call(rows=np.array([0]))
     assert (first.tolist(), second.tolist()) == ([1, 1], [3, 3])
     assert other.tolist() == [5, 5, 5]
     rows.put(1, first, np.array([7]))
-    rows.call_all()
+    rows.call()
     assert (first.tolist(), second.tolist()) == ([7, 7], [3, 3])
     assert other.tolist() == [25, 25, 25]
 
@@ -52,22 +62,22 @@ def test_one_row_alone_and_with_other_arrays():
 def test_a_failing_row_is_told(threads):
     """As with one call; the others are made all the same."""
     values = [np.array([k % 200]) for k in range(300)]
-    rows = Rows(_inverted, [(value,) for value in values], threads)
+    rows = Rows((_inverted,), [(value,) for value in values], threads)
     with pytest.raises(ArithmeticError, match="_inverted failed"):
-        rows.call_all()
+        rows.call()
     assert values[299][0] == 100 // 99
     with pytest.raises(ArithmeticError, match="_inverted failed"):
-        rows.call(0)
+        rows.call(rows=np.array([0]))
     rows.close()
 
 
 def test_threads_end_with_the_rows():
     """Closing leaves none behind; the next call starts them again."""
     arguments = [(np.ones(1), np.array([1])) for _ in range(500)]
-    rows = Rows(_scaled, arguments, 3)
+    rows = Rows((_scaled,), arguments, 3)
     before = threading.active_count()
     for _ in range(2):
-        rows.call_all()
+        rows.call()
         rows.close()
         assert threading.active_count() == before
 
@@ -75,4 +85,82 @@ def test_threads_end_with_the_rows():
 def test_addresses_are_not_copied():
     """A copy would write to memory that is not its own."""
     with pytest.raises(TypeError, match="cannot be copied"):
-        copy.copy(Rows(_scaled, [(np.ones(1), np.array([1]))]))
+        copy.copy(Rows((_scaled,), [(np.ones(1), np.array([1]))]))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_each_row_has_the_kernel_of_its_kind(threads):
+    """Rows that are not called stay as they are."""
+    values, numbers = np.ones((400, 2)), np.arange(400)[:, None]
+    arguments = zip(values, numbers, strict=True)
+    rows = Rows((_scaled, _raised), arguments, threads)
+    kinds = (np.arange(400) % 3 == 0).astype(np.uint8)
+    called = np.flatnonzero(np.arange(400) % 5)
+    rows.call(kinds, called)
+    rows.close()
+    expected = np.where(kinds[:, None], 1.0 + numbers, 1.0 * numbers)
+    expected[::5] = 1.0
+    np.testing.assert_array_equal(values, expected * np.ones((1, 2)))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_what_goes_in_and_comes_out_is_copied(threads):
+    """Of the rows that are called, from and to arrays of any stride."""
+    memory, factors = np.zeros((300, 5)), np.arange(300)[:, None]
+    inner = memory[:, 1:3]
+    arguments = [(memory[k], factors[k]) for k in range(300)]
+    rows = Rows((_scaled,), arguments, threads, inputs=(inner,), outputs=(inner,))
+    given, found = np.random.default_rng(0).random((300, 2)), np.full((300, 4), -1.0)
+    chosen = np.arange(7, 290)
+    rows.call(rows=chosen, given=(given,), returned=(found[:, 2:],))
+    np.testing.assert_array_equal(found[chosen, 2:], (given * factors)[chosen])
+    rest = np.setdiff1d(np.arange(300), chosen)
+    assert (found[rest] == -1).all()
+    assert (found[:, :2] == -1).all()
+    assert not memory[rest].any()
+    memory[:] = 1.0
+    rows.call()
+    rows.close()
+    np.testing.assert_array_equal(memory, factors * np.ones((1, 5)))
+
+
+def test_each_call_is_whole_when_it_returns():
+    """However many follow one another: nobody comes late and makes it again."""
+    counts = np.zeros((500, 1))
+    rows = Rows((_raised,), [(each, np.array([1])) for each in counts], 6)
+    sums = []
+    for k in range(1, 400):
+        rows.call(rows=np.arange(500 - k))
+        sums.append(counts.sum())
+    rows.close()
+    np.testing.assert_array_equal(np.diff(sums), 500.0 - np.arange(2, 400))
+    np.testing.assert_array_equal(counts[:, 0], np.clip(499 - np.arange(500), 0, 399))
+
+
+def test_threads_end_with_an_object_that_is_forgotten():
+    """It need not be closed."""
+    rows = Rows((_scaled,), [(np.ones(1), np.array([1])) for _ in range(500)], 3)
+    before = threading.active_count()
+    rows.call()
+    assert threading.active_count() == before + 2
+    del rows
+    gc.collect()
+    assert threading.active_count() == before
+
+
+def test_a_forked_process_has_threads_of_its_own():
+    """Those of its parent are not there."""
+    script = (
+        "import os\n"
+        "from test_rows import Rows, _scaled, np\n"
+        "value = np.ones((500, 1))\n"
+        "rows = Rows((_scaled,), [(v, np.array([2])) for v in value], 3)\n"
+        "rows.call()\n"
+        "child = os.fork()\n"
+        "rows.call()\n"
+        "assert (value == 4).all()\n"
+        "if child:\n"
+        "    assert os.waitpid(child, 0)[1] == 0\n"
+    )
+    command = [sys.executable, "-W", "ignore", "-c", script]
+    subprocess.run(command, check=True, timeout=120, cwd=Path(__file__).parent)
