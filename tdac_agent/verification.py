@@ -240,4 +240,6 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
         from tdac_agent.figures import draw_failures  # loads what draws
 
         draw_failures(task, report, load_trajectories(folder), folder)
+    # Of the candidate that was here before.
+    (out / "robust.json").unlink(missing_ok=True)
     write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")

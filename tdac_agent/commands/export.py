@@ -13,7 +13,8 @@ from rich.markup import escape
 
 from tdac_agent.commands.flags import check_tier
 from tdac_agent.deploy.webots import SPARE, Project, export_webots
-from tdac_agent.webots_run import WebotsReport, run_controller
+from tdac_agent.webots_report import WebotsReport
+from tdac_agent.webots_run import run_controller
 from tdac_envs.webots.stage import open_stage
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.progress import TimeRemainingColumn as TimeLeft
 
@@ -62,4 +63,9 @@ def measure(
             )
     except KeyboardInterrupt:
         console.print(f"{seen[1]} of {seen[0]} episodes had reached the goal; no rate")
+        if out is not None:
+            console.print(
+                escape(f"{out} holds the report of the suite; no robust.json"),
+                soft_wrap=True,
+            )
         raise

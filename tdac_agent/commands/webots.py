@@ -6,17 +6,20 @@ import json
 import re
 import sys
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.commands.flags import check_finite, check_tier
-from tdac_agent.webots_run import WebotsReport, WebotsRun, frames, run_controller
+from tdac_agent.webots_report import WebotsReport
+from tdac_agent.webots_run import WebotsRun, frames, run_controller
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.task import TOLERANCE
 from tdac_envs.errors import TaskError
@@ -34,6 +37,8 @@ def run(
     controller: Path,
     world: str,
     steps: int | None,
+    start: tuple[float, ...] | None,
+    heading: float | None,
     goal: tuple[float, float] | None,
     tolerance: float | None,
     ignore: tuple[str, ...],
@@ -44,26 +49,57 @@ def run(
 ) -> int:
     """Runs a controller and prints what it did; 0 if it passed."""
     check_tier(tier)
-    check_finite(goal=goal)
+    if heading is not None:
+        if start is None:
+            raise TaskError("--heading needs --start X Y")
+        start = (*start, heading)
+    check_finite(start=start, goal=goal)
     if video is not None and video.suffix.lower() not in SUFFIXES:
         raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
-    stage = open_stage(world_file(world), goal, ignore)
+    stage = open_stage(world_file(world), goal, ignore, start)
     options: dict[str, Any] = {
         "steps": steps,
         "goal_tolerance": TOLERANCE if tolerance is None else tolerance,
         "webots_sensors": webots_sensors,
     }
-    done = run_controller(controller, stage, stage.make_env(**options), tier=tier)
+    console = Console(stderr=as_json, emoji=False)
+    env = stage.make_env(**options)
+    with _bar(console) as bar:
+        watch = _watcher(bar, controller.name, env.nominal.horizon)
+        done = run_controller(controller, stage, env, tier=tier, watch=watch)
     if as_json:
         record = {"schema_version": 1, **asdict(done.report)}
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
     else:
-        _show(done.report, Console(emoji=False))
+        _show(done.report, console)
     if video is not None:
-        _film(done, stage.make_env(**options, render_mode="rgb_array"), video)
+        with console.status(f"drawing {escape(video.name)} …"):
+            _film(done, stage.make_env(**options, render_mode="rgb_array"), video)
         if not as_json:
             print(f"wrote {video} (twice real time)")
     return 0 if done.report.passed else 1
+
+
+def _bar(console: Console) -> Progress:
+    """For whoever watches; drawn where there is something new."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    off = not console.is_terminal
+    return Progress(
+        *columns, console=console, transient=True, auto_refresh=False, disable=off
+    )
+
+
+def _watcher(bar: Progress, name: str, most: int) -> Callable[[int], None]:
+    """What moves a bar over the steps of a run, each hundredth of them."""
+    row, told = bar.add_task(escape(name), total=most), 0
+
+    def watch(steps: int) -> None:
+        nonlocal told
+        if 100 * (steps - told) >= most:
+            told = steps
+            bar.update(row, completed=steps, refresh=True)
+
+    return watch
 
 
 def _film(done: WebotsRun, env: EPuckEnv, video: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from tdac_agent.commands.options import Json, Tier
+from tdac_agent.commands.options import Heading, Json, Start, Tier
 
 webots_app = typer.Typer(
     no_args_is_help=True, help="Run Webots controllers in worlds of Webots."
@@ -30,6 +30,8 @@ def webots_run(
             min=1, help="Steps of the world at most.  [default: as the env's horizon]"
         ),
     ] = None,
+    start: Start = None,
+    heading: Heading = None,
     goal: Annotated[
         Optional[tuple[float, float]],  # noqa: UP045
         typer.Option("--goal", metavar="X Y", help="m.  [default: the world's GOAL]"),
@@ -64,8 +66,8 @@ def webots_run(
 
     raise typer.Exit(
         webots.run(
-            controller, world, steps, goal, tolerance, tuple(ignore or ()),
-            webots_sensors, video, tier, as_json,
+            controller, world, steps, start, heading, goal, tolerance,
+            tuple(ignore or ()), webots_sensors, video, tier, as_json,
         )
     )  # fmt: skip
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -37,6 +38,7 @@ def run(file: str, png: Path | None, as_json: bool) -> None:
     console.print(f"[bold]{escape(world.source)}[/], Webots {world.version}", end="")
     console.print(f", step {world.time_step:g} ms")
     console.print(_people(world))
+    console.print()
     if world.obstacles:
         console.print(_obstacles(world.obstacles))
     if world.unmodelled:
@@ -62,17 +64,18 @@ def _draw(world: World, png: Path) -> None:
 
 def _people(world: World) -> Table:
     """Robots, goal and floors."""
-    table = Table(show_header=False)
+    table = Table.grid(padding=(0, 2))
     for index, robot in enumerate(world.robots):
         what = "e-puck" if index == 0 else "stands still"
-        pose = f"{_at(robot.x, robot.y)}, heading {robot.heading:.4f} rad"
-        table.add_row(what, escape(robot.name), f"{pose}, version {robot.version}")
+        pose = f"{_at(robot.x, robot.y)}, heading {_short(robot.heading)} rad"
+        name = "" if robot.name == "e-puck" else f"{escape(robot.name)}: "
+        table.add_row(what, f"{name}{pose}, version {robot.version}")
     if not world.robots:
-        table.add_row("e-puck", "–", "none in this file")
+        table.add_row("e-puck", "none in this file")
     goal = "none in this file: give one" if world.goal is None else _at(*world.goal)
-    table.add_row("goal", "", goal)
+    table.add_row("goal", goal)
     for arena in world.arenas:
-        table.add_row("arena", arena.kind, _floor(arena))
+        table.add_row("arena", f"{arena.kind} at {_floor(arena)}")
     return table
 
 
@@ -81,63 +84,91 @@ def _floor(arena: Arena) -> str:
     if isinstance(shape, Disc):
         size = f"radius {shape.radius:g} m"
     else:
-        size = f"{shape.length:g} x {shape.width:g} m, yaw {shape.yaw:.4f} rad"
+        turned = f", yaw {_short(shape.yaw)} rad" if shape.yaw else ""
+        size = f"{shape.length:g} x {shape.width:g} m{turned}"
     if not arena.has_wall:
         return f"{_at(shape.x, shape.y)}, {size}, no wall"
-    wall = f"wall {arena.wall_thickness:g} m thick, {arena.wall_height:g} m high"
+    wall = f"wall {arena.wall_thickness:g} x {arena.wall_height:g} m"
     return f"{_at(shape.x, shape.y)}, {size}, {wall}"
 
 
 def _obstacles(obstacles: Iterable[Obstacle]) -> Table:
+    """A line each, to the millimetre; --json has all digits."""
     things = list(obstacles)
-    table = Table(title=f"{len(things)} obstacles", title_justify="left")
-    for name in ("name", "type", "footprint", "height", "mass", "f"):
-        table.add_column(name)
-    for thing in things[:SHOWN]:
-        parts = thing.solid or thing.visible
-        bottom = min((part.bottom for part in parts), default=0.0)
-        top = max((part.top for part in parts), default=0.0)
-        table.add_row(
-            escape(thing.name),
-            escape(thing.kind),
-            _footprint(thing),
-            f"{bottom:.3f} … {top:.3f}" if parts else "",
-            "" if thing.mass is None else f"{thing.mass:.3g} kg",
-            f"{thing.reflectance:.2f}" if thing.visible else "",
-        )
+    count = f"{len(things)} obstacle{'' if len(things) == 1 else 's'} (m, rad, kg)"
+    rows = [_obstacle(thing) for thing in things[:SHOWN]]
+    told = {name for row in rows for name, value in row.items() if value}
+    table = _table(count, *(name for name in rows[0] if name in told))
+    if any(not thing.solid for thing in things):
+        table.caption, table.caption_justify = " * is seen, and not solid", "left"
+    for row in rows:
+        table.add_row(*(value for name, value in row.items() if name in told))
     if len(things) > SHOWN:
         table.add_row("…", f"{len(things) - SHOWN} more", "--json lists all")
     return table
 
 
+def _obstacle(thing: Obstacle) -> dict[str, str]:
+    return {
+        "name": escape(thing.name),
+        "type": escape(thing.kind),
+        "at": _at(thing.x, thing.y),
+        "footprint": _footprint(thing),
+        "yaw": _yaw(thing),
+        "height": _heights(thing),
+        "mass": "" if thing.mass is None else f"{thing.mass:.3g}",
+        "f": f"{thing.reflectance:.2g}" if thing.visible else "",
+    }
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
+    for name in columns:
+        table.add_column(name)
+    return table
+
+
+def _heights(thing: Obstacle) -> str:
+    """Up to where it reaches, and from where if it hangs."""
+    parts = thing.solid or thing.visible
+    if not parts:
+        return ""
+    bottom, top = min(p.bottom for p in parts), _short(max(p.top for p in parts))
+    hangs = bottom > 0.0 and _short(bottom) not in ("0", top)
+    return f"{_short(bottom)}…{top}" if hangs else top
+
+
 def _footprint(thing: Obstacle) -> str:
     parts = thing.solid or thing.visible
-    ghost = "" if thing.solid else " (not solid)"
     if not parts:
-        return f"a mark at {_at(thing.x, thing.y)}"
+        return "a mark"
     shape = parts[0].shape
+    ghost = "" if thing.solid else " *"
     if len(parts) > 1:
-        return f"{len(parts)} pieces at {_at(thing.x, thing.y)}{ghost}"
+        return f"{len(parts)} pieces{ghost}"
     if isinstance(shape, Disc):
-        return f"disc {_at(shape.x, shape.y)}, radius {shape.radius:.4g}{ghost}"
+        return f"radius {shape.radius:.4g}{ghost}"
     if isinstance(shape, Rectangle):
-        size = f"{shape.length:.4g} x {shape.width:.4g}"
-        return f"{size} at {_at(shape.x, shape.y)}, yaw {shape.yaw:.4f}{ghost}"
-    return f"{len(shape.points)} corners at {_at(thing.x, thing.y)}{ghost}"
+        return f"{shape.length:.4g} x {shape.width:.4g}{ghost}"
+    return f"{len(shape.points)} corners{ghost}"
+
+
+def _yaw(thing: Obstacle) -> str:
+    parts = thing.solid or thing.visible
+    alone = parts[0].shape if len(parts) == 1 else None
+    return _short(alone.yaw) if isinstance(alone, Rectangle) else ""
 
 
 def _unmodelled(nodes: tuple[Unmodelled, ...]) -> Table:
-    table = Table(title="Not modelled", title_justify="left")
-    for name in ("name", "type", "at", "line", "why", "may be solid"):
-        table.add_column(name)
+    table = _table("Not modelled", "name", "type", "at", "line", "solid", "why")
     for node in nodes[:SHOWN]:
         table.add_row(
             escape(node.name),
             escape(node.kind),
             _at(node.x, node.y),
             str(node.line),
+            "[yellow]perhaps[/]" if node.may_be_solid else "no",
             escape(node.why),
-            "[yellow]yes[/]" if node.may_be_solid else "no",
         )
     if len(nodes) > SHOWN:
         table.add_row("…", f"{len(nodes) - SHOWN} more", "--json lists all")
@@ -145,7 +176,12 @@ def _unmodelled(nodes: tuple[Unmodelled, ...]) -> Table:
 
 
 def _at(x: float, y: float) -> str:
-    return f"({x:.4f}, {y:.4f})"
+    return f"({_short(x)}, {_short(y)})"
+
+
+def _short(value: float) -> str:
+    """Three decimals at most: a millimetre."""
+    return f"{round(value, 3) + 0.0:.3f}".rstrip("0").rstrip(".")
 
 
 def _record(world: World) -> dict[str, Any]:

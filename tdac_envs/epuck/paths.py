@@ -123,14 +123,31 @@ def route(ground: Ground, start: Point, goal: Point) -> NDArray[np.float32]:
         field = field_to(ground, end)
         if entry(ground, np.isfinite(field), start) is not None:
             return field
-    widest = widest_body(ground, start, goal)
-    reason = f"the widest body that gets through has a radius of {1e3 * widest:.1f} mm"
-    if widest <= 0.0:
-        reason = "they are in separate rooms"
+    reason = _walled_off(ground, start, goal) or _too_narrow(ground, start, goal)
     raise TaskError(
         f"no free path for a body of {1e3 * BODY_RADIUS:g} mm from start "
         f"({start[0]:g}, {start[1]:g}) to goal ({goal[0]:g}, {goal[1]:g}): {reason}"
     )
+
+
+def _too_narrow(ground: Ground, start: Point, goal: Point) -> str:
+    widest = widest_body(ground, start, goal)
+    if widest <= 0.0:
+        return "they are in separate rooms"
+    return f"the widest body that gets through has a radius of {1e3 * widest:.1f} mm"
+
+
+def _walled_off(ground: Ground, start: Point, goal: Point) -> str:
+    """Which of the two is outside an arena whose wall is around the other."""
+    for arena in ground.world.arenas:
+        inside = [arena.inside.contains(*place) for place in (start, goal)]
+        if arena.has_wall and inside[0] != inside[1]:
+            left, low, right, high = arena.inside.bounds
+            return (
+                f"the {'goal' if inside[0] else 'start'} is outside the arena's wall, "
+                f"which reaches from ({left:g}, {low:g}) to ({right:g}, {high:g})"
+            )
+    return ""
 
 
 @lru_cache(maxsize=4)

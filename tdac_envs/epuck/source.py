@@ -49,10 +49,15 @@ def open_world(
         raise TaskError(
             f"{_name(world)} has no e-puck in it; give start=(x, y, heading)"
         )
-    return world if start is None else _started(world, start)
+    return world if start is None else started(world, start)
 
 
-def _started(world: World, start: Sequence[float]) -> World:
+def started(world: World, start: Sequence[float]) -> World:
+    """The world with its first e-puck at (x, y) or (x, y, heading).
+
+    Raises:
+        TaskError: These are no numbers.
+    """
     there = world.robots[0] if world.robots else EPuck("e-puck", 0.0, 0.0, 0.0)
     given = tuple(start) if isinstance(start, Iterable) else (start,)
     if len(given) == 2:

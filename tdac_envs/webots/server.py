@@ -61,7 +61,7 @@ class StepServer:
         self._observation, info = self._env.reset(seed=0)
         self.log.note(self._env, info)
         place = {"world_path": self._stage.name, "project_path": self._folder}
-        return {**self._stage.facts(), **place}
+        return {**self._stage.facts(), **place, "places": self._places()}
 
     def step(self, action: Any) -> dict[str, Any]:
         """Answers one request: duration (ms), commands to devices, an event.
@@ -124,7 +124,7 @@ class StepServer:
             "time": self._now() / 1e3,
             "values": self._sampler.take(),
             "velocity": self._velocity() if self._tells_truth else [0.0] * 6,
-            "places": self._places() if self._stage.is_supervisor else {},
+            "places": self._places(),
             "warnings": warnings,
         }
 
@@ -198,8 +198,9 @@ class StepServer:
         return [*motion, *frame.vector(0.0, 0.0, turn_rate(poses, dt))]
 
     def _places(self) -> dict[int, tuple[list[float], list[float]]]:
-        """Where the nodes are that move; empty before the first step."""
-        if self.log.steps == 0:
+        """Where a supervisor finds what moves; empty where the file says it."""
+        stage, at_start = self._stage, self.log.steps == 0
+        if not stage.is_supervisor or (at_start and not stage.is_moved):
             return {}
         x, y, heading = self.log.poses[-1]
         frame, scene = self._stage.frame, self._stage.scene

@@ -14,6 +14,7 @@ from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.paths import entry, field_to
+from tdac_envs.epuck.source import started
 from tdac_envs.errors import WorldError
 from tdac_envs.wbt.fields import flag, text
 from tdac_envs.wbt.frames import Frame
@@ -35,6 +36,7 @@ class Stage:
         name: Of the file.
         text: Of the file.
         world: With a goal; see `has_goal`.
+        is_moved: Whether the robot starts elsewhere than where the file has it.
         has_goal: Whether there is one; else that of `world` is the farthest place.
         left_out: Nodes that may be solid and are ignored.
         scene: The file's nodes.
@@ -48,6 +50,7 @@ class Stage:
     name: str
     text: str
     world: World
+    is_moved: bool
     has_goal: bool
     left_out: tuple[str, ...]
     scene: Scene
@@ -116,7 +119,10 @@ class Stage:
 
 
 def open_stage(
-    path: Path, goal: Sequence[float] | None = None, ignore: Iterable[str] = ()
+    path: Path,
+    goal: Sequence[float] | None = None,
+    ignore: Iterable[str] = (),
+    start: Sequence[float] | None = None,
 ) -> Stage:
     """Reads a world for a controller.
 
@@ -124,9 +130,11 @@ def open_stage(
         path: The `.wbt` file.
         goal: (x, y), m; by default the file's. There need not be one.
         ignore: Names or types of nodes that may be missing.
+        start: (x, y), m, or (x, y, heading), rad; by default the file's.
 
     Raises:
         WorldError: The world cannot be used.
+        TaskError: Start or goal is no point.
     """
     content = read_text(path)
     world = read_world(content, path.name)
@@ -136,6 +144,9 @@ def open_stage(
     check_modelled(world, names)
     if goal is not None:
         world = with_goal(world, finite_point("goal", goal))
+    in_file = world.robot
+    if start is not None:
+        world = started(world, start)
     has_goal = world.goal is not None
     if not has_goal:
         world = replace(world, goal=_farthest(world))
@@ -143,12 +154,13 @@ def open_stage(
     top = frame_of(document)
     robot, own = _find_robot(document.nodes, top, path.name)
     devices, absent = find_devices(robot, world.robot.max_wheel_speed)
-    frame = FileFrame.of(top, own, world.robot.heading)
+    frame = FileFrame.of(top, own, in_file.heading)
     scene = Scene(document.nodes)
     return Stage(
         name=path.name,
         text=content,
         world=world,
+        is_moved=start is not None,
         has_goal=has_goal,
         left_out=names,
         scene=scene,

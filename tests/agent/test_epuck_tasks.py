@@ -214,7 +214,14 @@ def test_the_hash_tells_tasks_apart(tmp_path, changes):
         ({"env": "TDAC-Car-v0"}, "env: Input should be"),
         ({"env": EPUCK, "world": "arena", "ignore": ["x"]}, "no node called 'x'"),
         ({"env": EPUCK, "world": "nothing.wbt"}, "no such file"),
-        ({"env": EPUCK, "goal": [0.0, 3.0]}, "separate rooms|outside"),
+        (
+            {"env": EPUCK, "goal": [0.0, 3.0]},
+            r"the goal is outside the arena's wall, .* to \(1, 1\)",
+        ),
+        (
+            {"env": EPUCK, "start": [1.5, 0.0, 0.0]},
+            "the start is outside the arena's wall",
+        ),
         ({"env": EPUCK, "start": [0.6, -0.38]}, "already at the goal"),
     ],
 )

@@ -469,7 +469,11 @@ def test_wrong_words(tdac, good, words, reason):
 
 def test_an_interrupt_leaves_nothing(good, no_traces):
     """Ctrl-C between disturbed episodes: exit 130, no process, no file."""
+    kept = good / "kept"
+    kept.mkdir()
+    (kept / "robust.json").write_text("of an earlier controller")
     words = ["verify", str(good), "--profile", "policy", "--robust", "5000"]
+    words += ["--out", str(kept)]
     process = subprocess.Popen(
         [sys.executable, "-m", "tdac_agent.cli", *words],
         stderr=subprocess.PIPE,
@@ -484,6 +488,9 @@ def test_an_interrupt_leaves_nothing(good, no_traces):
     assert process.returncode == 130, err
     assert err.decode().strip().splitlines()[-1] == "interrupted"
     assert re.search(r"episodes had reached the goal; no rate", out.decode())
+    assert f"{kept} holds the report of the suite; no robust.json" in out.decode()
+    assert (kept / "report.json").is_file()
+    assert not (kept / "robust.json").exists()
 
 
 def _begun(folder):

@@ -8,6 +8,8 @@ import pytest
 
 from tdac_agent.cli import main
 from tdac_envs import read_world
+from tdac_envs.wbt.reader import load_world
+from tdac_envs.worlds import bundled_worlds, world_file
 
 WORLD = """#VRML_SIM R2025a utf8
 WorldInfo { basicTimeStep 16 }
@@ -43,11 +45,23 @@ def test_it_shows_what_is_in_a_world(tdac):
     code, out, err = tdac("small.wbt")
     assert (code, err) == (0, "")
     for said in (
-        "Webots R2025a, step 16 ms", "(-0.4000, 0.1000), heading 0.5000 rad",
-        "(0.5000, 0.2000)", "radius 0.8 m", "box [1]", "0.2 x 0.1 at (0.2000, 0.3000)",
-        "0.5 kg", "Smaug", "an unknown node or PROTO", "--ignore NAME",
+        "Webots R2025a, step 16 ms", "(-0.4, 0.1), heading 0.5 rad, version 1",
+        "(0.5, 0.2)", "radius 0.8 m", "box [1]", "(0.2, 0.3)  0.2 x 0.1", "Smaug",
+        "an unknown node or PROTO", "--ignore NAME",
     ):  # fmt: skip
         assert said in out
+
+
+@pytest.mark.parametrize("world", bundled_worlds())
+def test_a_thing_has_a_line(tdac, monkeypatch, world):
+    """In a terminal of 80 columns, too."""
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = tdac(world)
+    _, _, table = out.partition("obstacles (m, rad, kg)")
+    _, _, *rows, mark = [line for line in table.splitlines() if line.strip()]
+    assert mark.strip() == "* is seen, and not solid"
+    assert len(rows) == len(load_world(world_file(world)).obstacles)
+    assert max(map(len, out.splitlines())) <= 80
 
 
 def test_it_draws(tdac, tmp_path):

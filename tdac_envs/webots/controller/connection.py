@@ -47,6 +47,7 @@ class Connection:
         self._world = world
         self.facts = world.reset()
         self.devices = {device["name"]: device for device in self.facts["devices"]}
+        self.places.update(self.facts["places"])
         keys = ("type", "base", "def", "parent", "fields")
         nodes = self.facts["scene"]
         self.facts["scene"] = [dict(zip(keys, node, strict=True)) for node in nodes]

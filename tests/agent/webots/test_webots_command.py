@@ -61,6 +61,36 @@ def test_without_a_goal_or_with_another(tdac, there):
     assert (code, run["goal"], run["passed"]) == (1, [0.5, 0.3], False)
 
 
+def test_another_start(tdac, there):
+    """The robot stands there, turned as is said, and a supervisor finds it there."""
+    program = there / "where.py"
+    program.write_text(
+        "from controller import Supervisor\n"
+        "robot = Supervisor()\n"
+        "me = robot.getSelf()\n"
+        "for _ in range(2):\n"
+        "    print(me.getPosition(), me.getField('rotation').getSFRotation()[3])\n"
+        "    robot.step(32)\n"
+    )
+    words = ["webots", "run", program, there / "open.wbt", "--json", "--start"]
+    _, run = record(tdac(*words, 0.1, -0.2, 1.5))
+    assert run["start"] == [0.1, -0.2, 1.5]
+    for line in run["output"].splitlines():
+        assert line == "[0.1, -0.2, 0.0] 1.5"
+    _, run = record(tdac(*words, 0.1, -0.2))
+    assert run["start"] == [0.1, -0.2, 0.0]
+
+
+def test_progress_for_whoever_watches(tdac, there, monkeypatch):
+    """On a terminal a bar counts the steps; elsewhere there is none."""
+    words = ["webots", "run", CONTROLLERS / "module_loop.py", there / "open.wbt"]
+    assert "20/20" not in tdac(*words, "--steps", 20)[1]
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    _, out, _ = tdac(*words, "--steps", 20)
+    assert "module_loop.py" in out
+    assert all(f"{step:2}/20" in out for step in (0, 10, 20))
+
+
 def test_bundled_world(tdac):
     """A world can be named."""
     code, run = record(
@@ -155,7 +185,10 @@ def test_another_tolerance(tdac, there):
         (["good.py", "open.wbt", "--video", "x.avi"], "expected .mp4 or .gif"),
         (["good.py", "open.wbt", "--tier", "magic"], "unknown sandbox tier"),
         (["good.py", "open.wbt", "--goal", "nan", "0"], "expected --goal to be finite"),
-        (["good.py", "open.wbt", "--goal", "9", "9"], "goal"),
+        (["good.py", "open.wbt", "--goal", "9", "9"], "outside the arena's wall"),
+        (["good.py", "open.wbt", "--start", "9", "0"], "the start is outside"),
+        (["good.py", "open.wbt", "--start", "0", "inf"], "expected --start to be fin"),
+        (["good.py", "open.wbt", "--heading", "1"], "--heading needs --start X Y"),
         (["good.py", "empty.wbt"], "empty.wbt: there is no e-puck in it"),
         (["good.py", "open.wbt", "--ignore", "X"], "no node called 'X' to ignore"),
         (["good.py"], "Missing argument"),
