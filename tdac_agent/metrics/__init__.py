@@ -20,6 +20,7 @@ from tdac_agent.metrics.frames import (
     frames_from_tau,
     frames_of,
     iterations_of,
+    join_frames,
     load_frames,
 )
 from tdac_agent.metrics.rates import (
@@ -30,6 +31,7 @@ from tdac_agent.metrics.rates import (
     success_rate,
     unbiased_success_rate,
 )
+from tdac_agent.metrics.reported import load_reported
 from tdac_agent.metrics.table import summarise
 
 __all__ = [
@@ -49,7 +51,9 @@ __all__ = [
     "frames_from_tau",
     "frames_of",
     "iterations_of",
+    "join_frames",
     "load_frames",
+    "load_reported",
     "pass_at_n",
     "success_rate",
     "summarise",

@@ -88,6 +88,20 @@ def frames_of(runs: Iterable[Run]) -> Frames:
     return _frames([_row(run) for run in kept], candidates)
 
 
+def join_frames(*frames: Frames) -> Frames:
+    """The runs of several frames in one.
+
+    Raises:
+        RunError: There are none, or a run is in two of them.
+    """
+    if not frames:
+        raise RunError("there are no runs to join")
+    runs = pd.concat([each.runs for each in frames], ignore_index=True)
+    _check_unique(runs)
+    tried = pd.concat([each.candidates for each in frames], ignore_index=True)
+    return Frames(runs, tried)
+
+
 def _candidate(run: Run, attempt: Attempt) -> Row:
     return {
         "run": str(run.folder),
@@ -130,6 +144,7 @@ def frames_from_tau(
     tau: Sequence[int | None],
     most: int,
     *,
+    ended: Sequence[int] = (),
     invalid: int = 0,
     **labels: str,
 ) -> Frames:
@@ -138,6 +153,8 @@ def frames_from_tau(
     Args:
         tau: Iteration of the first success of each run, None where there was none.
         most: K.
+        ended: Iterations of further runs that money, time or a fault ended without
+            success.
         invalid: How many of the iterations gave no controller; they are taken to be
             the first ones of the longest runs, which no metric depends on.
         labels: Columns such as `learner` and `task`.
@@ -145,11 +162,15 @@ def frames_from_tau(
     left = invalid
     rows: list[Row] = []
     candidates: list[Row] = []
-    for number, first in enumerate(sorted(tau, key=lambda t: -(t or most + 1))):
-        run, done = f"{' '.join(labels.values())} {number + 1}", first or most
-        status = "verified" if first else "not verified"
-        known = {"run": run, "K": most, "status": status, "tau": first, "done": done}
-        rows.append(dict.fromkeys(RUN_COLUMNS) | known | {"censored": False, **labels})
+    known = sorted(tau, key=lambda t: -(t or most + 1))
+    ends = [(first, first or most, False) for first in known]
+    for number, (first, done, cut) in enumerate(
+        [*ends, *((None, n, True) for n in ended)]
+    ):
+        run = f"{' '.join(labels.values())} {number + 1}"
+        status = "verified" if first else "interrupted" if cut else "not verified"
+        about = {"run": run, "K": most, "status": status, "tau": first, "done": done}
+        rows.append(dict.fromkeys(RUN_COLUMNS) | about | {"censored": cut, **labels})
         for k in range(1, done + 1):
             passed = k == first
             valid = passed or left == 0
@@ -184,9 +205,13 @@ def _frames(rows: list[Row], candidates: list[Row]) -> Frames:
         {"tau": "Int64", "done": "Int64", "K": "Int64", "censored": bool}
         | {"cost": float, "seconds": float, "tokens": "Int64"}
     )
-    if runs["run"].duplicated().any():
-        again = runs["run"][runs["run"].duplicated()].iloc[0]
-        raise RunError(f"the run {again} is there twice")
+    _check_unique(runs)
     tried = pd.DataFrame(candidates, columns=list(CANDIDATE_COLUMNS))
     types = {"k": int, "j": int, "valid": bool, "passed": bool, "failed": "Int64"}
     return Frames(runs, tried.astype(types))
+
+
+def _check_unique(runs: pd.DataFrame) -> None:
+    if runs["run"].duplicated().any():
+        again = runs["run"][runs["run"].duplicated()].iloc[0]
+        raise RunError(f"the run {again} is there twice")

@@ -1,6 +1,10 @@
 """Figures of runs and metrics, with matplotlib: vector, legible, colour-blind safe."""
 
-from tdac_agent.plots.metrics import plot_cumulative_success, plot_success_rates
+from tdac_agent.plots.metrics import (
+    plot_cumulative_panels,
+    plot_cumulative_success,
+    plot_success_rates,
+)
 from tdac_agent.plots.preprocessing import plot_preprocessing
 from tdac_agent.plots.runs import plot_breakdown, plot_failures
 from tdac_agent.plots.style import figure_bytes, save_figure
@@ -10,6 +14,7 @@ from tdac_agent.plots.ways import plot_trajectories
 __all__ = [
     "figure_bytes",
     "plot_breakdown",
+    "plot_cumulative_panels",
     "plot_cumulative_success",
     "plot_failures",
     "plot_preprocessing",

@@ -6,20 +6,26 @@ import math
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import MaxNLocator
 
-from tdac_agent.metrics import Frames, cumulative_success, success_rate
+from tdac_agent.metrics import Frames, Rate, cumulative_success, success_rate
 from tdac_agent.plots.style import (
+    COLOURS,
     LINES,
     MARKERS,
     TEXT,
     colours_of,
+    dress,
     legend,
     new_figure,
+    new_plot,
     spread,
     title,
 )
+
+BEHIND = "#D5D5D5"
 
 
 def plot_success_rates(
@@ -40,46 +46,46 @@ def plot_success_rates(
     names = _order(groups, by)
     figure, axes = new_figure(max(5.0, 1.1 + 0.95 * len(names)), 3.6)
     colours = colours_of(groups)
-    offsets = spread(len(groups))
     width = 0.8 / max(1, len(groups))
-    for (group, frames), offset in zip(groups.items(), offsets, strict=True):
+    for number, name in enumerate(names):
         rates = {
-            name: success_rate(frames.only(**{by: name}))
-            for name in frames.runs[by].drop_duplicates()
+            group: success_rate(frames.only(**{by: name}))
+            for group, frames in groups.items()
+            if (frames.runs[by] == name).any()
         }
-        for number, name in enumerate(names):
-            rate = rates.get(name)
-            if rate is None or math.isnan(rate.value):
-                continue
-            place = number + offset
-            axes.bar(place, rate.value, 0.92 * width, color=colours[group])
-            top = rate.value
-            if not math.isnan(rate.low):
-                ends = [[rate.value - rate.low], [rate.high - rate.value]]
-                axes.errorbar(
-                    place, rate.value, ends, color=TEXT, capsize=3, linewidth=1
-                )
-                top = rate.high
-            axes.annotate(
-                f"{rate.value:.2f}",
-                (place, top),
-                (0, 3),
-                textcoords="offset points",
-                ha="center",
-                fontsize=8.5,
-                color=TEXT,
-            )
+        offsets = spread(len(rates), len(rates) * width)
+        for (group, rate), offset in zip(rates.items(), offsets, strict=True):
+            if not math.isnan(rate.value):
+                _bar(axes, number + offset, rate, 0.92 * width, colours[group])
     axes.set_xticks(range(len(names)), names)
     axes.set_xlim(-0.6, len(names) - 0.4)
     axes.set_ylim(0, 1.12)
     axes.set_yticks(np.arange(0, 1.01, 0.25))
-    axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     title(axes, heading, provenance)
     if len(groups) > 1:
         for group, colour in colours.items():
             axes.bar(0, 0, color=colour, label=group)
         legend(axes, len(groups))
     return figure
+
+
+def _bar(axes: Axes, place: float, rate: Rate, width: float, colour: str) -> None:
+    """A rate with its interval, where it has one, and its figure above."""
+    axes.bar(place, rate.value, width, color=colour)
+    top = rate.value
+    if not math.isnan(rate.low):
+        ends = [[rate.value - rate.low], [rate.high - rate.value]]
+        axes.errorbar(place, rate.value, ends, color=TEXT, capsize=3, linewidth=1)
+        top = rate.high
+    axes.annotate(
+        f"{rate.value:.2f}",
+        (place, top),
+        (0, 3),
+        textcoords="offset points",
+        ha="center",
+        fontsize=8.5,
+        color=TEXT,
+    )
 
 
 def plot_cumulative_success(
@@ -93,6 +99,9 @@ def plot_cumulative_success(
 ) -> Figure:
     """CS(k) of each learner, with its pointwise interval.
 
+    Bands of more than three curves would hide each other: those are in
+    `plot_cumulative_panels`.
+
     Args:
         frames: The runs.
         by: Column of the runs that makes a curve.
@@ -102,44 +111,107 @@ def plot_cumulative_success(
         bands: Whether to shade the 95 % intervals.
     """
     figure, axes = new_figure(6.4, 4.0)
-    names = list(frames.runs[by].drop_duplicates())
-    colours = colours_of(names)
-    last = most if most is not None else _shown(frames.runs)
-    for number, name in enumerate(names):
-        curve = cumulative_success(frames.runs[frames.runs[by] == name], last)
-        # From zero iterations, where nothing has succeeded.
-        k = np.concatenate([[0], curve["k"]])
-        value = np.concatenate([[0.0], curve["cs"]])
-        count = int((frames.runs[by] == name).sum())
-        axes.step(
-            k,
-            value,
-            where="post",
-            color=colours[name],
-            linestyle=LINES[number % len(LINES)],
-            marker=MARKERS[number % len(MARKERS)],
-            markersize=5,
-            markevery=[int(n) for n in np.flatnonzero(np.diff(value)) + 1],
-            label=f"{name} (R = {count})",
-        )
-        if bands and len(names) <= 3:
-            axes.fill_between(
-                curve["k"],
-                curve["low"],
-                curve["high"],
-                step="post",
-                color=colours[name],
-                alpha=0.14,
-                linewidth=0,
-            )
+    curves = _curves(frames, by, most)
+    for number, (name, curve) in enumerate(curves.items()):
+        colour = COLOURS[number % len(COLOURS)]
+        _step(axes, curve, number, colour, label=_counted(frames, by, name))
+        if bands and len(curves) <= 3:
+            _band(axes, curve, colour)
+    _frame(axes, curves)
     axes.set_xlabel("iteration k", color=TEXT)
-    axes.set_xlim(0, last + 0.4)
+    title(axes, heading, provenance)
+    legend(axes, len(curves))
+    return figure
+
+
+def plot_cumulative_panels(
+    frames: Frames,
+    *,
+    by: str = "learner",
+    most: int | None = None,
+    heading: str = "Cumulative success CS(k)",
+    provenance: str = "",
+) -> Figure:
+    """A panel for each learner: its CS(k) with its band, the others in grey behind it.
+
+    Args:
+        frames: The runs.
+        by: Column of the runs that makes a panel.
+        most: Largest k; where the last curve has reached its end, by default.
+        heading: Title of the first panel.
+        provenance: A line below it.
+    """
+    curves = _curves(frames, by, most)
+    columns = min(3, max(1, len(curves)))
+    rows = max(1, math.ceil(len(curves) / columns))
+    figure = new_plot(2.7 * columns, 2.1 * rows + 0.5)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for axes in grid.flat[len(curves) :]:
+        axes.set_axis_off()
+    for number, (name, curve) in enumerate(curves.items()):
+        axes, colour = dress(grid.flat[number]), COLOURS[number % len(COLOURS)]
+        for other in curves.values():
+            axes.step(other["k"], other["cs"], "-", where="post", color=BEHIND, lw=1)
+        _band(axes, curve, colour)
+        _step(axes, curve, 0, colour)
+        axes.set_title(_counted(frames, by, name), fontsize=9.5, color=TEXT)
+    if curves:
+        _frame(grid.flat[0], curves)
+    figure.supxlabel("iteration k", fontsize=9.5, color=TEXT)
+    about = f"{heading}\n{provenance}" if provenance else heading
+    figure.suptitle(about, x=0.01, ha="left", fontsize=10.5, color=TEXT)
+    return figure
+
+
+def _curves(frames: Frames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
+    """CS(k) of each kind, from k = 0, where nothing has succeeded."""
+    last = most if most is not None else _shown(frames.runs)
+    begin = pd.DataFrame({"k": [0], "cs": [0.0], "low": [0.0], "high": [0.0]})
+    return {
+        name: pd.concat([begin, cumulative_success(runs, last)], ignore_index=True)
+        for name, runs in frames.runs.groupby(by, sort=False)
+    }
+
+
+def _counted(frames: Frames, by: str, name: str) -> str:
+    return f"{name} (R = {int((frames.runs[by] == name).sum())})"
+
+
+def _step(
+    axes: Axes, curve: pd.DataFrame, number: int, colour: str, label: str = ""
+) -> None:
+    """A curve with a mark at each of its steps."""
+    value = curve["cs"].to_numpy(float)
+    axes.step(
+        curve["k"],
+        value,
+        where="post",
+        color=colour,
+        linestyle=LINES[number % len(LINES)],
+        marker=MARKERS[number % len(MARKERS)],
+        markersize=5,
+        markevery=[int(n) for n in np.flatnonzero(np.diff(value)) + 1],
+        label=label,
+    )
+
+
+def _band(axes: Axes, curve: pd.DataFrame, colour: str) -> None:
+    rest = curve[curve["k"] > 0]
+    axes.fill_between(
+        rest["k"],
+        rest["low"],
+        rest["high"],
+        step="post",
+        color=colour,
+        alpha=0.14,
+        linewidth=0,
+    )
+
+
+def _frame(axes: Axes, curves: dict[str, pd.DataFrame]) -> None:
+    axes.set_xlim(0, max(curve["k"].max() for curve in curves.values()) + 0.4)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylim(0, 1.03)
-    axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-    title(axes, heading, provenance)
-    legend(axes, len(names))
-    return figure
 
 
 def _shown(runs: pd.DataFrame) -> int:

@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,9 @@ from tdac_agent.metrics import (
     first_pass,
     frames_from_tau,
     iterations_of,
+    join_frames,
     load_frames,
+    load_reported,
     pass_at_n,
     success_rate,
     summarise,
@@ -34,16 +37,15 @@ from tdac_agent.metrics import (
 )
 
 ROOT = Path(__file__).parents[3]
-PAPER = pd.read_csv(ROOT / "results" / "paper" / "results.csv")
+RESULTS = ROOT / "results" / "paper" / "results.csv"
+PAPER = pd.read_csv(RESULTS)
 FACTS = ROOT.parent / "shared/facts/paper_results.json"
 taus = st.lists(st.none() | st.integers(1, 6), min_size=2, max_size=8)
 
 
 def paper_frames(row):
     """The frames of one bar of the paper."""
-    tau = [int(word) for word in row.tau.split()]
-    labels = {"learner": row.learner, "task": row.setting}
-    return frames_from_tau(tau, 20, invalid=row.invalid, **labels)
+    return load_reported(RESULTS, setting=row.setting, learner=row.learner)
 
 
 @pytest.mark.parametrize(
@@ -234,10 +236,7 @@ def test_best_of_n_for_the_same_money():
 def test_one_row_per_kind():
     """Each kind has its own figures; what intervals assume is written down."""
     one, two = paper_frames(PAPER.iloc[0]), paper_frames(PAPER.iloc[4])
-    both = Frames(
-        pd.concat([one.runs, two.runs]), pd.concat([one.candidates, two.candidates])
-    )
-    table = summarise(both)
+    table = summarise(join_frames(one, two))
     assert table["learner"].tolist() == ["GPT-5.2", "GPT-4o"]
     assert table["sr"].tolist() == [5 / 11, 5 / 35]
     assert table["cs_K"].tolist() == [1.0, 1.0]
@@ -250,3 +249,43 @@ def test_a_folder_without_runs(tmp_path):
     """One line says so."""
     with pytest.raises(RunError, match="there is no run at or below"):
         load_frames(tmp_path)
+
+
+def test_a_table_of_first_successes(tmp_path):
+    """Ended runs with a plus sign, columns of runs taken over, rows chosen."""
+    table = tmp_path / "table.csv"
+    table.write_text("kind,learner,tau\nx,one,1 3 2+\ny,one,9\n")
+    frames = load_reported(table, most=5, kind="x")
+    assert frames.runs["learner"].tolist() == ["one"] * 3
+    assert frames.runs["tau"].tolist() == [3, 1, pd.NA]
+    assert frames.runs["done"].tolist() == [3, 1, 2]
+    assert frames.runs["censored"].tolist() == [False, False, True]
+    assert success_rate(frames).trials == 3 + 1 + 2
+    assert cumulative_success(frames.runs)["at_risk"].tolist() == [3, 2, 2, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "only", "told"),
+    [
+        ("learner\none\n", {}, "has no column 'tau'"),
+        ("tau\n1\n", {"task": "maze"}, "has no column 'task'"),
+        ("tau,task\n1,cave\n", {"task": "maze"}, "has no row"),
+        ("tau\n1 two\n", {}, "expected iterations such as 1 2 5+"),
+        ("", {}, "cannot read"),
+    ],
+)
+def test_a_broken_table(tmp_path, text, only, told):
+    """One line says what is wrong with it."""
+    table = tmp_path / "table.csv"
+    table.write_text(text)
+    with pytest.raises(RunError, match=re.escape(told)):
+        load_reported(table, **only)
+
+
+def test_a_run_counts_once():
+    """Frames that share a run are not joined, and there must be some."""
+    frames = frames_from_tau([1], 2, learner="one")
+    with pytest.raises(RunError, match="twice"):
+        join_frames(frames, frames)
+    with pytest.raises(RunError, match="no runs"):
+        join_frames()

@@ -3,13 +3,18 @@
 import json
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from tdac_agent.errors import RunError
-from tdac_agent.metrics import Frames, cumulative_success, frames_from_tau, success_rate
+from tdac_agent.metrics import (
+    cumulative_success,
+    frames_from_tau,
+    join_frames,
+    success_rate,
+)
 from tdac_agent.plots import (
     plot_breakdown,
+    plot_cumulative_panels,
     plot_cumulative_success,
     plot_failures,
     plot_preprocessing,
@@ -29,13 +34,9 @@ from tdac_envs.errors import TdacError
 @pytest.fixture(scope="module")
 def frames():
     """Two learners."""
-    kinds = [
+    return join_frames(
         frames_from_tau([1, 1, 3], 5, learner="one"),
         frames_from_tau([2, None], 5, learner="two"),
-    ]
-    return Frames(
-        pd.concat([kind.runs for kind in kinds]),
-        pd.concat([kind.candidates for kind in kinds]),
     )
 
 
@@ -108,6 +109,28 @@ def test_curves_are_cumulative_success(frames):
         assert {k: expected.get(k, 0.0) for k in shown} == shown
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == ["one (R = 3)", "two (R = 2)"]
+
+
+def test_each_panel_has_its_curve_and_band(frames):
+    """CS(k) over the curves of the others, and the interval behind it."""
+    panels = plot_cumulative_panels(frames, most=4).axes
+    for axes, name in zip(panels, ("one", "two"), strict=True):
+        curve = cumulative_success(frames.only(learner=name).runs, 4)
+        assert axes.lines[-1].get_ydata()[1:].tolist() == curve["cs"].tolist()
+        assert len(axes.lines) == 3
+        band = axes.collections[0].get_paths()[0].vertices
+        assert band[:, 1].min() == pytest.approx(curve["low"].min())
+        assert band[:, 1].max() == pytest.approx(curve["high"].max())
+
+
+def test_bars_of_one_group_stand_in_the_middle(frames):
+    """A learner that only one group has leaves no gap for the other."""
+    groups = {"here": frames, "there": frames.only(learner="one")}
+    bars = plot_success_rates(groups).axes[0].patches
+    places = sorted(
+        bar.get_x() + bar.get_width() / 2 for bar in bars if bar.get_x() > 0
+    )
+    assert places[-1] == pytest.approx(1.0)
 
 
 def test_every_failed_test_has_its_row(run):

@@ -1,0 +1,72 @@
+"""Results that are only known by their first successes, as a paper prints them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pandas as pd
+
+from tdac_agent.errors import RunError
+from tdac_agent.metrics.frames import (
+    RUN_COLUMNS,
+    Frames,
+    frames_from_tau,
+    join_frames,
+)
+
+PAPER_K = 20
+_WORD = re.compile(r"(\d+)(\+?)")
+
+
+def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
+    """Frames of a table with a row per kind of runs, as in `results/paper`.
+
+    Its column `tau` holds the iterations of the first successes, `1 2 5`; `2+` is a run
+    that was ended after two iterations without success, by money, time or a fault.
+    `invalid` counts iterations that gave no controller. Columns that are in
+    `RUN_COLUMNS`, too, are taken over; others only serve to choose rows.
+
+    Args:
+        path: A CSV file.
+        most: K.
+        only: Values of columns, of the rows that are wanted: `setting="2d"`.
+
+    Raises:
+        RunError: It cannot be read, or has no such column or row.
+    """
+    try:
+        table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    except (OSError, ValueError) as error:
+        reason = str(error).partition("\n")[0]
+        raise RunError(f"cannot read {path}: {reason}") from error
+    for name in ("tau", *only):
+        if name not in table:
+            known = ", ".join(table.columns)
+            raise RunError(f"{path} has no column {name!r}; expected one of {known}")
+    for name, value in only.items():
+        table = table[table[name] == value]
+    if table.empty:
+        raise RunError(f"{path} has no row with {only}")
+    labels = [name for name in table if name in RUN_COLUMNS and name != "tau"]
+    return join_frames(
+        *(_kind(row, labels, path, most) for row in table.to_dict("records"))
+    )
+
+
+def _kind(row: dict[str, str], labels: list[str], path: Path, most: int) -> Frames:
+    tau: list[int] = []
+    ended: list[int] = []
+    for word in row["tau"].split():
+        found = _WORD.fullmatch(word)
+        if found is None:
+            wanted = "expected iterations such as 1 2 5+"
+            raise RunError(f"{path}: {wanted}, got {row['tau']!r}")
+        (ended if found[2] else tau).append(int(found[1]))
+    return frames_from_tau(
+        tau,
+        most,
+        ended=ended,
+        invalid=int(row.get("invalid") or 0),
+        **{name: row[name] for name in labels},
+    )
