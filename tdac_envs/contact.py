@@ -75,10 +75,26 @@ def first_contact(
         In [0, 1); 2.0 where the step is free. A disc that starts in touch and moves
         away or along is free.
     """
+    end_x, end_y, _ = move(x, y, heading, forward, turn)
+    return contact_before(clear, x, y, heading, forward, turn, radius, end_x, end_y)
+
+
+@kernel()
+def contact_before(
+    clear: FloatGrid,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    radius: float,
+    end_x: float,
+    end_y: float,
+) -> float:
+    """As `first_contact`, with the place where the step ends."""
     length = abs(forward)
     if length == 0.0:
         return 2.0
-    end_x, end_y, _ = move(x, y, heading, forward, turn)
     # Both ends are the centre of a stretch of the arc that is surely free.
     open_at_start = max(_room(clear, x, y) - radius, 0.0)
     open_at_end = max(_room(clear, end_x, end_y) - radius, 0.0)
@@ -165,7 +181,9 @@ def _room(clear: FloatGrid, x: float, y: float) -> float:
     i, j = math.floor(x + 0.5), math.floor(y + 0.5)
     if i < 0 or j < 0 or j >= clear.shape[0] - 2 or i >= clear.shape[1] - 2:
         return 0.0
-    return float(clear[j + 1, i + 1]) - math.hypot(x - i, y - j) - _ROUNDING
+    off_x, off_y = x - i, y - j
+    off = math.sqrt(off_x * off_x + off_y * off_y)
+    return float(clear[j + 1, i + 1]) - off - _ROUNDING
 
 
 @kernel()

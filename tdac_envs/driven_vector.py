@@ -83,6 +83,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._seeds: list[int | None] = [None] * num_envs
         self._vary = [setup.variation != "nominal" for setup in self.setups]
         self._over = np.zeros(num_envs, np.bool_)
+        self._commands = np.zeros((num_envs, 2))
         self.goals = np.array([task.goal for task in self.tasks], np.float32)
         self._starts = np.array([(*task.start, task.shortest) for task in self.tasks])
         self._bind()
@@ -131,12 +132,13 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
                 f"expected reset(options={{'reset_mask': ...}}) of the robots whose "
                 f"episodes have ended: {resting[:10].tolist()}"
             )
+        self._commands[:] = wanted
         self._slip()
         self._place(resting, {})
         observations = {k: np.empty_like(seen) for k, seen in self._seen().items()}
         told = np.empty_like(self.robots.outcome)
         copies = *observations.values(), told
-        self._rows.call(self._over, given=(wanted,), returned=copies)
+        self._rows.call(self._over, returned=copies)
         outcome = told.T.copy()
         rewards = outcome[stepping.REWARD]
         terminated = outcome[stepping.TERMINATED] == 1.0
@@ -192,7 +194,12 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             self._kernels,
             arguments,
             self.threads,
-            inputs=(self.robots.state[:, stepping.LEFT : stepping.RIGHT + 1],),
+            inputs=[
+                (
+                    self._commands,
+                    self.robots.state[:, stepping.LEFT : stepping.RIGHT + 1],
+                )
+            ],
             outputs=(*self._seen().values(), self.robots.outcome),
         )
 
@@ -262,7 +269,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     def _wanted(self, actions: Any) -> Array:
         try:
-            wanted = np.ascontiguousarray(actions, np.float64)
+            wanted = np.asarray(actions, np.float64)
         except (TypeError, ValueError):
             wanted = np.empty(0)
         if wanted.shape != (self.num_envs, 2) or not np.isfinite(wanted).all():

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.compiled import kernel
-from tdac_envs.contact import first_contact, move, wrap_angle
+from tdac_envs.contact import contact_before, move, wrap_angle
 from tdac_envs.grid import FloatGrid
 from tdac_envs.rays import LeapGrid, cast_rays, sees
 from tdac_envs.stepping import (
@@ -75,12 +75,14 @@ def advance(
     # y points down, so a positive turn is clockwise on the screen.
     turn = (left - right) * dt / axle
     x, y, heading = state[X], state[Y], state[HEADING]
-    touch = first_contact(clear, x, y, heading, forward, turn, radius)
-    part = 1.0
+    end_x, end_y, end_heading = move(x, y, heading, forward, turn)
+    touch = contact_before(
+        clear, x, y, heading, forward, turn, radius, end_x, end_y
+    )  # fmt: skip
     if touch <= 1.0:
         part = max(touch - CONTACT_GAP / abs(forward), 0.0)
-    x, y, heading = move(x, y, heading, part * forward, part * turn)
-    state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
+        end_x, end_y, end_heading = move(x, y, heading, part * forward, part * turn)
+    state[X], state[Y], state[HEADING] = end_x, end_y, wrap_angle(end_heading)
     return bool(touch <= 1.0)
 
 

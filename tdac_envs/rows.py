@@ -39,8 +39,9 @@ class Rows:
         arguments: Of each row; all of the same types. No two rows may write to the
             same memory.
         threads: How many work at a time; by default as many as there are cores.
-        inputs: Arrays with a row for each row, written to before its call.
-        outputs: Arrays with a row for each row, read after its call.
+        inputs: Pairs of arrays with a row for each row, in one piece; before a row's
+            call, that of the first is copied to that of the second.
+        outputs: Such arrays, which can be copied after a row's call.
     """
 
     def __init__(
@@ -49,7 +50,7 @@ class Rows:
         arguments: Iterable[tuple[Any, ...]],
         threads: int | None = None,
         *,
-        inputs: Arrays = (),
+        inputs: Sequence[tuple[NDArray[Any], NDArray[Any]]] = (),
         outputs: Arrays = (),
     ) -> None:
         self._kernels = kernels
@@ -60,15 +61,18 @@ class Rows:
         self._firsts = np.zeros(len(packed), np.uint8)
         self._threads = threads or len(os.sched_getaffinity(0))
         self._kept.append([inputs, outputs])
-        self._copied = _pieces(inputs, _TO), _pieces(outputs, _FROM)
+        self._given = _pieces([to for _, to in inputs], _TO)
+        _join(self._given, _FROM, [source for source, _ in inputs])
+        self._returned = _pieces(outputs, _FROM)
         calls: list[Any] = [kernel.load() for kernel in kernels]
         entries = [ctypes.cast(call, ctypes.c_void_p).value for call in calls]
         self._entries = np.array(entries, np.int64)
         self._plan = np.zeros(row_loop.THREADS, np.int64)
         self._plan[row_loop.SHARE] = _SHARE
         self._plan[row_loop.ENTRIES] = self._entries.ctypes.data
-        self._plan[row_loop.GIVEN] = _address(self._copied[0])
-        self._plan[row_loop.RETURNED] = _address(self._copied[1])
+        self._plan[row_loop.GIVEN] = _address(self._given)
+        self._plan[row_loop.N_GIVEN] = len(inputs)
+        self._plan[row_loop.RETURNED] = _address(self._returned)
         self._differ()
         self._team: Team | None = None
 
@@ -98,8 +102,6 @@ class Rows:
         self,
         kinds: Kinds | None = None,
         rows: Index | None = None,
-        *,
-        given: Arrays = (),
         returned: Arrays = (),
     ) -> None:
         """Makes the calls of some rows, in any order.
@@ -108,9 +110,8 @@ class Rows:
             kinds: Number of the kernel of each row, also of those that are not called;
                 by default the first.
             rows: By default all.
-            given: What the inputs become in these rows; of their types, each row in
-                one piece. They stay as they are without.
-            returned: What the outputs are copied to in these rows; likewise.
+            returned: What the outputs are copied to in these rows; of their types. Not
+                copied where there is none.
 
         Raises:
             ArithmeticError: One of them failed.
@@ -119,11 +120,8 @@ class Rows:
         which = self._firsts
         if kinds is not None:
             which = np.ascontiguousarray(kinds, np.uint8)
-        if given:
-            _join(self._copied[0], _FROM, given)
         if returned:
-            _join(self._copied[1], _TO, returned)
-        self._plan[row_loop.N_GIVEN] = len(given)
+            _join(self._returned, _TO, returned)
         self._plan[row_loop.N_RETURNED] = len(returned)
         self._plan[row_loop.ORDER] = _address(order)
         self._plan[row_loop.KINDS] = _address(which)

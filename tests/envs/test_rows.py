@@ -109,19 +109,21 @@ def test_what_goes_in_and_comes_out_is_copied(threads):
     memory, factors = np.zeros((300, 5)), np.arange(300)[:, None]
     inner = memory[:, 1:3]
     arguments = [(memory[k], factors[k]) for k in range(300)]
-    rows = Rows((_scaled,), arguments, threads, inputs=(inner,), outputs=(inner,))
     given, found = np.random.default_rng(0).random((300, 2)), np.full((300, 4), -1.0)
+    inputs = [(given, inner)]
+    rows = Rows((_scaled,), arguments, threads, inputs=inputs, outputs=(inner,))
     chosen = np.arange(7, 290)
-    rows.call(rows=chosen, given=(given,), returned=(found[:, 2:],))
+    rows.call(rows=chosen, returned=(found[:, 2:],))
     np.testing.assert_array_equal(found[chosen, 2:], (given * factors)[chosen])
     rest = np.setdiff1d(np.arange(300), chosen)
     assert (found[rest] == -1).all()
     assert (found[:, :2] == -1).all()
     assert not memory[rest].any()
-    memory[:] = 1.0
+    kept = found.copy()
     rows.call()
     rows.close()
-    np.testing.assert_array_equal(memory, factors * np.ones((1, 5)))
+    np.testing.assert_array_equal(inner, given * factors)
+    np.testing.assert_array_equal(found, kept)
 
 
 def test_each_call_is_whole_when_it_returns():
