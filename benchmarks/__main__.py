@@ -1,6 +1,6 @@
 """Runs the benches at their real sizes.
 
-    python -m benchmarks [NAME …] [--maps DIR] [--quick] [--json] [--profile]
+    python -m benchmarks [NAME …] [--rounds N] [--maps DIR] [--json] [--profile]
 
 Without names, all of them. Every bench times its floor and what it is compared with
 in the same run, in turns; only the ratios carry over to another machine. `--quick`
@@ -24,9 +24,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from benchmarks.timing import Bench, show
+from benchmarks.timing import Bench, Effort, show
 
-NAMES = ("steps", "preprocessing", "planning", "start_up")
+NAMES = ("env_step", "epuck_step", "peers", "preprocessing", "planning", "start_up")
 PROFILED = 25
 """Lines of a profile."""
 
@@ -55,9 +55,10 @@ def main() -> int:
 
 def _bench(name: str, options: argparse.Namespace) -> Callable[[], Sequence[Bench]]:
     benches = import_module(f"benchmarks.{name}").benches
+    effort = Effort(options.quick, options.rounds)
     if name == "planning":
-        return partial(benches, options.quick, options.maps)
-    return partial(benches, options.quick)
+        return partial(benches, effort, options.maps)
+    return partial(benches, effort)
 
 
 def _profile(name: str, run: Callable[[], object]) -> None:
@@ -80,6 +81,12 @@ def _machine() -> str:
     )
 
 
+def _rounds(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text}")
+    return int(text)
+
+
 def _options() -> argparse.Namespace:
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=about)
@@ -87,6 +94,7 @@ def _options() -> argparse.Namespace:
         "names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}"
     )
     parser.add_argument("--maps", type=Path, help="folder of MovingAI maps and .scen")
+    parser.add_argument("--rounds", type=_rounds, help="turns that the cases take")
     parser.add_argument("--quick", action="store_true", help="toy sizes, one round")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--profile", action="store_true", help="print profiles")

@@ -1,17 +1,18 @@
 """Steps of TDAC-Map2D-v0 next to CartPole-v1: alone, in batches, and as they grow.
 
-    python -m benchmarks.env_step [--rounds N] [--json]
+    python -m benchmarks env_step
 
-Prints how many times as fast as CartPole-v1 through `gym.make` a step is: of a single
-environment in several situations, of a batch on one thread and on two; then how the
-time grows with the area of the map and with the number of rays, and what the map's
-arrays take for each pixel. All take turns in short bursts.
+A step of a single environment through `gym.make` in several situations, of a robot of
+a batch on one thread and on two; then how the time grows with the area of the map and
+with the number of rays, and what the map's arrays take for each pixel. All take turns
+in short bursts. Floor: an environment that does nothing, so that Gymnasium's wrappers
+are all that it costs.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import cycle, islice
 from typing import Any
 
@@ -20,14 +21,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tdac_envs  # noqa: F401 - registers the env
-from benchmarks.race import Burst, Row, compared, main, race
+from benchmarks.timing import Bench, Effort, compared, in_turn
 
 Actions = list[Any]
 Env = gym.Env[Any, Any]
+Burst = Callable[[], int]
+"""Makes some steps and returns how many."""
 
-REFERENCE = "CartPole-v1"
+FLOOR, REFERENCE = "nothing", "CartPole-v1"
 NAME = "TDAC-Map2D-v0"
+ROUNDS = 60
 STEPS = 300
+BATCH_STEPS = 8192
+"""Of all robots of a batch in a burst."""
 ROBOTS = 512
 AREAS = (0.1, 0.5, 2.0, 4.0, 16.0)
 RAYS = (1, 18, 72, 288)
@@ -110,13 +116,29 @@ def single_burst(env: Env, drive: Drive) -> Burst:
     return burst
 
 
-def reference() -> Burst:
-    """CartPole-v1 with random actions."""
-    return single_burst(gym.make(REFERENCE), random_driving)
+def yardsticks() -> dict[str, Burst]:
+    """The floor and the reference, with random actions."""
+    floor = gym.make(gym.envs.registration.EnvSpec("Floor-v0", entry_point=DoNothing))
+    return {
+        FLOOR: single_burst(floor, random_driving),
+        REFERENCE: single_burst(gym.make(REFERENCE), random_driving),
+    }
 
 
-def batch_burst(envs: Any, steps: int = 1) -> Burst:
+def raced(
+    title: str,
+    bursts: dict[str, Burst],
+    rounds: int,
+    notes: Mapping[str, str] | None = None,
+) -> Bench:
+    """A bench of steps, beside the yardsticks."""
+    times = in_turn({**yardsticks(), **bursts}, rounds)
+    return compared(title, times, FLOOR, REFERENCE, notes=notes)
+
+
+def batch_burst(envs: Any) -> Burst:
     """Some steps of a batch, which has been reset."""
+    steps = max(BATCH_STEPS // envs.num_envs, 1)
     envs.action_space.seed(0)
     script = cycle([envs.action_space.sample() for _ in range(8)])
 
@@ -128,36 +150,36 @@ def batch_burst(envs: Any, steps: int = 1) -> Burst:
     return burst
 
 
-def single_rows(rounds: int) -> list[Row]:
+def single(rounds: int) -> Bench:
     """A single environment through `gym.make`."""
-    floor = gym.make(gym.envs.registration.EnvSpec("Floor-v0", entry_point=DoNothing))
-    bursts = {REFERENCE: reference(), "nothing": single_burst(floor, random_driving)}
-    for name, (options, drive) in SINGLE.items():
-        bursts[name] = single_burst(gym.make(NAME, **options), drive)
-    return compared(race(bursts, rounds), REFERENCE)
+    bursts = {
+        name: single_burst(gym.make(NAME, **options), drive)
+        for name, (options, drive) in SINGLE.items()
+    }
+    return raced("A single TDAC-Map2D-v0", bursts, rounds)
 
 
-def batch_rows(rounds: int) -> list[Row]:
+def batches(rounds: int) -> Bench:
     """Batches, on one thread and on more."""
-    bursts = {REFERENCE: reference()}
+    bursts = {}
     for count in (64, 1024, 4096):
         for threads in (1, 2):
             envs = gym.make_vec(NAME, count, "vector_entry_point", threads=threads)
             envs.reset(seed=0)
             name = f"{count} robots, {threads} thread{'s' * (threads > 1)}"
-            bursts[name] = batch_burst(envs, max(1024 // count, 1))
-    return compared(race(bursts, rounds), REFERENCE)
+            bursts[name] = batch_burst(envs)
+    return raced("Batches of robots on the maze", bursts, rounds)
 
 
-def rays_rows(rounds: int) -> list[Row]:
+def more_rays(rounds: int) -> Bench:
     """A batch with few and with many rays, on one thread."""
-    bursts = {REFERENCE: reference()}
+    bursts = {}
     for count in RAYS:
         options = {"n_rays": count, "threads": 1, "field_of_view": 360.0}
         envs = gym.make_vec(NAME, 256, "vector_entry_point", **options)
         envs.reset(seed=0)
         bursts[f"{count} ray{'s' * (count > 1)}"] = batch_burst(envs)
-    return compared(race(bursts, rounds), REFERENCE)
+    return raced("256 robots with more rays, one thread", bursts, rounds)
 
 
 def pillars(pixels: float) -> NDArray[np.bool_]:
@@ -167,9 +189,9 @@ def pillars(pixels: float) -> NDArray[np.bool_]:
     return at[:, None] & at[None, :]
 
 
-def area_rows(rounds: int) -> list[Row]:
+def larger_maps(rounds: int) -> Bench:
     """Robots all over a map, and one that stays in its corner, as the map grows."""
-    bursts, memory = {REFERENCE: reference()}, []
+    bursts, notes = {}, {}
     for area in AREAS:
         cells = pillars(area)
         last = len(cells) - 40.0 - (len(cells) - 40.0) % 96 + 16.0
@@ -180,13 +202,14 @@ def area_rows(rounds: int) -> list[Row]:
             "on_collision": "block",
         }
         one = gym.make(NAME, **options)
+        task = one.unwrapped.nominal  # type: ignore[attr-defined]
         bursts[f"{area:g} MPix, alone"] = single_burst(one, random_driving)
+        notes[f"{area:g} MPix, alone"] = f"{bytes_of(task):.1f} bytes a pixel"
         envs = gym.make_vec(NAME, ROBOTS, "vector_entry_point", threads=1, **options)
         scatter(envs, len(cells))
         bursts[f"{area:g} MPix, all over"] = batch_burst(envs)
-        task = one.unwrapped.nominal  # type: ignore[attr-defined]
-        memory.append(Row(f"{area:g} MPix, memory", bytes_of(task), "bytes a pixel"))
-    return compared(race(bursts, rounds), REFERENCE) + memory
+    title = f"Larger maps: one robot alone, and {ROBOTS} all over, one thread"
+    return raced(title, bursts, rounds, notes)
 
 
 def scatter(envs: Any, side: int) -> None:
@@ -207,13 +230,8 @@ def bytes_of(task: Any) -> float:
     return float(sum(array.nbytes for array in arrays) / world.grid.cells.size)
 
 
-BENCHES: dict[str, Callable[[int], list[Row]]] = {
-    "A single environment": single_rows,
-    "Batches of robots on the maze": batch_rows,
-    "256 robots with more rays, one thread": rays_rows,
-    f"Larger maps: one robot alone, and {ROBOTS} all over, one thread": area_rows,
-}
-
-
-if __name__ == "__main__":
-    main("benchmarks.env_step", __doc__, BENCHES, REFERENCE)
+def benches(effort: Effort) -> list[Bench]:
+    """One bench a table."""
+    tables = (single, batches, more_rays, larger_maps)
+    rounds = effort.rounds_of(ROUNDS)
+    return [table(rounds) for table in tables[: 2 if effort.quick else None]]

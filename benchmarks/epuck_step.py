@@ -1,30 +1,30 @@
 """Steps of TDAC-EPuck-v0 next to CartPole-v1: alone, in batches, in larger worlds.
 
-    python -m benchmarks.epuck_step [--rounds N] [--json]
+    python -m benchmarks epuck_step
 
-Prints how many times as fast as CartPole-v1 through `gym.make` a step is: of a single
-environment in several situations, of a batch on one thread and on two, and as the
-number of solid parts of a world grows. All take turns in short bursts.
+A step of a single environment through `gym.make` in several situations, of a robot of
+a batch on one thread and on two, and as the number of solid parts of a world grows. All
+take turns in short bursts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
 from benchmarks.env_step import (
-    REFERENCE,
+    ROUNDS,
+    Burst,
     Drive,
     Env,
     batch_burst,
+    raced,
     random_driving,
-    reference,
     single_burst,
 )
-from benchmarks.race import Burst, Row, compared, main, race
+from benchmarks.timing import Bench, Effort
 from tdac_envs import World
 from tdac_envs.footprint import Rectangle
 from tdac_envs.world import EPuck, Obstacle, Part
@@ -70,31 +70,32 @@ SINGLE: dict[str, tuple[dict[str, Any], Drive]] = {
 }
 
 
-def single_rows(rounds: int) -> list[Row]:
+def single(rounds: int) -> Bench:
     """A single environment through `gym.make`."""
-    bursts: dict[str, Burst] = {REFERENCE: reference()}
-    for name, (options, drive) in SINGLE.items():
-        bursts[name] = single_burst(gym.make(NAME, **options), drive)
-    return compared(race(bursts, rounds), REFERENCE)
+    bursts = {
+        name: single_burst(gym.make(NAME, **options), drive)
+        for name, (options, drive) in SINGLE.items()
+    }
+    return raced("A single TDAC-EPuck-v0", bursts, rounds)
 
 
-def batch_rows(rounds: int) -> list[Row]:
+def batches(rounds: int) -> Bench:
     """Batches, on one thread and on more."""
-    bursts: dict[str, Burst] = {REFERENCE: reference()}
+    bursts = {}
     for world in ("arena", "maze"):
         for count in (1024, 4096):
             for threads in THREADS:
                 name = f"{world}, {count} robots, {threads} thread{'s' * (threads > 1)}"
                 bursts[name] = batch(count, world=world, threads=threads)
-    return compared(race(bursts, rounds), REFERENCE)
+    return raced("Batches of e-pucks", bursts, rounds)
 
 
-def parts_rows(rounds: int) -> list[Row]:
+def more_things(rounds: int) -> Bench:
     """A batch on one thread, among more and more posts, 20 cm apart."""
-    bursts: dict[str, Burst] = {REFERENCE: reference()}
-    for count in PARTS:
-        bursts[f"{count} posts"] = batch(1024, world=posts(count), threads=1)
-    return compared(race(bursts, rounds), REFERENCE)
+    bursts = {
+        f"{count} posts": batch(1024, world=posts(count), threads=1) for count in PARTS
+    }
+    return raced("1024 e-pucks among more things, one thread", bursts, rounds)
 
 
 def batch(count: int, **options: Any) -> Burst:
@@ -118,12 +119,8 @@ def posts(count: int) -> World:
     return World((start,), goal, obstacles=tuple(obstacles))
 
 
-BENCHES: dict[str, Callable[[int], list[Row]]] = {
-    "A single environment": single_rows,
-    "Batches of robots": batch_rows,
-    "1024 robots among more things, one thread": parts_rows,
-}
-
-
-if __name__ == "__main__":
-    main("benchmarks.epuck_step", __doc__, BENCHES, REFERENCE)
+def benches(effort: Effort) -> list[Bench]:
+    """One bench a table."""
+    tables = (single, batches, more_things)
+    rounds = effort.rounds_of(ROUNDS)
+    return [table(rounds) for table in tables[: 1 if effort.quick else None]]

@@ -1,7 +1,10 @@
 """Other simulators of the same kind, stepped where they are installed.
 
+    python -m benchmarks peers
+
 ir-sim: one differential-drive robot with a lidar of 18 beams among three shapes. VMAS:
-its scenario "navigation" with one agent and 18 rays, as a batch.
+its scenario "navigation" with one agent and 18 rays, as a batch. Beside them, ours with
+18 rays, alone and in a batch of as many.
 """
 
 from __future__ import annotations
@@ -12,9 +15,19 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
-from benchmarks.race import Burst
+from benchmarks.env_step import (
+    NAME,
+    ROUNDS,
+    Burst,
+    batch_burst,
+    raced,
+    random_driving,
+    single_burst,
+)
+from benchmarks.timing import Bench, Effort
 
 BATCH = 1024
 STEPS = 50
@@ -32,6 +45,18 @@ obstacle:
   - {shape: {name: rectangle, length: 1.5, width: 1.2}, state: [6, 2, 0.5]}
   - {shape: {name: rectangle, length: 1.0, width: 2.0}, state: [3, 7, 0]}
 """
+
+
+def benches(effort: Effort) -> list[Bench]:
+    """One bench."""
+    batch = gym.make_vec(NAME, BATCH, "vector_entry_point")
+    batch.reset(seed=0)
+    bursts = {
+        f"{NAME}, random": single_burst(gym.make(NAME), random_driving),
+        f"{NAME}, {BATCH} robots": batch_burst(batch),
+        **dict(steppers()),
+    }
+    return [raced("Other simulators", bursts, effort.rounds_of(ROUNDS // 3))]
 
 
 def steppers() -> Iterator[tuple[str, Burst]]:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -23,7 +23,7 @@ import numpy as np
 from skimage.graph import MCP_Geometric
 
 from benchmarks.preprocessing import floor_plan
-from benchmarks.timing import Bench, Call, compared, in_turn, row_of
+from benchmarks.timing import Bench, Call, Effort, compared, in_turn
 from tdac_envs.grid import BoolGrid
 from tdac_envs.map_files import read_movingai
 from tdac_envs.plan import distance_field, path_length, plan_path
@@ -45,11 +45,12 @@ class Trip:
     length: float
 
 
-def benches(quick: bool = False, maps: Path | None = None) -> list[Bench]:
+def benches(effort: Effort, maps: Path | None = None) -> list[Bench]:
     """One bench a map."""
-    rounds = 1 if quick else 3
+    rounds = effort.rounds_of(3)
     return [
-        _on_map(name, free, trips, rounds) for name, free, trips in _maps(quick, maps)
+        _on_map(name, free, trips, rounds)
+        for name, free, trips in _maps(effort.quick, maps)
     ]
 
 
@@ -92,16 +93,10 @@ def _on_map(name: str, free: BoolGrid, trips: list[Trip], rounds: int) -> Bench:
     timed = trips[:: max(len(trips) // TIMED, 1)][:TIMED]
     taken: dict[str, list[float]] = {FLOOR: [], OURS: [], THEIRS: []}
     for trip in timed:
-        for row in in_turn(_searches(free, trip), rounds):
-            taken[row.case].append(row.fastest)
-    rows = [row_of(case, seconds) for case, seconds in taken.items()]
-    pairs = zip(taken[THEIRS], taken[OURS], strict=True)
-    faster = float(np.median([theirs / ours for theirs, ours in pairs]))
-    right = f"{len(trips) - wrong} of {len(trips)} optimal"
-    note = f"{right}; in the median {faster:.1f} x as fast"
-    bench = compared(f"Planning, {name}", rows, FLOOR, THEIRS)
-    noted = [replace(r, note=note if r.case == OURS else "") for r in bench.rows]
-    return replace(bench, rows=noted)
+        for case, seconds in in_turn(_searches(free, trip), rounds).items():
+            taken[case].append(min(seconds))
+    notes = {OURS: f"{len(trips) - wrong} of {len(trips)} optimal"}
+    return compared(f"Planning, {name}", taken, FLOOR, THEIRS, notes=notes)
 
 
 def _optimal(free: BoolGrid, trip: Trip) -> bool:

@@ -11,14 +11,15 @@ map sizes; n log n is what it is compared with.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import statistics
+from collections.abc import Mapping
 from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.timing import Bench, Call, Row, compared, in_turn
+from benchmarks.timing import Bench, Call, Effort, compared, in_turn
 from tdac_envs.preprocessing import preprocess
 
 Picture = NDArray[np.uint8]
@@ -34,13 +35,13 @@ FLOOR, PLAIN = "one distance transform", "OpenCV + scikit-image, 40 candidates"
 PAPER, DEFAULT = 'preset="paper"', "default preset"
 
 
-def benches(quick: bool = False) -> list[Bench]:
+def benches(effort: Effort) -> list[Bench]:
     """One bench for each size, and one for the growth."""
-    sizes = {0.1: None} if quick else SIZES
-    rounds = 1 if quick else 5
+    sizes: Mapping[float, float | None] = {0.1: None} if effort.quick else SIZES
+    rounds = effort.rounds_of(5)
     found = [_at_size(size, limit, rounds) for size, limit in sizes.items()]
-    growth = GROWTH[:2] if quick else GROWTH
-    return [*found, _growth(growth, rounds)]
+    growth = GROWTH[:2] if effort.quick else GROWTH
+    return [*found, _growth(growth, effort.rounds_of(3))]
 
 
 def floor_plan(megapixels: float, seed: int = 0) -> Drawn:
@@ -105,25 +106,23 @@ def cases(drawn: Drawn) -> dict[str, Call]:
 def _at_size(megapixels: float, limit: float | None, rounds: int) -> Bench:
     every = cases(floor_plan(megapixels))
     slow = {PLAIN: every.pop(PLAIN)}
-    rows = [*in_turn(every, rounds), *in_turn(slow, 1)]
+    times = {**in_turn(every, rounds), **in_turn(slow, 1)}
     title = f"Preprocessing, {megapixels:g} MPix"
     limits = {PAPER: limit, DEFAULT: 3 * limit} if limit else {}
-    return compared(title, rows, FLOOR, PLAIN, limits)
+    return compared(title, times, FLOOR, PLAIN, limits)
 
 
 def _growth(sizes: tuple[float, ...], rounds: int) -> Bench:
     """The paper's grid over map sizes; each row's note is against n log n."""
-    rows: list[Row] = []
+    times: dict[str, list[float]] = {}
+    notes: dict[str, str] = {}
+    first = f"{sizes[0]:g} MPix"
     for size in sizes:
         picture, start, goal = floor_plan(size)
         call = partial(preprocess, picture, start, goal, RADIUS, preset="paper")
-        (row,) = in_turn({f"{size:g} MPix": call}, max(rounds - 2, 1))
-        rows.append(row)
-    cost = [size * math.log(1e6 * size) for size in sizes]
-    bench = compared('Growth of preset="paper"', rows, rows[0].case, rows[0].case)
-    noted = [
-        replace(row, note=f"{row.per_floor / (n / cost[0]):.2f} x n log n")
-        for row, n in zip(bench.rows, cost, strict=True)
-        if row.per_floor is not None
-    ]
-    return replace(bench, rows=noted)
+        name = f"{size:g} MPix"
+        times |= in_turn({name: call}, rounds)
+        grown = statistics.median(times[name]) / statistics.median(times[first])
+        cost = size * math.log(1e6 * size) / (sizes[0] * math.log(1e6 * sizes[0]))
+        notes[name] = f"{grown / cost:.2f} x n log n"
+    return compared('Growth of preset="paper"', times, first, first, notes=notes)

@@ -13,7 +13,7 @@ import subprocess
 import sys
 from functools import partial
 
-from benchmarks.timing import Bench, compared, in_turn
+from benchmarks.timing import Bench, Effort, compared, in_turn
 
 FLOOR, REFERENCE = "python -c pass", "import numpy"
 STEP = (
@@ -31,7 +31,7 @@ CASES = {
 LIMITS = {"tdac --help": 0.3}
 
 
-def benches(quick: bool = False) -> list[Bench]:
+def benches(effort: Effort) -> list[Bench]:
     """One bench."""
     calls = {
         name: partial(
@@ -39,5 +39,5 @@ def benches(quick: bool = False) -> list[Bench]:
         )
         for name, words in CASES.items()
     }
-    rows = in_turn(calls, 1 if quick else 7)
-    return [compared("Start-up, a process each", rows, FLOOR, REFERENCE, LIMITS)]
+    times = in_turn(calls, effort.rounds_of(7))
+    return [compared("Start-up, a process each", times, FLOOR, REFERENCE, LIMITS)]

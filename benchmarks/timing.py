@@ -9,16 +9,36 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-Call = Callable[[], object]
+Call = Callable[[], int | object]
+"""What is timed once; or so many times as it returns."""
+Times = Mapping[str, Sequence[float]]
+"""Of each case, s, one for each round."""
 
 WIDTH = 130
 """Columns of a table that is not cut."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How thoroughly a bench measures.
+
+    Attributes:
+        quick: Toy sizes, one round: shows that all of it works.
+        rounds: In each, all cases take their turn; by default what the bench needs.
+    """
+
+    quick: bool = False
+    rounds: int | None = None
+
+    def rounds_of(self, usual: int) -> int:
+        """The number of rounds, where a bench usually makes `usual`."""
+        return self.rounds or (1 if self.quick else usual)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +51,10 @@ class Row:
         fastest: Least time, s.
         slowest: Greatest time, s.
         per_floor: Times the least that the machine can do, as the bench says.
-        per_reference: Times what the bench compares with; None without that.
+        speed: How many times as fast as what the bench compares with: median over the
+            rounds, each compared with the other of the same round.
+        low: First quartile of these.
+        high: Third quartile of these.
         limit: Most seconds that it should take, or None.
         note: More figures, in words.
     """
@@ -40,8 +63,10 @@ class Row:
     seconds: float
     fastest: float
     slowest: float
-    per_floor: float | None = None
-    per_reference: float | None = None
+    per_floor: float
+    speed: float
+    low: float
+    high: float
     limit: float | None = None
     note: str = ""
 
@@ -63,71 +88,85 @@ class Bench:
     rows: Sequence[Row]
 
 
-def in_turn(cases: Mapping[str, Call], rounds: int) -> list[Row]:
+def in_turn(cases: Mapping[str, Call], rounds: int) -> dict[str, list[float]]:
     """Times each case `rounds` times, one after the other, after one call unseen."""
     taken: dict[str, list[float]] = {name: [] for name in cases}
     for number in range(rounds + 1):
         for name, call in cases.items():
             began = time.perf_counter()
-            call()
+            count = call()
+            seconds = time.perf_counter() - began
             if number:
-                taken[name].append(time.perf_counter() - began)
-    return [row_of(name, values) for name, values in taken.items()]
-
-
-def row_of(case: str, seconds: Sequence[float]) -> Row:
-    """Median and range of some times."""
-    return Row(case, statistics.median(seconds), min(seconds), max(seconds))
+                taken[name].append(seconds / (count if isinstance(count, int) else 1))
+    return taken
 
 
 def compared(
     title: str,
-    rows: Sequence[Row],
+    times: Times,
     floor: str,
     reference: str,
     limits: Mapping[str, float] | None = None,
+    notes: Mapping[str, str] | None = None,
 ) -> Bench:
-    """A bench with its ratios filled in.
-
-    The ratio of the fastest times, which other work disturbs least.
-    """
-    fastest = {row.case: row.fastest for row in rows}
-    return Bench(
-        title,
-        floor,
-        reference,
-        [
-            replace(
-                row,
-                per_floor=row.fastest / fastest[floor],
-                per_reference=row.fastest / fastest[reference],
-                limit=(limits or {}).get(row.case),
+    """A bench of these times, with the ratios to two of its cases."""
+    rows = []
+    for case, own in times.items():
+        low, speed, high = _quartiles(_ratios(times[reference], own))
+        _, per_floor, _ = _quartiles(_ratios(own, times[floor]))
+        rows.append(
+            Row(
+                case,
+                statistics.median(own),
+                min(own),
+                max(own),
+                per_floor,
+                speed,
+                low,
+                high,
+                (limits or {}).get(case),
+                (notes or {}).get(case, ""),
             )
-            for row in rows
-        ],
-    )
+        )
+    return Bench(title, floor, reference, rows)
+
+
+def _ratios(over: Sequence[float], under: Sequence[float]) -> list[float]:
+    """Of each round; of the medians where the cases had different rounds."""
+    if len(over) != len(under):
+        over, under = [statistics.median(over)], [statistics.median(under)]
+    return [a / b for a, b in zip(over, under, strict=True)]
+
+
+def _quartiles(ratios: Sequence[float]) -> tuple[float, float, float]:
+    if len(ratios) == 1:
+        return ratios[0], ratios[0], ratios[0]
+    low, middle, high = statistics.quantiles(ratios, method="inclusive")
+    return low, middle, high
 
 
 def show(bench: Bench) -> None:
     """Prints a bench as a table."""
     table = Table(title=bench.title, title_justify="left", box=SIMPLE)
-    for name in ("case", "median", "range", "× floor", "× reference", "limit", ""):
+    heads = ("case", "median", "range", "× floor", "speed", "quartiles", "limit", "")
+    for name in heads:
         figures = "left" if name in ("case", "") else "right"
         table.add_column(name, justify=figures, no_wrap=True)
     for row in bench.rows:
         table.add_row(
             row.case,
-            duration(row.seconds) if row.seconds else "",
+            duration(row.seconds),
             _range(row),
-            _ratio(row.per_floor),
-            _ratio(row.per_reference),
+            f"{row.per_floor:.3g}",
+            f"{row.speed:.3g}",
+            "" if row.low == row.high else f"{row.low:.3g} to {row.high:.3g}",
             _verdict(row),
             row.note,
         )
     console = Console()
     console.width = max(console.width, WIDTH)
     console.print(table)
-    console.print(f"floor: {bench.floor}; reference: {bench.reference}\n")
+    console.print(f"floor: {bench.floor}; speed: times that of {bench.reference}\n")
 
 
 def duration(seconds: float) -> str:
@@ -142,10 +181,6 @@ def _range(row: Row) -> str:
     if row.fastest == row.slowest:
         return ""
     return f"{duration(row.fastest)} to {duration(row.slowest)}"
-
-
-def _ratio(value: float | None) -> str:
-    return "" if value is None else f"{value:.3g}"
 
 
 def _verdict(row: Row) -> str:

@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.plain_grid import best_score
 from benchmarks.preprocessing import RADIUS, floor_plan
-from benchmarks.timing import Row, compared, duration, row_of
+from benchmarks.timing import Row, compared, duration, in_turn
 from tdac_envs.preprocessing import rank_candidates
 
 
@@ -18,13 +18,31 @@ def test_the_straightforward_version_does_the_same_work():
     )
 
 
-def test_ratios_are_of_the_fastest_times():
-    rows = [row_of("floor", [2.0, 1.0, 9.0]), row_of("mine", [3.0, 5.0])]
-    bench = compared("Title", rows, "floor", "floor", {"mine": 4.0})
+def test_ratios_are_between_times_of_the_same_round():
+    """What disturbs a round disturbs both of its times."""
+    times = {"floor": [1.0, 2.0, 50.0], "mine": [2.0, 4.0, 100.0]}
+    bench = compared("Title", times, "floor", "floor", {"mine": 4.0}, {"mine": "note"})
     assert bench.rows == [
-        Row("floor", 2.0, 1.0, 9.0, 1.0, 1.0),
-        Row("mine", 4.0, 3.0, 5.0, 3.0, 3.0, 4.0),
+        Row("floor", 2.0, 1.0, 50.0, 1.0, 1.0, 1.0, 1.0),
+        Row("mine", 4.0, 2.0, 100.0, 2.0, 0.5, 0.5, 0.5, 4.0, "note"),
     ]
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_cases_of_other_rounds_are_compared_by_their_medians(rounds):
+    """One round is enough."""
+    bench = compared("Title", {"a": [6.0] * rounds, "b": [3.0]}, "a", "a")
+    assert bench.rows[1] == Row("b", 3.0, 3.0, 3.0, 0.5, 2.0, 2.0, 2.0)
+
+
+def test_each_case_is_timed_in_each_round():
+    """A call that returns a number made so many steps; the first is not seen."""
+    calls = []
+    cases = {name: lambda n=name: calls.append(n) for name in "ab"}
+    times = in_turn({**cases, "many": lambda: 10**9}, 2)
+    assert calls == list("ababab")
+    assert [len(seconds) for seconds in times.values()] == [2, 2, 2]
+    assert max(times["many"]) < 1e-6
 
 
 @pytest.mark.parametrize(
