@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -10,12 +11,16 @@ from tdac_agent.report import Episode
 from tdac_agent.sandbox import Limits
 from tdac_agent.task_file import Profile
 
+SUITE: Final = "suite"
+"""The kind of a `Job`."""
+
 
 class Job(BaseModel):
-    """What the judge's process is to do; all paths are absolute."""
+    """A suite that the judge's process is to run; all paths are absolute."""
 
     model_config = ConfigDict(extra="forbid")
 
+    kind: Literal["suite"] = SUITE
     task: Path
     controller: Path
     suites: list[Path] = Field(description="In the order in which they run.")
@@ -25,6 +30,7 @@ class Job(BaseModel):
     seed: int
     limits: Limits
     out: Path
+    trajectories: Path | None = Field(description="Folder for them, if wanted.")
 
 
 class Findings(BaseModel):

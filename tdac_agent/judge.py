@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -34,7 +35,11 @@ WALL_SECONDS = 600.0
 
 Key = tuple[str, int | None, str]
 NOMINAL: Key = ("nominal", None, "policy")
-OWN_LOOP: Key = ("nominal", None, "run_episode")
+OWN_LOOPS: tuple[Key, ...] = (
+    ("nominal", None, "run_episode"),
+    ("nominal", 50, "run_episode"),
+    ("nominal", 20, "truncated run_episode"),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,9 +172,8 @@ class Judge:
 
     def begin(self, *, jitters: bool, own_loop: bool) -> None:
         """Starts the episodes that every suite asks for, beside its other tests."""
-        self._submit(NOMINAL)
-        if own_loop:
-            self._submit(OWN_LOOP)
+        for key in (NOMINAL, *(OWN_LOOPS if own_loop else ())):
+            self._submit(key)
         if jitters:
             for number in range(1, JITTERS + 1):
                 self._submit((f"jitter {number}", None, "policy"))
@@ -375,3 +379,8 @@ class Judge:
         """Gives a child its files, and has it import the controller."""
         child.furnish(self._workdir, self.source)
         child.load()
+
+
+def rollout_key(name: str, steps: int | None, drive: str) -> str:
+    """One episode's name in a report log."""
+    return json.dumps([name, steps, drive])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
+from types import TracebackType
 
 from tdac_agent.sandbox import (
     TIERS,
@@ -97,6 +98,17 @@ class Nursery:
             for zygote in self._zygotes + self._full:
                 zygote.close()
             self._zygotes, self._full = [], []
+
+    def __enter__(self) -> Nursery:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.kill()
 
     def kill(self) -> None:
         """Ends all; the processes that used it have ended, whatever they were at."""

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ class SeededJob(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
+    kind: Literal["seeds"] = "seeds"
     task: Path
     contender: Contender
     disturbance: Disturbance

@@ -4,21 +4,34 @@ from __future__ import annotations
 
 import ast
 import functools
-import json
+import os
 from collections.abc import Callable
 from importlib.util import decode_source
+from pathlib import Path
 from typing import Any
 
 import pytest
 from _pytest.runner import runtestprotocol
 
 from tdac_agent.contract import MAX_SOURCE_BYTES
-from tdac_agent.judge import Judge
+from tdac_agent.judge import Judge, rollout_key
 from tdac_agent.oracle import Oracle
 from tdac_agent.report import GROUPS, MAX_MESSAGE, group_of, id_of
 from tdac_agent.sandbox import ControllerError
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Rollout
+
+# Some of these cost a verification more than its tests do.
+UNUSED_PLUGINS = (
+    "cacheprovider",
+    "unraisableexception",
+    "threadexception",
+    "doctest",
+    "pastebin",
+    "stepwise",
+    "faulthandler",
+    "legacypath",
+)
 
 
 class Controller:
@@ -168,10 +181,26 @@ def _shorten(error: BaseException) -> None:
             error.msg = error.args[0]
 
 
-def rollout_key(name: str, steps: int | None, drive: str) -> str:
-    """One episode's name in a report log."""
-    return json.dumps([name, steps, drive])
-
-
 def _marker_names(item: pytest.Item) -> set[str]:
     return {marker.name for marker in item.iter_markers()}
+
+
+def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
+    """Runs pytest over folders that lie side by side, hermetic, with a report log."""
+    root = suites[0].parent
+    arguments = [
+        *(str(folder) for folder in suites),
+        f"--rootdir={root}",
+        f"--confcutdir={root}",
+        "-c",
+        os.devnull,
+        "-p",
+        "pytest_reportlog.plugin",
+        f"--report-log={log}",
+        *(word for name in UNUSED_PLUGINS for word in ("-p", f"no:{name}")),
+        "--import-mode=importlib",
+        "--assert=plain",
+        "--strict-markers",
+        "-q",
+    ]
+    pytest.main(arguments, plugins=plugins)

@@ -80,6 +80,7 @@ def verify(
             seed=seed,
             limits=limits or Limits(),
             out=folder / "results",
+            trajectories=None if out is None else folder / "trajectories",
         )
         _prepare(job, task, source, suites)
         with contextlib.ExitStack() as stack:
@@ -97,7 +98,7 @@ def verify(
             seconds=round(time.monotonic() - began, 3),
         )
         if out is not None:
-            _keep(report, task, job.out / "trajectories", out)
+            _keep(report, task, folder / "trajectories", out)
     return report
 
 
@@ -170,9 +171,11 @@ def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> No
     above one of them takes part.
     """
     job.out.mkdir()
+    if job.trajectories is not None:
+        job.trajectories.mkdir()
     write_workdir(job.task, task)
-    write_atomic(job.task / "task.yaml", portable_task_file(task))
-    write_atomic(job.controller, source)
+    (job.task / "task.yaml").write_text(portable_task_file(task), encoding="utf-8")
+    job.controller.write_bytes(source)
     for link, folder in zip(job.suites, suites.values(), strict=True):
         link.parent.mkdir(exist_ok=True)
         link.symlink_to(folder, target_is_directory=True)

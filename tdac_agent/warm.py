@@ -23,6 +23,7 @@ from pathlib import Path
 from types import TracebackType
 
 from tdac_agent.errors import Fault
+from tdac_agent.nursery import Nursery
 
 # What of Python's own environment the judge's process keeps: where things are. The
 # rest can change a verdict; PYTHONOPTIMIZE, for one, takes away every assertion.
@@ -43,11 +44,13 @@ class WarmJudge:
     Making one returns at once: it warms up while the caller goes on. A context manager.
 
     Args:
-        forked: Whether the server is forked from this process, which spares it the
-            importing; only for a process of one thread that has little else to do.
+        nursery: Where its children come from, started ahead and ended by the caller;
+            the server is then forked from this process, which should have a single
+            thread, and has all that this one has loaded. By default it is an
+            interpreter of its own.
     """
 
-    def __init__(self, *, forked: bool = False) -> None:
+    def __init__(self, nursery: Nursery | None = None) -> None:
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -61,8 +64,11 @@ class WarmJudge:
         )
         environment["TMPDIR"] = self._folder.name
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
-        start = _fork_server if forked else _start_server
-        self._server = start(environment, self._folder.name, self._log.fileno())
+        place = environment, self._folder.name, self._log.fileno()
+        if nursery is None:
+            self._server = _start_server(*place)
+        else:
+            self._server = _fork_server(nursery, *place)
 
     def run(
         self,
@@ -178,7 +184,9 @@ def _start_server(environment: dict[str, str], folder: str, log: int) -> _Server
     return _Server(process.stdin.fileno(), process.stdout.fileno(), end)
 
 
-def _fork_server(environment: dict[str, str], folder: str, log: int) -> _Server:
+def _fork_server(
+    nursery: Nursery, environment: dict[str, str], folder: str, log: int
+) -> _Server:
     """A server that has what this process has imported."""
     import cv2
 
@@ -200,7 +208,7 @@ def _fork_server(environment: dict[str, str], folder: str, log: int) -> _Server:
             os.chdir(folder)
             from tdac_agent.judging import serve
 
-            serve(rehearse=False)
+            serve(nursery)
         finally:
             os._exit(1)
     cv2.setNumThreads(threads)

@@ -17,6 +17,7 @@ from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation import evaluate, load_tasks
 from tdac_agent.evaluation_report import Evaluation
 from tdac_agent.files import write_atomic
+from tdac_agent.nursery import Nursery
 from tdac_agent.warm import WarmJudge
 from tdac_envs.errors import TaskError
 
@@ -61,10 +62,9 @@ def run(
         doing = escape(f"{task}: {policy}")
         bar.update(row, completed=count, successes=successes, doing=doing, refresh=True)
 
-    # The judge warms up while the maps are preprocessed.
-    with WarmJudge(forked=True) as judge:
+    with Nursery() as nursery:
         loaded = load_tasks(tasks)
-        with bar:
+        with WarmJudge(nursery) as judge, bar:
             found = evaluate(
                 policies,
                 loaded,

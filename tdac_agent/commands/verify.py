@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ from tdac_agent.commands.report_view import show_report
 from tdac_agent.commands.robust_flags import RobustFlags
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
+from tdac_agent.nursery import Nursery
 from tdac_agent.report import Report
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import Profile
@@ -37,6 +39,7 @@ def run(
     out: Path | None,
     as_json: bool,
     robust: RobustFlags,
+    nursery: Nursery,
 ) -> int:
     """Verifies and prints; returns the exit code."""
     check_tier(tier)
@@ -44,11 +47,12 @@ def run(
     if out is not None:
         _make_folder(out)
     console = Console(stderr=as_json, emoji=False)
-    # The judge warms up while the map is preprocessed.
-    with WarmJudge(forked=True) as judge:
-        with console.status("preparing the task …") as status:
-            file, task = controller_and_task(controller, flags)
-            status.update(f"verifying {file.name} on {task.name} …")
+    with console.status("preparing the task …"):
+        file, task = controller_and_task(controller, flags)
+    gc.freeze()
+    gc.enable()
+    with WarmJudge(nursery) as judge:
+        with console.status(f"verifying {file.name} on {task.name} …"):
             report = verify(
                 file,
                 task,

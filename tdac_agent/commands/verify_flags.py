@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -108,17 +109,22 @@ def verify(
     delay: Delay = None,
 ) -> None:
     """Test a controller in the sandbox; exit 0 only if every test passed."""
-    from tdac_agent.commands import verify as command
-    from tdac_agent.commands.robust_flags import DisturbanceFlags, RobustFlags
+    # What is loaded now stays: nothing of it is worth collecting.
+    gc.disable()
+    from tdac_agent.nursery import Nursery
 
-    spec = task_flags(
-        task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
-        metres, None,
-    )  # fmt: skip
-    disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
-    wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
-    raise typer.Exit(
-        command.run(
+    # Its first process starts while the rest is loaded.
+    with Nursery() as nursery:
+        from tdac_agent.commands import verify as command
+        from tdac_agent.commands.robust_flags import DisturbanceFlags, RobustFlags
+
+        spec = task_flags(
+            task, map_image, world, ignore, start, goal, heading, robot_radius, None,
+            snap, metres, None,
+        )  # fmt: skip
+        disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+        wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
+        code = command.run(
             controller,
             spec,
             profile,
@@ -130,5 +136,6 @@ def verify(
             out,
             as_json,
             wanted,
+            nursery,
         )
-    )
+    raise typer.Exit(code)
