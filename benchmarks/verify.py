@@ -36,7 +36,7 @@ from tdac_agent.privileged import (
     privileged_controller,
     reference_ways,
 )
-from tdac_agent.task import Task, portable_task_file, write_workdir
+from tdac_agent.task import Task, lay_out
 from tdac_agent.warm import WarmJudge
 
 READY_SECONDS = 2.0
@@ -82,7 +82,7 @@ def main() -> int:
         for controller, source in controllers.items():
             run = _run_folder(folder / controller, task, source)
             rows.append(_row(controller, "command line", _from_cli(run), options.runs))
-        with WarmJudge() as judge:
+        with WarmJudge(task=task) as judge:
             for controller, source in controllers.items():
                 measure = _from_loop(task, source, judge)
                 rows.append(_row(controller, "loop", measure, options.runs))
@@ -106,8 +106,7 @@ def _controllers(task: Task, folder: Path) -> dict[str, str]:
 
 
 def _run_folder(folder: Path, task: Task, source: str) -> Path:
-    write_workdir(folder, task)
-    (folder / "task.yaml").write_text(portable_task_file(task))
+    lay_out(task, folder)
     (folder / "controller.py").write_text(source)
     return folder
 

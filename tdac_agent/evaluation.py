@@ -31,8 +31,8 @@ from tdac_agent.overlay import Overlay, draw_overlay
 from tdac_agent.provenance import VERSIONED, sha256_of
 from tdac_agent.sandbox import Limits
 from tdac_agent.seeded import CALLS_FILE, POSES_FILE, SeededJob
-from tdac_agent.seeded_run import lay_out, run_seeds
-from tdac_agent.task import Task, load_task
+from tdac_agent.seeded_run import run_seeds
+from tdac_agent.task import Task, lay_out, load_task
 from tdac_agent.warm import WarmJudge
 from tdac_envs.arguments import one_of, whole_number
 from tdac_envs.errors import TaskError

@@ -27,6 +27,7 @@ from tdac_agent.crew import end_with_parent
 from tdac_agent.jobs import SUITE, Job
 from tdac_agent.nursery import Nursery
 from tdac_agent.suite_run import judge_suite
+from tdac_agent.task import load_task
 from tdac_envs.map2d import Map2DEnv
 
 # Exit codes of a worker; a suite may well end it with another one.
@@ -34,7 +35,7 @@ NO_JOB, DID_JOB = 77, 78
 DONE = b"done"
 
 
-def serve(nursery: Nursery | None = None) -> None:
+def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
     """Forks one worker after another until there is no further job.
 
     Says of each worker its process id, and that its job is done. The worker itself
@@ -43,12 +44,15 @@ def serve(nursery: Nursery | None = None) -> None:
     Args:
         nursery: Of the first worker, which has a job at once; by default there is
             time to load all that a job needs.
+        known: Folder of a task that is read ahead, where there is time.
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
     if nursery is None:
         nursery = Nursery()
         _rehearse()
+        if known is not None:
+            load_task(known)
         gc.collect()
     # What is alive now stays shared with the workers.
     gc.freeze()
@@ -152,4 +156,4 @@ def do_job(request: Path, nursery: Nursery, later: contextlib.ExitStack) -> None
 
 
 if __name__ == "__main__":
-    serve()
+    serve(known=Path(sys.argv[1]) if sys.argv[1:] else None)

@@ -14,9 +14,9 @@ from tdac_agent.provenance import origin
 from tdac_agent.robust_report import RobustProvenance, RobustReport, summarise
 from tdac_agent.sandbox import Limits
 from tdac_agent.seeded import SeededEpisode, SeededJob
-from tdac_agent.seeded_run import lay_out, run_seeds
+from tdac_agent.seeded_run import run_seeds
 from tdac_agent.sequential import MARGIN, SequentialTest
-from tdac_agent.task import Task
+from tdac_agent.task import Task, lay_out
 from tdac_agent.verification import read_source
 from tdac_agent.warm import WarmJudge
 from tdac_envs.arguments import whole_number

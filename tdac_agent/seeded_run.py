@@ -11,7 +11,6 @@ from typing import Generic, TypeVar
 from pydantic import ValidationError
 
 from tdac_agent.errors import Fault
-from tdac_agent.files import write_atomic
 from tdac_agent.measures import Measured
 from tdac_agent.seeded import (
     ENDING_FILE,
@@ -21,20 +20,12 @@ from tdac_agent.seeded import (
     SeededJob,
 )
 from tdac_agent.setting import Nominal
-from tdac_agent.task import Task, portable_task_file, write_workdir
 from tdac_agent.verification import DEADLINE_SECONDS
 from tdac_agent.warm import WarmJudge
 
 E = TypeVar("E", SeededEpisode, Measured)
 # A policy twice too slow is cut off, and a time-out is tried once more.
 SLOWEST = 4.0
-
-
-def lay_out(task: Task, folder: Path) -> Path:
-    """Writes a task for the judge, with all that a controller may read; its folder."""
-    write_workdir(folder, task)
-    write_atomic(folder / "task.yaml", portable_task_file(task))
-    return folder
 
 
 def run_seeds(

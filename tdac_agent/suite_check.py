@@ -68,7 +68,7 @@ def check_suite(
         raise ValueError(f"expected at least 1 repeat, got {repeats}")
     began = time.monotonic()
     with contextlib.ExitStack() as stack:
-        warm = judge or stack.enter_context(WarmJudge())
+        warm = judge or stack.enter_context(WarmJudge(task=task))
         ask = partial(
             verify,
             task=task,

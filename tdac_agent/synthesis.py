@@ -121,7 +121,7 @@ def synthesize(
 
 def _run(dialogue: Dialogue, given: str | None, *, paid: bool) -> Run:
     """The loop, and how it ended on record."""
-    recorder, judge = dialogue.calls.recorder, WarmJudge()
+    recorder, judge = dialogue.calls.recorder, WarmJudge(task=dialogue.task)
     try:
         if paid:
             _prove(dialogue.task, recorder, judge)

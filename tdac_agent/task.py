@@ -134,6 +134,13 @@ def write_workdir(folder: Path, task: Task) -> None:
     (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())
 
 
+def lay_out(task: Task, folder: Path) -> Path:
+    """Writes a task for the judge, with all that a controller may read; its folder."""
+    write_workdir(folder, task)
+    (folder / "task.yaml").write_text(portable_task_file(task), encoding="utf-8")
+    return folder
+
+
 def portable_task_file(task: Task, own_suite: str | None = None) -> str:
     """`task.yaml` for a run folder: the map or the world is the folder's own.
 

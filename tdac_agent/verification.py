@@ -15,7 +15,7 @@ from tdac_agent.provenance import origin, sha256_of, versions
 from tdac_agent.report import OWN, SHIPPED, Provenance, Report
 from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
 from tdac_agent.sandbox import Limits
-from tdac_agent.task import Task, portable_task_file, write_workdir
+from tdac_agent.task import Task, lay_out
 from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Trajectory, nominal_first
 from tdac_agent.warm import WarmJudge
@@ -173,8 +173,7 @@ def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> No
     job.out.mkdir()
     if job.trajectories is not None:
         job.trajectories.mkdir()
-    write_workdir(job.task, task)
-    (job.task / "task.yaml").write_text(portable_task_file(task), encoding="utf-8")
+    lay_out(task, job.task)
     job.controller.write_bytes(source)
     for link, folder in zip(job.suites, suites.values(), strict=True):
         link.parent.mkdir(exist_ok=True)

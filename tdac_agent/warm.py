@@ -24,6 +24,7 @@ from types import TracebackType
 
 from tdac_agent.errors import Fault
 from tdac_agent.nursery import Nursery
+from tdac_agent.task import Task, lay_out
 
 # What of Python's own environment the judge's process keeps: where things are. The
 # rest can change a verdict; PYTHONOPTIMIZE, for one, takes away every assertion.
@@ -48,9 +49,12 @@ class WarmJudge:
             the server is then forked from this process, which should have a single
             thread, and has all that this one has loaded. By default it is an
             interpreter of its own.
+        task: What most of its jobs will be about, which that one reads ahead.
     """
 
-    def __init__(self, nursery: Nursery | None = None) -> None:
+    def __init__(
+        self, nursery: Nursery | None = None, *, task: Task | None = None
+    ) -> None:
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -62,11 +66,13 @@ class WarmJudge:
         self._folder = tempfile.TemporaryDirectory(
             prefix="tdac-judge-", ignore_cleanup_errors=True
         )
+        self._path = Path(self._folder.name)
         environment["TMPDIR"] = self._folder.name
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
-        place = environment, self._folder.name, self._log.fileno()
+        place = environment, self._path, self._log.fileno()
         if nursery is None:
-            self._server = _start_server(*place)
+            known = [] if task is None else [lay_out(task, self._path / "task")]
+            self._server = _start_server(known, *place)
         else:
             self._server = _fork_server(nursery, *place)
 
@@ -163,10 +169,12 @@ class _Server:
     end: Callable[[], None]
 
 
-def _start_server(environment: dict[str, str], folder: str, log: int) -> _Server:
-    """A server in an interpreter of its own."""
+def _start_server(
+    known: list[Path], environment: dict[str, str], folder: Path, log: int
+) -> _Server:
+    """A server in an interpreter of its own, which reads a known task ahead."""
     process = subprocess.Popen(
-        [sys.executable, "-P", "-m", "tdac_agent.judging"],
+        [sys.executable, "-P", "-m", "tdac_agent.judging", *map(str, known)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=log,
@@ -185,7 +193,7 @@ def _start_server(environment: dict[str, str], folder: str, log: int) -> _Server
 
 
 def _fork_server(
-    nursery: Nursery, environment: dict[str, str], folder: str, log: int
+    nursery: Nursery, environment: dict[str, str], folder: Path, log: int
 ) -> _Server:
     """A server that has what this process has imported."""
     import cv2
