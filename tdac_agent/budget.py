@@ -56,43 +56,25 @@ class BudgetExhausted(Exception):
     Args:
         message: One line.
         limit: What it would go beyond.
-        before: That limit.
         taken: All that is reserved or spent without the call.
     """
 
-    def __init__(
-        self, message: str, limit: Limit, before: Amount, taken: Amount
-    ) -> None:
+    def __init__(self, message: str, limit: Limit, taken: Amount) -> None:
         super().__init__(message)
-        self.limit = limit
-        self.before = before
-        self.taken = taken
+        self._limit = limit
+        self._taken = taken
 
-    def flag(self, more: Amount) -> str:
-        """The flag with which so much more could be taken."""
-        return _flag(self.limit, self.taken.plus(more))
-
-    def way_on(self, next_one: Amount, rest: Amount) -> str:
-        """The flag to go on with: twice the limit, or what makes more sense.
+    def flag(self, most: Amount, times: int = 1) -> str:
+        """The flag with which more could be taken, cents rounded up.
 
         Args:
-            next_one: The least that is needed more.
-            rest: The most that the rest of the run can take.
+            most: What more.
+            times: So many times all that has been taken then.
         """
-        doubled = self.before.times(2)
-        least, most = self.taken.plus(next_one), self.taken.plus(rest)
-        wanted = Amount(
-            min(max(doubled.tokens, least.tokens), most.tokens),
-            min(max(doubled.usd, least.usd), most.usd),
-        )
-        return _flag(self.limit, wanted)
-
-
-def _flag(limit: Limit, amount: Amount) -> str:
-    """A flag with an amount, cents rounded up."""
-    if limit == "--max-tokens":
-        return f"{limit} {amount.tokens}"
-    return f"{limit} {math.ceil(100 * amount.usd - ROUNDING) / 100:.12g}"
+        total = self._taken.plus(most).times(times)
+        if self._limit == "--max-tokens":
+            return f"{self._limit} {total.tokens}"
+        return f"{self._limit} {math.ceil(100 * total.usd - ROUNDING) / 100:.12g}"
 
 
 class Budget:
@@ -161,7 +143,6 @@ class Budget:
                 f"{told_usd(taken.usd)} of {told_usd(cost)} are spent or reserved, and "
                 f"the next question may cost {told_usd(worst.usd)}",
                 "--max-cost",
-                Amount(usd=cost),
                 taken,
             )
         if tokens is not None and worst.tokens and both.tokens > tokens:
@@ -169,7 +150,6 @@ class Budget:
                 f"{taken.tokens} of {tokens} tokens are spent or reserved, and the "
                 f"next question may take {worst.tokens}",
                 "--max-tokens",
-                Amount(tokens),
                 taken,
             )
 

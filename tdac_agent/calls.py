@@ -45,15 +45,16 @@ class OutOfBudget(Exception):
 
     def __init__(self, error: BudgetExhausted, worst: Amount, rest: Rest) -> None:
         super().__init__(str(error))
-        self.way_on = error.way_on(worst, rest.most)
-        left = f"at most {rest.questions} questions are left"
-        if rest.questions == 1:
-            self.outlook = f"at most this one question is left: {error.flag(worst)}"
-        else:
-            self.outlook = (
-                f"{left}: {error.flag(worst)} is the least that lets the next one be "
-                f"put, {error.flag(rest.most)} all of them"
-            )
+        least, whole = error.flag(worst), error.flag(rest.most)
+        # Twice what is needed at least, so that it does not stop at once again.
+        twice = error.flag(worst, times=2)
+        self.way_on = min(twice, whole, key=lambda flag: float(flag.split()[1]))
+        self.outlook = (
+            f"at most {rest.questions} questions are left: {least} is enough for the "
+            f"next one, {whole} for all of them"
+            if rest.questions > 1
+            else f"at most this question is left: {least} is enough"
+        )
 
 
 @dataclass(frozen=True, slots=True)

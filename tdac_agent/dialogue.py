@@ -77,17 +77,17 @@ class Dialogue:
         """
         request = self._repair("summarise", source, report, self._at(k, j))
         evidence = tuple(failure.test for failure in report.failures)
-        for _ in range(MAX_ASKS):
+        for asked in range(1, MAX_ASKS + 1):
             reply = self.calls.ask(self.optimizer, request)
             try:
                 if reply.stop != "end":
                     raise RuleAnswerError(_ENDED[reply.stop])
                 operations = parse_operations(reply.text)
             except RuleAnswerError as error:
-                request = self._again(request, reply, str(error))
+                request = self._again(request, reply, str(error), asked)
                 continue
             self.book, notes = apply(self.book, operations, k, evidence)
-            self.calls.recorder.rules(k, self.book, notes)
+            self.calls.recorder.rules(k, self.book, notes or ("no change",))
             return
         self.calls.recorder.rules(k, self.book, ("no usable answer: the rules stay",))
 
@@ -141,18 +141,23 @@ class Dialogue:
         The question is then put with what was wrong; a truncated answer is never used,
         and asked for again with more room.
         """
-        notes: tuple[str, ...] = ()
-        for _ in range(MAX_ASKS):
+        problems = []
+        for asked in range(1, MAX_ASKS + 1):
             reply = self.calls.ask(model, request)
             answer = _file_in(reply)
             if answer.source is not None:
                 return Candidate(answer.source, reply.notes)
-            notes = (*reply.notes, f"not used: {answer.problem}")
-            request = self._again(request, reply, answer.problem)
-        return Candidate(None, notes)
+            problems.append(answer.problem)
+            request = self._again(request, reply, answer.problem, asked)
+        reasons = "; ".join(dict.fromkeys(problems))
+        why = f"none of {MAX_ASKS} answers could be used: {reasons}"
+        return Candidate(None, (*reply.notes, why))
 
-    def _again(self, request: Request, reply: Reply, problem: str) -> Request:
+    def _again(
+        self, request: Request, reply: Reply, problem: str, asked: int
+    ) -> Request:
         """The same question with what was wrong with the answer; the last word only."""
+        self.calls.recorder.unused(request, problem, asked, MAX_ASKS)
         first = request.prompt.partition(_AGAIN)[0]
         prompt = f"{first}{_AGAIN}{problem}. Give the whole answer anew.\n"
         room = request.max_tokens

@@ -10,6 +10,9 @@ from tdac_agent.report import GROUPS, Diagnosis, Failure, Report
 MAX_GROUPS = 3
 MAX_NAMES = 6
 MAX_MESSAGES = 4
+MAX_LINES = 9
+"""Of causes that are told in a line each."""
+LINE_CHARS = 200
 MAX_CHARS = 1500
 """Of one message, or of one account of an episode."""
 
@@ -38,7 +41,7 @@ class Group:
 
 
 def render_feedback(report: Report) -> str:
-    """The failures by root cause: three in full, the rest by the names of the tests.
+    """The failures by root cause: three in full, the others in a line each.
 
     Where several parts of the suite failed, each part has its say first. Episodes that
     are held out appear with pass or fail only.
@@ -47,9 +50,9 @@ def render_feedback(report: Report) -> str:
     chosen = choose(groups)
     parts = [f"{len(report.failures)} of {report.verdict.expected} tests failed."]
     parts += [f"{n}. {_tell(group)}" for n, group in enumerate(chosen, 1)]
-    named = [f for group in groups if group not in chosen for f in group.members]
-    if named:
-        parts.append(f"Also failed: {', '.join(failure.test for failure in named)}")
+    others = [group for group in groups if group not in chosen]
+    if others:
+        parts.append("\n".join(["Also failed:", *_lines(others, report)]))
     if not_run:
         parts.append(f"{not_run[0].message}: {_names(not_run)}")
     return "\n\n".join(parts)
@@ -124,6 +127,19 @@ def _tell(group: Group) -> str:
     return "\n   ".join(lines)
 
 
+def _lines(groups: list[Group], report: Report) -> list[str]:
+    """A line for each cause: tests, and what is wrong; the last ones by name only."""
+    unit = report.provenance.unit
+    lines = [
+        f"- {_names(list(group.members))}: {_short(group, unit, LINE_CHARS)}"
+        for group in groups[:MAX_LINES]
+    ]
+    rest = [failure for group in groups[MAX_LINES:] for failure in group.members]
+    return [" ".join(line.split()) for line in lines] + (
+        [f"- and {', '.join(failure.test for failure in rest)}"] if rest else []
+    )
+
+
 def _first(texts: list[str]) -> list[str]:
     """The first of some texts, each bounded, and how many more there are."""
     more = len(texts) - MAX_MESSAGES
@@ -138,11 +154,11 @@ def _names(failures: list[Failure]) -> str:
     return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def _short(group: Group, unit: str) -> str:
+def _short(group: Group, unit: str, limit: int = 100) -> str:
     """A root cause with its figures, in some words."""
     first = group.members[0]
     if first.diagnosis is None or first.diagnosis.cause in ("error", "contract"):
-        return cut(first.message, 100)
+        return cut(first.message, limit)
     if group.held_out:
         return f"{len(group.members)} of the starts that are held out"
     return _figures(first.diagnosis, unit)

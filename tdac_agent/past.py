@@ -17,7 +17,10 @@ from tdac_agent.provider import Provider, Reply, Request, served_at
 
 KEY_SCHEMA = 1
 # What is the same when the same loop runs again; calls and processes are told apart.
-REPEATED = ("prove.start", "prove.end", "verify.start", "verify.end", "rules")
+REPEATED = (
+    *("prove.start", "prove.end", "verify.start", "verify.end"),
+    *("call.unused", "rules"),
+)
 _REPLY = TypeAdapter(Reply)
 _AMOUNT = TypeAdapter(Amount)
 _REPORTED = (

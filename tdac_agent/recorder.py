@@ -105,7 +105,7 @@ class Recorder:
             "run.resume",
             task=self.run.task,
             learner=self.run.learner,
-            answers=len(past.replies),
+            answers=Counter(str(one.get("kind")) for one in past.replies.values()),
             unanswered=len(past.open),
             lost_usd=past.lost_usd,
             **facts,
@@ -175,6 +175,12 @@ class Recorder:
         }
         self.event("call.reply", **record)
         self._count(request, reply, cost)
+
+    def unused(self, request: Request, problem: str, asked: int, most: int) -> None:
+        """Keeps why an answer could not be used, and how often it was asked for."""
+        _, k, j = request.sample
+        facts = {"kind": request.kind, "k": k, "j": j, "problem": problem}
+        self.event("call.unused", **facts, asked=asked, most=most)
 
     def recall(self, request: Request, key: str) -> Reply | None:
         """The answer on record to this very question, if there is one."""

@@ -156,8 +156,9 @@ def _edit(book: RuleBook, wanted: Edit, k: int) -> tuple[RuleBook, str]:
     if double is not None:
         return book, f"not edited: {_says(double)}"
     edits = (*rule.edits, f"k={k}: was {rule.text!r}")
-    fields = {"text": wanted.text, "edits": edits, "tried": 0, "cured": 0, "worse": 0}
-    return book.change(rule.id, **fields), f"edited {rule.id}: {wanted.text}"
+    anew = {"tried": 0, "cured": 0, "passes": (), "worse": 0}
+    book = book.change(rule.id, text=wanted.text, edits=edits, **anew)
+    return book, f"edited {rule.id}: {wanted.text}"
 
 
 def _drop(book: RuleBook, wanted: Drop, k: int) -> tuple[RuleBook, str]:

@@ -41,7 +41,10 @@ class RepairRule(_Record):
     evidence: tuple[str, ...] = Field(description="Tests that had failed.")
     edits: tuple[str, ...] = Field((), description="`k=3: was ...`, oldest first.")
     tried: int = Field(0, description="First candidates written under it.")
-    cured: int = Field(0, description="Of these, those that passed its evidence.")
+    cured: int = Field(0, description="Of these, those that passed all its evidence.")
+    passes: tuple[int, ...] = Field(
+        (), description="How often they passed each test of its evidence, in its order."
+    )
     worse: int = Field(0, description="Those that failed more tests than before it.")
     status: Status = "in force"
     ended: int | None = Field(None, description="Iteration k of its end.")
@@ -52,7 +55,29 @@ class RepairRule(_Record):
         """What came of it, for people and models."""
         if not self.tried:
             return "not tried yet"
-        return f"cured {self.cured} of {self.tried}, worse in {self.worse}"
+        passes = self.passes_each
+        always = sum(count == self.tried for count in passes)
+        now_and_then = sum(0 < count < self.tried for count in passes)
+        told = f"cured {always} of {len(passes)} test{'s' * (len(passes) != 1)}"
+        if self.tried > 1:
+            told += f" in {self.tried} tries"
+        if now_and_then:
+            told += f", {now_and_then} more in some of them"
+        if self.worse:
+            told += "; more tests failed than before"
+            told += f" in {self.worse} of them" if self.tried > 1 else ""
+        return told
+
+    @property
+    def passes_each(self) -> tuple[int, ...]:
+        """How often each test of its evidence passed, in the order of the evidence."""
+        # A record that does not tell the tests apart tells how often all of them did.
+        return self.passes or (self.cured,) * len(self.evidence)
+
+    @property
+    def benefit(self) -> float:
+        """What it did good, tests by their share, less how often it did harm."""
+        return sum(self.passes_each) / max(1, len(self.evidence)) - self.worse
 
     @property
     def in_force(self) -> bool:
@@ -62,9 +87,7 @@ class RepairRule(_Record):
     @property
     def rejected(self) -> bool:
         """Whether it may not come back: it was dropped, or did more harm than good."""
-        return self.status == "dropped" or (
-            not self.in_force and self.cured < self.worse
-        )
+        return self.status == "dropped" or (not self.in_force and self.benefit < 0)
 
 
 class RuleBook(_Record):
@@ -123,7 +146,7 @@ class RuleBook(_Record):
             rules = book.in_force
             # What was just learnt has had no chance yet.
             old = [rule for rule in rules if rule.born < newest] or rules
-            worst = min(old, key=lambda rule: rule.cured - rule.worse)
+            worst = min(old, key=lambda rule: rule.benefit)
             reason = f"{worst.effect_told}; no room for more rules"
             book = book.change(worst.id, status="made room", ended=k, reason=reason)
         return book
@@ -137,11 +160,13 @@ class RuleBook(_Record):
         """
         book, now = self, set(failed)
         for rule in self.in_force:
-            cured = not now.intersection(rule.evidence)
+            passed = [test not in now for test in rule.evidence]
+            each = zip(rule.passes_each, passed, strict=True)
             book = book.change(
                 rule.id,
                 tried=rule.tried + 1,
-                cured=rule.cured + cured,
+                cured=rule.cured + all(passed),
+                passes=tuple(count + one for count, one in each),
                 worse=rule.worse + (len(now) > before),
             )
         return book

@@ -10,6 +10,13 @@ from rich.markup import escape
 from rich.spinner import Spinner
 
 from tdac_agent.budget import told_usd
+from tdac_agent.commands.run_view import told_tests
+
+_ANSWERS = (
+    ("generate", "controller", "controllers"),
+    ("edit", "edit", "edits"),
+    ("summarise", "about the rules", "about the rules"),
+)
 
 
 class Progress:
@@ -58,6 +65,8 @@ class Progress:
         elif kind == "call.reply":
             for note in record["notes"]:
                 self._console.print(f"  [dim]{at}  {escape(note)}[/]")
+        elif kind == "call.unused":
+            self._print_unused(at, record)
         elif kind == "rules":
             for note in record["notes"]:
                 self._console.print(f"  [dim]k={record['k']}  rules: {escape(note)}[/]")
@@ -71,8 +80,7 @@ class Progress:
         for note in record["notes"]:
             self._console.print(f"[yellow]note: {escape(note)}[/]", soft_wrap=True)
         if record["event"] == "run.resume":
-            answers = record["answers"]
-            known = f"{answers} answer{'' if answers == 1 else 's'} on record"
+            known = _known(record["answers"])
             self._console.print(f"going on: {known}{_open(record)}", soft_wrap=True)
 
     def _print_fault(self, at: str, record: dict[str, Any]) -> None:
@@ -81,20 +89,35 @@ class Progress:
         told = f"{record['fault']} fault: {record['reason']}; {then}"
         self._console.print(f"  [yellow]{at}  {escape(told)}[/]")
 
+    def _print_unused(self, at: str, record: dict[str, Any]) -> None:
+        asked, most = record["asked"], record["most"]
+        then = "asking again" if asked < most else "given up"
+        told = f"answer {asked} of {most} cannot be used: {record['problem']}; {then}"
+        self._console.print(f"  [yellow]{at}  {escape(told)}[/]")
+
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         if record["passed"]:
             self._console.print(f"[green]✔ {at}  all tests passed[/]")
         elif not record["valid"]:
-            self._console.print(f"[yellow]– {at}  no code in the answer[/]")
+            why = escape("; ".join(record["notes"][-1:]))
+            self._console.print(f"[yellow]– {at}  {why}[/]")
         elif record["unchanged"]:
             self._console.print(f"[yellow]= {at}  the same code as before[/]")
         else:
             failed = record["failed_tests"]
-            names = ", ".join(name.partition("::")[2] for name in failed[:3])
-            more = f" and {len(failed) - 3} more" if len(failed) > 3 else ""
-            self._console.print(
-                f"[red]✘ {at}  {len(failed)} failed:[/] {escape(names)}{more}"
-            )
+            names = escape(told_tests(failed, 3))
+            self._console.print(f"[red]✘ {at}  {len(failed)} failed:[/] {names}")
+
+
+def _known(answers: dict[str, int]) -> str:
+    """How many answers are on record, and what they are."""
+    total, parts = sum(answers.values()), []
+    for kind, one, more in _ANSWERS:
+        count = answers.get(kind, 0)
+        if count:
+            parts.append(f"{count} {one if count == 1 else more}")
+    about = f" ({', '.join(parts)})" if parts else ""
+    return f"{total} answer{'' if total == 1 else 's'} on record{about}"
 
 
 def _open(record: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from tdac_agent.commands.run_view import told_tests
 from tdac_agent.records import load_rules, load_run
 from tdac_agent.rules import RepairRule, RuleBook
 
@@ -24,7 +25,8 @@ def run(folder: Path, as_json: bool) -> int:
     console = Console(emoji=False)
     title = f"{record.task}: rules by {record.optimizer}, {record.status}"
     if book.rules:
-        console.print(_table(book, title))
+        console.print(f"[bold]{escape(title)}[/]\n")
+        console.print(_lives(book))
     else:
         console.print(
             f"{escape(title)}: no rules, since no iteration failed as a whole"
@@ -32,35 +34,36 @@ def run(folder: Path, as_json: bool) -> int:
     return 0
 
 
-def _table(book: RuleBook, title: str) -> Table:
-    table = Table(
-        title=escape(title), title_justify="left", expand=True, show_lines=True
-    )
-    widths = {"text": 3, "evidence": 2, "effect": 1, "state": 1}
-    for name in ("rule", "text", "scope", "born", "evidence", "effect", "state"):
-        table.add_column(name, overflow="fold", ratio=widths.get(name))
+def _lives(book: RuleBook) -> Table:
+    """A paragraph for each rule: its text, then what became of it."""
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    grid.add_column(no_wrap=True, style="bold")
+    grid.add_column(overflow="fold")
     for rule in book.rules:
-        table.add_row(
-            rule.id,
-            escape("\n".join([rule.text, *rule.edits])),
-            rule.scope,
-            f"k={rule.born}",
-            escape(_evidence(rule)),
-            rule.effect_told,
-            _state(rule),
-        )
-    return table
+        state = f"[{_COLOURS[rule.status]}]{_state(rule)}[/]"
+        lines = [
+            f"[bold]{escape(rule.text)}[/]",
+            *(f"[dim]{escape(edit)}[/]" for edit in rule.edits),
+            f"{state} · {rule.scope} · since k={rule.born}",
+            f"from: {escape(told_tests(rule.evidence, 4))}",
+            f"effect: {escape(_effect(rule))}",
+            "",
+        ]
+        grid.add_row(rule.id, "\n".join(lines))
+    return grid
 
 
-def _evidence(rule: RepairRule) -> str:
-    names = [test.rpartition("::")[2] for test in rule.evidence]
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+def _effect(rule: RepairRule) -> str:
+    """What came of it; of several tests, those that it cured by name."""
+    pairs = zip(rule.evidence, rule.passes_each, strict=True)
+    cured = [test for test, count in pairs if rule.tried and count == rule.tried]
+    if not 0 < len(cured) < len(rule.evidence):
+        return rule.effect_told
+    return f"{rule.effect_told} ({told_tests(cured, 4)})"
 
 
 def _state(rule: RepairRule) -> str:
-    told = f"[{_COLOURS[rule.status]}]{rule.status}[/]"
     if rule.in_force:
-        return told
-    return f"{told} in k={rule.ended}" + (
-        f": {escape(rule.reason)}" if rule.reason else ""
-    )
+        return rule.status
+    why = f": {rule.reason}" if rule.reason else ""
+    return escape(f"{rule.status} in k={rule.ended}{why}")

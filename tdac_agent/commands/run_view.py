@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.markup import escape
@@ -69,10 +70,21 @@ def _attempts(run: Run) -> Table:
     table.add_column("result")
     table.add_column("failed tests")
     for attempt in run.attempts:
-        names = [name.partition("::")[2] for name in attempt.failed_tests]
-        shown = ", ".join(names[:4]) + (" …" if len(names) > 4 else "")
-        table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(shown))
+        told = told_tests(attempt.failed_tests, 4) or _why_invalid(attempt)
+        table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(told))
     return table
+
+
+def told_tests(tests: Sequence[str], most: int) -> str:
+    """The names of some tests, and how many more there are."""
+    names = [name.rpartition("::")[2] for name in tests]
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def _why_invalid(attempt: Attempt) -> str:
+    """Of an answer without code, the last reason; its notes end with it."""
+    return "" if attempt.valid else "; ".join(attempt.notes[-1:])
 
 
 def _result(attempt: Attempt) -> str:

@@ -18,6 +18,8 @@ from tdac_agent.commands.run_view import way_on
 from tdac_agent.errors import RunError
 from tdac_agent.records import JOURNAL, RUN_FILE, load_run, status_now
 
+WIDE = 100
+"""Characters, with which there is room for all columns."""
 _COLOURS = {
     "verified": "green",
     "not verified": "red",
@@ -41,7 +43,7 @@ def run(folder: Path, as_json: bool) -> int:
         return 0
     console = Console(emoji=False)
     if rows:
-        console.print(_table(rows))
+        console.print(_table(rows, console.width))
         for row in rows:
             if row["status"] == "unreadable":
                 told = f"[red]{escape(row['run'])}: {escape(row['reason'])}[/]"
@@ -99,29 +101,37 @@ def _age(row: dict[str, Any]) -> tuple[str, str]:
     return row.get("started", ""), row["run"]
 
 
-def _table(rows: list[dict[str, Any]]) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("run", "task", "learner"):
-        table.add_column(name, overflow="fold")
+def _table(rows: list[dict[str, Any]], width: int) -> Table:
+    """A line for each run: a long learner is cut, a narrow table has fewer columns."""
+    wide = width >= WIDE
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    table.add_column("run", no_wrap=True)
+    if wide:
+        table.add_column("task", no_wrap=True)
+    table.add_column("learner", overflow="ellipsis", min_width=8)
     table.add_column("status", no_wrap=True)
     for name in ("k", "tokens", "cost"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("started", no_wrap=True)
+    if wide:
+        table.add_column("started", no_wrap=True)
     for row in rows:
         status = row["status"]
+        task, started = row.get("task", ""), _when(row.get("started", ""))
         table.add_row(
             escape(row["run"]),
-            escape(row.get("task", "")),
-            escape(row.get("learner", "")),
+            *([escape(task)] if wide else []),
+            # One word, so that it is not wrapped where it is cut.
+            escape(row.get("learner", "").replace(" ", "\N{NO-BREAK SPACE}")),
             f"[{_COLOURS.get(status, 'yellow')}]{status}[/]",
             *_figures(row),
+            *([started] if wide else []),
         )
     return table
 
 
 def _figures(row: dict[str, Any]) -> list[str]:
     if "k" not in row:
-        return []
+        return ["", "", ""]
     tokens = row["tokens_in"] + row["tokens_out"]
     cost = "unknown" if row["cost"] is None else told_usd(row["cost"])
     asked = tokens or row["cost"] != 0.0
@@ -129,7 +139,6 @@ def _figures(row: dict[str, Any]) -> list[str]:
         f"{row['k']}/{row['iterations']}",
         str(tokens) if tokens else "–",
         cost if asked else "–",
-        _when(row["started"]),
     ]
 
 

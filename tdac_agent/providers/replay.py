@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,7 @@ def make(words: str, options: Options) -> Replay:
         raise ProviderError(f"cannot replay: {error}") from error
     except OSError as error:
         raise ProviderError(f"cannot replay {folder}: {error.strerror}") from error
-    return Replay(words, folder, records)
+    return Replay(words, folder, records, reworded=folder == DEMO)
 
 
 class Replay:
@@ -47,13 +48,23 @@ class Replay:
         words: What the user calls the run.
         folder: Of the run.
         journal: Its records.
+        reworded: Whether what follows on the task, as how failures are told, may be
+            worded otherwise by now; it is noted where it is.
     """
 
     paid = False
 
-    def __init__(self, words: str, folder: Path, journal: list[JournalRecord]) -> None:
+    def __init__(
+        self,
+        words: str,
+        folder: Path,
+        journal: list[JournalRecord],
+        *,
+        reworded: bool = False,
+    ) -> None:
         self.name = f"replay:{words}"
         self._folder = folder
+        self._reworded = reworded
         self._replies = [r for r in journal if r.get("event") == "call.reply"]
 
     def complete(self, request: Request) -> Reply:
@@ -64,7 +75,8 @@ class Replay:
         at = f"{request.kind} k={k} j={j}"
         try:
             prompt, answer = _files(self._folder, place, number + 1)
-            _compare(prompt.read_text("utf-8"), request.prompt, f"{at} in {prompt}")
+            where = f"{at} in {prompt}"
+            notes = self._compare(prompt.read_text("utf-8"), request, where)
             text = answer.read_bytes().decode("utf-8", "surrogatepass")
             record = [r for r in self._replies if _place(r) == place][number]
         except (OSError, IndexError):
@@ -77,8 +89,31 @@ class Replay:
         if reply is None:
             raise PermanentFault(f"the journal of {self._folder} is damaged at {at}")
         return replace(
-            reply, tokens_in=0, tokens_out=0, tokens_cached=0, tokens_written=0
+            reply,
+            tokens_in=0,
+            tokens_out=0,
+            tokens_cached=0,
+            tokens_written=0,
+            notes=(*reply.notes, *notes),
         )
+
+    def _compare(self, recorded: str, request: Request, where: str) -> tuple[str, ...]:
+        """Refuses an answer to another question, or notes how it is another one.
+
+        Raises:
+            PermanentFault: It names the first line that differs.
+        """
+        asked, stable = request.prompt, request.stable
+        if recorded == asked:
+            return ()
+        pairs = zip(recorded.split("\n"), asked.split("\n"), strict=False)
+        same = sum(
+            1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
+        )
+        line = f"line {same + 1} differs"
+        if self._reworded and recorded[:stable] == asked[:stable]:
+            return (f"recorded when this question was worded otherwise: {line}",)
+        raise PermanentFault(f"another question than {where}: {line}")
 
 
 def _files(folder: Path, place: Place, number: int) -> tuple[Path, Path]:
@@ -87,23 +122,6 @@ def _files(folder: Path, place: Place, number: int) -> tuple[Path, Path]:
     calls = folder / "iterations" / f"k{k:02d}" / f"j{j}"
     suffix = "" if number == 1 else f"-{number}"
     return calls / f"{kind}.prompt{suffix}.md", calls / f"{kind}.reply{suffix}.md"
-
-
-def _compare(recorded: str, asked: str, where: str) -> None:
-    """Refuses an answer to another question.
-
-    Raises:
-        PermanentFault: It names the first line that differs.
-    """
-    if recorded == asked:
-        return
-    pairs = zip(recorded.split("\n"), asked.split("\n"), strict=False)
-    same = 0
-    for old, new in pairs:
-        if old != new:
-            break
-        same += 1
-    raise PermanentFault(f"another question than {where}: line {same + 1} differs")
 
 
 def _place(record: JournalRecord) -> tuple[Any, Any, Any]:

@@ -3,10 +3,15 @@
 import json
 
 import pytest
+from small import write_small_task
 
 from tdac_agent.cli import main
+from tdac_agent.errors import Fault
+from tdac_agent.journal import read_records
 from tdac_agent.providers.replay import DEMO
 from tdac_agent.records import load_run
+from tdac_agent.synthesis import synthesize
+from tdac_agent.task import load_task
 
 
 @pytest.fixture
@@ -32,7 +37,29 @@ def test_the_demo_is_the_recorded_run_with_live_tests(
     assert places == [(a.k, a.j, a.passed) for a in recorded.attempts]
     failed = [tuple(a["failed_tests"]) for a in run["attempts"]]
     assert failed == [a.failed_tests for a in recorded.attempts]
-    assert (tmp_path / "runs" / "demo-1" / "controller.py").is_file()
+    again = tmp_path / "runs" / "demo-1"
+    assert (again / "controller.py").is_file()
+    replies = [r for r in read_records(again / "journal.jsonl") if "blob" in r]
+    for reply in replies:
+        reworded = any("worded otherwise" in note for note in reply["notes"])
+        assert reworded == (question(again, reply) != question(DEMO, reply))
+        # A new controller was asked for in the very same words.
+        assert not (reworded and reply["kind"] == "generate")
+
+
+def question(folder, reply):
+    """The prompt that was answered."""
+    place = folder / "iterations" / f"k{reply['k']:02}" / f"j{reply['j']}"
+    return (place / f"{reply['kind']}.prompt.md").read_text()
+
+
+def test_it_answers_no_other_task(tmp_path):
+    """What is worded otherwise may be how failures are told, never the task."""
+    task = load_task(write_small_task(tmp_path / "task"))
+    with pytest.raises(
+        Fault, match=r"another question than generate k=1 j=0 in .*line"
+    ):
+        synthesize(task, "replay:demo", out=tmp_path / "run", prompt="underspecified")
 
 
 def test_it_shows_a_failure_and_its_repair(recorded):

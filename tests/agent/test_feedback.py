@@ -68,15 +68,37 @@ def test_at_most_three_causes_in_full(small_task, warm):
     ]
     driving = Failure(test="e::drive", group="end to end", message="it hit a wall")
     text = render_feedback(report_with(report, *failures, driving))
-    assert "it hit a wall" in text
-    assert "reason 1." in text
-    assert "reason 2." not in text
+    full, _, lines = text.partition("Also failed:\n")
+    assert "it hit a wall" in full
+    assert "reason 1." in full
+    assert "reason 2." not in full
+    assert "- a::t4, a::t5: reason 2.\n" in lines
     text = render_feedback(report_with(report, *failures))
-    assert "a::t0, a::t1" in text
-    assert text.count("reason 0.") == 1
-    assert "reason 2." in text
-    assert "reason 3." not in text
-    assert text.endswith("Also failed: a::t6, a::t7, a::t8, a::t9")
+    assert "1. a::t0, a::t1\n   reason 0." in text
+    assert "3. a::t4, a::t5\n   reason 2." in text
+    assert text.endswith(
+        "Also failed:\n- a::t6, a::t7: reason 3.\n- a::t8, a::t9: reason 4."
+    )
+
+
+def test_every_cause_is_told(small_task, warm):
+    """Beside those in full each has a line of its own; of very many, the names."""
+    report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    failures = [
+        Failure(test=f"a::t{n}", group="unit", message=f"reason {n}\n{'y' * 999}.")
+        for n in range(8)
+    ]
+    text = render_feedback(report_with(report, *failures))
+    *_, last = text.partition("Also failed:\n")
+    lines = last.splitlines()
+    assert [line[:17] for line in lines] == [
+        f"- a::t{n}: reason {n}" for n in range(3, 8)
+    ]
+    assert all(len(line) < 300 for line in lines)
+    many = [Failure(test=f"b::t{n}", group="unit", message=f"{n}") for n in range(30)]
+    text = render_feedback(report_with(report, *many))
+    assert "\n- b::t11: 11\n" in text
+    assert text.endswith("\n- and " + ", ".join(f"b::t{n}" for n in range(12, 30)))
 
 
 SAME = {

@@ -313,7 +313,8 @@ def test_repair_prompts_tell_earlier_attempts_and_rules(small_task, warm):
     }
     for text in told.values():
         assert "## Earlier attempts, oldest first\n- k=1 j=0: 3\n" in text
-    line = "- R1 (task, since k=1; cured 0 of 1, worse in 1): slow down near walls\n"
+    effect = "cured 0 of 1 test; more tests failed than before"
+    line = f"- R1 (task, since k=1; {effect}): slow down near walls\n"
     assert line in told["summarise"]
     assert line not in told["edit"]
     assert "test_x" not in told["summarise"]

@@ -82,14 +82,20 @@ def test_rules_live_on(policy_task, good_source, tmp_path, out, tdac, monkeypatc
     assert f"- {SLOW} [R1]\n- Do not stand still. [R2]\n# ===" in blocks[2]
     assert "- Turn before the wall at x = 70. [R1]\n# ===" in blocks[4]
     assert len({prompt.partition(BEGIN)[0] for prompt in prompts}) == 1
-    assert "- R2 (environment, since k=1; cured 0 of 1, worse in 1): Do" in prompts[3]
+    first, second, third = (attempt.failed_tests for attempt in run.attempts)
+    cured = len(set(first) - set(second))
+    told = f"cured {cured} of {len(first)} tests; more tests failed than before"
+    assert f"- R2 (environment, since k=1; {told}): Do" in prompts[3]
+    assert third == ()
     assert "k=1 j=0: " in prompts[3].partition("## Earlier attempts")[2]
     check_life(out)
-    monkeypatch.setenv("COLUMNS", "800")  # so that no cell is wrapped
+    monkeypatch.setenv("COLUMNS", "80")
     code_, shown, _ = tdac("rules", out)
     assert code_ == 0
-    for words in ("R2", "dropped", "it drives now", f"was '{SLOW}'", "cured 1 of 1"):
+    every = f"cured {len(first)} of {len(first)} tests"
+    for words in ("R2", "dropped in k=2: it drives now", f"was '{SLOW}'", every):
         assert words in " ".join(shown.split()), shown
+    assert max(map(len, shown.splitlines())) <= 80
     code_, shown, _ = tdac("rules", out, "--json")
     assert json.loads(shown) == load_rules(out).model_dump(mode="json")
 

@@ -209,13 +209,33 @@ def test_a_rule_remembers_its_life():
 
 
 def test_what_came_of_a_rule():
-    """A first candidate cures it or not, and may be worse than what was before."""
-    book, _ = after([add("one")])
+    """Each test of its evidence counts for itself; more failures than before, too."""
+    book, _ = apply(RuleBook(), [add("one")], 1, ("a", "b", "c"))
     assert book.rules[0].effect_told == "not tried yet"
-    book = book.observed(("test_0", "test_2"), 5).observed(("test_1", "test_2"), 1)
+    book = book.observed(("b", "c"), 3)
     rule = book.rules[0]
-    assert (rule.tried, rule.cured, rule.worse) == (2, 1, 1)
-    assert rule.effect_told == "cured 1 of 2, worse in 1"
+    assert (rule.tried, rule.cured, rule.worse, rule.passes) == (1, 0, 0, (1, 0, 0))
+    assert rule.effect_told == "cured 1 of 3 tests"
+    book = book.observed(("c", "d", "e"), 2)
+    rule = book.rules[0]
+    assert (rule.tried, rule.cured, rule.worse, rule.passes) == (2, 0, 1, (2, 1, 0))
+    assert rule.effect_told == (
+        "cured 1 of 3 tests in 2 tries, 1 more in some of them; more tests failed than "
+        "before in 1 of them"
+    )
+    assert book.observed((), 2).rules[0].cured == 1
+    edited, _ = apply(book, [edit("R1", "other")], 4, ("c",))
+    assert edited.rules[0].effect_told == "not tried yet"
+
+
+def test_a_record_that_does_not_tell_tests_apart():
+    """An older one counts all tests of a rule as one; it goes on from there."""
+    book, _ = apply(RuleBook(), [add("one")], 1, ("a", "b"))
+    old = book.change("R1", tried=2, cured=1)
+    assert old.rules[0].effect_told == (
+        "cured 0 of 2 tests in 2 tries, 2 more in some of them"
+    )
+    assert old.observed(("b",), 9).rules[0].passes == (2, 1)
 
 
 def test_the_worst_rules_make_room():
@@ -224,7 +244,7 @@ def test_the_worst_rules_make_room():
     book = RuleBook()
     for k in range(1, 9):
         book, _ = apply(book, [add(f"rule {k} {long}")], k, ("t",))
-    book = book.change("R3", cured=1, tried=1).change("R5", worse=2, tried=2)
+    book = book.change("R3", passes=(1,), tried=1).change("R5", worse=2, tried=2)
     left = []
     for k in range(9, 20):
         before = book.in_force

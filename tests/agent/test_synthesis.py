@@ -129,7 +129,13 @@ def test_invalid_answers_are_asked_again_twice(policy_task, good_source, out, re
         (1, False, False),
         (2, True, True),
     ]
-    assert run.attempts[0].notes[-1].startswith("not used: it")
+    why = run.attempts[0].notes[-1]
+    assert why.startswith("none of 3 answers could be used: it")
+    unused = [r for r in journal(out) if r["event"] == "call.unused"]
+    assert [(r["k"], r["j"], r["asked"], r["most"]) for r in unused] == [
+        (1, 0, asked, 3) for asked in (1, 2, 3)
+    ]
+    assert all(why.endswith(r["problem"]) for r in unused)
     first = out / "iterations" / "k01" / "j0"
     replies = sorted(path.name for path in first.glob("generate.reply*"))
     assert replies == [
