@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from tdac_agent.commands import (
+    campaign_flags,
     check_suite_flags,
     doctor_flags,
     evaluate_flags,
@@ -49,6 +50,7 @@ for part in (
     play_flags,
     evaluate_flags,
     train_flags,
+    campaign_flags,
     check_suite_flags,
     runs_flags,
     webots_flags,

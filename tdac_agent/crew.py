@@ -18,7 +18,7 @@ from typing import Any, Generic, ParamSpec, TypeVar
 
 from tdac_agent.errors import Fault
 
-SIZE = max(2, os.cpu_count() or 2)
+SIZE = max(2, len(os.sched_getaffinity(0)))
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -52,6 +52,7 @@ def foresee(
     *,
     iterations: int = 20,
     patience: int = 1,
+    refine: bool = True,
     template: PromptTemplate = FULL,
     base_url: str | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
@@ -65,6 +66,7 @@ def foresee(
         prices: Of the models.
         iterations: K.
         patience: J.
+        refine: Whether failures become rules.
         template: Of the question for a new controller.
         base_url: Where the models are served, if not by the vendor.
         max_output: Tokens that an answer may have.
@@ -74,7 +76,8 @@ def foresee(
     """
     prompt = generate_prompt(task, (), template)
     tokens = estimate_tokens(prompt)
-    work, sizes = whole(iterations, patience), tokens_asked(tokens, max_output)
+    work = whole(iterations, patience, refine=refine)
+    sizes = tokens_asked(tokens, max_output)
     prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
     first, second = prices_of
     once = most = first_cost = None

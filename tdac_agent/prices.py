@@ -14,7 +14,7 @@ from tdac_agent.provider import Reply
 from tdac_envs.errors import TdacError
 
 SHIPPED = Path(__file__).parent / "prices.yaml"
-FREE = frozenset({"builtin", "replay"})
+FREE = frozenset({"builtin", "replay", "scripted"})
 """Providers that ask no model."""
 
 

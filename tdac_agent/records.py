@@ -16,6 +16,7 @@ from tdac_agent.rules import RuleBook
 Status = Literal[
     "running", "verified", "not verified", "interrupted", "fault", "budget"
 ]
+Setting = Literal["dual tier", "edit only", "prompt only", "best of N", "one shot"]
 RUN_FILE = "run.json"
 JOURNAL = "journal.jsonl"
 RULES_FILE = "rules.json"
@@ -65,6 +66,7 @@ class Run(BaseModel):
         {}, description="Address of each model's server that is not the vendor's."
     )
     prompt: str = Field("full", description="Template of the first question.")
+    refine: bool = Field(True, description="Whether failures become rules.")
     max_output: int = Field(0, description="Tokens that an answer may have.")
     index: int = Field(0, description="Of several runs of the same.")
     version: str = Field("", description="Of this program.")
@@ -98,6 +100,11 @@ class Run(BaseModel):
         return self.status in {"verified", "not verified"}
 
     @property
+    def setting(self) -> Setting:
+        """What of the loop was in use."""
+        return setting_of(self.iterations, self.patience, refine=self.refine)
+
+    @property
     def tokens(self) -> int:
         """In and out together."""
         return self.tokens_in + self.tokens_out
@@ -106,6 +113,19 @@ class Run(BaseModel):
     def controller(self) -> Path:
         """Path of the verified controller."""
         return self.folder / "controller.py"
+
+
+def setting_of(iterations: int, patience: int, *, refine: bool) -> Setting:
+    """The loop that K, J and the prompt's refinement make.
+
+    Both repairs are the paper's dual tier; with neither, a run draws one candidate
+    after the other until one passes.
+    """
+    if refine and iterations > 1:
+        return "dual tier" if patience else "prompt only"
+    if patience:
+        return "edit only"
+    return "one shot" if iterations == 1 else "best of N"
 
 
 def status_now(run: Run) -> str:

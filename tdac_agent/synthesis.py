@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from tdac_agent.beginning import account_of, describe, hold_folder, open_record
@@ -38,12 +38,14 @@ def synthesize(
     start_from: str | None = None,
     base_url: str | None = None,
     prompt: str = "full",
+    refine: bool = True,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
     max_tokens: int | None = None,
     budget: Budget | None = None,
     index: int = 0,
     retry: RetryPolicy | None = None,
+    judge: WarmJudge | None = None,
     on_event: Event | None = None,
 ) -> Run:
     """Writes, tests and repairs controllers until one is verified.
@@ -64,12 +66,15 @@ def synthesize(
         base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
         prompt: Template of the question for a new controller: `full`,
             `underspecified`, or a file (docs/prompts.md).
+        refine: Whether failures become rules of the prompt; without, each new
+            controller is asked for in the same words.
         max_output: Tokens that an answer may have; twice as many after a cut one.
         max_cost: USD that the run may spend; by default what it was begun with, or 2.
         max_tokens: That it may spend, in and out together; the same, or no limit.
         budget: Shared with other runs, in the place of these limits.
         index: Of several runs of the same, which keeps their samples apart.
         retry: How patiently a model is asked after faults.
+        judge: A warm one, for several runs one after the other; its own by default.
         on_event: Called with each journal record, if given.
 
     Returns:
@@ -96,6 +101,7 @@ def synthesize(
         start_from=start_from,
         iterations=iterations,
         patience=patience,
+        refine=refine,
         seed=seed,
     )
     account = account_of(models, run_there(out), max_cost, max_tokens, budget)
@@ -116,12 +122,15 @@ def synthesize(
             max_output,
         )
         dialogue = Dialogue(task, *models, calls, template=template)
-        return _run(dialogue, start_from, paid=any(model.paid for model in models))
+        paid = any(model.paid for model in models)
+        with ExitStack() as stack:
+            warm = judge or stack.enter_context(WarmJudge(task=task))
+            return _run(dialogue, start_from, warm, paid=paid)
 
 
-def _run(dialogue: Dialogue, given: str | None, *, paid: bool) -> Run:
+def _run(dialogue: Dialogue, given: str | None, judge: WarmJudge, *, paid: bool) -> Run:
     """The loop, and how it ended on record."""
-    recorder, judge = dialogue.calls.recorder, WarmJudge(task=dialogue.task)
+    recorder = dialogue.calls.recorder
     try:
         if paid:
             _prove(dialogue.task, recorder, judge)
@@ -137,8 +146,6 @@ def _run(dialogue: Dialogue, given: str | None, *, paid: bool) -> Run:
         with suppress(OSError):
             recorder.finish("fault", reason=str(error))
         raise
-    finally:
-        judge.close()
     return recorder.run
 
 
@@ -169,7 +176,7 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
             parent = source
             if j < run.patience:
                 candidate = dialogue.edit(k, j + 1, source, report)
-            else:
+            elif run.refine:
                 dialogue.summarise(k, j, source, report)
     recorder.finish("not verified")
 

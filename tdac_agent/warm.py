@@ -17,12 +17,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 from tdac_agent.errors import Fault
+from tdac_agent.locks import wait_for
 from tdac_agent.nursery import Nursery
 from tdac_agent.task import Task, lay_out
 
@@ -50,11 +51,18 @@ class WarmJudge:
             thread, and has all that this one has loaded. By default it is an
             interpreter of its own.
         task: What most of its jobs will be about, which that one reads ahead.
+        turn: File whose lock is held during a job, so that those who share it do one
+            after the other.
     """
 
     def __init__(
-        self, nursery: Nursery | None = None, *, task: Task | None = None
+        self,
+        nursery: Nursery | None = None,
+        *,
+        task: Task | None = None,
+        turn: Path | None = None,
     ) -> None:
+        self._turn = turn
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -92,6 +100,12 @@ class WarmJudge:
         Raises:
             Fault: The judge did not start, or the job took too long.
         """
+        with nullcontext() if self._turn is None else wait_for(self._turn):
+            self._run(request, seconds, meanwhile)
+
+    def _run(
+        self, request: Path, seconds: float, meanwhile: Callable[[], None] | None
+    ) -> None:
         worker = self._worker()
         try:
             os.write(self._server.requests, f"{request}\n".encode())

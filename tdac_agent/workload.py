@@ -35,19 +35,21 @@ class Rest(NamedTuple):
     most: Amount
 
 
-def whole(iterations: int, patience: int) -> Workload:
+def whole(iterations: int, patience: int, *, refine: bool = True) -> Workload:
     """The questions of a run in which nothing ever passes."""
-    return Workload(iterations, iterations * (patience + 1))
+    return Workload(iterations, iterations * (patience + refine))
 
 
-def from_here(request: Request, iterations: int, patience: int) -> Workload:
+def from_here(
+    request: Request, iterations: int, patience: int, *, refine: bool = True
+) -> Workload:
     """A question, and all that may come after it where nothing ever passes."""
     _, k, j = request.sample
-    later = whole(iterations - k, patience)
-    repairs = {"generate": patience + 1, "edit": patience - j + 2, "summarise": 1}
+    later = whole(iterations - k, patience, refine=refine)
+    left = {"generate": patience, "edit": patience - j + 1, "summarise": 0}
     return Workload(
         later.learner + (request.kind == "generate"),
-        later.optimizer + repairs[request.kind],
+        later.optimizer + left[request.kind] + refine,
     )
 
 
@@ -79,7 +81,7 @@ def rest_of(
         worst: That it may take.
         max_output: Tokens that an answer may have.
     """
-    left = from_here(request, run.iterations, run.patience)
+    left = from_here(request, run.iterations, run.patience, refine=run.refine)
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
     this = Workload(1, 0) if request.role == "learner" else Workload(0, 1)
     most = worst

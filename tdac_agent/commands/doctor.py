@@ -13,8 +13,12 @@ from dataclasses import asdict, dataclass
 from rich.console import Console
 from rich.markup import escape
 
+from tdac_agent.campaign.config import read_config
 from tdac_agent.commands.play import has_display
+from tdac_agent.lifecycle import model_warnings, retired
+from tdac_agent.providers.choice import OFFLINE
 from tdac_agent.sandbox import available_tiers
+from tdac_agent.shipped import shipped, shipped_names
 
 EXTRAS = {
     "human": "pygame",
@@ -46,7 +50,7 @@ class Check:
 
 def run(as_json: bool) -> int:
     """Tries everything and prints it; 3 where something needed does not work."""
-    checks = [*_sandbox(), _video(), _window(), *_extras(), *_keys()]
+    checks = [*_sandbox(), _video(), _window(), *_extras(), *_keys(), *_models()]
     if as_json:
         record = {
             "checks": [asdict(check) for check in checks],
@@ -112,6 +116,21 @@ def _keys() -> list[Check]:
     return checks
 
 
+def _models() -> list[Check]:
+    """Which models of the shipped campaigns are gone, or soon will be."""
+    checks = []
+    for name in shipped_names("*.yaml"):
+        models = read_config(shipped(name)).models
+        gone = retired(models)
+        notes = model_warnings(models)
+        if notes:
+            checks.append(Check(f"campaign {name}", not gone, "; ".join(notes)))
+        elif any(model.partition(":")[0] not in OFFLINE for model in models):
+            detail = "none of its models is known to end soon"
+            checks.append(Check(f"campaign {name}", True, detail))
+    return checks
+
+
 def _versions() -> dict[str, str]:
     versions = {name: importlib.metadata.version(name) for name in PACKAGES}
     return {"python": platform.python_version(), **versions}
@@ -123,6 +142,6 @@ def _show(checks: list[Check]) -> None:
         mark = "[green]✔[/]" if check.works else "[yellow]–[/]"
         if check.needed and not check.works:
             mark = "[red]✘[/]"
-        console.print(f"{mark} {check.name:<22} {escape(check.detail)}")
+        console.print(f"{mark} {check.name:<26} {escape(check.detail)}")
     versions = ", ".join(f"{name} {value}" for name, value in _versions().items())
     console.print(f"\n{versions}", highlight=False)

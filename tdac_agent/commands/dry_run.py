@@ -16,7 +16,14 @@ from tdac_agent.prompt import load_template
 from tdac_agent.providers.choice import Options, check_name, missing_before
 
 
-def run(flags: TaskFlags, models: dict[str, Any], k: int, j: int, as_json: bool) -> int:
+def run(
+    flags: TaskFlags,
+    models: dict[str, Any],
+    k: int,
+    j: int,
+    refine: bool,
+    as_json: bool,
+) -> int:
     """Prints the prompt, and nothing else, to stdout, the rest to stderr.
 
     Args:
@@ -25,6 +32,7 @@ def run(flags: TaskFlags, models: dict[str, Any], k: int, j: int, as_json: bool)
             `synthesize`.
         k: Iterations.
         j: Edits per iteration.
+        refine: Whether failures become rules.
         as_json: Whether to print the outlook.
     """
     learner = models["learner"]
@@ -44,6 +52,7 @@ def run(flags: TaskFlags, models: dict[str, Any], k: int, j: int, as_json: bool)
         prices,
         iterations=k,
         patience=j,
+        refine=refine,
         template=template,
         base_url=models["base_url"],
         max_output=models["max_output"],

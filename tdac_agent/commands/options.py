@@ -78,7 +78,8 @@ Learner = Annotated[
     typer.Option(
         metavar="MODEL",
         help="Who writes: `builtin` (a template, no model), `anthropic:MODEL`, "
-        "`openai:MODEL`, `command:PROGRAM`, `manual:DIR` or `replay:RUN`.",
+        "`openai:MODEL`, `command:PROGRAM`, `manual:DIR`, `replay:RUN` or "
+        "`scripted:SCRIPT`.",
         rich_help_panel=MODELS,
     ),
 ]

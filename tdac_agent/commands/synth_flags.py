@@ -81,6 +81,13 @@ def synth(
             help="What is asked: `full`, `underspecified`, or your own template file."
         ),
     ] = "full",
+    refine: Annotated[
+        bool,
+        typer.Option(
+            "--refine/--no-refine",
+            help="Turn failures into rules of the prompt, or leave it as it is.",
+        ),
+    ] = True,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -130,8 +137,9 @@ def synth(
     if dry_run:
         from tdac_agent.commands import dry_run as dry
 
-        raise typer.Exit(dry.run(spec, models, k, j, as_json))
-    wanted = {**models, **limits, "iterations": k, "patience": j, "seed": seed}
+        raise typer.Exit(dry.run(spec, models, k, j, refine, as_json))
+    loop = {"iterations": k, "patience": j, "refine": refine, "seed": seed}
+    wanted = {**models, **limits, **loop}
     raise typer.Exit(command.run(spec, wanted, out, from_, as_json))
 
 

@@ -19,6 +19,7 @@ RUN_COLUMNS = {
     "prompt": "Template of the first question.",
     "K": "Most iterations.",
     "J": "Edits per iteration.",
+    "setting": "What of the loop was in use, as in `tdac_agent.records.Setting`.",
     "seed": "Of the jittered starts, and of the run among those of a kind.",
     "status": "As in `run.json`.",
     "tau": "Iteration of the first success; missing where there was none.",
@@ -83,9 +84,12 @@ def load_frames(*folders: Path) -> Frames:
 
 def frames_of(runs: Iterable[Run]) -> Frames:
     """Frames of run records."""
-    kept = list(runs)
-    candidates = [_candidate(run, attempt) for run in kept for attempt in run.attempts]
-    return _frames([_row(run) for run in kept], candidates)
+    rows: list[Row] = []
+    candidates: list[Row] = []
+    for run in runs:
+        rows.append(_row(run))
+        candidates += [_candidate(run, attempt) for attempt in run.attempts]
+    return _frames(rows, candidates)
 
 
 def join_frames(*frames: Frames) -> Frames:
@@ -129,6 +133,7 @@ def _row(run: Run) -> Row:
         "prompt": run.prompt,
         "K": run.iterations,
         "J": run.patience,
+        "setting": run.setting,
         "seed": run.seed,
         "status": run.status,
         "tau": run.tau,

@@ -17,7 +17,7 @@ from tdac_agent.metrics.rates import (
     unbiased_success_rate,
 )
 
-KIND = ("learner", "optimizer", "task", "prompt")
+KIND = ("learner", "optimizer", "task", "prompt", "setting")
 
 
 def summarise(frames: Frames, by: Sequence[str] = KIND) -> pd.DataFrame:

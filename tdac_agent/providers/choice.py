@@ -22,11 +22,13 @@ OWN = {
     "command": "tdac_agent.providers.command:make",
     "manual": "tdac_agent.providers.manual:make",
     "replay": "tdac_agent.providers.replay:make",
+    "scripted": "tdac_agent.providers.scripted:make",
 }
 FORMS = (
-    "builtin, anthropic:MODEL, openai:MODEL, command:PROGRAM, manual:DIR, replay:RUN"
+    "builtin, anthropic:MODEL, openai:MODEL, command:PROGRAM, manual:DIR, replay:RUN, "
+    "scripted:SCRIPT"
 )
-OFFLINE = frozenset({"builtin", "command", "manual", "replay"})
+OFFLINE = frozenset({"builtin", "command", "manual", "replay", "scripted"})
 
 
 @dataclass(frozen=True, slots=True)

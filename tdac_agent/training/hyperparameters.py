@@ -10,13 +10,11 @@ from typing import Any, Literal
 import numpy as np
 import yaml
 
+from tdac_agent.shipped import shipped
 from tdac_envs.errors import TaskError
 from tdac_envs.wrappers import WRAPPERS
 
 Algo = Literal["ppo", "sac", "td3"]
-# In a wheel the files are beside this package's modules, in a clone at its top.
-_HERE = Path(__file__).parent.parent
-_FOLDERS = (_HERE / "configs" / "sb3", _HERE.parent / "configs" / "sb3")
 _LINEAR = "lin_"
 
 
@@ -41,8 +39,7 @@ class Hyperparameters:
 
 def config_file(algo: Algo) -> Path:
     """The file that is shipped for an algorithm."""
-    files = [folder / f"{algo}.yml" for folder in _FOLDERS]
-    return next((file for file in files if file.is_file()), files[0])
+    return shipped(f"sb3/{algo}.yml")
 
 
 def read_hyperparameters(file: Path, env: str) -> Hyperparameters:

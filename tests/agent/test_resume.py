@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from script import NO_RULES, STILL, Script, code
 from small import write_small_task
 
 from tdac_agent.errors import Fault, RunError
@@ -23,33 +24,6 @@ from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
-NO_RULES = Reply("```json\n[]\n```")
-
-
-def code(source, **reported):
-    return Reply(f"```python\n{source}```\n", **reported)
-
-
-class Script:
-    """A provider that gives prepared answers and remembers what it was asked."""
-
-    name = "script"
-    paid = False
-
-    def __init__(self, *answers):
-        self.answers = list(answers)
-        self.requests = []
-
-    def complete(self, request):
-        self.requests.append(request)
-        answer = self.answers.pop(0)
-        if isinstance(answer, BaseException):
-            raise answer
-        return answer
-
-    def asked(self):
-        return [(r.kind, *r.sample[1:]) for r in self.requests]
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,9 @@ import subprocess
 import sys
 
 import pytest
+import script
+from script import STILL as NOTHING
+from script import Script
 from small import write_small_task
 
 from tdac_agent.errors import Fault, ProviderError, RunError
@@ -18,32 +21,10 @@ from tdac_agent.task import load_task
 from tdac_agent.verification import verify
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
-NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 def code(source):
-    return Reply(f"Here it is:\n```python\n{source}```\n", tokens_in=10, tokens_out=5)
-
-
-class Script:
-    """A provider that gives prepared answers and remembers what it was asked."""
-
-    name = "script"
-    paid = False
-
-    def __init__(self, *answers):
-        self.answers = list(answers)
-        self.requests = []
-
-    def complete(self, request):
-        self.requests.append(request)
-        answer = self.answers.pop(0)
-        if isinstance(answer, BaseException):
-            raise answer
-        return answer
-
-    def asked(self):
-        return [(r.kind, *r.sample[1:]) for r in self.requests]
+    return script.code(source, tokens_in=10, tokens_out=5)
 
 
 @pytest.fixture
@@ -298,3 +279,34 @@ def test_a_run_folder_is_self_contained(tmp_path, good_source):
     assert process.returncode == 0, process.stderr
     assert "goal reached" in process.stdout or "reached" in process.stdout
     assert (moved / "controller.mp4").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("patience", "asked"),
+    [
+        (0, [("generate", 1, 0), ("generate", 2, 0)]),
+        (1, [("generate", 1, 0), ("edit", 1, 1), ("generate", 2, 0), ("edit", 2, 1)]),
+    ],
+)
+def test_without_refinement_the_prompt_stays(patience, asked, policy_task, out):
+    """No rules are asked for, each new controller is asked for in the same words."""
+    model = Script(*(code(f"{NOTHING}X = {n}\n") for n in range(4)))
+    run = synthesize(
+        policy_task, model, out=out, iterations=2, patience=patience, refine=False
+    )
+    assert model.asked() == asked
+    prompts = {r.prompt for r in model.requests if r.kind == "generate"}
+    assert len(prompts) == 1
+    assert (run.refine, run.status) == (False, "not verified")
+    assert run.setting == ("edit only" if patience else "best of N")
+    with pytest.raises(RunError, match="refinement of the prompt"):
+        synthesize(
+            policy_task, Script(), out=halted(out), iterations=2, patience=patience
+        )
+
+
+def halted(folder):
+    """The run as if its last process had been killed."""
+    record = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps(record | {"status": "running"}))
+    return folder

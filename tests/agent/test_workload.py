@@ -48,16 +48,18 @@ def run_of(learner, optimizer, iterations, patience):
     )
 
 
-@given(st.integers(1, 6), st.integers(0, 4))
-def test_the_questions_that_are_left(iterations, patience):
+@given(st.integers(1, 6), st.integers(0, 4), st.booleans())
+def test_the_questions_that_are_left(iterations, patience, refine):
     """From each question on, those that the loop would put; from the first, all."""
-    questions = list(all_questions(iterations, patience))
-    assert whole(iterations, patience).questions == len(questions)
+    every = all_questions(iterations, patience)
+    questions = [place for place in every if refine or place[0] != "summarise"]
+    assert whole(iterations, patience, refine=refine).questions == len(questions)
     for number, place in enumerate(questions):
         left = questions[number:]
         learner = sum(kind == "generate" for kind, _, _ in left)
         expected = (learner, len(left) - learner)
-        assert from_here(request(*place), iterations, patience) == expected
+        left_now = from_here(request(*place), iterations, patience, refine=refine)
+        assert left_now == expected
 
 
 names = st.sampled_from(list(TARIFFS))

@@ -1,0 +1,1 @@
+"""Campaigns: learners × optimizers × tasks × settings × R runs, resumable."""

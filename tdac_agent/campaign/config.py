@@ -1,0 +1,118 @@
+"""What a campaign is asked for: a YAML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from tdac_agent.errors import RunError
+from tdac_agent.provider import MAX_OUTPUT_TOKENS
+from tdac_agent.providers.choice import OFFLINE
+from tdac_agent.records import Setting
+from tdac_agent.shipped import shipped, shipped_names
+
+SAME = "same"
+"""As an optimizer: the learner itself."""
+Keep = Literal["all", "records"]
+
+
+class CampaignError(RunError):
+    """A campaign cannot be run as it was asked for."""
+
+
+class CampaignConfig(BaseModel):
+    """Contents of a campaign's file, schema 1."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    schema_version: Literal[1] = Field(1, alias="schema")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
+    about: str = ""
+    tasks: tuple[str, ...] = Field(
+        min_length=1, description="Bundled names, or files relative to this one."
+    )
+    learners: tuple[str, ...] = Field(min_length=1, description="As for --learner.")
+    optimizers: tuple[str, ...] = Field(
+        (SAME,), min_length=1, description="As for --optimizer; `same` as the learner."
+    )
+    settings: tuple[Setting, ...] = Field(("dual tier",), min_length=1)
+    prompts: tuple[str, ...] = Field(
+        ("full",), min_length=1, description="As for --prompt."
+    )
+    runs: int = Field(5, ge=1, description="R, of each kind.")
+    iterations: int = Field(20, ge=1, description="K of the settings that repair.")
+    patience: int = Field(1, ge=1, description="J of those that edit.")
+    samples: int | None = Field(
+        None,
+        ge=2,
+        description="N of `best of N`; by default as many answers as the dual tier "
+        "may have: K·(J + 2).",
+    )
+    seed: int = Field(0, ge=0, description="Of the first run; the next has the next.")
+    base_url: str | None = Field(None, description="As for --base-url.")
+    max_output: int = Field(MAX_OUTPUT_TOKENS, ge=1, description="As for --max-output.")
+    max_cost: float | None = Field(
+        None, ge=0, description="USD that all runs together may spend."
+    )
+    max_tokens: int | None = Field(None, ge=0, description="That all may spend.")
+    keep: Keep = Field(
+        "all", description="`records`: of a finished run only what the tables need."
+    )
+
+    @model_validator(mode="after")
+    def _usable(self) -> Self:
+        for name in ("tasks", "learners", "optimizers", "settings", "prompts"):
+            values = getattr(self, name)
+            again = {value for value in values if values.count(value) > 1}
+            if again:
+                raise ValueError(f"{name}: {again.pop()!r} is there twice")
+        if any(name.partition(":")[0] == "manual" for name in self.models):
+            raise ValueError("a manual: folder is for one run, not for a campaign")
+        online = sorted(n for n in self.models if n.partition(":")[0] not in OFFLINE)
+        if online and self.max_cost is None and self.max_tokens is None:
+            raise ValueError(
+                f"max_cost: say how many USD all runs together may spend on {online[0]}"
+            )
+        return self
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Names of all learners and optimizers."""
+        others = [name for name in self.optimizers if name != SAME]
+        return tuple(dict.fromkeys([*self.learners, *others]))
+
+
+def find_config(given: str) -> Path:
+    """The file that is meant: a path, or the name of a shipped one.
+
+    Raises:
+        CampaignError: There is none.
+    """
+    if Path(given).is_file():
+        return Path(given)
+    own = shipped(f"{given}.yaml")
+    if "/" not in given and own.is_file():
+        return own
+    known = ", ".join(name.removesuffix(".yaml") for name in shipped_names("*.yaml"))
+    raise CampaignError(f"no campaign {given!r}: expected a YAML file, or {known}")
+
+
+def read_config(file: Path) -> CampaignConfig:
+    """What a campaign's file says.
+
+    Raises:
+        CampaignError: It cannot be read, or has a wrong or unknown key.
+    """
+    try:
+        return CampaignConfig.model_validate(yaml.safe_load(file.read_text("utf-8")))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"])) or "campaign"
+        reason = first["msg"].removeprefix("Value error, ")
+        raise CampaignError(f"{file}: {place}: {reason}") from error
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise CampaignError(f"cannot read the campaign {file}: {reason}") from error

@@ -1,0 +1,131 @@
+"""Carries out a campaign: what is to be done, in which order, and when to stop."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tdac_agent.campaign.config import CampaignError
+from tdac_agent.campaign.executor import Ended, Executor, Update
+from tdac_agent.campaign.perform import Outcome, Terms, read_outcome
+from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
+from tdac_agent.campaign.progress import Progress
+from tdac_agent.files import write_atomic
+from tdac_agent.locks import hold
+from tdac_agent.prices import FREE
+
+CONFIG_FILE = "campaign.yaml"
+RUNS = "runs"
+Watch = Callable[[Update], None]
+
+
+@dataclass(slots=True)
+class _Queue:
+    """The runs that are left."""
+
+    progress: Progress
+    todo: deque[PlannedRun]
+    again: deque[tuple[PlannedRun, Outcome]] = field(default_factory=deque)
+    _second: set[str] = field(default_factory=set)
+
+    def next(self) -> PlannedRun | None:
+        """The next run; after all others, those that a fault ended, once more."""
+        while self.todo:
+            planned = self.todo.popleft()
+            if not (self.progress.exhausted and asks_models(planned)):
+                return planned
+        if not self.again:
+            return None
+        planned, outcome = self.again.popleft()
+        self.progress.take_back(planned, outcome)
+        return planned
+
+    def ended(self, update: Ended) -> None:
+        """Remembers a run that a fault has ended for the first time."""
+        name = update.planned.name
+        if update.outcome.status == "fault" and name not in self._second:
+            self._second.add(name)
+            self.again.append((update.planned, update.outcome))
+
+
+def look(plan: Plan, shard: Shard, runs: Path) -> tuple[Progress, list[PlannedRun]]:
+    """How far a campaign is, by its folder, and the runs that are left."""
+    progress, left = Progress.of(plan, shard), []
+    for planned in plan.all(shard):
+        known = read_outcome(planned.name, runs)
+        if known is not None and known.finished:
+            progress.had(planned, known)
+        else:
+            left.append(planned)
+    return progress, left
+
+
+def carry_out(
+    progress: Progress,
+    left: list[PlannedRun],
+    terms: Terms,
+    run: Executor,
+    watch: Watch,
+) -> None:
+    """Makes all runs that are left; one that fails stops no other.
+
+    Where the budget is exhausted, no run is begun that may ask a model.
+
+    Args:
+        progress: Kept up to date.
+        left: In their order.
+        terms: What all runs share.
+        run: The executor.
+        watch: Called with each update, after the progress was updated.
+    """
+    queue = _Queue(progress, deque(left))
+    with closing(run(terms, queue.next)) as updates:
+        for update in updates:
+            progress.update(update)
+            if isinstance(update, Ended):
+                queue.ended(update)
+            watch(update)
+
+
+def asks_models(planned: PlannedRun) -> bool:
+    """Whether a run may cost something."""
+    names = (planned.cell.learner, planned.cell.optimizer)
+    return not {name.partition(":")[0] for name in names} <= FREE
+
+
+@contextmanager
+def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
+    """Makes a campaign's folder, and keeps a second driver of the shard out of it.
+
+    Args:
+        out: The folder.
+        shard: Which part is carried out.
+        config: Text of the campaign's file, of which a copy is kept.
+
+    Raises:
+        CampaignError: It cannot be used.
+    """
+    lock = out / f".driver-{shard.i}-of-{shard.n}.lock"
+    with ExitStack() as stack:
+        try:
+            if out.is_dir() and any(out.iterdir()) and not (out / RUNS).is_dir():
+                reason = "is not empty; give another folder with --out"
+                raise CampaignError(f"{out} {reason}")
+            (out / RUNS).mkdir(parents=True, exist_ok=True)
+            mine = stack.enter_context(hold(lock))
+            if mine:
+                write_atomic(out / CONFIG_FILE, config)
+        except OSError as error:
+            raise CampaignError(f"cannot write to {out}: {error.strerror}") from error
+        if not mine:
+            raise CampaignError(f"another process is at work on {out}")
+        yield
+
+
+def foreign(plan: Plan, runs: Path) -> list[str]:
+    """Folders of runs that are not of the plan: of other files, tasks or versions."""
+    known = {cell.folder for cell in plan.cells}
+    return sorted(path.name for path in runs.iterdir() if path.name not in known)

@@ -1,0 +1,174 @@
+"""The executor `local`: worker processes of this machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Generator, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from tdac_agent.campaign.executor import Begun, Bereaved, Ended, Next, Told, Update
+from tdac_agent.campaign.perform import Outcome, Terms
+from tdac_agent.campaign.plan import PlannedRun
+
+ERRORS = "errors.log"
+FAREWELL_SECONDS = 15.0
+"""In which interrupted workers write down how far they came."""
+MOST_RUNS = 500
+"""Of one process, lest something grows in it."""
+CHUNK = 1 << 16
+ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "VECLIB_MAXIMUM")
+
+
+@dataclass(slots=True, eq=False)
+class _Worker:
+    """A worker process, and what it is at."""
+
+    process: subprocess.Popen[bytes]
+    planned: PlannedRun | None = None
+    runs: int = 0
+    _torn: bytes = b""
+
+    @property
+    def answers(self) -> IO[bytes]:
+        assert self.process.stdout is not None
+        return self.process.stdout
+
+    def begin(self, planned: PlannedRun) -> None:
+        """Hands over a run; that the process has died shows in its answers."""
+        assert self.process.stdin is not None
+        self.planned = planned
+        self.runs += 1
+        with suppress(BrokenPipeError):
+            self.process.stdin.write(planned.to_json().encode() + b"\n")
+            self.process.stdin.flush()
+
+    def messages(self) -> list[dict[str, Any]] | None:
+        """What it has said since; None where it has ended."""
+        raw = os.read(self.answers.fileno(), CHUNK)
+        *lines, self._torn = (self._torn + raw).split(b"\n")
+        return [json.loads(line) for line in lines] if raw else None
+
+    def end(self) -> None:
+        """Lets go of it; one that is idle ends by itself."""
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()
+        self.process.wait()
+        self.answers.close()
+
+
+@dataclass(slots=True)
+class _Pool:
+    """The workers of a campaign."""
+
+    terms: Terms
+    errors: IO[bytes]
+    selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
+
+    @property
+    def workers(self) -> list[_Worker]:
+        return [key.data for key in self.selector.get_map().values()]
+
+    @property
+    def busy(self) -> list[_Worker]:
+        return [worker for worker in self.workers if worker.planned is not None]
+
+    def idle(self) -> _Worker | None:
+        """A worker that has nothing to do; a new one while there are too few."""
+        for worker in self.workers:
+            if worker.planned is None and worker.runs < MOST_RUNS:
+                return worker
+            if worker.planned is None:
+                self.dismiss(worker)
+        if len(self.workers) < self.terms.workers:
+            return self._start()
+        return None
+
+    def dismiss(self, worker: _Worker) -> None:
+        self.selector.unregister(worker.answers)
+        worker.end()
+
+    def _start(self) -> _Worker:
+        words = [str(os.getpid()), json.dumps(asdict(self.terms))]
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "tdac_agent.campaign.worker", *words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self.errors,
+            env=os.environ | {f"{name}_NUM_THREADS": "1" for name in ONE_THREAD},
+            # An interrupt is for the driver, which passes it on.
+            start_new_session=True,
+        )
+        worker = _Worker(process)
+        self.selector.register(worker.answers, selectors.EVENT_READ, worker)
+        return worker
+
+    def close(self) -> None:
+        """Interrupts those that are at work, and waits until all have ended."""
+        for worker in self.busy:
+            worker.process.send_signal(signal.SIGINT)
+        deadline = time.monotonic() + FAREWELL_SECONDS
+        for worker in self.workers:
+            if worker.planned is not None:
+                with suppress(subprocess.TimeoutExpired):
+                    worker.process.wait(max(0.0, deadline - time.monotonic()))
+                worker.process.kill()
+            self.dismiss(worker)
+        self.selector.close()
+
+
+def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
+    """Makes runs in worker processes, `terms.workers` at a time.
+
+    Args:
+        terms: What all runs share.
+        next_run: Where they come from.
+    """
+    runs = Bereaved(next_run)
+    with (Path(terms.folder) / ERRORS).open("ab") as errors:
+        pool = _Pool(terms, errors)
+        try:
+            yield from _hand_out(pool, runs)
+            while pool.busy:
+                for key, _ in pool.selector.select():
+                    yield from _hear(pool, key.data, runs)
+                yield from _hand_out(pool, runs)
+        finally:
+            pool.close()
+
+
+def _hand_out(pool: _Pool, runs: Bereaved) -> Iterator[Update]:
+    """Gives each idle worker a run, while there are runs."""
+    while len(pool.busy) < pool.terms.workers:
+        planned = runs.next()
+        worker = None if planned is None else pool.idle()
+        if planned is None or worker is None:
+            return
+        worker.begin(planned)
+        yield Begun(planned)
+
+
+def _hear(pool: _Pool, worker: _Worker, runs: Bereaved) -> Iterator[Update]:
+    """What a worker says, or that it has died."""
+    planned, messages = worker.planned, worker.messages()
+    if messages is None:
+        pool.dismiss(worker)
+        if planned is not None:
+            yield runs.died(planned)
+        return
+    assert planned is not None
+    for message in messages:
+        if "outcome" in message:
+            worker.planned = None
+            yield Ended(planned, Outcome(**message["outcome"]))
+        else:
+            yield Told(planned, message["record"])

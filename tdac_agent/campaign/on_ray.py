@@ -1,0 +1,101 @@
+"""The executor `ray`: tasks on a Ray cluster, or on one that is started here.
+
+The folder of the campaign must be the same on all machines, and keys must be in the
+environment of Ray's own processes there.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Generator
+from typing import Any
+
+from tdac_agent.campaign.cores import own_core
+from tdac_agent.campaign.executor import Begun, Bereaved, Ended, Next, Update
+from tdac_agent.campaign.perform import Outcome, Terms, perform
+from tdac_agent.campaign.plan import PlannedRun
+from tdac_agent.errors import ProviderError
+from tdac_agent.warm import WarmJudge
+
+STORE_BYTES = 96 << 20
+"""Of a cluster that is started here: runs pass through folders, not through Ray."""
+WAIT_SECONDS = 1.0
+
+
+def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
+    """Makes runs as Ray tasks of one CPU each, `terms.workers` at a time.
+
+    Args:
+        terms: What all runs share.
+        next_run: Where they come from.
+
+    Raises:
+        ProviderError: Ray is not installed.
+    """
+    ray = _start(terms.workers)
+    # A task whose process dies is ours to put again, as with the other executor.
+    task = ray.remote(num_cpus=1, max_retries=0)(_in_task)
+    runs = Bereaved(next_run)
+    pending: dict[Any, PlannedRun] = {}
+    try:
+        while True:
+            while len(pending) < terms.workers:
+                planned = runs.next()
+                if planned is None:
+                    break
+                pending[task.remote(planned, terms)] = planned
+                yield Begun(planned)
+            if not pending:
+                return
+            done, _ = ray.wait(list(pending), timeout=WAIT_SECONDS)
+            for reference in done:
+                yield _update(ray, reference, pending.pop(reference), runs)
+    finally:
+        for reference in pending:
+            ray.cancel(reference, force=True)
+        ray.shutdown()
+
+
+def _update(ray: Any, reference: Any, planned: PlannedRun, runs: Bereaved) -> Update:
+    try:
+        outcome: Outcome = ray.get(reference)
+    except ray.exceptions.WorkerCrashedError:
+        return runs.died(planned)
+    except ray.exceptions.RayError as error:
+        reason = " ".join(str(error).split())[:300]
+        return Ended(planned, Outcome(planned.name, "error", reason))
+    return Ended(planned, outcome)
+
+
+def _in_task(planned: PlannedRun, terms: Terms) -> Outcome:
+    """One run, in a process of Ray's."""
+    with own_core() as turn, WarmJudge(turn=turn) as judge:
+        return perform(planned, terms, judge)
+
+
+def _start(workers: int) -> Any:
+    """Ray, connected to the cluster that `RAY_ADDRESS` names or to one of its own.
+
+    Raises:
+        ProviderError: It is not installed.
+    """
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    try:
+        import ray
+    except ImportError as error:
+        raise ProviderError(
+            '--executor ray needs a package: pip install "tdac[ray]"'
+        ) from error
+    if os.environ.get("RAY_ADDRESS"):
+        ray.init(log_to_driver=False, logging_level=logging.ERROR)
+    else:
+        ray.init(
+            num_cpus=workers,
+            object_store_memory=STORE_BYTES,
+            include_dashboard=False,
+            log_to_driver=False,
+            logging_level=logging.ERROR,
+        )
+    return ray

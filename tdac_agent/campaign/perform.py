@@ -1,0 +1,199 @@
+"""One run of a campaign, in whichever process: the same for all executors."""
+
+from __future__ import annotations
+
+import functools
+import json
+import shutil
+import sys
+import traceback
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.budget import Budget
+from tdac_agent.campaign.gate import gated
+from tdac_agent.campaign.plan import PlannedRun
+from tdac_agent.errors import Fault
+from tdac_agent.prices import FREE
+from tdac_agent.providers import choose_models
+from tdac_agent.records import JOURNAL, RUN_FILE, Run
+from tdac_agent.retry import RetryPolicy
+from tdac_agent.synthesis import synthesize
+from tdac_agent.task import Task, load_task
+from tdac_agent.warm import WarmJudge
+from tdac_envs.errors import TdacError
+
+PATIENCE = RetryPolicy(seconds=4 * 3600.0)
+"""Nobody waits for a single answer of a campaign."""
+KEPT = frozenset({RUN_FILE, JOURNAL, "task.yaml", "controller.py", "report.json"})
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What all runs of a campaign share.
+
+    Attributes:
+        folder: Of the campaign, absolute.
+        workers: How many runs are under way at a time.
+        max_cost: USD of all together.
+        max_tokens: Of all together.
+        keep: `all`, or `records`.
+    """
+
+    folder: str
+    workers: int
+    max_cost: float | None
+    max_tokens: int | None
+    keep: str
+
+    @property
+    def runs(self) -> Path:
+        """The folder of all runs."""
+        return Path(self.folder) / "runs"
+
+    def budget(self, planned: PlannedRun) -> Budget:
+        """The budget of a run: of its own where no model is asked."""
+        cell = planned.cell
+        kinds = {name.partition(":")[0] for name in (cell.learner, cell.optimizer)}
+        if kinds <= FREE:
+            return Budget()
+        ledger = Path(self.folder) / "ledger.jsonl"
+        return Budget(self.max_cost, self.max_tokens, ledger)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a run.
+
+    Attributes:
+        name: Of the run.
+        status: As in `run.json`; `error` where there is no run to speak of.
+        reason: Why it did not come to its end.
+        tau: Iteration of its success.
+        tokens: In and out.
+        cost: USD; None where it is unknown.
+        seconds: That it took, all of its processes together.
+    """
+
+    name: str
+    status: str
+    reason: str = ""
+    tau: int | None = None
+    tokens: int = 0
+    cost: float | None = 0.0
+    seconds: float = 0.0
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing left to do."""
+        return self.status in {"verified", "not verified"}
+
+    def to_json(self) -> dict[str, Any]:
+        """For another process."""
+        return asdict(self)
+
+
+Tell = Callable[[dict[str, Any]], None]
+
+
+def perform(
+    planned: PlannedRun, terms: Terms, judge: WarmJudge | None, tell: Tell | None = None
+) -> Outcome:
+    """Makes a run, or goes on with it; whatever goes wrong is an outcome.
+
+    Args:
+        planned: Which.
+        terms: What all runs share.
+        judge: A warm one; one of its own by default.
+        tell: Called with each record of its journal.
+    """
+    try:
+        run = _synthesize(planned, terms, judge, tell)
+    except Fault as error:
+        known = read_outcome(planned.name, terms.runs)
+        return known or Outcome(planned.name, "error", str(error))
+    except (TdacError, OSError) as error:
+        return Outcome(planned.name, "error", " ".join(str(error).split()))
+    except Exception as error:  # the others go on
+        traceback.print_exc(file=sys.stderr)
+        reason = " ".join(str(error).split())
+        return Outcome(planned.name, "error", f"{type(error).__name__}: {reason}")
+    if terms.keep == "records" and run.finished:
+        _thin_out(run.folder)
+    return _outcome(planned.name, run)
+
+
+def _synthesize(
+    planned: PlannedRun, terms: Terms, judge: WarmJudge | None, tell: Tell | None
+) -> Run:
+    cell = planned.cell
+    task = _task(cell.task)
+    models = choose_models(cell.learner, cell.optimizer, task.setting, cell.base_url)
+    gates, same = Path(terms.folder) / "gates", models[0] is models[1]
+    learner = gated(models[0], gates, terms.workers)
+    optimizer = learner if same else gated(models[1], gates, terms.workers)
+    folder = terms.runs / planned.name
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    return synthesize(
+        task,
+        learner,
+        optimizer,
+        out=folder,
+        iterations=cell.iterations,
+        patience=cell.patience,
+        refine=cell.refine,
+        seed=planned.seed,
+        base_url=cell.base_url,
+        prompt=cell.prompt,
+        max_output=cell.max_output,
+        budget=terms.budget(planned),
+        index=planned.index,
+        retry=PATIENCE,
+        judge=judge,
+        on_event=tell,
+    )
+
+
+@functools.lru_cache(maxsize=4)
+def _task(name: str) -> Task:
+    """A task, which a worker has many runs of."""
+    return load_task(name)
+
+
+def read_outcome(name: str, runs: Path) -> Outcome | None:
+    """What is on record of a run; None where there is none that can be read.
+
+    Args:
+        name: Of the run.
+        runs: The folder of all runs.
+    """
+    try:
+        known = json.loads((runs / name / RUN_FILE).read_bytes())
+        cost = known["cost"]
+        return Outcome(
+            name,
+            known["status"],
+            known["reason"],
+            known["tau"],
+            known["tokens_in"] + known["tokens_out"],
+            None if cost is None else cost + known["cost_lost"],
+            known["seconds"],
+        )
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def _outcome(name: str, run: Run) -> Outcome:
+    cost = None if run.cost is None else run.cost + run.cost_lost
+    return Outcome(name, run.status, run.reason, run.tau, run.tokens, cost, run.seconds)
+
+
+def _thin_out(folder: Path) -> None:
+    """Leaves of a finished run what the tables need, and the evidence of its end."""
+    for path in folder.iterdir():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        elif path.name not in KEPT:
+            path.unlink()

@@ -1,0 +1,236 @@
+"""From a campaign's file to its runs, each with a name that is always the same."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
+from tdac_agent.prompt import VARIANTS, generate_prompt, load_template
+from tdac_agent.records import Setting
+from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import bundled_task
+from tdac_agent.verification import suite_sha256
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Runs that differ in their number alone.
+
+    Attributes:
+        folder: Name of their folder.
+        task: Name or absolute path.
+        task_name: For people.
+        learner: LLM1.
+        optimizer: LLM2.
+        setting: What of the loop is in use.
+        prompt: Template of the first question; a name, or an absolute path.
+        iterations: K.
+        patience: J.
+        refine: Whether failures become rules.
+        base_url: Where the models are served.
+        max_output: Tokens of an answer.
+    """
+
+    folder: str
+    task: str
+    task_name: str
+    learner: str
+    optimizer: str
+    setting: Setting
+    prompt: str
+    iterations: int
+    patience: int
+    refine: bool
+    base_url: str | None
+    max_output: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedRun:
+    """One run of a campaign.
+
+    Attributes:
+        cell: What it is of.
+        index: Its number among those of its cell, from 1.
+        seed: Of its jittered starts.
+    """
+
+    cell: Cell
+    index: int
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Its folder below that of all runs; the same whenever it is planned."""
+        return f"{self.cell.folder}/r{self.index:04d}"
+
+    def to_json(self) -> str:
+        """All of it, for another process."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> PlannedRun:
+        """What `to_json` wrote."""
+        content = json.loads(text)
+        return cls(**{**content, "cell": Cell(**content["cell"])})
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """Every n-th run, beginning with the i-th."""
+
+    i: int = 1
+    n: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Shard:
+        """From `i/n`.
+
+        Raises:
+            CampaignError: It is no such thing.
+        """
+        found = re.fullmatch(r"(\d+)/(\d+)", text)
+        if found is None or not 1 <= int(found[1]) <= int(found[2]):
+            raise CampaignError(f"expected --shard as in 1/4, got {text!r}")
+        return cls(int(found[1]), int(found[2]))
+
+
+WHOLE = Shard()
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The runs of a campaign.
+
+    Attributes:
+        cells: The kinds of run, in the file's order.
+        tasks: By `Cell.task`.
+        runs: R of each.
+        seed: Of the first run.
+    """
+
+    cells: tuple[Cell, ...]
+    tasks: Mapping[str, Task]
+    runs: int
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.cells) * self.runs
+
+    def all(self, shard: Shard = WHOLE) -> Iterator[PlannedRun]:
+        """All runs, or those of a shard: first of all the first one of each kind.
+
+        So what there is of a campaign that was stopped is of all kinds alike.
+        """
+        numbered = product(range(1, self.runs + 1), self.cells)
+        for number, (index, cell) in enumerate(numbered):
+            if number % shard.n == shard.i - 1:
+                yield PlannedRun(cell, index, self.seed + index - 1)
+
+
+def make_plan(config: CampaignConfig, base: Path) -> Plan:
+    """The plan of a campaign; its tasks are read and found feasible.
+
+    Args:
+        config: The file's contents.
+        base: Its folder.
+
+    Raises:
+        TdacError: A task or a prompt cannot be used.
+    """
+    tasks = {
+        name: (place := _task(name, base), load_task(place)) for name in config.tasks
+    }
+    prompts = {name: _prompt(name, base) for name in config.prompts}
+    kinds = product(
+        config.tasks,
+        config.learners,
+        config.optimizers,
+        config.prompts,
+        config.settings,
+    )
+    cells = [
+        _cell(
+            config, *tasks[task], learner, optimizer, prompt, prompts[prompt], setting
+        )
+        for task, learner, optimizer, prompt, setting in kinds
+    ]
+    known = dict(tasks.values())
+    return Plan(tuple(dict.fromkeys(cells)), known, config.runs, config.seed)
+
+
+def _cell(
+    config: CampaignConfig,
+    place: str,
+    task: Task,
+    learner: str,
+    optimizer: str,
+    prompt: str,
+    template: str,
+    setting: Setting,
+) -> Cell:
+    """One kind of run; its folder is named after all that its runs depend on."""
+    iterations, patience, refine = loop_of(config, setting)
+    facts: dict[str, Any] = {
+        "task_name": task.name,
+        "learner": learner,
+        "optimizer": learner if optimizer == SAME else optimizer,
+        "setting": setting,
+        "iterations": iterations,
+        "patience": patience,
+        "refine": refine,
+        "base_url": config.base_url,
+        "max_output": config.max_output,
+    }
+    words = generate_prompt(task, (), load_template(template))
+    about = facts | {
+        "task": task.sha256(),
+        "suite": suite_sha256(task),
+        "prompt": hashlib.sha256(words.encode("utf-8", "surrogatepass")).hexdigest(),
+        "version": importlib.metadata.version("tdac"),
+        "seed": config.seed,
+    }
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
+    shown = [task.name, learner, setting, *([prompt] if prompt != "full" else [])]
+    folder = f"{slug('-'.join(shown))}-{digest[:8]}"
+    return Cell(folder=folder, task=place, prompt=template, **facts)
+
+
+def loop_of(config: CampaignConfig, setting: Setting) -> tuple[int, int, bool]:
+    """K, J and whether failures become rules, of a setting."""
+    most, edits = config.iterations, config.patience
+    samples = config.samples or most * (edits + 2)
+    return {
+        "dual tier": (most, edits, True),
+        "edit only": (most, edits, False),
+        "prompt only": (most, 0, True),
+        "best of N": (samples, 0, False),
+        "one shot": (1, 0, False),
+    }[setting]
+
+
+def slug(text: str, most: int = 60) -> str:
+    """A text as part of a file's name."""
+    return re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:most].rstrip("-.")
+
+
+def _task(name: str, base: Path) -> str:
+    """The name of a bundled task, or where a task is."""
+    return name if bundled_task(name) is not None else str((base / name).resolve())
+
+
+def _prompt(name: str, base: Path) -> str:
+    return name if name in VARIANTS else str((base / name).resolve())
+
+
+def models_of(cells: Sequence[Cell]) -> tuple[str, ...]:
+    """The models of some cells."""
+    return tuple(dict.fromkeys(n for c in cells for n in (c.learner, c.optimizer)))

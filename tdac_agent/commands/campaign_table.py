@@ -1,0 +1,145 @@
+"""The metrics of a campaign as a table, and how far it is in a line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.budget import told_usd
+from tdac_agent.campaign.plan import Cell
+from tdac_agent.campaign.progress import Progress
+from tdac_agent.metrics import Rate
+
+COLOURS = {"verified": "green", "not verified": "red"}
+ALWAYS = ("task", "learner")
+SOMETIMES = ("optimizer", "prompt", "setting")
+
+
+@dataclass(frozen=True, slots=True)
+class Labels:
+    """What tells the kinds of run of a campaign apart.
+
+    Attributes:
+        names: Of the columns.
+    """
+
+    names: tuple[str, ...]
+
+    def of(self, cell: Cell) -> list[str]:
+        """The labels of a kind of run."""
+        known = {
+            "task": cell.task_name,
+            "learner": cell.learner,
+            "optimizer": cell.optimizer,
+            "prompt": Path(cell.prompt).name,
+            "setting": cell.setting,
+        }
+        return [known[name] for name in self.names]
+
+
+def labels_of(cells: Sequence[Cell]) -> Labels:
+    """Task and learner, and what else is not the same in all."""
+    rows = [(c.optimizer != c.learner, c.optimizer, c.prompt, c.setting) for c in cells]
+    other = any(row[0] for row in rows)
+    varied = {"optimizer": other, "prompt": _several(rows, 2)}
+    varied["setting"] = _several(rows, 3)
+    return Labels((*ALWAYS, *(name for name in SOMETIMES if varied[name])))
+
+
+def _several(rows: Sequence[tuple[object, ...]], column: int) -> bool:
+    return len({row[column] for row in rows}) > 1
+
+
+def show_summary(summary: pd.DataFrame, console: Console) -> None:
+    """Prints the metrics of each kind of run that there is."""
+    if summary.empty:
+        return
+    names = [*ALWAYS]
+    names += [n for n in SOMETIMES[1:] if summary[n].nunique() > 1]
+    if (summary["optimizer"] != summary["learner"]).any():
+        names.insert(2, "optimizer")
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in names:
+        table.add_column(name, overflow="fold")
+    for name in ("R", "verified", "halted", "SR", "CS(K)", "first pass", "mean τ"):
+        table.add_column(name, justify="right", no_wrap=True)
+    paid = bool(summary["tokens_per_verified"].notna().any())
+    if paid:
+        table.add_column("tokens", justify="right", no_wrap=True)
+        table.add_column("USD", justify="right", no_wrap=True)
+    for row in summary.to_dict("records"):
+        labels = [
+            escape(Path(str(row[n])).name if n == "prompt" else str(row[n]))
+            for n in names
+        ]
+        table.add_row(*labels, *_metrics(row), *(_spent(row) if paid else []))
+    console.print(table)
+    console.print(
+        "[dim]95 % intervals: SR by resampling runs, CS(K) and first pass exact "
+        "(docs/metrics.md)"
+        + ("; tokens and USD: each verified run's share of all" if paid else "")
+        + "[/]",
+        soft_wrap=True,
+    )
+
+
+def _metrics(row: dict[Any, Any]) -> list[str]:
+    halted = int(row["censored"])
+    tau = row["tau_mean"]
+    return [
+        str(row["R"]),
+        f"[green]{row['verified']}[/]" if row["verified"] else "0",
+        f"[yellow]{halted}[/]" if halted else "[dim]–[/]",
+        *(_rate(row, name) for name in ("sr", "cs_K", "first_pass")),
+        "–" if pd.isna(tau) else f"{tau:.1f}",
+    ]
+
+
+def _rate(row: dict[Any, Any], name: str) -> str:
+    low, high = row[f"{name}_low"], row[f"{name}_high"]
+    return escape(str(Rate(row[name], 0, 0, low, high, "")))
+
+
+def _spent(row: dict[Any, Any]) -> list[str]:
+    tokens, cost = row["tokens_per_verified"], row["cost_per_verified"]
+    return [
+        "–" if pd.isna(tokens) else f"{tokens:,.0f}",
+        "–" if pd.isna(cost) else f"{cost:.3f}",
+    ]
+
+
+def told_counts(progress: Progress, *, going: bool = False) -> str:
+    """How far a campaign is, in a line."""
+    parts = [f"[bold]{progress.finished} of {progress.planned}[/] runs have ended"]
+    if going:
+        parts.append(f"{len(progress.doing)} at work")
+        parts.append(f"{told_time(progress.seconds)} gone")
+        left = progress.seconds_left
+        parts.append("" if left is None else f"about {told_time(left)} left")
+    elif progress.now:
+        parts.append(f"{progress.now} of them now, in {told_time(progress.seconds)}")
+    if progress.deaths:
+        parts.append(f"{progress.deaths} processes died and were replaced")
+    if progress.tokens:
+        parts.append(f"{progress.tokens:,} tokens, {told_usd(progress.cost)}")
+    if progress.exhausted:
+        parts.append("[yellow]the budget is exhausted[/]")
+    return ", ".join(part for part in parts if part)
+
+
+def told_time(seconds: float) -> str:
+    """A time for people: `41 s`, `12:05 min`, `7:30 h`."""
+    whole = round(seconds)
+    if whole < 100:
+        return f"{seconds:.1f} s" if whole < 10 else f"{whole} s"
+    if whole < 6000:
+        return f"{whole // 60}:{whole % 60:02d} min"
+    return f"{whole // 3600}:{whole // 60 % 60:02d} h"

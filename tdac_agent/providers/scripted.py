@@ -1,0 +1,163 @@
+"""`scripted:SCRIPT`: a stand-in for a model that draws from prepared controllers.
+
+No model is asked. It is for rehearsals and simulations of the loop: how often its
+controllers are right is known beforehand. What it answers depends on the script's seed
+and on which question of which run it is, and on nothing else.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from tdac_agent.builtin import builtin_for
+from tdac_agent.builtin.parameters import names_of
+from tdac_agent.errors import ProviderError
+from tdac_agent.provider import Kind, Reply, Request
+from tdac_agent.providers.choice import Options
+from tdac_agent.providers.secrets import one_line
+from tdac_agent.setting import Setting
+from tdac_agent.shipped import shipped
+
+_KINDS: tuple[Kind, ...] = ("generate", "edit")
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Choice(_Strict):
+    """One controller of a script: the template of `builtin`, or a file."""
+
+    weight: float = Field(1.0, gt=0, description="Where it is drawn.")
+    file: Path | None = Field(None, description="Relative to the script.")
+    parameters: dict[str, float] = Field({}, description="Of the template.")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Choice:
+        if self.file is not None and self.parameters:
+            raise ValueError("expected a file, or parameters of the template")
+        return self
+
+
+class Script(_Strict):
+    """Contents of a script, schema 1."""
+
+    schema_version: Literal[1] = Field(1, alias="schema")
+    about: str = ""
+    seed: int = Field(0, ge=0, description="Of the draws.")
+    drawn: bool = Field(
+        True, description="Else the k-th is for iteration k, the last one for the rest."
+    )
+    generate: tuple[Choice, ...] = Field(min_length=1)
+    edit: tuple[Choice, ...] = Field(min_length=1)
+
+
+def make(words: str, options: Options) -> Scripted:
+    """The provider for a script: a shipped one by its name, or a file.
+
+    Raises:
+        ProviderError: The script cannot be used.
+    """
+    if not words:
+        raise ProviderError("which script? As in scripted:weak, or scripted:my.yaml")
+    own = shipped(f"scripts/{words}.yaml")
+    file = own if own.is_file() else Path(words)
+    script = _read(file)
+    sources = {
+        kind: tuple(_source(choice, file, options.setting) for choice in choices)
+        for kind, choices in zip(_KINDS, (script.generate, script.edit), strict=True)
+    }
+    return Scripted(words, script, sources)
+
+
+class Scripted:
+    """A provider; see `Provider`.
+
+    Args:
+        words: What the user calls the script.
+        script: Its contents.
+        sources: Of its controllers, by the kind of the question.
+    """
+
+    paid = False
+
+    def __init__(
+        self, words: str, script: Script, sources: dict[Kind, tuple[str, ...]]
+    ) -> None:
+        self.name = f"scripted:{words}"
+        self._script = script
+        self._sources = sources
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`. It has no rules to give."""
+        if request.kind == "summarise":
+            return Reply("```json\n[]\n```\n")
+        number = self._number(request)
+        source = self._sources[request.kind][number]
+        return Reply(f"```python\n{source}```\n", notes=(f"script: no. {number + 1}",))
+
+    def _number(self, request: Request) -> int:
+        """Which of the controllers is given."""
+        run, k, j = request.sample
+        script = self._script
+        choices = script.edit if request.kind == "edit" else script.generate
+        if not script.drawn:
+            return min(k, len(choices)) - 1
+        kind = _KINDS.index(request.kind)
+        random = np.random.default_rng([script.seed, run, k, j, kind, request.turn])
+        weights = np.array([choice.weight for choice in choices])
+        return int(random.choice(len(choices), p=weights / weights.sum()))
+
+
+def _read(file: Path) -> Script:
+    """A script.
+
+    Raises:
+        ProviderError: There is none, or it has a wrong or unknown key.
+    """
+    try:
+        return Script.model_validate(yaml.safe_load(file.read_text("utf-8")))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ProviderError(f"{file}: {place}: {first['msg']}") from error
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else one_line(str(error))
+        raise ProviderError(f"cannot read the script {file}: {reason}") from error
+
+
+def _source(choice: Choice, script: Path, setting: Setting) -> str:
+    """The source of a controller, with a line end at its end.
+
+    Raises:
+        ProviderError: There is no such file, or the template no such parameter.
+    """
+    if choice.file is None:
+        return _filled_in(choice.parameters, script, setting)
+    file = script.parent / choice.file
+    try:
+        return file.read_text("utf-8").rstrip() + "\n"
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise ProviderError(f"{script}: {file}: {reason}") from error
+
+
+def _filled_in(values: dict[str, float], script: Path, setting: Setting) -> str:
+    """The template of `builtin` with some parameters."""
+    template: Any = builtin_for(setting)
+    known = names_of(template.kind)
+    for name in set(values) - set(known):
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise ProviderError(
+            f"{script}: the template has no parameter {name!r}{hint}; known: "
+            f"{', '.join(known)}"
+        )
+    source: str = template.render(template.kind().changed(**values))
+    return source

@@ -1,0 +1,123 @@
+"""A campaign from the command line: it goes on, repeats nothing, and fails alone."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from conftest import Small
+
+from tdac_agent.metrics import CANDIDATE_COLUMNS, RUN_COLUMNS, find_runs
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory):
+    """Two kinds that work and one whose every run ends with a fault."""
+    small = Small(tmp_path_factory.mktemp("campaign"))
+    small.write()
+    small.write("broken", learners=["replay:demo", "builtin"])
+    return small, small.run("--workers", 2, name="broken"), small.run("--json")
+
+
+def test_runs_that_fail_stop_no_other_and_say_why(once):
+    """Exit 3; the reason is told once, with how often it was met, and the way on."""
+    _, (code, said, complained), _ = once
+    assert (code, complained) == (3, "")
+    assert said.count("replay") > 0
+    assert "2 × fault: replay:demo: permanent fault: another question than" in said
+    assert "2 of 4 runs have ended, 2 of them now" in said
+    assert "go on: tdac campaign broken.yaml --workers 2 --out out" in said
+    assert said.count(" fault, ") == 4  # tried once more, after all others
+
+
+def test_runs_of_another_file_are_not_made_again(once):
+    """The same runs have the same names: `builtin` was done, `scripted` was not."""
+    small, _, (code, said, _) = once
+    summary = json.loads(said)
+    assert code == 0
+    assert (summary["planned"], summary["finished"], summary["before"]) == (4, 4, 2)
+    assert summary["problems"] == {}
+    assert len(list(find_runs(small.folder / "out"))) == 6
+
+
+def test_the_same_command_again_does_nothing_and_says_so(once):
+    small, _, _ = once
+    before = {p: p.stat().st_mtime_ns for p in (small.folder / "out/runs").rglob("*")}
+    table = small.table()
+    code, said, _ = small.run()
+    assert code == 0
+    assert "all of them have come to their end before; nothing was done" in said
+    assert "1 other kinds of run are in" in said
+    after = {p: p.stat().st_mtime_ns for p in (small.folder / "out/runs").rglob("*")}
+    assert after == before
+    assert small.table() == table
+
+
+def test_the_tables_hold_each_run_once_with_the_columns_of_the_metrics(once):
+    small, _, _ = once
+    runs = pd.read_csv(small.folder / "out/runs.csv")
+    tried = pd.read_csv(small.folder / "out/candidates.csv")
+    assert list(runs.columns) == list(RUN_COLUMNS)
+    assert list(tried.columns) == list(CANDIDATE_COLUMNS)
+    assert runs["run"].is_unique
+    assert set(tried["run"]) <= set(runs["run"])
+    assert sorted(runs["seed"]) == [0, 0, 1, 1]
+    builtin = runs[runs["learner"] == "builtin"]
+    assert (builtin["tau"] == 1).all()
+    assert runs["learner"].str.startswith("scripted:").sum() == 2
+    summary = pd.read_csv(small.folder / "out/summary.csv")
+    assert (summary["R"] == 2).all()
+
+
+def test_shards_make_all_runs_together(small):
+    """Each has its part; the whole has nothing left to do."""
+    small.write(learners=["builtin"])
+    for part in ("1/2", "2/2"):
+        code, said, _ = small.run("--shard", part, "--workers", 1)
+        assert code == 0
+        assert "1 of 1 runs have ended" in said
+    code, said, _ = small.run()
+    assert "2 runs of 1 kind, R = 2" in said
+    assert "nothing was done" in said
+
+
+def test_of_finished_runs_only_records_may_be_kept(small):
+    """A handful of files a run; the tables and the way on are the same."""
+    small.write(learners=["builtin"], runs=1)
+    small.write("thin", learners=["builtin"], runs=1, keep="records")
+    assert small.run()[0] == small.run(name="thin", out="thin")[0] == 0
+    assert small.table() == small.table("thin")
+    (run,) = find_runs(small.folder / "thin")
+    names = "controller.py journal.jsonl report.json run.json task.yaml"
+    assert sorted(path.name for path in run.folder.iterdir()) == names.split()
+    assert "nothing was done" in small.run(name="thin", out="thin")[1]
+
+
+def test_a_dry_run_writes_nothing_and_needs_no_key(tdac, monkeypatch):
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    code, said, _ = tdac("campaign", "paper_2d", "--dry-run")
+    assert code == 0
+    assert "25 runs; no model was asked" in said
+    assert "all runs together stop at 50.00 USD" in said
+    assert not list(Path().iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "line"),
+    [
+        (("paper_2d",), 2, "error: no key for OpenAI"),
+        (("paper_2",), 2, "error: no campaign 'paper_2': expected a YAML file, or"),
+        (("offline", "--shard", "5/4"), 2, "error: expected --shard as in 1/4"),
+        (("offline", "--out", "/proc/none"), 2, "error: cannot write to /proc/none"),
+    ],
+)
+def test_what_cannot_be_done_is_told_before_the_first_run(
+    words, code, line, tdac, monkeypatch
+):
+    """One line, nothing begun."""
+    for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
+        monkeypatch.delenv(name, raising=False)
+    found, _, complained = tdac("campaign", *words)
+    assert (found, len(complained.splitlines())) == (code, 1)
+    assert complained.startswith(line)
+    assert not list(Path().rglob("run.json"))

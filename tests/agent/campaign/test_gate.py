@@ -1,0 +1,134 @@
+"""How many questions are asked at a time."""
+
+import os
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from tdac_agent.campaign.gate import FIRST, Gate, Gated, gated
+from tdac_agent.provider import RateLimited, Reply, Request
+from tdac_agent.retry import RetryPolicy, answer
+
+ASKED = Request("generate", "?")
+
+
+class Server:
+    """A provider that answers so many at a time, and refuses the others."""
+
+    name = "openai:some"
+    paid = True
+
+    def __init__(self, capacity):
+        self.capacity = capacity
+        self.lock = threading.Lock()
+        self.now = self.most = self.refused = 0
+
+    def complete(self, request):
+        with self.lock:
+            self.now += 1
+            self.most = max(self.most, self.now)
+            too_many = self.now > self.capacity
+            self.refused += too_many
+        try:
+            for _ in range(20):
+                os.sched_yield()
+            if too_many:
+                raise RateLimited("slow down")
+            return Reply("ok")
+        finally:
+            with self.lock:
+                self.now -= 1
+
+
+def yielding(_seconds):
+    os.sched_yield()
+
+
+def test_places_grow_by_one_a_round_and_are_halved_by_a_rate_limit(tmp_path):
+    """n answers at n places make n + 1 of them, about; never more than there may be."""
+    gate = Gate(tmp_path, most=12)
+    assert gate.places == FIRST
+    for _ in range(int(FIRST)):
+        gate.answered()
+    assert FIRST + 0.9 < gate.places <= FIRST + 1.0
+    for _ in range(200):
+        gate.answered()
+    assert gate.places == 12
+    with gate.place() as asked_at:
+        gate.limited(asked_at)
+    assert gate.places == 6
+    for _ in range(9):
+        with gate.place() as asked_at:
+            gate.limited(asked_at)
+    assert gate.places == 1
+
+
+def test_a_wave_of_rate_limits_counts_once(tmp_path):
+    """Questions that were asked before the places were cut say nothing about them."""
+    gate = Gate(tmp_path, most=8)
+    with gate.place() as first, gate.place() as second, gate.place() as third:
+        for asked_at in (first, second, third):
+            gate.limited(asked_at)
+    assert gate.places == 4
+
+
+def test_workers_share_what_the_server_bears(tmp_path):
+    """Sixteen workers, a server that bears four: every question is answered, and most
+    of them are asked while there is room for them.
+    """
+    server, done = Server(4), []
+
+    def work():
+        # Each worker has a gate of its own, as processes have.
+        model = Gated(server, Gate(tmp_path, most=16, sleep=yielding))
+        policy = RetryPolicy(first_wait=0.0)
+        done.extend(
+            answer(model.complete, ASKED, policy, lambda miss: None, yielding)
+            for _ in range(12)
+        )
+
+    threads = [threading.Thread(target=work) for _ in range(16)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(done) == 16 * 12
+    assert server.most <= FIRST + 1
+    assert server.refused < len(done)
+
+
+def test_who_is_killed_has_let_go_of_its_place(tmp_path):
+    gate = Gate(tmp_path, most=1, sleep=lambda _: pytest.fail("there is no place"))
+    hold = (
+        "import sys; from pathlib import Path; from tdac_agent.campaign.gate import "
+        "Gate\nwith Gate(Path(sys.argv[1]), 1).place():\n print('has', flush=True)\n "
+        "sys.stdin.read()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", hold, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as other:
+        assert other.stdout.readline() == b"has\n"
+        assert gate._free() is None
+        other.kill()
+        other.wait()
+        with gate.place():
+            pass
+
+
+def test_a_free_model_has_no_gate(tmp_path):
+    class Free(Server):
+        paid = False
+
+    model = Free(1)
+    assert gated(model, tmp_path, 4) is model
+    assert gated(Server(1), tmp_path, 4).name == "openai:some"
+
+
+def test_a_torn_state_begins_anew(tmp_path):
+    gate = Gate(tmp_path, most=99)
+    (tmp_path / "state.json").write_text("{")
+    assert gate.places == FIRST
