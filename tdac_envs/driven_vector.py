@@ -112,7 +112,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
                 self._randoms[i], self._seeds[i] = seeding.np_random(one)
         chosen = np.flatnonzero(mask)
         self._place(chosen, rest)
-        self._rows.call(mask, chosen)
+        self._rows.call(chosen, mask)
         self._over[mask] = False
         observations = {key: seen.copy() for key, seen in self._seen().items()}
         self._complete(observations, chosen.tolist())
@@ -135,10 +135,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._commands[:] = wanted
         self._slip()
         self._place(resting, {})
-        observations = {k: np.empty_like(seen) for k, seen in self._seen().items()}
-        told = np.empty_like(self.robots.outcome)
-        copies = *observations.values(), told
-        self._rows.call(self._over, returned=copies)
+        *seen, told = self._rows.call_all(self._over)
+        observations = dict(zip(self._seen(), seen, strict=True))
         outcome = told.T.copy()
         rewards = outcome[stepping.REWARD]
         terminated = outcome[stepping.TERMINATED] == 1.0
@@ -258,7 +256,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         }
         self.last_poses = self.pose()
         self._place(over, {})
-        self._rows.call(ended, over)
+        self._rows.call(over, ended)
         for key, seen in self._seen().items():
             observations[key][over] = seen[over]
         told = slice(stepping.REACHED, None)

@@ -13,19 +13,17 @@ from numpy.typing import NDArray
 
 from tdac_envs import row_loop
 from tdac_envs.compiled import Kernel
+from tdac_envs.row_copies import Arrays, Outputs, address, copies
 from tdac_envs.team import Team
 
 Index = NDArray[np.int64]
 Kinds = NDArray[np.uint8] | NDArray[np.bool_]
-Arrays = Sequence[NDArray[Any]]
 
 # Rows that a thread takes at a time: little waiting at the end, few that share a line
 # of the cache with another thread's.
 _SHARE = 16
 # Rows for which it pays to wake a thread.
 _LEAST = 64
-# Where the ends of a copy are in its words.
-_TO, _FROM = 0, 2
 
 
 class Rows:
@@ -41,7 +39,7 @@ class Rows:
         threads: How many work at a time; by default as many as there are cores.
         inputs: Pairs of arrays with a row for each row, in one piece; before a row's
             call, that of the first is copied to that of the second.
-        outputs: Such arrays, which can be copied after a row's call.
+        outputs: Such arrays, of which `call_all` returns copies.
     """
 
     def __init__(
@@ -60,19 +58,17 @@ class Rows:
         self._all = np.arange(len(packed))
         self._firsts = np.zeros(len(packed), np.uint8)
         self._threads = threads or len(os.sched_getaffinity(0))
-        self._kept.append([inputs, outputs])
-        self._given = _pieces([to for _, to in inputs], _TO)
-        _join(self._given, _FROM, [source for source, _ in inputs])
-        self._returned = _pieces(outputs, _FROM)
+        self._kept.append([inputs])
+        self._given, self._outputs = copies(inputs), Outputs(outputs)
         calls: list[Any] = [kernel.load() for kernel in kernels]
         entries = [ctypes.cast(call, ctypes.c_void_p).value for call in calls]
         self._entries = np.array(entries, np.int64)
         self._plan = np.zeros(row_loop.THREADS, np.int64)
         self._plan[row_loop.SHARE] = _SHARE
         self._plan[row_loop.ENTRIES] = self._entries.ctypes.data
-        self._plan[row_loop.GIVEN] = _address(self._given)
+        self._plan[row_loop.GIVEN] = address(self._given)
         self._plan[row_loop.N_GIVEN] = len(inputs)
-        self._plan[row_loop.RETURNED] = _address(self._returned)
+        self._plan[row_loop.RETURNED] = address(self._outputs.pieces)
         self._differ()
         self._team: Team | None = None
 
@@ -98,33 +94,39 @@ class Rows:
         self._plan[row_loop.WIDTH] = len(self._columns)
         self._plan[row_loop.VALUES] = self._values.ctypes.data
 
-    def call(
-        self,
-        kinds: Kinds | None = None,
-        rows: Index | None = None,
-        returned: Arrays = (),
-    ) -> None:
+    def call(self, rows: Index, kinds: Kinds | None = None) -> None:
         """Makes the calls of some rows, in any order.
 
         Args:
+            rows: Their numbers.
             kinds: Number of the kernel of each row, also of those that are not called;
                 by default the first.
-            rows: By default all.
-            returned: What the outputs are copied to in these rows; of their types. Not
-                copied where there is none.
 
         Raises:
             ArithmeticError: One of them failed.
         """
-        order = self._all if rows is None else np.ascontiguousarray(rows, np.int64)
+        self._make(np.ascontiguousarray(rows, np.int64), kinds, 0)
+
+    def call_all(self, kinds: Kinds | None = None) -> list[NDArray[Any]]:
+        """Makes the calls of all rows; returns what is then in the outputs.
+
+        Args:
+            kinds: Number of the kernel of each row; by default the first.
+
+        Raises:
+            ArithmeticError: One of them failed.
+        """
+        found = self._outputs.renewed()
+        self._make(self._all, kinds, len(found))
+        return found
+
+    def _make(self, order: Index, kinds: Kinds | None, returned: int) -> None:
         which = self._firsts
         if kinds is not None:
             which = np.ascontiguousarray(kinds, np.uint8)
-        if returned:
-            _join(self._returned, _TO, returned)
-        self._plan[row_loop.N_RETURNED] = len(returned)
-        self._plan[row_loop.ORDER] = _address(order)
-        self._plan[row_loop.KINDS] = _address(which)
+        self._plan[row_loop.N_RETURNED] = returned
+        self._plan[row_loop.ORDER] = address(order)
+        self._plan[row_loop.KINDS] = address(which)
         count = len(order)
         threads = max(min(self._threads, -(-count // _LEAST)), 1)
         if self._at_work().make(self._plan, self._slots[0], count, threads):
@@ -143,21 +145,3 @@ class Rows:
             self._team = Team(self._threads, self._slots.shape[1])
             weakref.finalize(self, self._team.end)
         return self._team
-
-
-def _address(array: NDArray[Any]) -> int:
-    return int(array.__array_interface__["data"][0])
-
-
-def _pieces(arrays: Arrays, end: int) -> Index:
-    """Copies from or to the rows of these arrays, whose other ends are open."""
-    pieces = np.zeros((len(arrays), row_loop.N_PIECE), np.int64)
-    pieces[:, -1] = [array[0].nbytes for array in arrays]
-    _join(pieces, end, arrays)
-    return pieces
-
-
-def _join(pieces: Index, end: int, arrays: Arrays) -> None:
-    """Has these arrays be one end of the copies."""
-    pieces[:, end] = [_address(array) for array in arrays]
-    pieces[:, end + 1] = [array.strides[0] for array in arrays]

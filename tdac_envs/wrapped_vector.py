@@ -57,7 +57,7 @@ class Routes:
     def ahead(self, poses: Array) -> Array:
         """The next way-point of each robot, shape (n, 2), as of `Route.ahead`."""
         np.divide(poses[:, :2] - self._corners, self._spacings, out=self._cells)
-        self._rows.call()
+        self._rows.call_all()
         at = self._found * self._spacings + self._corners
         return np.where(np.isfinite(self._found), at, self._goals)
 

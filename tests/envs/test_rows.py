@@ -37,7 +37,7 @@ def test_each_row_is_called_once(count, threads):
     """With arrays of any length; whatever the number of threads."""
     arrays = [np.arange(1.0 + k % 7) for k in range(count)]
     rows = Rows((_scaled,), [(a, np.array([k])) for k, a in enumerate(arrays)], threads)
-    rows.call()
+    rows.call_all()
     rows.close()
     for k, array in enumerate(arrays):
         np.testing.assert_array_equal(array, k * np.arange(1.0 + k % 7))
@@ -47,13 +47,13 @@ def test_one_row_alone_and_with_other_arrays():
     """Only that one is written to; what was put in its place counts."""
     first, second, other = np.ones(2), np.ones(2), np.ones(3)
     rows = Rows((_scaled,), [(first, np.array([2])), (second, np.array([3]))])
-    rows.call(rows=np.array([1]))
+    rows.call(np.array([1]))
     rows.put(0, other, np.array([5]))
-    rows.call(rows=np.array([0]))
+    rows.call(np.array([0]))
     assert (first.tolist(), second.tolist()) == ([1, 1], [3, 3])
     assert other.tolist() == [5, 5, 5]
     rows.put(1, first, np.array([7]))
-    rows.call()
+    rows.call_all()
     assert (first.tolist(), second.tolist()) == ([7, 7], [3, 3])
     assert other.tolist() == [25, 25, 25]
 
@@ -64,10 +64,10 @@ def test_a_failing_row_is_told(threads):
     values = [np.array([k % 200]) for k in range(300)]
     rows = Rows((_inverted,), [(value,) for value in values], threads)
     with pytest.raises(ArithmeticError, match="_inverted failed"):
-        rows.call()
+        rows.call_all()
     assert values[299][0] == 100 // 99
     with pytest.raises(ArithmeticError, match="_inverted failed"):
-        rows.call(rows=np.array([0]))
+        rows.call(np.array([0]))
     rows.close()
 
 
@@ -77,7 +77,7 @@ def test_threads_end_with_the_rows():
     rows = Rows((_scaled,), arguments, 3)
     before = threading.active_count()
     for _ in range(2):
-        rows.call()
+        rows.call_all()
         rows.close()
         assert threading.active_count() == before
 
@@ -96,7 +96,7 @@ def test_each_row_has_the_kernel_of_its_kind(threads):
     rows = Rows((_scaled, _raised), arguments, threads)
     kinds = (np.arange(400) % 3 == 0).astype(np.uint8)
     called = np.flatnonzero(np.arange(400) % 5)
-    rows.call(kinds, called)
+    rows.call(called, kinds)
     rows.close()
     expected = np.where(kinds[:, None], 1.0 + numbers, 1.0 * numbers)
     expected[::5] = 1.0
@@ -105,24 +105,31 @@ def test_each_row_has_the_kernel_of_its_kind(threads):
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_what_goes_in_and_comes_out_is_copied(threads):
-    """Of the rows that are called, from and to arrays of any stride."""
+    """Of each row that is called, from and to arrays of any stride and type."""
     memory, factors = np.zeros((300, 5)), np.arange(300)[:, None]
-    inner = memory[:, 1:3]
+    inner, given = memory[:, 1:3], np.random.default_rng(0).random((300, 2))
     arguments = [(memory[k], factors[k]) for k in range(300)]
-    given, found = np.random.default_rng(0).random((300, 2)), np.full((300, 4), -1.0)
-    inputs = [(given, inner)]
-    rows = Rows((_scaled,), arguments, threads, inputs=inputs, outputs=(inner,))
-    chosen = np.arange(7, 290)
-    rows.call(rows=chosen, returned=(found[:, 2:],))
-    np.testing.assert_array_equal(found[chosen, 2:], (given * factors)[chosen])
-    rest = np.setdiff1d(np.arange(300), chosen)
-    assert (found[rest] == -1).all()
-    assert (found[:, :2] == -1).all()
-    assert not memory[rest].any()
+    names = np.arange(300, dtype=np.uint8).reshape(300, 1, 1)
+    rows = Rows(
+        (_scaled,),
+        arguments,
+        threads,
+        inputs=[(given, inner)],
+        outputs=(inner, names, memory),
+    )
+    found, same, whole = rows.call_all()
+    np.testing.assert_array_equal(found, given * factors)
+    np.testing.assert_array_equal(same, names)
+    np.testing.assert_array_equal(whole, memory)
+    assert same.dtype == np.uint8
     kept = found.copy()
-    rows.call()
+    given[:] = 1.0
+    rows.call(np.arange(7, 290))
+    np.testing.assert_array_equal(inner[7:290], factors[7:290] * np.ones((1, 2)))
+    np.testing.assert_array_equal(inner[290:], kept[290:])
+    again, *_ = rows.call_all()
     rows.close()
-    np.testing.assert_array_equal(inner, given * factors)
+    np.testing.assert_array_equal(again, factors * np.ones((1, 2)))
     np.testing.assert_array_equal(found, kept)
 
 
@@ -132,7 +139,7 @@ def test_each_call_is_whole_when_it_returns():
     rows = Rows((_raised,), [(each, np.array([1])) for each in counts], 6)
     sums = []
     for k in range(1, 400):
-        rows.call(rows=np.arange(500 - k))
+        rows.call(np.arange(500 - k))
         sums.append(counts.sum())
     rows.close()
     np.testing.assert_array_equal(np.diff(sums), 500.0 - np.arange(2, 400))
@@ -143,7 +150,7 @@ def test_threads_end_with_an_object_that_is_forgotten():
     """It need not be closed."""
     rows = Rows((_scaled,), [(np.ones(1), np.array([1])) for _ in range(500)], 3)
     before = threading.active_count()
-    rows.call()
+    rows.call_all()
     assert threading.active_count() == before + 2
     del rows
     gc.collect()
@@ -157,9 +164,9 @@ def test_a_forked_process_has_threads_of_its_own():
         "from test_rows import Rows, _scaled, np\n"
         "value = np.ones((500, 1))\n"
         "rows = Rows((_scaled,), [(v, np.array([2])) for v in value], 3)\n"
-        "rows.call()\n"
+        "rows.call_all()\n"
         "child = os.fork()\n"
-        "rows.call()\n"
+        "rows.call_all()\n"
         "assert (value == 4).all()\n"
         "if child:\n"
         "    assert os.waitpid(child, 0)[1] == 0\n"
