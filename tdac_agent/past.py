@@ -87,6 +87,12 @@ class Past:
         """What the lost answers may have cost."""
         return sum(self.taken[call].usd for call in self.lost)
 
+    @property
+    def unanswered(self) -> int:
+        """How many questions were put and have no answer to this day."""
+        keys = {call.rpartition("/")[0] for call in self.open}
+        return len(keys - self.replies.keys())
+
     def next_call(self, key: str) -> str:
         """Name of the next attempt to ask a question."""
         self.attempts[key] += 1

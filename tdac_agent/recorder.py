@@ -106,7 +106,7 @@ class Recorder:
             task=self.run.task,
             learner=self.run.learner,
             answers=Counter(str(one.get("kind")) for one in past.replies.values()),
-            unanswered=len(past.open),
+            unanswered=past.unanswered,
             lost_usd=past.lost_usd,
             **facts,
         )

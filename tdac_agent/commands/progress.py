@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.markup import escape
 from rich.spinner import Spinner
+from rich.table import Table
 
 from tdac_agent.budget import told_usd
 from tdac_agent.commands.run_view import told_tests
@@ -64,12 +65,12 @@ class Progress:
             self._print_fault(at, record)
         elif kind == "call.reply":
             for note in record["notes"]:
-                self._console.print(f"  [dim]{at}  {escape(note)}[/]")
+                self._say(f"  {at}", escape(note), "dim")
         elif kind == "call.unused":
             self._print_unused(at, record)
         elif kind == "rules":
             for note in record["notes"]:
-                self._console.print(f"  [dim]k={record['k']}  rules: {escape(note)}[/]")
+                self._say(f"  k={record['k']}", f"rules: {escape(note)}", "dim")
         elif kind == "verify.start":
             self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
         elif kind == "verify.end":
@@ -78,35 +79,46 @@ class Progress:
     def _print_heading(self, record: dict[str, Any]) -> None:
         self._console.print(self._heading)
         for note in record["notes"]:
-            self._console.print(f"[yellow]note: {escape(note)}[/]", soft_wrap=True)
+            self._console.print(f"[yellow]note: {escape(note)}[/]")
         if record["event"] == "run.resume":
             known = _known(record["answers"])
-            self._console.print(f"going on: {known}{_open(record)}", soft_wrap=True)
+            self._console.print(f"going on: {known}{_open(record)}")
 
     def _print_fault(self, at: str, record: dict[str, Any]) -> None:
         wait = record["wait"]
         then = "given up" if wait is None else f"asking again in {wait:.0f} s"
         told = f"{record['fault']} fault: {record['reason']}; {then}"
-        self._console.print(f"  [yellow]{at}  {escape(told)}[/]")
+        self._say(f"  {at}", escape(told), "yellow")
 
     def _print_unused(self, at: str, record: dict[str, Any]) -> None:
+        """Why an answer is asked for again; what came of the last one follows."""
         asked, most = record["asked"], record["most"]
-        then = "asking again" if asked < most else "given up"
-        told = f"answer {asked} of {most} cannot be used: {record['problem']}; {then}"
-        self._console.print(f"  [yellow]{at}  {escape(told)}[/]")
+        if asked < most:
+            why = f"answer {asked} of at most {most} cannot be used: "
+            told = f"{why}{record['problem']}; asking again"
+            self._say(f"  {at}", escape(told), "yellow")
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         if record["passed"]:
-            self._console.print(f"[green]✔ {at}  all tests passed[/]")
+            self._say(f"✔ {at}", "all tests passed", "green")
         elif not record["valid"]:
-            why = escape("; ".join(record["notes"][-1:]))
-            self._console.print(f"[yellow]– {at}  {why}[/]")
+            why = "; ".join(record["notes"][-1:])
+            self._say(f"– {at}", escape(why), "yellow")
         elif record["unchanged"]:
-            self._console.print(f"[yellow]= {at}  the same code as before[/]")
+            self._say(f"= {at}", "the same code as before", "yellow")
         else:
             failed = record["failed_tests"]
             names = escape(told_tests(failed, 3))
-            self._console.print(f"[red]✘ {at}  {len(failed)} failed:[/] {names}")
+            told = f"[red]{len(failed)} failed:[/] {names}"
+            self._say(f"[red]✘ {at}[/]", told)
+
+    def _say(self, place: str, told: str, style: str = "") -> None:
+        """A line whose continuation is not mistaken for another one."""
+        line = Table.grid(padding=(0, 2, 0, 0))
+        line.add_column(no_wrap=True)
+        line.add_column(overflow="fold")
+        line.add_row(place, told, style=style)
+        self._console.print(line)
 
 
 def _known(answers: dict[str, int]) -> str:
@@ -121,13 +133,10 @@ def _known(answers: dict[str, int]) -> str:
 
 
 def _open(record: dict[str, Any]) -> str:
-    """Questions that were put when the last process ended, and what they may cost."""
+    """Questions that still have no answer, and what lost answers may have cost."""
     number, lost = record["unanswered"], record["lost_usd"]
-    if not number:
-        return ""
-    was, it = (
-        ("a question was", "it is") if number == 1 else ("questions were", "they are")
-    )
-    count = "" if number == 1 else f"{number} "
-    bill = f"; lost answers count with {told_usd(lost)}, at most" if lost else ""
-    return f"; {count}{was} without an answer when it ended: {it} put again{bill}"
+    told = ""
+    if number:
+        who = "one question is" if number == 1 else f"{number} questions are"
+        told = f"; {who} put again, without an answer so far"
+    return told + (f"; lost answers count with {told_usd(lost)}, at most" * bool(lost))

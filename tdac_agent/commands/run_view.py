@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Table
 
 from tdac_agent.budget import told_usd
@@ -17,26 +18,39 @@ def show_run(run: Run, console: Console) -> None:
     """Prints the attempts in a table, and what came of the run."""
     if run.attempts:
         console.print(_attempts(run))
-    took = f"{usage}\n" if (usage := _usage(run)) else ""
+    usage, folder = _usage(run), run.folder
     if run.verified:
         ending = (
             f"[bold green]verified[/] in iteration {run.tau}, {run.seconds:.1f} s: "
-            f"{run.controller}\n{took}"
-            f"  evidence: {run.folder / 'report.json'}, "
-            f"{run.folder / 'trajectory.png'}\n"
-            f"  see it drive: tdac play {run.folder} --video drive.mp4"
         )
+        console.print(f"{ending}{escape(str(run.controller))}", soft_wrap=True)
+        _tell_more(console, usage)
+        evidence = f"{folder / 'report.json'}, {folder / 'trajectory.png'}"
+        _tell_way(console, f"evidence: {evidence}")
+        drive = shlex.join(["tdac", "play", str(folder), "--video", "drive.mp4"])
+        _tell_way(console, f"see it drive: {drive}")
     elif run.status == "budget":
-        ending = (
-            f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}\n{took}"
-            f"  {run.outlook}\n  go on: {way_on(run)}"
-        )
+        console.print(f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}")
+        _tell_more(console, usage)
+        _tell_more(console, run.outlook)
+        _tell_way(console, f"go on: {way_on(run)}")
     else:
-        ending = (
-            f"[bold red]not verified[/] after {run.iterations} iterations; "
-            f"the attempts are in {run.folder / 'iterations'}\n{took}".rstrip()
-        )
-    console.print(ending, soft_wrap=True)
+        times = f"{run.iterations} iteration{'' if run.iterations == 1 else 's'}"
+        ending = f"[bold red]not verified[/] after {times}; "
+        told = f"{ending}the attempts are in {escape(str(folder / 'iterations'))}"
+        console.print(told, soft_wrap=True)
+        _tell_more(console, usage)
+
+
+def _tell_more(console: Console, told: str) -> None:
+    """A sentence that belongs to the line before, if there is something to say."""
+    if told:
+        console.print(Padding(escape(told), (0, 0, 0, 2)))
+
+
+def _tell_way(console: Console, told: str) -> None:
+    """A path or command, which stays in one piece to be copied."""
+    console.print(f"  {escape(told)}", soft_wrap=True)
 
 
 def _usage(run: Run) -> str:
@@ -52,7 +66,7 @@ def _usage(run: Run) -> str:
         tokens = "no tokens reported"
         if run.max_tokens is not None:
             tokens += ": each answer counts with all that was reserved for it"
-    return f"  {tokens}; {cost}"
+    return f"{tokens}; {cost}"
 
 
 def way_on(run: Run) -> str:

@@ -122,6 +122,10 @@ def test_a_process_that_dies_in_a_call(make):
     assert budget.taken == WORST
     assert calls.ask(Script(ANSWER), QUESTION) == ANSWER
     assert budget.taken.usd == pytest.approx(WORST.usd + 0.01)
+    # Answered since; what the lost answer may have cost stays.
+    later = make(Budget()).recorder.past
+    assert (calls.recorder.past.unanswered, later.unanswered) == (1, 0)
+    assert later.lost_usd == pytest.approx(WORST.usd)
     small = Budget(max_cost=1.9 * WORST.usd)
     with pytest.raises(OutOfBudget):
         make(small).ask(Script(ANSWER), replace(QUESTION, prompt="Other?"))
