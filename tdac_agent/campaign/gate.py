@@ -19,7 +19,14 @@ from pathlib import Path
 from tdac_agent.campaign.plan import slug
 from tdac_agent.files import write_atomic
 from tdac_agent.locks import wait_for
-from tdac_agent.provider import Provider, RateLimited, Reply, Request, served_at
+from tdac_agent.provider import (
+    Provider,
+    RateLimited,
+    Reply,
+    Request,
+    missing_for,
+    served_at,
+)
 
 FIRST = 8.0
 """Places in the beginning."""
@@ -112,6 +119,7 @@ class Gated:
         self.name = model.name
         self.paid = model.paid
         self.served_at = served_at(model)
+        self.missing = missing_for(model)
         self._model = model
         self._gate = gate
 

@@ -23,7 +23,9 @@ from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign_live import LiveView
 from tdac_agent.commands.campaign_table import show_summary, told_counts
+from tdac_agent.errors import ProviderError
 from tdac_agent.lifecycle import model_warnings
+from tdac_agent.provider import missing_for
 from tdac_agent.providers import choose_models
 from tdac_agent.tariff import bounds_of, tariffs_of
 
@@ -79,11 +81,11 @@ def run(wanted: Wanted, as_json: bool) -> int:
             keep=config.keep,
         )
         progress, left = look(plan, shard, terms.runs)
+        check_models(plan, left, config)
         _tell_heading(console, config, progress, folder)
         _tell_remarks(console, plan, terms)
         try:
             if left:
-                check_models(plan, left, config)
                 _make(progress, left, terms, wanted.executor, console)
         finally:
             summary = write_tables(collect(plan, terms.runs), folder)
@@ -105,12 +107,16 @@ def check_models(
     """Makes each model once, so that a missing key is known before the night.
 
     Raises:
-        ProviderError: One cannot be made, or nothing bounds what it costs.
+        ProviderError: With all that is missing.
     """
+    missing: dict[str, None] = {}
     for cell in dict.fromkeys(planned.cell for planned in left):
         setting = plan.tasks[cell.task].setting
         models = choose_models(cell.learner, cell.optimizer, setting, cell.base_url)
+        missing |= dict.fromkeys(line for one in models for line in missing_for(one))
         bounds_of(models, tariffs_of(models), config.max_cost, config.max_tokens)
+    if missing:
+        raise ProviderError("; and ".join(missing))
 
 
 def _make(

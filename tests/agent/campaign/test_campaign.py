@@ -15,7 +15,7 @@ def once(tmp_path_factory):
     """Two kinds that work and one whose every run ends with a fault."""
     small = Small(tmp_path_factory.mktemp("campaign"))
     small.write()
-    small.write("broken", learners=["replay:demo", "builtin"])
+    small.write("broken", learners=["replay:demo", "builtin"], keep="records")
     return small, small.run("--workers", 2, name="broken"), small.run("--json")
 
 
@@ -69,6 +69,7 @@ def test_the_tables_hold_each_run_once_with_the_columns_of_the_metrics(once):
     assert (summary["R"] == 2).all()
 
 
+@pytest.mark.slow
 def test_shards_make_all_runs_together(small):
     """Each has its part; the whole has nothing left to do."""
     small.write(learners=["builtin"])
@@ -81,16 +82,16 @@ def test_shards_make_all_runs_together(small):
     assert "nothing was done" in said
 
 
-def test_of_finished_runs_only_records_may_be_kept(small):
-    """A handful of files a run; the tables and the way on are the same."""
-    small.write(learners=["builtin"], runs=1)
-    small.write("thin", learners=["builtin"], runs=1, keep="records")
-    assert small.run()[0] == small.run(name="thin", out="thin")[0] == 0
-    assert small.table() == small.table("thin")
-    (run,) = find_runs(small.folder / "thin")
+def test_of_finished_runs_only_records_may_be_kept(once):
+    """A handful of files; they are found finished, and count, as all others."""
+    small, _, _ = once
+    runs = [run.folder for run in find_runs(small.folder / "out")]
+    thin = [run for run in runs if "-builtin-" in run.parent.name]
     names = "controller.py journal.jsonl report.json run.json task.yaml"
-    assert sorted(path.name for path in run.folder.iterdir()) == names.split()
-    assert "nothing was done" in small.run(name="thin", out="thin")[1]
+    assert [sorted(path.name for path in run.iterdir()) for run in thin] == [
+        names.split()
+    ] * 2
+    assert all((run / "iterations").is_dir() for run in runs if run not in thin)
 
 
 def test_a_dry_run_writes_nothing_and_needs_no_key(tdac, monkeypatch):
@@ -105,7 +106,12 @@ def test_a_dry_run_writes_nothing_and_needs_no_key(tdac, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "code", "line"),
     [
-        (("paper_2d",), 2, "error: no key for OpenAI"),
+        (
+            ("paper_2d",),
+            2,
+            "error: no key for OpenAI: set the environment variable "
+            "OPENAI_API_KEY; and no key for Anthropic",
+        ),
         (("paper_2",), 2, "error: no campaign 'paper_2': expected a YAML file, or"),
         (("offline", "--shard", "5/4"), 2, "error: expected --shard as in 1/4"),
         (("offline", "--out", "/proc/none"), 2, "error: cannot write to /proc/none"),
