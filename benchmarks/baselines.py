@@ -1,86 +1,77 @@
-"""Trains the baselines, and collects what came of them in results/baselines.
+"""Trains the baselines, lets them drive, and collects it all in results/baselines.
 
-    python -m benchmarks.baselines [--only ppo-maze-0 …] [--runs DIR] [--collect]
+    python -m benchmarks.baselines [STAGE …] [--only ppo-maze-0 …] [--runs DIR]
 
-Each training has a folder of its own in --runs. Started again, the command goes on with
-what was interrupted and leaves what is finished; `--collect` trains nothing.
+Stages: `train`; `evaluate`, all policies on the same episodes; `generalise`, learned
+ones on other maps and worlds; `collect`, tables and figures of what is there. Without
+names, all. Each piece of work has a place of its own in --runs: started again, the
+command goes on with what was interrupted and leaves what is finished.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from itertools import product
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
+from benchmarks import baseline_evaluation as evaluation
+from benchmarks import baseline_generalisation as generalisation
+from benchmarks import baseline_trainings as trainings
 from tdac_agent.files import write_atomic
-from tdac_agent.training.curve import CURVE_FILE
-from tdac_agent.training.plan import make_plan, read_plan
-from tdac_agent.training.policy_files import FACTS
-from tdac_agent.training.train import train
+from tdac_agent.plots import baselines as plots
+from tdac_agent.plots import save_figure
 
 RESULTS = Path(__file__).parent.parent / "results" / "baselines"
-SEEDS = (0, 1, 2)
-PPO_TASKS = ("maze", "epuck", "office", "cave", "rooms", "epuck-maze")
-SAC_TASKS = ("maze", "epuck")
-TRAININGS = {
-    f"{algo}-{task}-{seed}": (algo, task, seed)
-    for algo, tasks in (("ppo", PPO_TASKS), ("sac", SAC_TASKS))
-    for task, seed in product(tasks, SEEDS)
-}
+STAGES = ("train", "evaluate", "generalise", "collect")
 
 
 def main() -> int:
     """Returns the exit code."""
     options = _options()
-    for name in () if options.collect else options.only or TRAININGS:
-        algo, task, seed = TRAININGS[name]
-        print(name, flush=True)
-        train(make_plan((task,), algo, seed=seed), options.runs / name)
-    collect(options.runs)
+    names = options.only or list(trainings.TRAININGS)
+    stages: dict[str, Callable[[], object]] = {
+        "train": lambda: trainings.train_all(names, options.runs),
+        "evaluate": lambda: evaluation.evaluate_all(names, options.runs),
+        "generalise": lambda: generalisation.drive_all(names, options.runs),
+        "collect": lambda: collect(options.runs),
+    }
+    for stage in options.stages or STAGES:
+        stages[stage]()
     return 0
 
 
 def collect(runs: Path) -> None:
-    """Writes `curves.csv` and `trainings.csv` of what is in a folder of trainings."""
-    curves, rows = [], []
-    for name in TRAININGS:
-        folder = runs / name
-        if not (folder / FACTS).is_file():
-            continue
-        curve = pd.read_csv(folder / CURVE_FILE)
-        curve.insert(0, "training", name)
-        curves.append(curve)
-        rows.append(_row(name, folder, curve))
-    if not rows:
-        return
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    write_atomic(RESULTS / "curves.csv", pd.concat(curves).to_csv(index=False))
-    write_atomic(RESULTS / "trainings.csv", pd.DataFrame(rows).to_csv(index=False))
-
-
-def _row(name: str, folder: Path, curve: pd.DataFrame) -> dict[str, Any]:
-    plan, best = read_plan(folder), json.loads((folder / FACTS).read_text())
-    last = curve.iloc[-1]
-    found = best["evaluation"]
-    return {
-        "training": name,
-        "algo": plan.algo,
-        "task": plan.tasks[0],
-        "seed": plan.seed,
-        "steps_planned": plan.steps,
-        "steps": int(last.steps),
-        "seconds": last.seconds,
-        "best_steps": found["steps"],
-        "best_seconds": found["seconds"],
-        "success_rate": found["success_rate"],
-        "collision_rate": found["collision_rate"],
-        "episodes": plan.episodes,
+    """Writes tables and figures of what is in a folder of trainings."""
+    tables = {
+        "trainings": trainings.training_table(runs),
+        "curves": trainings.curve_table(runs),
+        "evaluation": evaluation.table(runs),
+        "generalisation": generalisation.table(runs),
     }
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    for name, table in tables.items():
+        if not table.empty:
+            write_atomic(RESULTS / f"{name}.csv", table.to_csv(index=False))
+    draw(RESULTS)
+
+
+def draw(results: Path) -> None:
+    """Draws the figures from the tables alone."""
+    found = {file.stem: pd.read_csv(file) for file in sorted(results.glob("*.csv"))}
+    if {"curves", "trainings"} <= found.keys():
+        curves = found["curves"].merge(
+            found["trainings"][["training", "algo", "task", "seed"]], on="training"
+        )
+        save_figure(plots.plot_learning_curves(curves), results / "curves.svg")
+    if "evaluation" in found:
+        figure = plots.plot_success_by_policy(found["evaluation"])
+        save_figure(figure, results / "evaluation.svg")
+    if "generalisation" in found:
+        figure = plots.plot_generalisation(found["generalisation"])
+        save_figure(figure, results / "generalisation.svg")
 
 
 def _options() -> argparse.Namespace:
@@ -88,10 +79,16 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.baselines", description=about
     )
-    parser.add_argument("--only", nargs="+", choices=TRAININGS, metavar="NAME")
+    parser.add_argument("stages", nargs="*", metavar="STAGE", help=", ".join(STAGES))
+    parser.add_argument(
+        "--only", nargs="+", choices=trainings.TRAININGS, metavar="NAME"
+    )
     parser.add_argument("--runs", type=Path, default=Path("runs") / "baselines")
-    parser.add_argument("--collect", action="store_true", help="train nothing")
-    return parser.parse_args()
+    options = parser.parse_args()
+    wrong = [stage for stage in options.stages if stage not in STAGES]
+    if wrong:
+        parser.error(f"no stage {wrong[0]!r}; expected some of {', '.join(STAGES)}")
+    return options
 
 
 if __name__ == "__main__":

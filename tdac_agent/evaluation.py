@@ -96,7 +96,7 @@ def evaluate(
     loaded = load_tasks(tasks)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-    seeds = tuple(np.random.SeedSequence(seed).generate_state(episodes).tolist())
+    seeds = episode_seeds(seed, episodes)
     results: list[Result] = []
     timings: list[Timing] = []
     with contextlib.ExitStack() as stack:
@@ -143,6 +143,11 @@ def evaluate(
     if out is not None:
         write_evaluation(found, out)
     return found
+
+
+def episode_seeds(seed: int, episodes: int) -> tuple[int, ...]:
+    """The seeds of the episodes of an evaluation, drawn from its own."""
+    return tuple(np.random.SeedSequence(seed).generate_state(episodes).tolist())
 
 
 def write_evaluation(found: Evaluation, out: Path) -> None:

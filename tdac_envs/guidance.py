@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,8 @@ this near, the body stays clear on every bundled map and world.
 # A route with room is taken if it is at most so many times as long as the shortest.
 _DETOUR = 1.25
 _SQRT2 = 2.0**0.5
+# A way ends at most so many grid points beside its goal.
+_BESIDE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,11 +97,11 @@ def route_to_goal(task: Map2DTask | EPuckTask, reach: float = REACH) -> Route:
         frame = (*task.ground.bounds[:2], task.ground.spacing)
     spacing, radius = frame[2], task.body_radius
     shortest = _in_spacings(task.field, spacing)
-    goal = np.unravel_index(int(np.argmin(shortest)), shortest.shape)
+    goal = _goal_cell(shortest, [(task.goal[k] - frame[k]) / spacing for k in (0, 1)])
     start = [(task.start[k] - frame[k]) / spacing for k in (0, 1)]
     roomy = shortest
     for margin in MARGINS:
-        wide = _roomy(place, (int(goal[1]), int(goal[0])), radius, margin)
+        wide = _roomy(place, goal, radius, margin)
         if _near(wide, start, radius / spacing) <= _DETOUR * task.shortest / spacing:
             roomy = wide
             break
@@ -107,6 +110,16 @@ def route_to_goal(task: Map2DTask | EPuckTask, reach: float = REACH) -> Route:
 
 def _in_spacings(field: Lengths, spacing: float) -> Lengths:
     return field if spacing == 1.0 else np.asarray(field / spacing, np.float32)
+
+
+def _goal_cell(shortest: Lengths, at: Sequence[float]) -> tuple[int, int]:
+    """Column and row of the grid point where a way ends, looked for near a point."""
+    top, left = (max(round(at[k]) - _BESIDE, 0) for k in (1, 0))
+    part = shortest[top : top + 2 * _BESIDE + 1, left : left + 2 * _BESIDE + 1]
+    if not part.size or part.min() > 0.0:
+        top, left, part = 0, 0, shortest
+    row, column = np.unravel_index(int(np.argmin(part)), part.shape)
+    return left + int(column), top + int(row)
 
 
 def _free(place: Terrain | Ground, radius: float) -> BoolGrid:

@@ -8,7 +8,7 @@ PPO("MultiInputPolicy", envs).learn(1_000_000)
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -69,6 +69,20 @@ class SB3VecEnv(VecEnv):
         self._reset_seeds()
         self._reset_options()
         return observations
+
+    def seed(self, seed: int | Sequence[int] | None = None) -> Sequence[int | None]:
+        """Seeds the next `reset`.
+
+        Args:
+            seed: Of the first robot, the next ones having those that follow; or one
+                for each robot.
+        """
+        if seed is None or isinstance(seed, int):
+            return super().seed(seed)
+        if len(seed) != self.num_envs:
+            raise TaskError(f"expected {self.num_envs} seeds, got {len(seed)}")
+        self._seeds = list(seed)
+        return self._seeds
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keeps the actions for `step_wait`."""

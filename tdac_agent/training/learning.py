@@ -9,7 +9,7 @@ import importlib.util
 import io
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -71,18 +71,18 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
         trials.close()
 
 
-def evaluate_batch(model: Any, envs: VecMonitor, seed: int) -> Point:
+def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> Point:
     """One episode of each robot of a batch, by the most likely actions.
 
     Args:
         model: With `predict`.
         envs: Of which each robot drives its first episode.
-        seed: Of the episodes.
+        seed: Of the first robot's episode, or of that of each robot.
 
     Returns:
         What is known from the episodes; steps, seconds and training are nought.
     """
-    envs.seed(seed)
+    envs.venv.seed(seed)  # type: ignore[arg-type]
     observations: Any = envs.reset()
     ended: list[dict[str, Any] | None] = [None] * envs.num_envs
     while None in ended:

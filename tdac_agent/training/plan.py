@@ -23,7 +23,7 @@ from tdac_envs.wrappers import check_wrappers
 
 PLAN_FILE = "training.json"
 Variation = Literal["nominal", "jitter", "random"]
-EVALUATIONS, EPISODES = 20, 100
+EVALUATIONS, EPISODES = 12, 100
 
 
 class TrainingPlan(BaseModel):

@@ -21,7 +21,7 @@ from small import QUICK, write_small_task
 import tdac_agent
 from tdac_agent.contenders import Contender
 from tdac_agent.driving import Stage, drive_seed
-from tdac_agent.evaluation import NO_DISTURBANCE, evaluate
+from tdac_agent.evaluation import NO_DISTURBANCE, episode_seeds, evaluate
 from tdac_agent.evaluation_report import compare
 from tdac_agent.exact import sign_test
 from tdac_agent.learned import (
@@ -259,6 +259,31 @@ def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task):
         assert episode.steps == len(places) - 1
         assert episode.collisions == info["collisions"]
         assert episode.driven == pytest.approx(length, abs=1e-2)
+
+
+def test_a_batch_drives_the_episodes_of_an_evaluation(tmp_path, small_task):
+    """Rates are the same as those of the judge, for the same seeds."""
+    sb3 = pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from tdac_agent.training.learning import evaluate_batch
+    from tdac_agent.training.plan import make_batch, make_plan
+
+    file, seeds = tmp_path / "model.zip", episode_seeds(3, 4)
+    model = save(file, sb3.PPO, wrap(small_task.make_env(), WRAPPERS))
+    plan = make_plan((str(write_small_task(tmp_path / "small")),))
+    envs = VecMonitor(make_batch(plan, 4), info_keywords=("collision",))
+    found = evaluate_batch(model, envs, seeds)
+    envs.close()
+    who = Contender("sb3", file, WRAPPERS)
+    stage = Stage(small_task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
+    alone = [drive_seed(stage, seed) for seed in seeds]
+    episodes = [measure(d.rollout, 0, d.task) for d in alone]
+    assert found.collision_rate == np.mean([e.collisions > 0 for e in episodes])
+    assert found.success_rate == np.mean([e.success for e in episodes])
+    # A network rounds a batch otherwise than a single observation.
+    lengths = np.mean([e.steps for e in episodes])
+    assert found.mean_length == pytest.approx(lengths, abs=1.0)
 
 
 def test_nothing_of_a_saved_policy_is_run(tmp_path, small_task):

@@ -56,6 +56,22 @@ def assert_equal(one, two):
         np.testing.assert_array_equal(one[key], two[key])
 
 
+def test_each_robot_may_have_a_seed_of_its_own():
+    """It then begins as it does alone; one seed for all goes on from the first."""
+    envs = batch(3, variation="jitter")
+    seeds = [7, 2**32 - 1, 0]
+    assert envs.seed(seeds) == seeds
+    poses = envs.reset()["pose"].copy()
+    for seed, pose in zip(seeds, poses, strict=True):
+        one = gym.make("TDAC-Map2D-v0", variation="jitter")
+        np.testing.assert_array_equal(one.reset(seed=seed)[0]["pose"], pose)
+    assert envs.seed(5) == [5, 6, 7]
+    np.testing.assert_array_equal(envs.reset()["pose"][2], poses[0])
+    with pytest.raises(TaskError, match="expected 3 seeds, got 2"):
+        envs.seed([1, 2])
+    envs.close()
+
+
 def test_a_policy_is_trained_and_evaluated_on_it():
     """Episodes are counted by the monitor, with their success."""
     torch = pytest.importorskip("torch")

@@ -1,0 +1,113 @@
+"""Learned policies on maps and worlds that they have and have not been trained on."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from benchmarks.baseline_trainings import TRAININGS, trained
+from tdac_agent.entrants import entrants_of
+from tdac_agent.evaluation import EPISODES, episode_seeds
+from tdac_agent.exact import exact_interval
+from tdac_agent.files import write_atomic
+from tdac_agent.task import load_task
+from tdac_agent.task_file import bundled_tasks
+from tdac_agent.training.plan import read_plan
+
+SEED = 0
+NOT_LEARNED = "follow-guidance"
+
+
+def drive_all(names: list[str], runs: Path) -> None:
+    """Has policies drive wherever their robot can, where that is not on record."""
+    for training in trained(runs):
+        if training not in names or TRAININGS[training].algo != "ppo":
+            continue
+        known = _read(training, runs)
+        for task in _places(TRAININGS[training].tasks):
+            if task not in known:
+                print(f"{training}: {task}", flush=True)
+                known[task] = _drive(training, task, runs)
+                _write(training, known, runs)
+
+
+def _drive(training: str, task: str, runs: Path) -> dict[str, int]:
+    """Episodes in which the goal was reached, and with a contact."""
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from tdac_agent.training.learning import evaluate_batch
+    from tdac_agent.training.plan import make_batch
+
+    folder = runs / training
+    plan = read_plan(folder).model_copy(
+        update={"tasks": (task,), "task_sha256": (load_task(task).sha256(),)}
+    )
+    model = PPO.load(folder / "policy.zip", device="cpu")
+    envs = VecMonitor(make_batch(plan, EPISODES), info_keywords=("collision",))
+    found = evaluate_batch(model, envs, episode_seeds(SEED, EPISODES))
+    envs.close()
+    rates = {"reached": found.success_rate, "collided": found.collision_rate}
+    return {name: round(rate * EPISODES) for name, rate in rates.items()}
+
+
+def table(runs: Path) -> pd.DataFrame:
+    """A row for each policy on each map or world."""
+    return pd.DataFrame(
+        [
+            _row(training, task, counts)
+            for training in trained(runs)
+            for task, counts in _read(training, runs).items()
+        ]
+    )
+
+
+def _row(training: str, task: str, counts: dict[str, int]) -> dict[str, Any]:
+    asked = TRAININGS[training]
+    low, high = exact_interval(counts["reached"], EPISODES)
+    return {
+        "training": training,
+        "trained_on": " ".join(asked.tasks),
+        "seed": asked.seed,
+        "evaluated_on": task,
+        "seen": task in asked.tasks,
+        "episodes": EPISODES,
+        "reached": counts["reached"],
+        "low": round(low, 6),
+        "high": round(high, 6),
+        "collided": counts["collided"],
+    }
+
+
+def _places(tasks: tuple[str, ...]) -> list[str]:
+    """The bundled tasks of the same environment."""
+    env = load_task(tasks[0]).spec.env
+    return [name for name in bundled_tasks() if load_task(name).spec.env == env]
+
+
+def _file(training: str, runs: Path) -> Path:
+    return runs / "elsewhere" / f"{training}.json"
+
+
+def _read(training: str, runs: Path) -> dict[str, dict[str, int]]:
+    """What is on record of this very policy, by task."""
+    file = _file(training, runs)
+    if not file.is_file():
+        return {}
+    found = json.loads(file.read_text())
+    same = found["sha256"] == _sha256(training, runs)
+    return dict(found["tasks"]) if same else {}
+
+
+def _write(training: str, known: dict[str, dict[str, int]], runs: Path) -> None:
+    file = _file(training, runs)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    found = {"sha256": _sha256(training, runs), "tasks": known}
+    write_atomic(file, json.dumps(found, indent=1) + "\n")
+
+
+def _sha256(training: str, runs: Path) -> str | None:
+    return entrants_of([trained(runs)[training]])[0].sha256

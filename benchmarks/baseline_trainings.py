@@ -1,0 +1,100 @@
+"""The trainings of the baselines, and the tables that tell how they went."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from tdac_agent.training.curve import CURVE_FILE, read_curve
+from tdac_agent.training.hyperparameters import Algo
+from tdac_agent.training.plan import make_plan, read_plan
+from tdac_agent.training.policy_files import FACTS, POLICY
+from tdac_agent.training.train import train
+
+SEEDS = (0, 1, 2)
+PPO_TASKS = ("maze", "epuck", "office", "cave", "rooms", "epuck-maze")
+SAC_TASKS = ("maze", "epuck")
+FOUR_MAPS = ("maze", "office", "cave", "rooms")
+LONGER = {"epuck-maze": 600_000, "four-maps": 1_200_000}
+"""Steps of PPO, where they are not those of the hyperparameters' file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """What is trained: an algorithm on some tasks, from a seed."""
+
+    algo: Algo
+    tasks: tuple[str, ...]
+    seed: int
+    steps: int | None = None
+
+
+TRAININGS = {
+    f"{algo}-{name}-{seed}": Training(algo, tasks, seed, LONGER.get(name))
+    for algo, sets in (
+        ("ppo", {task: (task,) for task in PPO_TASKS} | {"four-maps": FOUR_MAPS}),
+        ("sac", {task: (task,) for task in SAC_TASKS}),
+    )
+    for (name, tasks), seed in product(sets.items(), SEEDS)
+}
+
+
+def train_all(names: list[str], runs: Path) -> None:
+    """Trains, or goes on with what was interrupted."""
+    for name in names:
+        asked = TRAININGS[name]
+        print(name, flush=True)
+        plan = make_plan(asked.tasks, asked.algo, seed=asked.seed, steps=asked.steps)
+        train(plan, runs / name)
+
+
+def trained(runs: Path) -> dict[str, Path]:
+    """The policies of the trainings in a folder that are finished."""
+    return {name: runs / name / POLICY for name in TRAININGS if _done(runs / name)}
+
+
+def _done(folder: Path) -> bool:
+    curve = read_curve(folder)
+    return bool(curve) and curve[-1].steps >= read_plan(folder).steps
+
+
+def curve_table(runs: Path) -> pd.DataFrame:
+    """All learning curves: a row for each evaluation."""
+    curves = []
+    for name in trained(runs):
+        curve = pd.read_csv(runs / name / CURVE_FILE)
+        curve.insert(0, "training", name)
+        curves.append(curve)
+    return pd.concat(curves) if curves else pd.DataFrame()
+
+
+def training_table(runs: Path) -> pd.DataFrame:
+    """A row for each training."""
+    return pd.DataFrame([_row(name, runs / name) for name in trained(runs)])
+
+
+def _row(name: str, folder: Path) -> dict[str, Any]:
+    plan, best = read_plan(folder), json.loads((folder / FACTS).read_text())
+    last = pd.read_csv(folder / CURVE_FILE).iloc[-1]
+    found = best["evaluation"]
+    return {
+        "training": name,
+        "algo": plan.algo,
+        "task": " ".join(plan.tasks),
+        "seed": plan.seed,
+        "steps_planned": plan.steps,
+        "steps": int(last.steps),
+        "seconds": last.seconds,
+        "best_steps": found["steps"],
+        "best_seconds": found["seconds"],
+        "success_rate": found["success_rate"],
+        "collision_rate": found["collision_rate"],
+        "last_success_rate": last.success_rate,
+        "last_collision_rate": last.collision_rate,
+        "episodes": plan.episodes,
+    }

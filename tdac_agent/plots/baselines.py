@@ -1,0 +1,214 @@
+"""Figures of baselines: how they learn, how they do, and how they do elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, PercentFormatter
+
+from tdac_agent.exact import exact_interval
+from tdac_agent.plots.style import COLOURS, LINES, MARKERS, TEXT, colours_of, dress
+
+_COLUMNS = 4
+
+
+def plot_learning_curves(curves: pd.DataFrame) -> Figure:
+    """Success over steps, a panel per task, mean and range of the seeds.
+
+    Args:
+        curves: A row for each evaluation, with `task`, `algo`, `seed`, `steps` and
+            `success_rate`.
+    """
+    tasks = list(curves["task"].drop_duplicates())
+    algos = list(curves["algo"].drop_duplicates())
+    figure, panels = _panels(len(tasks), 2.5, 2.1)
+    for axes, task in zip(panels, tasks, strict=False):
+        for number, algo in enumerate(algos):
+            of = curves[(curves["task"] == task) & (curves["algo"] == algo)]
+            if not of.empty:
+                _curve(axes, of, algo.upper(), number)
+        count = curves[curves["task"] == task].groupby("algo")["seed"].nunique()
+        seeds = ", ".join(f"{algo.upper()} {count[algo]}" for algo in count.index)
+        _name(axes, task.replace(" ", ", "), f"seeds: {seeds}")
+        axes.set_ylim(-0.03, 1.05)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:.0f}k"))
+    _legend(figure, panels)
+    figure.supxlabel("steps of training, all robots together", fontsize=9, color=TEXT)
+    figure.supylabel("evaluation episodes reached", fontsize=9, color=TEXT)
+    return figure
+
+
+def _curve(axes: Axes, rows: pd.DataFrame, label: str, number: int) -> None:
+    """Each seed as a thin line; of several, their mean and range where all are."""
+    each = [of.sort_values("steps") for _, of in rows.groupby("seed")]
+    colour, line = COLOURS[number], LINES[number]
+    for of in each:
+        axes.plot(of["steps"], of["success_rate"], color=colour, lw=0.6, alpha=0.6)
+    first = max(of["steps"].min() for of in each)
+    last = min(of["steps"].max() for of in each)
+    steps = np.unique(rows["steps"])
+    steps = steps[(first <= steps) & (steps <= last)]
+    values = np.array(
+        [np.interp(steps, of["steps"], of["success_rate"]) for of in each]
+    )
+    low, high = values.min(axis=0), values.max(axis=0)
+    axes.fill_between(steps, low, high, color=colour, alpha=0.18, lw=0)
+    axes.plot(steps, values.mean(axis=0), line, color=colour, lw=1.8, label=label)
+
+
+def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
+    """Success by policy, a panel per task, with exact intervals; seeds side by side.
+
+    Args:
+        evaluation: A row for each policy on each task, with `task`, `policy`,
+            `training`, `knows`, `episodes` and `reached`; the last two are empty where
+            there is no such policy.
+    """
+    tasks = list(evaluation["task"].drop_duplicates())
+    policies = list(evaluation["policy"].drop_duplicates())
+    colours = colours_of(sorted(evaluation["knows"].drop_duplicates()))
+    width, height = 1.9, 0.7 + 0.24 * len(policies)
+    figure, panels = _panels(len(tasks), width, height, shared=True)
+    missing = False
+    for axes, task in zip(panels, tasks, strict=False):
+        of = evaluation[evaluation["task"] == task]
+        for place, policy in enumerate(policies):
+            known = of[of["policy"] == policy].dropna(subset=["episodes"])
+            _dots(axes, known, len(policies) - place, colours)
+            missing |= known.empty
+        _name(axes, task)
+        axes.set_yticks(range(len(policies), 0, -1), policies)
+        axes.set_ylim(0.4, len(policies) + 0.6)
+        axes.set_xlim(-0.05, 1.05)
+        axes.set_xticks([0, 0.5, 1])
+        axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+        axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
+    _legend(figure, panels)
+    told = "episodes reached without a contact, exact 95 % intervals"
+    if evaluation["training"].notna().any():
+        told += "; a dot for each seed of a training"
+    if missing:
+        told += "; –: there is none"
+    figure.supxlabel(told, fontsize=9, color=TEXT)
+    return figure
+
+
+def _dots(
+    axes: Axes, known: pd.DataFrame, place: float, colours: dict[str, str]
+) -> None:
+    if known.empty:
+        axes.text(0.02, place, "–", va="center", fontsize=8, color="#888888")
+        return
+    offsets = np.linspace(0.22, -0.22, len(known)) if len(known) > 1 else [0.0]
+    for offset, row in zip(offsets, known.to_dict("records"), strict=True):
+        reached, episodes = int(row["reached"]), int(row["episodes"])
+        rate = reached / episodes
+        low, high = exact_interval(reached, episodes)
+        knows = str(row["knows"])
+        axes.errorbar(
+            rate,
+            place + offset,
+            xerr=[[rate - low], [high - rate]],
+            fmt=MARKERS[list(colours).index(knows) % len(MARKERS)],
+            color=colours[knows],
+            markersize=4,
+            linewidth=1,
+            label=knows,
+            clip_on=False,
+        )
+
+
+def plot_generalisation(found: pd.DataFrame) -> Figure:
+    """Success where a policy was trained and elsewhere, mean of the seeds, in %.
+
+    Args:
+        found: A row for each policy on each place, with `trained_on`, `evaluated_on`,
+            `seen`, `episodes` and `reached`.
+    """
+    sums = found.groupby(["trained_on", "evaluated_on"], sort=False)
+    cells = sums[["reached", "episodes"]].sum()
+    rates = (cells["reached"] / cells["episodes"]).unstack(sort=False)
+    seen = sums["seen"].first().unstack(sort=False)
+    rows, columns = list(rates.index), list(rates.columns)
+    size = (2.2 + 0.52 * len(columns), 1.4 + 0.36 * len(rows))
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.add_subplot()
+    axes.imshow(rates.to_numpy(float), cmap="cividis", vmin=0, vmax=1, aspect="auto")
+    for y, trained in enumerate(rows):
+        for x, place in enumerate(columns):
+            _cell(axes, x, y, rates.loc[trained, place], seen.loc[trained, place])
+    axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right", fontsize=8)
+    labels = [name.replace(" ", ", ") for name in rows]
+    axes.set_yticks(range(len(rows)), labels, fontsize=8)
+    axes.tick_params(length=0, colors=TEXT)
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("evaluated on (framed: trained on it)", fontsize=9, color=TEXT)
+    axes.set_ylabel("trained on", fontsize=9, color=TEXT)
+    return figure
+
+
+def _cell(axes: Axes, x: int, y: int, rate: float, seen: object) -> None:
+    if math.isnan(rate):
+        return
+    colour = "white" if rate < 0.55 else "black"
+    axes.text(
+        x, y, f"{100 * rate:.0f}", ha="center", va="center", color=colour, fontsize=8
+    )
+    if seen is True or seen is np.True_:
+        frame = axes.add_patch(_frame(x, y))
+        frame.set_clip_on(False)
+
+
+def _frame(x: int, y: int) -> Rectangle:
+    return Rectangle((x - 0.5, y - 0.5), 1, 1, fill=False, ec="#D55E00", lw=2)
+
+
+def _panels(
+    count: int, width: float, height: float, *, shared: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """A figure with so many panels in rows, sizes of one in inches."""
+    columns = min(_COLUMNS, count)
+    rows = math.ceil(count / columns)
+    left = 1.6 if shared else 0.3
+    size = (left + width * columns, 0.7 + height * rows)
+    figure = Figure(figsize=size, layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    panels = [dress(axes) for axes in grid.flat]
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    return figure, panels
+
+
+def _name(axes: Axes, text: str, below: str = "") -> None:
+    axes.set_title(text, loc="left", fontsize=9.5, color=TEXT, pad=14 if below else 4)
+    axes.annotate(
+        below,
+        (0, 1),
+        (0, 4),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        fontsize=7.5,
+        color="#666666",
+    )
+
+
+def _legend(figure: Figure, panels: list[Axes]) -> None:
+    """One legend for all panels, above them."""
+    entries = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        entries.update(dict(zip(labels, handles, strict=True)))
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="outside upper left",
+        ncols=5,
+        frameon=False,
+        fontsize=8.5,
+    )
