@@ -19,8 +19,7 @@ from scipy.stats import binom
 from tdac_agent.metrics import (
     cumulative_success,
     exact_interval,
-    frames_from_tau,
-    success_rate,
+    rate_of_runs,
 )
 
 MOST = 20
@@ -53,8 +52,8 @@ def rate_coverage(
 @cache
 def _rate_interval(first: tuple[int, ...]) -> tuple[float, float]:
     """Of runs whose first successes these are; few runs are often alike."""
-    tau = [k if k <= MOST else None for k in first]
-    rate = success_rate(frames_from_tau(tau, MOST))
+    tau = np.array(first)
+    rate = rate_of_runs((tau <= MOST).astype(int), tau.clip(max=MOST))
     # Without an interval everything is possible.
     return (rate.low, rate.high) if rate.method != "none" else (0.0, 1.0)
 
@@ -95,7 +94,7 @@ def _curve_interval(ends: tuple[tuple[int, int], ...], at: int) -> tuple[float, 
         }
     )
     frame.loc[~seen, "tau"] = pd.NA
-    row = cumulative_success(frame).iloc[at - 1]
+    row = cumulative_success(frame, at).iloc[-1]
     return float(row["low"]), float(row["high"])
 
 

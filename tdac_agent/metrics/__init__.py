@@ -28,6 +28,7 @@ from tdac_agent.metrics.rates import (
     Rate,
     candidate_rate,
     first_pass,
+    rate_of_runs,
     success_rate,
     unbiased_success_rate,
 )
@@ -55,6 +56,7 @@ __all__ = [
     "load_frames",
     "load_reported",
     "pass_at_n",
+    "rate_of_runs",
     "success_rate",
     "summarise",
     "unbiased_success_rate",

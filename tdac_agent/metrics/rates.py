@@ -121,11 +121,23 @@ def _exact(successes: int, trials: int) -> Rate:
 def _over_runs(tries: pd.DataFrame, seed: int) -> Rate:
     """Of rows with run and passed: how many passed, each run being a unit."""
     per_run = tries.groupby("run")["passed"].agg(["sum", "size"])
-    passed, tried = per_run["sum"].to_numpy(int), per_run["size"].to_numpy(int)
+    return rate_of_runs(
+        per_run["sum"].to_numpy(int), per_run["size"].to_numpy(int), seed
+    )
+
+
+def rate_of_runs(passed: np.ndarray, tried: np.ndarray, seed: int = 0) -> Rate:
+    """A rate over all tries of some runs.
+
+    Args:
+        passed: Tries of each run that passed, shape (R,).
+        tried: Tries of each run, shape (R,).
+        seed: Of the resampling.
+    """
     successes, trials = int(passed.sum()), int(tried.sum())
-    value = successes / trials if trials else math.nan
     if trials and (tried == 1).all():
         return _exact(successes, trials)
+    value = successes / trials if trials else math.nan
     low, high, method = _resampled(passed, tried, seed)
     return Rate(value, successes, trials, low, high, method)
 
