@@ -27,8 +27,8 @@ from tdac_agent.plots.style import (
 from tdac_agent.records import JOURNAL, Attempt, Run
 
 MOST_TESTS = 40
-CELL = 0.36
-"""Width of a candidate, inches."""
+CELL, NARROW = 0.36, 0.21
+"""Width of a candidate, inches; where there are many."""
 MOST_LEVEL = 20
 """Candidates whose names fit in side by side."""
 STEPS = {"generate": "writing", "edit": "editing", "summarise": "rules"}
@@ -44,7 +44,8 @@ def plot_failures(run: Run) -> Figure:
             for test in shown
         ]
     ).reshape(len(shown), len(run.attempts))
-    width = 4.0 + CELL * max(6, len(run.attempts))
+    cell = CELL if len(run.attempts) <= MOST_LEVEL else NARROW
+    width = 4.0 + cell * max(6, len(run.attempts))
     figure, axes = new_figure(width, 1.7 + 0.21 * max(3, len(shown)))
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
@@ -140,7 +141,11 @@ def _stack(
     axes.set_xlabel("candidate k.j", color=TEXT)
     axes.set_ylabel(unit, color=TEXT)
     if len(names) > MOST_LEVEL:
-        axes.tick_params(axis="x", rotation=90, labelsize=7.5)
+        # The first one of each iteration stands for all of it.
+        firsts = [n for n, name in enumerate(names) if name.endswith(".0")]
+        kept = firsts[:: 1 + len(firsts) // 10]
+        axes.set_xticks(kept, [names[n].removesuffix(".0") for n in kept])
+        axes.set_xlabel("iteration k", color=TEXT)
     if below.any():
         legend(axes, 4)
 
