@@ -12,17 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.budget import Budget
-from tdac_agent.errors import ProviderError, RunError
+from tdac_agent.errors import RunError
 from tdac_agent.files import clear_unfinished
 from tdac_agent.journal import mend, read_records
 from tdac_agent.locks import LOCK_FILE, hold
 from tdac_agent.past import read_past
 from tdac_agent.prompt import PromptTemplate, generate_prompt
 from tdac_agent.provenance import sha256_of
-from tdac_agent.provider import Provider, missing_for, served_at
+from tdac_agent.provider import Provider, served_at
 from tdac_agent.recorder import Event, Recorder
 from tdac_agent.records import JOURNAL, Run
-from tdac_agent.tariff import Bounds, Tariff, bounds_of, tariffs_of
+from tdac_agent.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.task import Task
 from tdac_agent.verification import suite_sha256
 
@@ -60,34 +60,13 @@ def account_of(
     if shared is not None:
         if max_cost is not None or max_tokens is not None:
             raise ValueError("a shared budget has limits of its own")
-        bounds = _checked_bounds(models, tariffs, shared.max_cost, shared.max_tokens)
+        bounds = bounds_of(models, tariffs, shared.max_cost, shared.max_tokens)
         return Account(shared, tariffs, bounds.notes)
     if before is not None:
         max_cost = before.max_cost if max_cost is None else max_cost
         max_tokens = before.max_tokens if max_tokens is None else max_tokens
-    bounds = _checked_bounds(models, tariffs, max_cost, max_tokens)
+    bounds = bounds_of(models, tariffs, max_cost, max_tokens)
     return Account(Budget(bounds.max_cost, bounds.max_tokens), tariffs, bounds.notes)
-
-
-def _checked_bounds(
-    models: Sequence[Provider],
-    tariffs: Mapping[str, Tariff],
-    max_cost: float | None,
-    max_tokens: int | None,
-) -> Bounds:
-    """The limits of a run whose models lack nothing.
-
-    Raises:
-        ProviderError: With all that is missing.
-    """
-    missing = [line for model in models for line in missing_for(model)]
-    try:
-        bounds = bounds_of(models, tariffs, max_cost, max_tokens)
-    except ProviderError as error:
-        missing.append(str(error))
-    if missing:
-        raise ProviderError("; and ".join(dict.fromkeys(missing)))
-    return bounds
 
 
 def describe(

@@ -9,7 +9,13 @@ from typing import NamedTuple
 from tdac_agent.budget import NOTHING, Amount
 from tdac_agent.errors import ProviderError
 from tdac_agent.prices import Price, load_prices
-from tdac_agent.provider import Provider, Reply, Request, served_at
+from tdac_agent.provider import (
+    Provider,
+    Reply,
+    Request,
+    missing_for,
+    served_at,
+)
 from tdac_agent.tokens import most_tokens
 
 MAX_COST = 2.0
@@ -95,25 +101,31 @@ def bounds_of(
             vendor's model is refused without, others get `UNPRICED_TOKENS`.
 
     Raises:
-        ProviderError: A vendor's model without a price, and nothing that bounds it.
+        ProviderError: A model lacks its key or its package, or is a vendor's without a
+            price, so that nothing bounds it; all of that is said at once.
     """
     cost = MAX_COST if max_cost is None else max_cost
-    notes = []
+    notes: list[str] = []
+    problems: list[str] = []
     for model in {model.name: model for model in models}.values():
+        problems += missing_for(model)
         kind = model.name.partition(":")[0]
         tariff = tariffs[model.name]
         if tariff.free or tariff.price is not None or kind in OWN_MATTER:
             continue
         address = served_at(model)
         if max_tokens is None and address is None and kind in BY_VENDOR:
-            raise ProviderError(
+            problems.append(
                 f"no price is known for {model.name}, so --max-cost cannot bound it: "
                 "give --max-tokens N, or enter its price (docs/models.md)"
             )
+            continue
         max_tokens = UNPRICED_TOKENS if max_tokens is None else max_tokens
         place = "" if address is None else f" at {address}"
         notes.append(
             f"no price is known for {model.name}{place}: its cost is not counted; "
             f"at most {max_tokens} tokens (--max-tokens) bound the run"
         )
+    if problems:
+        raise ProviderError("; and ".join(dict.fromkeys(problems)))
     return Bounds(cost, max_tokens, tuple(notes))

@@ -66,7 +66,7 @@ class Wanted:
 
 def run(wanted: Wanted, as_json: bool) -> int:
     """Carries out a campaign and prints; returns the exit code."""
-    console = Console(stderr=as_json, highlight=False)
+    console = Console(stderr=as_json, highlight=False, emoji=False)
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
     config = with_limits(read_config(file), wanted.limits)
     with console.status("reading the tasks …"):

@@ -57,7 +57,7 @@ def run(given: str, limits: dict[str, Any], part: str, as_json: bool) -> int:
         part: Of all runs, `i/n`.
         as_json: Whether to print JSON.
     """
-    console = Console(stderr=as_json, highlight=False)
+    console = Console(stderr=as_json, highlight=False, emoji=False)
     shard, file = Shard.parse(part), find_config(given)
     config = with_limits(read_config(file), limits)
     for name in config.models:

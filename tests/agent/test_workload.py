@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_agent.budget import NOTHING, Amount, Budget, BudgetExhausted
@@ -48,6 +48,7 @@ def run_of(learner, optimizer, iterations, patience):
     )
 
 
+@settings(deadline=None)
 @given(st.integers(1, 6), st.integers(0, 4), st.booleans())
 def test_the_questions_that_are_left(iterations, patience, refine):
     """From each question on, those that the loop would put; from the first, all."""
@@ -65,6 +66,7 @@ def test_the_questions_that_are_left(iterations, patience, refine):
 names = st.sampled_from(list(TARIFFS))
 
 
+@settings(deadline=None)
 @given(names, names, st.integers(1, 4), st.integers(0, 3), st.data())
 def test_the_rest_of_a_run(learner, optimizer, iterations, patience, data):
     """It is at least the next question, shrinks to it, and is free where all is."""
@@ -122,6 +124,7 @@ def test_no_more_is_named_than_can_be_taken():
 amounts = st.floats(0.0001, 5)
 
 
+@settings(deadline=None)
 @given(amounts, amounts, amounts, amounts)
 def test_what_is_said_to_be_enough_is(limit, spent, worst, more):
     """With each flag that is named the question fits, and none goes beyond the rest."""
