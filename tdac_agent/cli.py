@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from copy import copy
 from typing import Annotated
 
 import typer
@@ -43,20 +44,19 @@ app = typer.Typer(
 )
 # Each module has the flags of its commands and calls on their work when they are used:
 # the help of all of them needs nothing else. They are listed in this order.
-for part in (
-    map_flags,
-    synth_flags,
-    verify_flags,
-    play_flags,
-    evaluate_flags,
-    train_flags,
-    campaign_flags,
-    check_suite_flags,
-    runs_flags,
-    webots_flags,
-    doctor_flags,
-):
-    app.add_typer(part.app)
+PARTS = (
+    map_flags.app,
+    synth_flags.app,
+    verify_flags.app,
+    play_flags.app,
+    evaluate_flags.app,
+    train_flags.app,
+    campaign_flags.app,
+    check_suite_flags.app,
+    runs_flags.app,
+    webots_flags.app,
+    doctor_flags.app,
+)
 
 
 @app.callback(invoke_without_command=True)
@@ -72,13 +72,35 @@ def _root(
         raise typer.Exit
 
 
+def command_line(words: list[str]) -> typer.Typer:
+    """The commands, or the part of them that has the first word alone.
+
+    Typer reads the flags of all that it is given, and takes its time.
+    """
+    line, first = copy(app), set(words[:1])
+    line.registered_groups = []
+    for part in [part for part in PARTS if first & _names(part)] or PARTS:
+        line.add_typer(part)
+    return line
+
+
+def _names(part: typer.Typer) -> set[str | None]:
+    """Of the commands and groups of a part."""
+    commands = {
+        command.name or command.callback.__name__.replace("_", "-")
+        for command in part.registered_commands
+        if command.callback is not None
+    }
+    return commands | {group.name for group in part.registered_groups}
+
+
 def main() -> None:
     """Entry point of the `tdac` script: every known error is one clear line."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
         words = with_heading(sys.argv[1:])
-        code = app(words, prog_name="tdac", standalone_mode=False)
+        code = command_line(words)(words, prog_name="tdac", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Exception as error:

@@ -124,7 +124,7 @@ def _read_line(descriptor: int) -> str:
 
 def _rehearse() -> None:
     """Loads what is compiled, and has pytest load what it needs for a suite."""
-    importlib.import_module("tdac_agent.seeded")
+    importlib.import_module("tdac_agent.seeded")  # and so `diagnosis`
     from tdac_agent.suite_plugin import run_tests
 
     cells = np.zeros((40, 60), np.bool_)

@@ -6,7 +6,6 @@ import contextlib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from tdac_agent.diagnosis import diagnose
 from tdac_agent.jobs import Findings, Job
 from tdac_agent.judge import Judge, rollout_key
 from tdac_agent.nursery import Nursery
@@ -29,7 +28,7 @@ def judge_suite(job: Job, nursery: Nursery, later: contextlib.ExitStack) -> None
     )
     later.callback(judge.close)
     judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")
-    # pytest is loaded while the first episodes are under way.
+    # Loaded while the first episodes are under way.
     from tdac_agent.suite_plugin import JudgePlugin, run_tests
 
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
@@ -59,6 +58,8 @@ def _save(judge: Judge, folder: Path, pool: ThreadPoolExecutor) -> None:
 
 
 def _findings(task: Task, judge: Judge, expected: list[str]) -> Findings:
+    from tdac_agent.diagnosis import diagnose
+
     diagnoses = {
         rollout_key(*key): diagnose(rollout, task.nominal).model_dump_json()
         for key, rollout in judge.rollouts.items()

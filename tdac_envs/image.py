@@ -7,13 +7,16 @@ import io
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps, UnidentifiedImageError
 
 from tdac_envs.errors import MapError
 from tdac_envs.grid import BoolGrid
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 MAX_PIXELS = 64_000_000
 """Largest picture that is decoded, px."""
@@ -146,6 +149,8 @@ def decode(data: bytes, name: str) -> ColourImage:
 
     The size is checked from the header, before any pixel is decoded.
     """
+    from PIL import Image, ImageOps, UnidentifiedImageError
+
     try:
         with warnings.catch_warnings():
             # Pillow's own size warning comes before ours; its error is kept.

@@ -21,7 +21,6 @@ from tdac_envs.image import load_image, read_bytes
 from tdac_envs.maps import BundledMap, bundled_map, bundled_maps
 from tdac_envs.metric import Point, resolution_of, to_pixels
 from tdac_envs.params import MapParams, RobotParams
-from tdac_envs.preprocessing import preprocess
 from tdac_envs.score import nearest_free
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
@@ -210,6 +209,9 @@ def _read_image(
     radius: float,
     snap: bool,
 ) -> Prepared:
+    # A grid that is ready needs none of it.
+    from tdac_envs.preprocessing import preprocess
+
     grid, params = preprocess(image, start, goal, robot_radius=radius, snap=snap)
     return Prepared(grid, params, image)
 

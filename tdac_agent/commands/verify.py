@@ -7,12 +7,10 @@ import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.etree import ElementTree
 
 from rich.console import Console
 
 from tdac_agent.commands.flags import TaskFlags, check_tier
-from tdac_agent.commands.report_view import show_report
 from tdac_agent.commands.robust_flags import RobustFlags
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
@@ -20,7 +18,6 @@ from tdac_agent.nursery import Nursery
 from tdac_agent.report import Report
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import Profile
-from tdac_agent.verification import verify
 from tdac_agent.warm import WarmJudge
 
 if TYPE_CHECKING:
@@ -52,6 +49,10 @@ def run(
     gc.freeze()
     gc.enable()
     with WarmJudge(nursery) as judge:
+        # Loaded while the judge gets ready.
+        from tdac_agent.commands.report_view import show_report
+        from tdac_agent.verification import verify
+
         with console.status(f"verifying {file.name} on {task.name} …"):
             report = verify(
                 file,
@@ -129,6 +130,8 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
 
 def write_junit(report: Report, path: Path) -> None:
     """Writes a JUnit XML file, a test case for each expected test."""
+    from xml.etree import ElementTree
+
     messages = {failure.test: failure.message for failure in report.failures}
     suite = ElementTree.Element(
         "testsuite",
