@@ -9,7 +9,10 @@ still until the time is up. For `builtin` our share is the wall time that is lef
 the time in which its processes computed is spread over the cores and taken away.
 
 Prints the median and the range of the wall times, s. The judge is given time to get
-ready before each run of the loop, as a learner gives it.
+ready before each run of the loop, as a learner gives it. Two figures say how fast the
+machine was meanwhile: a step of CartPole-v1 through `gym.make`, and an interpreter
+that imports numpy, which is as little as a judge and its sandbox can start with; our
+share is also given in such starts.
 """
 
 from __future__ import annotations
@@ -24,11 +27,14 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
+import gymnasium as gym
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.timing import WIDTH, duration, in_turn
 from tdac_agent import load_task, synthesize, verify
 from tdac_agent.privileged import (
     DO_NOTHING,
@@ -40,6 +46,7 @@ from tdac_agent.task import Task, lay_out
 from tdac_agent.warm import WarmJudge
 
 READY_SECONDS = 2.0
+CART_POLE_STEPS = 10_000
 LIMITS = {"command line": (2.0, 0.8), "loop": (1.0, 0.3)}
 STUCK_LIMIT = 1.0
 
@@ -78,6 +85,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         controllers = _controllers(task, folder)
+        before = _machine()
         rows = []
         for controller, source in controllers.items():
             run = _run_folder(folder / controller, task, source)
@@ -86,10 +94,12 @@ def main() -> int:
             for controller, source in controllers.items():
                 measure = _from_loop(task, source, judge)
                 rows.append(_row(controller, "loop", measure, options.runs))
+    machines = [before, _machine()]
     if options.json:
-        print(json.dumps([asdict(row) for row in rows], indent=1))
+        facts = {"machine": machines, "rows": rows}
+        print(json.dumps(facts, indent=1, default=asdict))
     else:
-        _show(rows, options.task)
+        _show(rows, options.task, machines)
     slow = [row for row in rows if row.share > row.limit or _too_long(row)]
     return 1 if slow else 0
 
@@ -109,6 +119,37 @@ def _run_folder(folder: Path, task: Task, source: str) -> Path:
     lay_out(task, folder)
     (folder / "controller.py").write_text(source)
     return folder
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """How fast the machine is.
+
+    Attributes:
+        step: Median time of a step of CartPole-v1, s.
+        start: Median time of `python -c "import numpy"`, s.
+    """
+
+    step: float
+    start: float
+
+
+def _machine() -> Machine:
+    start = [sys.executable, "-c", "import numpy"]
+    calls = {
+        "step": _cart_pole,
+        "start": partial(subprocess.run, start, check=True),
+    }
+    times = {name: statistics.median(t) for name, t in in_turn(calls, 7).items()}
+    return Machine(times["step"] / CART_POLE_STEPS, times["start"])
+
+
+def _cart_pole() -> None:
+    env = gym.make("CartPole-v1")
+    env.reset(seed=0)
+    for number in range(CART_POLE_STEPS):
+        if env.step(number % 2)[2]:
+            env.reset()
 
 
 Measure = Callable[[], tuple[float, float, bool]]
@@ -165,12 +206,13 @@ def _too_long(row: Row) -> bool:
     return row.controller == "builtin" and row.wall > LIMITS[row.way][0]
 
 
-def _show(rows: list[Row], task: str) -> None:
+def _show(rows: list[Row], task: str, machines: list[Machine]) -> None:
+    start = statistics.mean(machine.start for machine in machines)
     load = f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
     table = Table(title=f"Verification on {task}, s ({load})", title_justify="left")
     for name in ("controller", "from", "verdict"):
         table.add_column(name)
-    for name in ("wall", "range", "controller's CPU", "our share", "limit"):
+    for name in ("wall", "range", "controller's CPU", "our share", "limit", "starts"):
         table.add_column(name, justify="right")
     for row in rows:
         colour = "red" if row.share > row.limit else "green"
@@ -183,8 +225,16 @@ def _show(rows: list[Row], task: str) -> None:
             f"{row.computing:.2f}",
             f"[{colour}]{row.share:.2f}[/]",
             f"{row.limit:.1f}",
+            f"{row.share / start:.1f}",
         )
-    Console().print(table)
+    console = Console()
+    console.width = max(console.width, WIDTH)
+    console.print(table)
+    for when, machine in zip(("before", "after"), machines, strict=True):
+        console.print(
+            f"machine {when}: CartPole-v1 {duration(machine.step)} a step, "
+            f"import numpy {duration(machine.start)} a start"
+        )
 
 
 def _options() -> argparse.Namespace:

@@ -10,33 +10,36 @@ from pathlib import Path
 UNFINISHED = ".unfinished"
 
 
-def write_atomic(path: Path, data: str | bytes) -> None:
+def write_atomic(path: Path, data: str | bytes, *, lasting: bool = True) -> None:
     """Writes a file under a temporary name and moves it into place.
 
     Args:
         path: Where to; the folder must exist.
         data: Text (as UTF-8) or bytes.
+        lasting: Whether it is to outlive a machine that stops right afterwards.
 
     Raises:
         OSError: It names the file, whatever went wrong.
     """
     raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     try:
-        _write(path, raw)
+        _write(path, raw, lasting)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def _write(path: Path, raw: bytes) -> None:
+def _write(path: Path, raw: bytes, lasting: bool) -> None:
     handle, name = tempfile.mkstemp(UNFINISHED, f".{path.name}.", path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(raw)
             file.flush()
-            os.fsync(file.fileno())
+            if lasting:
+                os.fsync(file.fileno())
         os.chmod(name, 0o644)
         os.replace(name, path)
-        sync_folder(path.parent)
+        if lasting:
+            sync_folder(path.parent)
     except BaseException:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(name)

@@ -33,6 +33,8 @@ from tdac_envs.map2d import Map2DEnv
 # Exit codes of a worker; a suite may well end it with another one.
 NO_JOB, DID_JOB = 77, 78
 DONE = b"done"
+# What a job loads when it needs it, unless there was time before.
+LOADED_LATE = ("tdac_agent.findings", "tdac_agent.seeded")
 
 
 def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
@@ -124,7 +126,8 @@ def _read_line(descriptor: int) -> str:
 
 def _rehearse() -> None:
     """Loads what is compiled, and has pytest load what it needs for a suite."""
-    importlib.import_module("tdac_agent.seeded")  # and so `diagnosis`
+    for name in LOADED_LATE:
+        importlib.import_module(name)
     from tdac_agent.suite_plugin import run_tests
 
     cells = np.zeros((40, 60), np.bool_)

@@ -237,7 +237,7 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
         for path in folder.glob(pattern):
             path.unlink()
     for path in sorted(results.glob("*.npz")):
-        write_atomic(folder / path.name, path.read_bytes())
+        write_atomic(folder / path.name, path.read_bytes(), lasting=False)
     if not report.passed:
         from tdac_agent.figures import draw_failures  # loads what draws
 
