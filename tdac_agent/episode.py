@@ -257,7 +257,7 @@ def _mean_call(calls: list[float], child: Driver, waited: float) -> float:
     return max(0.0, math.fsum(calls) - line) / max(1, len(calls))
 
 
-def _late(times: NDArray[np.float64]) -> float:
+def late(times: NDArray[np.float64]) -> float:
     """99th percentile; `np.percentile` loads more than all else here takes."""
     last = len(times) - 1
     return float(np.interp(0.99 * last, np.arange(last + 1), np.sort(times)))
@@ -283,7 +283,7 @@ def _rollout(
         radius=task.body_radius,
         tolerance=task.goal_tolerance,
         error=None if error is None else str(error),
-        call_ms=(1000 * mean_call, _late(times)),
+        call_ms=(1000 * mean_call, late(times)),
         returned=returned,
         rooms=record.rooms(),
         calls=np.array(calls, np.float64),

@@ -19,7 +19,6 @@ class PrivateFolder:
 
     Args:
         parent: Where it is made.
-        mounted: Whether something is mounted on `scratch` while `parent` is in use.
 
     Attributes:
         root: The folder.
@@ -27,8 +26,7 @@ class PrivateFolder:
         scratch: Where the controller may write.
     """
 
-    def __init__(self, parent: Path, *, mounted: bool = False) -> None:
-        self._mounted = mounted
+    def __init__(self, parent: Path) -> None:
         self.root = parent / secrets.token_hex(16)
         self.work = self.root / "work"
         self.scratch = self.root / "scratch"
@@ -61,9 +59,6 @@ class PrivateFolder:
     def remove(self) -> None:
         """Delete the folder, whatever the controller left in it.
 
-        One that is mounted on is left to the end of `parent`, empty: the kernel would
-        wait for all its processors.
-
         Folders are lifted to the top before they are emptied: the controller may have
         nested them deeper than a path can say, and taken away rights.
         """
@@ -78,7 +73,5 @@ class PrivateFolder:
                     folders.append(lifted if count else Path(entry.path))
                 else:
                     os.unlink(entry.path)
-        kept = (self.root, self.scratch) if self._mounted else ()
         for folder in reversed(folders):
-            if folder not in kept:
-                folder.rmdir()
+            folder.rmdir()

@@ -103,10 +103,7 @@ class Zygote:
         self.witness = self.parent / "witness"
         try:
             self._furnish()
-            mounted = tier == "bubblewrap"
-            self._folders = [
-                PrivateFolder(self.parent, mounted=mounted) for _ in range(slots)
-            ]
+            self._folders = [PrivateFolder(self.parent) for _ in range(slots)]
             self._process, self._link, self._output, lifeline = self._start()
         except BaseException:
             shutil.rmtree(self.parent, ignore_errors=True)

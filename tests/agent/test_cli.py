@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from small import small_cells, write_small_task
 
+from tdac_agent.cli import PARTS, command_line
+
 COMMANDS = [
     "map", "world", "synth", "verify", "play", "evaluate", "train", "check-suite",
     "demo", "rules", "report", "runs", "webots run", "export webots", "doctor",
@@ -57,6 +59,14 @@ def test_help_and_version(tdac):
     code, out, _ = tdac("--version")
     assert code == 0
     assert re.fullmatch(r"tdac \d+\.\d+\.\d+\n", out)
+
+
+def test_a_command_reads_no_flags_of_another():
+    """Its own part of the command line alone is built; any other word gets them all."""
+    for words in (command.split() for command in COMMANDS):
+        assert len(command_line(words).registered_groups) == 1
+    for words in ([], ["--help"], ["verfy"]):
+        assert len(command_line(words).registered_groups) == len(PARTS)
 
 
 def test_the_help_is_quick():

@@ -400,6 +400,20 @@ def test_nothing_is_remembered_by_its_name(many, warm, change):
     assert third == first
 
 
+@pytest.mark.parametrize("known", ["this", "another"])
+def test_what_was_read_ahead_changes_nothing(
+    small_task, good_source, warm, known, tmp_path
+):
+    """A judge that has read this task or another one tells what one without does."""
+    other = load_task(write_small_task(tmp_path, goal=[100.0, 30.0]))
+    usual = verify(good_source, small_task, paper=True, judge=warm)
+    with WarmJudge(task=small_task if known == "this" else other) as judge:
+        assert told(verify(good_source, small_task, paper=True, judge=judge)) == told(
+            usual
+        )
+    assert usual.passed
+
+
 def test_a_good_controller_is_judged_as_ever(small_task, good_source, tmp_path):
     """Its report, and each pose of each episode, are the same after all others."""
     seen = []

@@ -340,7 +340,7 @@ def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
         env={**os.environ, "TMPDIR": str(no_traces)},
     )
     deadline = time.monotonic() + 60
-    running = "*/tdac-child-*/*/work/controller.py"
+    running = "**/tdac-child-*/*/work/controller.py"
     while not list(no_traces.glob(running)) and time.monotonic() < deadline:
         time.sleep(0.02)
     process.send_signal(number)

@@ -133,6 +133,23 @@ def test_a_nursery_has_more_children_than_a_zygote_has_places(tier):
     assert not any(child.folder.root.parent.exists() for child in children)
 
 
+def test_nothing_of_a_child_is_left_when_it_ends(tier, tmp_path):
+    """Its files go at once, whatever other children its zygote may still have."""
+    (tmp_path / "map").write_text("walls")
+    nursery = Nursery(ahead=False)
+    first, second = (nursery.take(tier, Limits()) for _ in range(2))
+    for child in (first, second):
+        child.furnish(tmp_path, WRITER)
+        child.load()
+        child.call("write", ("text",))
+    first.close()
+    left = first.folder.root.rglob("*")
+    assert [path for path in left if not path.is_dir()] == []
+    assert (second.folder.work / "map").read_text() == "walls"
+    second.close()
+    nursery.close()
+
+
 def test_a_nursery_that_was_not_used_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     Nursery().close()
