@@ -255,6 +255,15 @@ def test_a_missing_package(options, vendor, monkeypatch, canary):
         model.complete(QUESTION)
 
 
+@pytest.mark.parametrize("vendor", ["anthropic", "openai"])
+def test_a_package_is_loaded_with_the_first_question(options, vendor, monkeypatch):
+    """It takes a second or two, in which a run has long begun to show what it does."""
+    monkeypatch.setenv(f"{vendor.upper()}_API_KEY", "sk-none")
+    monkeypatch.delitem(sys.modules, vendor, raising=False)
+    assert choose_model(f"{vendor}:x", options).missing == ()
+    assert vendor not in sys.modules
+
+
 def test_providers_of_others(options, tmp_path, monkeypatch):
     """An entry point of the group `tdac.providers` is a provider by its name."""
     info = tmp_path / "echo-1.dist-info"
