@@ -1,6 +1,9 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# A file's tests share what they need, so they are run by one process; in their order
+# the files with short tests come last, and both processes end together.
+PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder
 
 .PHONY: synth test slow slow-sample bench lint clean
 
@@ -8,13 +11,13 @@ synth: $(VENV)/.installed
 	$(BIN)/tdac synth
 
 test: $(VENV)/.test-installed
-	$(BIN)/pytest -q -n 2 -m "not slow"
+	$(BIN)/pytest $(PARALLEL) -m "not slow"
 
 slow-sample: $(VENV)/.test-installed
-	TDAC_SLOW_SAMPLE=1 $(BIN)/pytest -q -n 2 -m slow
+	TDAC_SLOW_SAMPLE=1 $(BIN)/pytest $(PARALLEL) -m slow
 
 slow: $(VENV)/.test-installed
-	$(BIN)/pytest -q -n 2 -m slow
+	$(BIN)/pytest $(PARALLEL) -m slow
 
 bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[bench]"

@@ -18,6 +18,10 @@ def small_cells():
     return cells
 
 
+# A short way in short steps, on which a slow controller is soon cut off.
+SHORT = {"dt": 0.02, "start": [95, 30], "goal": [130, 90]}
+
+
 def write_small_task(folder: Path, **changes) -> Path:
     """A folder with the small map and a task.yaml; `changes` go into the file."""
     folder.mkdir(parents=True, exist_ok=True)

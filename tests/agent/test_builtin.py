@@ -78,6 +78,7 @@ def test_first_candidate_is_neutral(builtin):
 
 
 UP, DOWN = 1, -1
+SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
@@ -190,7 +191,11 @@ def test_a_persons_rule_counts(builtin):
 
 
 @pytest.mark.parametrize(
-    "cause", ["collision", "no motion", "too slow", "held out", "error", None]
+    "cause",
+    [
+        *("collision", "held out", None),
+        *(pytest.param(c, marks=SLOW) for c in ("no motion", "too slow", "error")),
+    ],
 )
 def test_never_tries_the_same_twice(builtin, cause):
     """Ten iterations that all fail in the same way are twenty different candidates."""

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from small import write_small_task
+from small import SHORT, write_small_task
 
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.privileged import (
@@ -31,8 +31,8 @@ VACUOUS = "def test_anything(controller):\n    assert controller.source\n"
 
 @pytest.fixture
 def task(tmp_path):
-    """The small task in short steps, so that a slow controller is soon cut off."""
-    return load_task(write_small_task(tmp_path / "task", dt=0.02))
+    """The small room with a short way."""
+    return load_task(write_small_task(tmp_path / "task", **SHORT))
 
 
 @pytest.fixture
@@ -59,7 +59,9 @@ def assert_proven(check, repeats):
         assert bool(row.failures) != (row.controller == REFERENCE)
 
 
-@pytest.mark.parametrize("profile", ["paper", "policy"])
+@pytest.mark.parametrize(
+    "profile", ["paper", pytest.param("policy", marks=pytest.mark.slow)]
+)
 def test_the_shipped_suite_proves_itself(task, profile, warm):
     """The reference passes, each bad controller fails, twice alike; all is reported.
 
@@ -235,14 +237,14 @@ def events(folder):
     return [json.loads(line) for line in lines]
 
 
-def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source):
+def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
     """It ends as a fault, with the reason on record, before the first call."""
     folder = write_small_task(tmp_path / "task", suite="mine", profile="policy")
     (folder / "mine").mkdir()
     (folder / "mine" / "test_mine.py").write_text(IMPOSSIBLE)
     learner, out = Paid(good_source), tmp_path / "run"
     with pytest.raises(Fault, match=r"own/test_mine\.py::test_flies: it took 3 steps"):
-        synthesize(load_task(folder), learner, out=out)
+        synthesize(load_task(folder), learner, out=out, judge=warm)
     assert learner.calls == 0
     assert load_run(out).status == "fault"
     records = events(out)
@@ -251,12 +253,12 @@ def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source):
 
 
 @pytest.mark.parametrize("who", ["learner", "optimizer"])
-def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who):
+def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
     """Whoever of the two is paid; it is on record before the first call."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
     paid, out = Paid(good_source), tmp_path / "run"
     providers = {"learner": "builtin", who: paid}
-    assert synthesize(task, **providers, out=out).verified
+    assert synthesize(task, **providers, out=out, judge=warm).verified
     assert paid.calls == (who == "learner")
     records = events(out)
     begun = [record["event"] for record in records][:4]
@@ -265,8 +267,8 @@ def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who):
     assert records[2]["suite"] == "map2d"
 
 
-def test_what_costs_nothing_needs_no_proof(tmp_path):
+def test_what_costs_nothing_needs_no_proof(tmp_path, warm):
     """A run of the builtin learner loses no time."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
-    assert synthesize(task, out=tmp_path / "run").verified
+    assert synthesize(task, out=tmp_path / "run", judge=warm).verified
     assert not any(r["event"].startswith("prove") for r in events(tmp_path / "run"))

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 import pytest
-from small import small_cells, write_small_task
+from small import SHORT, small_cells, write_small_task
 
 from tdac_agent.cli import PARTS, command_line
 
@@ -334,7 +334,7 @@ def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
 
 def test_check_suite_says_yes(tdac, tmp_path):
     """Exit 0 and a table of the controllers."""
-    folder = write_small_task(tmp_path / "short", dt=0.02, profile="policy")
+    folder = write_small_task(tmp_path / "short", profile="policy", **SHORT)
     code, out, _ = tdac("check-suite", "--task", folder, "--repeats", 1)
     assert code == 0
     for name in ("reference", "do-nothing", "constant", "random", "raising", "slow"):
@@ -344,7 +344,7 @@ def test_check_suite_says_yes(tdac, tmp_path):
 
 def test_check_suite_says_no(tdac, tmp_path):
     """Exit 1; with --json the record alone on stdout."""
-    folder = write_small_task(tmp_path / "short", dt=0.02, profile="policy")
+    folder = write_small_task(tmp_path / "short", profile="policy", **SHORT)
     (tmp_path / "test_mine.py").write_text("def test_no():\n    assert 0, 'never'\n")
     words = ["check-suite", "--task", folder, "--suite", tmp_path, "--repeats", 1]
     code, out, _ = tdac(*words, "--json")

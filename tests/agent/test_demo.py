@@ -1,17 +1,19 @@
 """`tdac demo`: what was recorded is what a language model said, and it still holds."""
 
 import json
+from pathlib import Path
 
 import pytest
 from small import write_small_task
 
-from tdac_agent.cli import main
 from tdac_agent.errors import Fault
+from tdac_agent.extract import extract_source
 from tdac_agent.journal import read_records
 from tdac_agent.providers.replay import DEMO
 from tdac_agent.records import load_run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
+from tdac_agent.verification import verify
 
 
 @pytest.fixture
@@ -20,16 +22,12 @@ def recorded():
     return load_run(DEMO)
 
 
-def test_the_demo_is_the_recorded_run_with_live_tests(
-    recorded, tmp_path, monkeypatch, capsys
-):
+@pytest.mark.slow
+def test_the_demo_is_the_recorded_run_with_live_tests(recorded, tdac):
     """The same candidates fail and pass as when it was recorded; none is paid for."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.argv", ["tdac", "demo", "--json"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 0
-    run = json.loads(capsys.readouterr().out)
+    code, out, _ = tdac("demo", "--json")
+    assert code == 0
+    run = json.loads(out)
     assert run["status"] == "verified"
     assert run["learner"] == "replay:demo"
     assert (run["tau"], run["tokens_out"]) == (recorded.tau, 0)
@@ -37,7 +35,7 @@ def test_the_demo_is_the_recorded_run_with_live_tests(
     assert places == [(a.k, a.j, a.passed) for a in recorded.attempts]
     failed = [tuple(a["failed_tests"]) for a in run["attempts"]]
     assert failed == [a.failed_tests for a in recorded.attempts]
-    again = tmp_path / "runs" / "demo-1"
+    again = Path("runs/demo-1")
     assert (again / "controller.py").is_file()
     replies = [r for r in read_records(again / "journal.jsonl") if "blob" in r]
     for reply in replies:
@@ -53,13 +51,30 @@ def question(folder, reply):
     return (place / f"{reply['kind']}.prompt.md").read_text()
 
 
-def test_it_answers_no_other_task(tmp_path):
+@pytest.mark.parametrize("which", [0, -1], ids=["first", "last"])
+def test_a_recorded_candidate_fares_as_it_did(recorded, warm, which):
+    """The tests of today fail the first one, and pass the last one, as they did."""
+    attempt, task = recorded.attempts[which], load_task(recorded.task)
+    place = DEMO / "iterations" / f"k{attempt.k:02d}" / f"j{attempt.j}"
+    source = extract_source((place / "generate.reply.md").read_text())
+    report = verify(source, task, seed=recorded.seed, judge=warm)
+    assert report.passed == attempt.passed
+    assert tuple(f.test for f in report.failures) == attempt.failed_tests
+
+
+def test_it_answers_no_other_task(tmp_path, warm):
     """What is worded otherwise may be how failures are told, never the task."""
     task = load_task(write_small_task(tmp_path / "task"))
     with pytest.raises(
         Fault, match=r"another question than generate k=1 j=0 in .*line"
     ):
-        synthesize(task, "replay:demo", out=tmp_path / "run", prompt="underspecified")
+        synthesize(
+            task,
+            "replay:demo",
+            out=tmp_path / "run",
+            prompt="underspecified",
+            judge=warm,
+        )
 
 
 def test_it_shows_a_failure_and_its_repair(recorded):

@@ -41,6 +41,7 @@ from tdac_envs import write_world
 from tdac_envs.footprint import Disc
 from tdac_envs.world import Obstacle, Part
 
+SLOW = pytest.mark.slow
 # What two collisions make of the neutral parameters.
 TUNED = EPuckParameters(
     inflation_margin=0.004,
@@ -151,7 +152,13 @@ def failed(cause):
     return Report.model_construct(failures=(failure,))
 
 
-@pytest.mark.parametrize("cause", ["collision", "no motion", "too slow", "error"])
+@pytest.mark.parametrize(
+    "cause",
+    [
+        "collision",
+        *(pytest.param(c, marks=SLOW) for c in ("no motion", "too slow", "error")),
+    ],
+)
 def test_never_tries_the_same_twice(crates, cause):
     """Ten iterations that all fail in the same way are twenty different candidates."""
     builtin, book, tried = builtin_for(crates.setting), RuleBook(), []
@@ -336,10 +343,10 @@ SYNTHESES = [
 
 
 @pytest.mark.parametrize("name", SYNTHESES)
-def test_it_is_verified(name, tmp_path):
+def test_it_is_verified(name, tmp_path, warm):
     """Every world ends with a controller that passes the whole suite."""
     task = world_task(name) or pytest.skip("the paper's world is not here")
-    run = synthesize(task, out=tmp_path / "run", iterations=3)
+    run = synthesize(task, out=tmp_path / "run", iterations=3, judge=warm)
     assert run.verified
     source = (tmp_path / "run" / "controller.py").read_text()
     assert read_parameters(source, EPuckParameters) is not None

@@ -39,7 +39,10 @@ def assert_proven(check, repeats):
         assert bool(row.failures) != (row.controller == REFERENCE)
 
 
-@pytest.mark.parametrize(("profile", "repeats"), [("paper", 1), ("policy", 2)])
+@pytest.mark.parametrize(
+    ("profile", "repeats"),
+    [("paper", 1), pytest.param("policy", 2, marks=pytest.mark.slow)],
+)
 def test_the_shipped_suite_proves_itself(task, profile, repeats, warm):
     """The reference passes, each bad one fails for how it drives, each time alike."""
     check = check_suite(

@@ -4,11 +4,14 @@ Each variant is the builtin controller with one of its functions wrapped: exactl
 unit tests that are meant for it must fail. What is wrong may also show when it drives.
 """
 
+import shutil
+from functools import partial
+
 import pytest
 
 from tdac_agent.builtin import EPuckParameters, render_epuck
 from tdac_agent.task import load_task
-from tdac_agent.verification import verify
+from tdac_agent.verification import SHIPPED_SUITES, verify
 
 PARSE = ["test_parse_world"]
 GRIDS = ["test_build_grid[0.0]", "test_build_grid[0.04]"]
@@ -179,6 +182,21 @@ def source(task):
     return render_epuck(EPuckParameters(), task=task.nominal)
 
 
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    """The shipped suite but for its episodes, which say nothing about the rows."""
+    folder = tmp_path_factory.mktemp("rows")
+    for name in ("test_static.py", "test_unit.py"):
+        shutil.copy(SHIPPED_SUITES / "epuck" / name, folder)
+    return folder
+
+
+@pytest.fixture
+def checked(task, rows, warm):
+    """Checks a source against the rows."""
+    return partial(verify, task=task, profile="paper", shipped=rows, judge=warm)
+
+
 def failed(report, group):
     return {
         failure.test.partition("::")[2]
@@ -198,10 +216,10 @@ def test_the_good_one_passes(task, source, warm):
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_one_fails_where_it_is_wrong(task, source, warm, name):
+def test_a_wrong_one_fails_where_it_is_wrong(checked, source, name):
     """Exactly the unit tests that are about it fail."""
     wrapper, tests = WRONG[name]
-    report = verify(source + wrapper, task, profile="paper", paper=True, judge=warm)
+    report = checked(source + wrapper)
     assert failed(report, "unit") == set(tests)
     assert failed(report, "static") == set()
 
@@ -210,15 +228,9 @@ def test_a_wrong_one_fails_where_it_is_wrong(task, source, warm, name):
     "name",
     ["parse_world", "build_grid", "astar", "compute_wheel_speeds", "run_episode"],
 )
-def test_a_missing_function_is_named(task, source, warm, name):
+def test_a_missing_function_is_named(checked, source, name):
     """The static contract names each function that is not there."""
-    report = verify(
-        source.replace(f"def {name}(", f"def other_{name}("),
-        task,
-        profile="paper",
-        paper=True,
-        judge=warm,
-    )
+    report = checked(source.replace(f"def {name}(", f"def other_{name}("))
     message = next(f.message for f in report.failures if "entry_points" in f.test)
     assert name in message
 

@@ -144,9 +144,9 @@ def test_a_policy_drives_the_environment(task, controller):
     assert observation["pose"][0] > -0.6
 
 
-def test_a_run_is_self_contained(task, tmp_path):
+def test_a_run_is_self_contained(task, tmp_path, warm):
     """A synthesis leaves the world, its original, the picture and a task that loads."""
-    run = synthesize(task, out=tmp_path / "run", iterations=2)
+    run = synthesize(task, out=tmp_path / "run", iterations=2, judge=warm)
     assert run.verified
     folder = tmp_path / "run"
     names = {path.name for path in folder.iterdir()}

@@ -230,7 +230,9 @@ def save(path, algo, env, **options):
     return model
 
 
-@pytest.mark.parametrize("algo", ["PPO", "SAC", "TD3"])
+@pytest.mark.parametrize(
+    "algo", ["PPO", "SAC", pytest.param("TD3", marks=pytest.mark.slow)]
+)
 def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task):
     """Step for step as `model.predict` in the wrapped environment."""
     sb3 = pytest.importorskip("stable_baselines3")

@@ -24,7 +24,9 @@ def journal(folder):
     return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
-def test_each_call_is_on_record_before_and_after(small_task, good_source, tmp_path):
+def test_each_call_is_on_record_before_and_after(
+    small_task, good_source, tmp_path, warm
+):
     """While a model thinks, the question is on the disk; then the answer is, too."""
     out = tmp_path / "run"
     seen = []
@@ -41,7 +43,7 @@ def test_each_call_is_on_record_before_and_after(small_task, good_source, tmp_pa
             return Reply(f"```python\n{good_source}```")
 
     events = []
-    synthesize(small_task, Watcher(), out=out, on_event=events.append)
+    synthesize(small_task, Watcher(), out=out, on_event=events.append, judge=warm)
     assert seen == ["call.intent"]
     assert events == journal(out)
     names = [event["event"] for event in events]

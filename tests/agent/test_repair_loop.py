@@ -59,7 +59,9 @@ def out(tmp_path):
     return tmp_path / "run"
 
 
-def test_rules_live_on(policy_task, good_source, tmp_path, out, tdac, monkeypatch):
+def test_rules_live_on(
+    policy_task, good_source, tmp_path, out, tdac, monkeypatch, warm
+):
     """Learnt, edited and dropped over three iterations; `tdac rules` shows it all."""
     model = Model(
         tmp_path / "model",
@@ -73,7 +75,9 @@ def test_rules_live_on(policy_task, good_source, tmp_path, out, tdac, monkeypatc
         ),
         code(good_source),
     )
-    run = synthesize(policy_task, model.name, out=out, iterations=3, patience=0)
+    run = synthesize(
+        policy_task, model.name, out=out, iterations=3, patience=0, judge=warm
+    )
     assert run.tau == 3
     prompts = model.prompts()
     assert len(prompts) == 5
@@ -115,7 +119,7 @@ def check_life(folder):
 
 
 def test_a_malformed_answer_about_rules_is_asked_again(
-    policy_task, good_source, tmp_path, out
+    policy_task, good_source, tmp_path, out, warm
 ):
     """With the reason; after three of them the rules stay, and the run goes on."""
     model = Model(
@@ -123,7 +127,9 @@ def test_a_malformed_answer_about_rules_is_asked_again(
         *(code(STILL), "- Do not stand still.", rules(add("x" * 201)), rules()),
         *(code(STILL), "no", "no", "no", code(good_source)),
     )
-    run = synthesize(policy_task, model.name, out=out, iterations=3, patience=0)
+    run = synthesize(
+        policy_task, model.name, out=out, iterations=3, patience=0, judge=warm
+    )
     assert run.tau == 3
     assert load_rules(out).rules == ()
     first, second, third = model.prompts()[1:4]
@@ -134,13 +140,13 @@ def test_a_malformed_answer_about_rules_is_asked_again(
 
 
 def test_an_unusable_answer_is_asked_again_with_the_reason(
-    policy_task, good_source, tmp_path, out
+    policy_task, good_source, tmp_path, out, warm
 ):
     """Nothing is guessed: not from two files, and not from a part of one."""
     two = code(good_source) + code(good_source.replace("1.0", "0.9"))
     part = code("def helper(obs):\n    return 0.0, 0.0\n")
     model = Model(tmp_path / "model", two, part, code(good_source))
-    run = synthesize(policy_task, model.name, out=out, iterations=1)
+    run = synthesize(policy_task, model.name, out=out, iterations=1, judge=warm)
     assert run.tau == 1
     _, second, third = model.prompts()
     assert "two blocks that may be the file" in second[-200:]
@@ -150,13 +156,15 @@ def test_an_unusable_answer_is_asked_again_with_the_reason(
     assert (folder / "generate.reply-2.md").read_text() == part
 
 
-def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out):
+def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out, warm):
     """One line each, the one in question left out; no figure of a held-out start."""
     model = Model(
         tmp_path / "model",
         *(code(STILL), code(WALL), code(f"{WALL}X = 1\n"), code(good_source)),
     )
-    run = synthesize(policy_task, model.name, out=out, iterations=1, patience=3)
+    run = synthesize(
+        policy_task, model.name, out=out, iterations=1, patience=3, judge=warm
+    )
     assert run.tau == 1
     first, second, third = (
         prompt.partition("## Earlier attempts, oldest first\n")[2]
@@ -172,10 +180,10 @@ def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out):
     assert "nominal: collision in step " in lines[1]
 
 
-def test_the_prompt_is_on_record(policy_task, good_source, tmp_path, out):
+def test_the_prompt_is_on_record(policy_task, good_source, tmp_path, out, warm):
     """A run says which template its questions were made from."""
     model = Model(tmp_path / "model", code(good_source))
-    synthesize(policy_task, model.name, out=out, prompt="underspecified")
+    synthesize(policy_task, model.name, out=out, prompt="underspecified", judge=warm)
     assert load_run(out).prompt == "underspecified"
     assert "## Advice" not in model.prompts()[0]
 

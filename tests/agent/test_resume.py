@@ -43,11 +43,11 @@ def events(folder, name):
 
 
 @pytest.fixture(scope="module")
-def once_halted(policy_task, tmp_path_factory):
+def once_halted(policy_task, tmp_path_factory, warm):
     out = tmp_path_factory.mktemp("halted") / "run"
     model = Script(code(STILL, tokens_in=7), PermanentFault("401 no such key"))
     with pytest.raises(Fault):
-        synthesize(policy_task, model, out=out)
+        synthesize(policy_task, model, out=out, judge=warm)
     return out
 
 
@@ -57,13 +57,13 @@ def halted(once_halted, out):
     return shutil.copytree(once_halted, out)
 
 
-def test_what_is_on_record_is_not_done_again(policy_task, good_source, halted):
+def test_what_is_on_record_is_not_done_again(policy_task, good_source, halted, warm):
     """Neither asked nor verified; tokens, time and the record go on."""
     before = load_run(halted)
     report = (halted / "iterations/k01/j0/report.json").stat()
     seen = []
     model = Script(code(good_source, tokens_in=3))
-    run = synthesize(policy_task, model, out=halted, on_event=seen.append)
+    run = synthesize(policy_task, model, out=halted, on_event=seen.append, judge=warm)
     assert model.asked() == [("edit", 1, 1)]
     assert (run.status, run.tau, run.tokens_in) == ("verified", 1, 10)
     assert [(a.k, a.j, a.passed) for a in run.attempts] == [(1, 0, False), (1, 1, True)]
@@ -79,7 +79,7 @@ def test_what_is_on_record_is_not_done_again(policy_task, good_source, halted):
     assert before.censored
 
 
-def test_a_report_of_other_code_does_not_count(policy_task, good_source, halted):
+def test_a_report_of_other_code_does_not_count(policy_task, good_source, halted, warm):
     """Whoever puts a passing report into the folder has the candidate verified anew."""
     other = halted / "iterations/k01/j0/report.json"
     text = json.loads(other.read_text())
@@ -94,25 +94,27 @@ def test_a_report_of_other_code_does_not_count(policy_task, good_source, halted)
         "failed_tests": 0,
     }
     other.write_text(json.dumps(text))
-    run = synthesize(policy_task, Script(code(good_source)), out=halted)
+    run = synthesize(policy_task, Script(code(good_source)), out=halted, judge=warm)
     assert [a.passed for a in run.attempts] == [False, True]
     assert not json.loads(other.read_text())["verdict"]["passed"]
 
 
-def test_an_answer_that_is_damaged_is_asked_for_again(policy_task, good_source, halted):
+def test_an_answer_that_is_damaged_is_asked_for_again(
+    policy_task, good_source, halted, warm
+):
     """The hash tells; what was lost is lost, but never taken for an answer."""
     for blob in (halted / "blobs").iterdir():
         if STILL in blob.read_text() and "```" in blob.read_text()[:4]:
             blob.write_text("```python\nraise\n```")
     model = Script(code(good_source))
-    assert synthesize(policy_task, model, out=halted).tau == 1
+    assert synthesize(policy_task, model, out=halted, judge=warm).tau == 1
     assert model.asked() == [("generate", 1, 0)]
 
 
 @pytest.fixture(scope="module")
-def once_verified(policy_task, tmp_path_factory):
+def once_verified(policy_task, tmp_path_factory, warm):
     out = tmp_path_factory.mktemp("verified") / "run"
-    assert synthesize(policy_task, "builtin", out=out).verified
+    assert synthesize(policy_task, "builtin", out=out, judge=warm).verified
     return out
 
 
@@ -129,7 +131,7 @@ def test_a_run_that_has_ended(once_verified, out, tdac):
     assert tdac("synth", "--resume", out)[0] == 1
 
 
-def test_another_run_is_refused(policy_task, small_task, halted):
+def test_another_run_is_refused(policy_task, small_task, halted, warm):
     """One line names all that differs; the folder stays as it is."""
     before = {path: path.read_bytes() for path in halted.rglob("*") if path.is_file()}
     expected = (
@@ -137,29 +139,29 @@ def test_another_run_is_refused(policy_task, small_task, halted):
         r"optimizer script there, builtin here; J 1 there, 2 here; seed 0 there, 4 here"
     )
     with pytest.raises(RunError, match=expected) as caught:
-        synthesize(policy_task, "builtin", out=halted, seed=4, patience=2)
+        synthesize(policy_task, "builtin", out=halted, seed=4, patience=2, judge=warm)
     assert "\n" not in str(caught.value)
     with pytest.raises(RunError, match="another first question"):
-        synthesize(small_task, Script(), out=halted)
+        synthesize(small_task, Script(), out=halted, judge=warm)
     with pytest.raises(RunError, match="another controller to begin with"):
-        synthesize(policy_task, Script(), out=halted, start_from=STILL)
+        synthesize(policy_task, Script(), out=halted, start_from=STILL, judge=warm)
     after = {path: path.read_bytes() for path in halted.rglob("*") if path.is_file()}
     assert after == before
 
 
-def test_one_process_at_a_time(policy_task, halted):
+def test_one_process_at_a_time(policy_task, halted, warm):
     """A run that is being written is left alone."""
     with hold(halted / LOCK_FILE) as mine:
         assert mine
         with pytest.raises(RunError, match="another process is at work on"):
-            synthesize(policy_task, Script(), out=halted)
+            synthesize(policy_task, Script(), out=halted, judge=warm)
 
 
-def test_the_same_edit_is_not_tested_again(policy_task, good_source, out):
+def test_the_same_edit_is_not_tested_again(policy_task, good_source, out, warm):
     """Comments and layout are no change; the model is told, and the report stands."""
     same = f"# repaired\n\n{STILL}"
     model = Script(code(STILL), code(same), code(good_source))
-    run = synthesize(policy_task, model, out=out, patience=2)
+    run = synthesize(policy_task, model, out=out, patience=2, judge=warm)
     assert [(a.j, a.unchanged) for a in run.attempts] == [
         *((0, False), (1, True), (2, False))
     ]
@@ -170,20 +172,20 @@ def test_the_same_edit_is_not_tested_again(policy_task, good_source, out):
     assert "The last edit changed nothing" in second
     assert "# repaired" in second
     model = Script(code(STILL), code(same), NO_RULES, code(good_source))
-    again = synthesize(policy_task, model, out=out.with_name("other"))
+    again = synthesize(policy_task, model, out=out.with_name("other"), judge=warm)
     assert again.tau == 2
     assert "The last edit changed nothing" in model.requests[2].prompt
     assert "changed nothing" not in model.requests[3].prompt
 
 
-def test_equal_questions_are_different_samples(policy_task, good_source, out):
+def test_equal_questions_are_different_samples(policy_task, good_source, out, warm):
     """A run that goes on after equal questions gives each of them its own answer."""
     nothing = Reply("No code.")
     model = Script(nothing, nothing, nothing, PermanentFault("gone"))
     with pytest.raises(Fault):
-        synthesize(policy_task, model, out=out)
+        synthesize(policy_task, model, out=out, judge=warm)
     model = Script(code(good_source))
-    run = synthesize(policy_task, model, out=out)
+    run = synthesize(policy_task, model, out=out, judge=warm)
     assert [(a.k, a.valid) for a in run.attempts] == [(1, False), (2, True)]
     (request,) = model.requests
     assert (request.sample[1:], request.turn, request.repeat) == ((2, 0), 0, 1)
@@ -193,7 +195,7 @@ TASKS = ["maze", "epuck-maze", "own map"]
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_a_folder_knows_how_it_was_begun(tmp_path, name):
+def test_a_folder_knows_how_it_was_begun(tmp_path, name, warm):
     """`--resume` needs nothing else: task, models, prompt and all that was given."""
     from tdac_envs.maps import bundled_map
 
@@ -219,7 +221,13 @@ def test_a_folder_knows_how_it_was_begun(tmp_path, name):
     out = tmp_path / "run"
     with pytest.raises(Fault):
         synthesize(
-            task, model, out=out, prompt=str(template), start_from=None, **wanted
+            task,
+            model,
+            out=out,
+            prompt=str(template),
+            start_from=None,
+            **wanted,
+            judge=warm,
         )
     template.unlink()
     known = asked_for(out)
@@ -228,7 +236,7 @@ def test_a_folder_knows_how_it_was_begun(tmp_path, name):
     assert generate_prompt(known["task"], ()) == generate_prompt(task, ())
     model = Script(PermanentFault("gone again"))
     with pytest.raises(Fault, match="gone again"):
-        synthesize(**{**known, "learner": model, "optimizer": None})
+        synthesize(**{**known, "learner": model, "optimizer": None}, judge=warm)
     assert model.requests[0].prompt.endswith("Please.\n")
 
 

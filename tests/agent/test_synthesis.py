@@ -47,11 +47,11 @@ OPERATIONS = [{"op": "add", "scope": "code", "text": text} for text in LEARNT]
 RULES = Reply(f"```json\n{json.dumps(OPERATIONS)}\n```", tokens_in=7)
 
 
-def test_it_passes_after_rules_and_an_edit(policy_task, good_source, out):
+def test_it_passes_after_rules_and_an_edit(policy_task, good_source, out, warm):
     """Two failures, rules, a failure, an edit that passes: k = 2, j = 1."""
     learner = Script(code(NOTHING), code(NOTHING + "\nX = 2\n"))
     optimizer = Script(code(NOTHING + "\nX = 1\n"), RULES, code(good_source))
-    run = synthesize(policy_task, learner, optimizer, out=out)
+    run = synthesize(policy_task, learner, optimizer, out=out, judge=warm)
     assert run.verified
     assert run.tau == 2
     assert learner.asked() == [("generate", 1, 0), ("generate", 2, 0)]
@@ -101,10 +101,12 @@ def check_folder(folder, source):
         Reply("```python\ndef policy(:\n```"),
     ],
 )
-def test_invalid_answers_are_asked_again_twice(policy_task, good_source, out, reply):
+def test_invalid_answers_are_asked_again_twice(
+    policy_task, good_source, out, reply, warm
+):
     """Then the iteration is spent and marked invalid; each answer is kept."""
     learner = Script(reply, reply, reply, code(good_source))
-    run = synthesize(policy_task, learner, out=out)
+    run = synthesize(policy_task, learner, out=out, judge=warm)
     assert run.tau == 2
     assert [(a.k, a.valid, a.passed) for a in run.attempts] == [
         (1, False, False),
@@ -124,22 +126,24 @@ def test_invalid_answers_are_asked_again_twice(policy_task, good_source, out, re
     ]
 
 
-def test_faults_use_up_no_iteration(policy_task, good_source, out):
+def test_faults_use_up_no_iteration(policy_task, good_source, out, warm):
     """A provider that cannot be reached is asked again; the second answer counts."""
     learner = Script(ProviderFault("503"), ProviderFault("503"), code(good_source))
-    run = synthesize(policy_task, learner, out=out, iterations=1, retry=AT_ONCE)
+    run = synthesize(
+        policy_task, learner, out=out, iterations=1, retry=AT_ONCE, judge=warm
+    )
     assert run.tau == 1
     faults = [r for r in journal(out) if r["event"] == "call.fault"]
     assert [fault["attempt"] for fault in faults] == [1, 2]
     assert {fault["fault"] for fault in faults} == {"transient"}
 
 
-def test_four_faults_stop_the_run(policy_task, out):
+def test_four_faults_stop_the_run(policy_task, out, warm):
     """The run is neither verified nor failed, and its record says why."""
     learner = Script(*[ProviderFault("no route to host")] * 4)
     expected = r"script: transient fault: no route to host \(asked 4 times\)"
     with pytest.raises(Fault, match=expected):
-        synthesize(policy_task, learner, out=out, retry=AT_ONCE)
+        synthesize(policy_task, learner, out=out, retry=AT_ONCE, judge=warm)
     assert learner.answers == []
     run = load_run(out)
     assert run.status == "fault"
@@ -147,11 +151,11 @@ def test_four_faults_stop_the_run(policy_task, out):
     assert "no route" in journal(out)[-1]["reason"]
 
 
-def test_a_permanent_fault_keeps_what_there_is(policy_task, out):
+def test_a_permanent_fault_keeps_what_there_is(policy_task, out, warm):
     """It is not asked again; the candidate before it stays on record."""
     learner = Script(code(NOTHING), PermanentFault("401 no such key"))
     with pytest.raises(Fault, match=r"permanent fault: 401 no such key$"):
-        synthesize(policy_task, learner, out=out)
+        synthesize(policy_task, learner, out=out, judge=warm)
     run = load_run(out)
     assert run.status == "fault"
     assert [(a.k, a.j, a.passed) for a in run.attempts] == [(1, 0, False)]
@@ -159,33 +163,35 @@ def test_a_permanent_fault_keeps_what_there_is(policy_task, out):
     assert (out / "iterations/k01/j1/edit.prompt.md").is_file()
 
 
-def test_a_truncated_answer_gets_more_room(policy_task, good_source, out):
+def test_a_truncated_answer_gets_more_room(policy_task, good_source, out, warm):
     """It is never used, even where the code in it is whole, and asked for again."""
     cut = Reply(f"```python\n{good_source}```", stop="length")
     learner = Script(cut, code(good_source))
-    run = synthesize(policy_task, learner, out=out)
+    run = synthesize(policy_task, learner, out=out, judge=warm)
     assert run.tau == 1
     first, second = (request.max_tokens for request in learner.requests)
     assert second == 2 * first
 
 
-def test_more_room_than_a_model_can_have(policy_task, good_source, out):
+def test_more_room_than_a_model_can_have(policy_task, good_source, out, warm):
     """Where it is refused, the usual room is asked for; the run goes on."""
     cut, refused = (
         Reply("```python", stop="length"),
         PermanentFault("400 at most 16384"),
     )
     learner = Script(cut, refused, cut, refused, code(good_source))
-    assert synthesize(policy_task, learner, out=out).tau == 1
+    assert synthesize(policy_task, learner, out=out, judge=warm).tau == 1
     rooms = [request.max_tokens for request in learner.requests]
     usual = rooms[0]
     assert rooms == [usual, 2 * usual, usual, 2 * usual, usual]
 
 
-def test_it_gives_up_after_k_iterations(policy_task, out):
+def test_it_gives_up_after_k_iterations(policy_task, out, warm):
     """Nothing verified: no controller.py, status `not verified`."""
     learner = Script(code(NOTHING), RULES, code(NOTHING), RULES)
-    run = synthesize(policy_task, learner, out=out, iterations=2, patience=0)
+    run = synthesize(
+        policy_task, learner, out=out, iterations=2, patience=0, judge=warm
+    )
     assert run.status == "not verified"
     assert run.tau is None
     assert not run.controller.exists()
@@ -193,21 +199,21 @@ def test_it_gives_up_after_k_iterations(policy_task, out):
     assert learner.requests[-1].report.verdict.failed_tests > 0
 
 
-def test_an_interrupt_leaves_a_readable_run(policy_task, out):
+def test_an_interrupt_leaves_a_readable_run(policy_task, out, warm):
     """Ctrl-C in the middle of a call."""
     learner = Script(code(NOTHING), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
-        synthesize(policy_task, learner, out=out)
+        synthesize(policy_task, learner, out=out, judge=warm)
     run = load_run(out)
     assert run.status == "interrupted"
     assert [(a.k, a.j) for a in run.attempts] == [(1, 0)]
     assert journal(out)[-1]["status"] == "interrupted"
 
 
-def test_a_given_controller_is_tried_first(policy_task, good_source, out):
+def test_a_given_controller_is_tried_first(policy_task, good_source, out, warm):
     """`start_from` replaces the first answer of the learner."""
     learner = Script()
-    run = synthesize(policy_task, learner, out=out, start_from=good_source)
+    run = synthesize(policy_task, learner, out=out, start_from=good_source, judge=warm)
     assert run.tau == 1
     assert learner.requests == []
 
@@ -215,38 +221,38 @@ def test_a_given_controller_is_tried_first(policy_task, good_source, out):
 @pytest.mark.parametrize(
     "source", ["", pytest.param("# no line end", marks=pytest.mark.slow)]
 )
-def test_a_given_controller_may_be_poor(policy_task, good_source, out, source):
+def test_a_given_controller_may_be_poor(policy_task, good_source, out, source, warm):
     """An empty file or one without a line end is a candidate like any other."""
     learner = Script(code(good_source))
-    run = synthesize(policy_task, learner, out=out, start_from=source)
+    run = synthesize(policy_task, learner, out=out, start_from=source, judge=warm)
     assert [a.passed for a in run.attempts] == [False, True]
 
 
-def test_builtin_needs_no_model(policy_task, out):
+def test_builtin_needs_no_model(policy_task, out, warm):
     """The builtin learner verifies the small task by itself."""
-    run = synthesize(policy_task, out=out)
+    run = synthesize(policy_task, out=out, judge=warm)
     assert run.verified
     assert run.learner == run.optimizer == "builtin"
     assert run.tokens_in == 0
 
 
-def test_an_unknown_learner(policy_task, out):
+def test_an_unknown_learner(policy_task, out, warm):
     """The name is refused before anything is written."""
     with pytest.raises(ProviderError, match="unknown model 'gpt'; known: builtin, "):
-        synthesize(policy_task, "gpt", out=out)
+        synthesize(policy_task, "gpt", out=out, judge=warm)
     assert not out.exists()
 
 
-def test_a_folder_in_use(policy_task, out):
+def test_a_folder_in_use(policy_task, out, warm):
     """A run never writes into a folder that holds something."""
     out.mkdir()
     (out / "mine.txt").write_text("keep")
     with pytest.raises(RunError, match="is not empty"):
-        synthesize(policy_task, out=out)
+        synthesize(policy_task, out=out, judge=warm)
     assert [path.name for path in out.iterdir()] == ["mine.txt"]
 
 
-def test_a_run_folder_is_self_contained(tmp_path, good_source):
+def test_a_run_folder_is_self_contained(tmp_path, good_source, warm):
     """Moved elsewhere it verifies with its own suite, and its controller runs alone."""
     folder = write_small_task(tmp_path / "task", suite="mine")
     (folder / "mine").mkdir()
@@ -254,7 +260,7 @@ def test_a_run_folder_is_self_contained(tmp_path, good_source):
     (folder / "mine" / "test_mine.py").write_text(test)
     out = tmp_path / "run"
     learner = Script(code(good_source))
-    assert synthesize(load_task(folder), learner, out=out).verified
+    assert synthesize(load_task(folder), learner, out=out, judge=warm).verified
     moved = tmp_path / "elsewhere" / "moved"
     moved.parent.mkdir()
     out.rename(moved)

@@ -114,13 +114,15 @@ def code(source, *counts):
     return Reply(f"```python\n{source}```\n", "end", *counts)
 
 
-def test_an_exhausted_budget_stops_a_run(tmp_path, good_source, tdac, monkeypatch):
+def test_an_exhausted_budget_stops_a_run(
+    tmp_path, good_source, tdac, monkeypatch, warm
+):
     """Censored, with what it took; more money and it goes on, spending counted on."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
     out = tmp_path / "run"
     model = Model("openai:gpt-4o", None, code(STILL, 8000, 4000, 2000))
     limits = {"max_output": 5000, "max_cost": 0.15}
-    run = synthesize(task, model, out=out, **limits)
+    run = synthesize(task, model, out=out, **limits, judge=warm)
     assert (run.status, run.censored, run.tau) == ("budget", True, None)
     price = 2.5 * 8000 + 10 * 4000
     assert run.cost == pytest.approx(price / 1e6)
@@ -137,7 +139,7 @@ def test_an_exhausted_budget_stops_a_run(tmp_path, good_source, tdac, monkeypatc
     assert "8000 tokens in (2000 from a cache), 4000 out; 0.0600 USD" in told
     limits["max_cost"] = 0.5
     model.answers = [code(good_source, 9000, 3000)]
-    run = synthesize(task, model, out=out, **limits)
+    run = synthesize(task, model, out=out, **limits, judge=warm)
     assert (run.status, run.censored) == ("verified", False)
     assert (run.reason, run.enough, run.outlook) == ("", "", "")
     price += 2.5 * 9000 + 10 * 3000
@@ -158,10 +160,12 @@ def test_answers_that_report_no_tokens(tmp_path, tdac):
     assert "no tokens reported: each answer counts with all that was reserved" in told
 
 
-def test_a_shared_budget_has_limits_of_its_own(tmp_path, small_task):
+def test_a_shared_budget_has_limits_of_its_own(tmp_path, small_task, warm):
     """Limits of a run beside it would mean nothing."""
     with pytest.raises(ValueError, match="a shared budget has limits of its own"):
-        synthesize(small_task, out=tmp_path / "r", max_cost=1.0, budget=Budget(1.0))
+        synthesize(
+            small_task, out=tmp_path / "r", max_cost=1.0, budget=Budget(1.0), judge=warm
+        )
 
 
 def test_all_that_is_missing_is_said_at_once(tdac, monkeypatch):

@@ -71,7 +71,9 @@ def without_seconds(points):
     return [str(replace(point, seconds=0.0)) for point in points]
 
 
-@pytest.mark.parametrize("algo", ["ppo", "sac", "td3"])
+@pytest.mark.parametrize(
+    "algo", ["ppo", *(pytest.param(a, marks=pytest.mark.slow) for a in ("sac", "td3"))]
+)
 def test_a_training_leaves_a_policy_its_facts_and_a_curve(
     algo, tmp_path, small, config
 ):
@@ -145,9 +147,8 @@ def start(*words):
     )
 
 
-@pytest.mark.parametrize(
-    "number", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_a_killed_training_loses_little(number, tmp_path, small, config, tdac):
     """It goes on from its last checkpoint, with all that was evaluated till then."""
     out = tmp_path / "out"

@@ -18,6 +18,7 @@ from tdac_envs.task2d import widest_connected_radius
 EACH_MAP = pytest.mark.parametrize("name", bundled_maps())
 EACH_HAND = pytest.mark.parametrize("hand", [LEFT, RIGHT], ids=["left", "right"])
 JITTERS = range(5)
+QUICK = ("maze", "rooms")
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +94,7 @@ def test_the_script_reproduces_the_map(name, drawn):
     assert (cv2.absdiff(now, before) > 8).mean() < 0.005
 
 
+@pytest.mark.slow
 def test_the_script_draws_the_same_twice(drawn, tmp_path):
     draw_maps(tmp_path)
     for path in drawn.iterdir():
@@ -138,7 +140,13 @@ def test_going_straight_fails(name, make):
 
 
 @EACH_HAND
-@EACH_MAP
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+        for name in bundled_maps()
+    ],
+)
 def test_following_a_wall_fails(name, hand, make):
     env = make(name)
     info = run(env, wall_follower(hand, env.nominal.robot))

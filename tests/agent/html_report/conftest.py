@@ -16,7 +16,7 @@ from tdac_agent.trajectory import Trajectory
 
 
 @pytest.fixture(scope="session")
-def runs(tmp_path_factory, good_source):
+def runs(tmp_path_factory, good_source, warm):
     """A folder with a hostile run that was not verified, and one that was."""
     place = tmp_path_factory.mktemp("report") / "runs"
     suite = place.parent / "suite"
@@ -28,9 +28,13 @@ def runs(tmp_path_factory, good_source):
     task = load_task(
         write_small_task(place.parent / "evil", profile="policy", suite="../suite")
     )
-    synthesize(task, model, out=name, iterations=2, patience=1)
+    synthesize(task, model, out=name, iterations=2, patience=1, judge=warm)
     synthesize(
-        load_task(spec), Model(HITS, good_source), out=place / "verified", iterations=2
+        load_task(spec),
+        Model(HITS, good_source),
+        out=place / "verified",
+        iterations=2,
+        judge=warm,
     )
     return place
 

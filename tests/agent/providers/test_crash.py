@@ -145,17 +145,22 @@ def whole(model, task_folder, tmp_path):
     return make
 
 
-def test_a_run_that_is_killed_again_and_again(model, task_folder, whole, tmp_path):
-    """In the middle of an answer's line, and after that of a verification."""
+@pytest.mark.parametrize(
+    "kills",
+    [[(5, 0.5)], pytest.param([(5, 0.5), (4, 1.0)], marks=pytest.mark.slow)],
+    ids=["once", "again"],
+)
+def test_a_run_that_is_killed(model, task_folder, whole, tmp_path, kills):
+    """In the middle of an answer's line, and then after that of a verification."""
     expected = state(whole(2))
     folder = tmp_path / "killed" / "run"
     folder.parent.mkdir()
-    for kill_at, share in ((5, 0.5), (4, 1.0)):
+    for kill_at, share in kills:
         assert start(model, task_folder, [folder], kill_at, share) is None
     assert load_run(folder).status == "running"
     assert start(model, task_folder, [folder]) == ["verified"]
     assert state(folder) == expected
-    check_calls(model, folder, 0, kills=2)
+    check_calls(model, folder, 0, kills=len(kills))
     run = load_run(folder)
     assert run.cost_lost > 0
     assert model.billed <= run.cost + run.cost_lost

@@ -20,9 +20,10 @@ QUESTION = Request("generate", "Wände? ÄÖ\n" * 20_000)
 STANDS = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
-@pytest.fixture
-def policy_task(tmp_path):
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
+@pytest.fixture(scope="module")
+def policy_task(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("task")
+    return load_task(write_small_task(folder, profile="policy"))
 
 
 @pytest.fixture
@@ -145,25 +146,30 @@ def test_a_folder_that_is_gone(tmp_path):
         model.complete(QUESTION)
 
 
-@pytest.fixture
-def recorded(policy_task, good_source, tmp_path):
+@pytest.fixture(scope="module")
+def once_recorded(policy_task, good_source, tmp_path_factory, warm):
     """A run: a refusal to write code, one that stands still, its repair."""
-    folder = tmp_path / "mail"
-    folder.mkdir()
+    folder = tmp_path_factory.mktemp("mail")
     answers = ["I would rather not.", STANDS, good_source]
     fenced = [answers[0], *(f"```python\n{text}```\n" for text in answers[1:])]
     done = answer_in(folder, fenced)
-    out = tmp_path / "recorded"
-    run = synthesize(policy_task, Manual(folder, poll=0.005), out=out)
+    out = folder.with_name("recorded")
+    run = synthesize(policy_task, Manual(folder, poll=0.005), out=out, judge=warm)
     done()
     assert run.verified
     return out
 
 
-def test_a_run_is_replayed(policy_task, recorded, tmp_path):
+@pytest.fixture
+def recorded(once_recorded, tmp_path):
+    """That run, to be damaged."""
+    return shutil.copytree(once_recorded, tmp_path / "recorded")
+
+
+def test_a_run_is_replayed(policy_task, recorded, tmp_path, warm):
     """The same answers to the same questions: the same run, from the record alone."""
     out = tmp_path / "again"
-    run = synthesize(policy_task, f"replay:{recorded}", out=out)
+    run = synthesize(policy_task, f"replay:{recorded}", out=out, judge=warm)
     before = load_run(recorded)
     assert [a.model_dump() for a in run.attempts] == [
         a.model_dump() for a in before.attempts
@@ -174,13 +180,15 @@ def test_a_run_is_replayed(policy_task, recorded, tmp_path):
         assert old.read_bytes() == new.read_bytes()
 
 
-def test_a_miss_is_an_error(policy_task, recorded, tmp_path, small_task):
+def test_a_miss_is_an_error(policy_task, recorded, tmp_path, small_task, warm):
     """Another question, or one too many, is a fault that says where."""
     with pytest.raises(Fault, match=r"permanent fault: another question than.*line"):
-        synthesize(small_task, f"replay:{recorded}", out=tmp_path / "other")
+        synthesize(small_task, f"replay:{recorded}", out=tmp_path / "other", judge=warm)
     (recorded / "iterations/k01/j1/edit.reply.md").unlink()
     with pytest.raises(Fault, match=r"answer 1 to edit k=1 j=1 is not in"):
-        synthesize(policy_task, f"replay:{recorded}", out=tmp_path / "again")
+        synthesize(
+            policy_task, f"replay:{recorded}", out=tmp_path / "again", judge=warm
+        )
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def journal(folder):
 
 
 def test_faults_cost_neither_k_nor_j(
-    server, task_file, good_source, tmp_path, monkeypatch
+    server, task_file, good_source, tmp_path, monkeypatch, warm
 ):
     """Learner and optimizer of different vendors, both with faults: k = 1, j = 1."""
     for vendor in (ANTHROPIC, OPENAI):
@@ -51,7 +51,13 @@ def test_faults_cost_neither_k_nor_j(
     out = tmp_path / "run"
     task = load_task(task_file)
     run = synthesize(
-        task, "anthropic:m", "openai:n", out=out, iterations=1, retry=AT_ONCE
+        task,
+        "anthropic:m",
+        "openai:n",
+        out=out,
+        iterations=1,
+        retry=AT_ONCE,
+        judge=warm,
     )
     assert [(a.k, a.j, a.passed) for a in run.attempts] == [(1, 0, False), (1, 1, True)]
     paths = [seen.path for seen in server.seen]
@@ -71,7 +77,7 @@ def test_faults_cost_neither_k_nor_j(
 
 
 def test_a_fault_that_stays_ends_the_run(
-    server, task_file, good_source, tmp_path, monkeypatch
+    server, task_file, good_source, tmp_path, monkeypatch, warm
 ):
     """A wrong key in mid-run: the run ends as a fault, all before it is kept."""
     server.script = [
@@ -82,7 +88,11 @@ def test_a_fault_that_stays_ends_the_run(
     expected = "anthropic:m: permanent fault: 401: authentication_error: no such key"
     with pytest.raises(Fault, match=expected):
         synthesize(
-            load_task(task_file), "anthropic:m", out=tmp_path / "run", base_url=url
+            load_task(task_file),
+            "anthropic:m",
+            out=tmp_path / "run",
+            base_url=url,
+            judge=warm,
         )
     run = load_run(tmp_path / "run")
     assert run.status == "fault"
@@ -102,7 +112,9 @@ def start(words, **variables):
     )
 
 
-@pytest.mark.parametrize("vendor", [ANTHROPIC, OPENAI])
+@pytest.mark.parametrize(
+    "vendor", [ANTHROPIC, pytest.param(OPENAI, marks=pytest.mark.slow)]
+)
 def test_an_interrupt_in_a_call(server, task_file, tmp_path, no_traces, vendor):
     """Ctrl-C while a server is silent: exit 130, and the run can be read."""
     process = None

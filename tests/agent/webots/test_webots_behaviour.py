@@ -1,6 +1,7 @@
 """The `controller` package behaves as Webots does, call by call."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -695,7 +696,8 @@ class TestFolder:
 
     def test_processor_time_is_bounded(self, drive, quick):
         """A controller that only computes is ended, and has failed."""
-        report = drive("while True:\n    pass\n", OPEN, steps=1, limits=quick).report
+        limits = replace(quick, cpu_seconds=1)
+        report = drive("while True:\n    pass\n", OPEN, steps=1, limits=limits).report
         assert report.outcome == "error"
         assert "the run" in report.error
 

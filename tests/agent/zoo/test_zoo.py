@@ -6,7 +6,7 @@ from enclosure import Enclosure, differences
 from grounds import KINDS
 
 CASES = all_cases()
-ALWAYS = {"astar_pursuit", "policy_minimal", "forged_positions", "proc_walk", "daemon"}
+ALWAYS = {"astar_pursuit", "forged_positions", "proc_walk"}
 KEYS = {"idea", "profile", "verdict", "fails", "error", "why", "tiers", "onto", "also"}
 KEYS |= {"repeat", "hides", "limits"}
 # Of attacks, good controllers, and good ones in full contract, by kind of task.
