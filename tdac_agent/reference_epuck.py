@@ -12,7 +12,7 @@ import numpy as np
 from tdac_agent.reference import Point, taut
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.contact import first_touch
-from tdac_envs.epuck.paths import entry
+from tdac_envs.epuck.paths import entry, open_field
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.grid import BoolGrid
 from tdac_envs.plan import Path, descend, distance_field
@@ -33,11 +33,11 @@ def oracle_path(task: EPuckTask, x: float, y: float) -> Path:
     ends = np.array([[x, y], task.goal])
     for margin in MARGINS:
         free = _roomy(task, (x, y), margin)
-        last = entry(ground, free, task.goal)
+        last = entry(ground, open_field(free), task.goal)
         if last is None:
             continue
         field = distance_field(free, last)
-        first = entry(ground, np.isfinite(field), (x, y))
+        first = entry(ground, field.astype(np.float32), (x, y))
         if first is not None:
             path = descend(free, field, first) * ground.spacing + ground.bounds[:2]
             return np.vstack([ends[:1], path, ends[1:]])

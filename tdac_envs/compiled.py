@@ -34,6 +34,10 @@ _DTYPES = {
 }
 _DTYPES["i8"] = np.int64
 _RESULT, _ERROR, _FIRST = 0, 1, 2
+# Words of an array before its shape and strides.
+_ARRAY = 5
+_FORMS = {"f8": "d", "i8": "q"}
+_RESULTS = {"f8": "<d", "f4": "<f", "i8": "<q", "b1": "<?"}
 _LOCK = threading.RLock()
 
 
@@ -57,6 +61,9 @@ class Kernel(Generic[P, R]):
         arguments, _, result = (signature or "").partition("->")
         self._types = [_Type(text) for text in arguments.split()]
         self._result = result.strip()
+        forms = "".join(kind.form for kind in self._types)
+        self._form = struct.Struct(f"<{_FIRST}q{forms}")
+        self._memory = ctypes.c_char * self._form.size
         self._entry: Callable[[int], int] | None = None
         self._engine: Any = None
 
@@ -68,8 +75,10 @@ class Kernel(Generic[P, R]):
         """
         if self.signature is None:
             return self.function(*args, **kwargs)
-        slots, kept = self.pack(args)
-        self._run(slots.ctypes.data)
+        packed, kept = self._pack(args)
+        slots = self._memory.from_buffer_copy(packed)
+        if self.load()(ctypes.addressof(slots)):
+            raise ArithmeticError(f"{self.name} failed")
         del kept
         return cast(R, self._result_in(slots))
 
@@ -90,29 +99,27 @@ class Kernel(Generic[P, R]):
     def __reduce__(self) -> str:
         return self.name
 
-    def _run(self, address: int) -> None:
-        if self.load()(address):
-            raise ArithmeticError(f"{self.name} failed")
-
-    def _result_in(self, slots: NDArray[np.int64]) -> Any:
-        word = slots[_RESULT : _RESULT + 1]
-        if self._result == "b1":
-            return bool(word.view(np.uint8)[0])
-        if self._result in ("f4", "f8"):
-            return float(word.view(_DTYPES[self._result])[0])
-        return int(word[0]) if self._result == "i8" else None
+    def _result_in(self, slots: Any) -> Any:
+        form = _RESULTS.get(self._result)
+        return struct.unpack_from(form, slots, 8 * _RESULT)[0] if form else None
 
     def pack(self, args: Any) -> tuple[NDArray[np.int64], list[Any]]:
         """The arguments as the compiled entry reads them, and what they point to."""
-        words: list[int] = [0, 0]
+        packed, kept = self._pack(args)
+        return np.frombuffer(packed, np.int64).copy(), kept
+
+    def _pack(self, args: Any) -> tuple[bytes, list[Any]]:
+        words: list[Any] = [0] * _FIRST
         kept: list[Any] = []
         if len(args) != len(self._types):
             wanted, given = len(self._types), len(args)
             raise TypeError(f"{self.name}: expected {wanted} arguments, got {given}")
         for value, kind in zip(args, self._types, strict=True):
-            words += kind.words(value, kept)
-        slots = np.array(words, np.int64)
-        return slots, kept
+            if kind.dimensions:
+                words += kind.words(value, kept)
+            else:
+                words.append(value)
+        return self._form.pack(*words), kept
 
     def load(self) -> Callable[[int], int]:
         """The compiled entry, which takes the address of packed arguments.
@@ -155,22 +162,25 @@ def kernel(signature: str | None = None) -> Callable[[Callable[P, R]], Kernel[P,
 
 
 class _Type:
-    """A type of a signature: `f8`, or `f4[:,:]`."""
+    """A type of a signature: `f8`, or `f4[:,:]`.
+
+    Attributes:
+        form: How `struct` packs a value of it into 64-bit words.
+    """
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.item, _, rest = text.partition("[")
         self.dimensions = rest.count(":")
+        words = f"{_ARRAY + 2 * self.dimensions}q"
+        self.form = words if self.dimensions else _FORMS[self.item]
         self.dtype = np.dtype(_DTYPES[self.item])
 
     def __str__(self) -> str:
         return self.text
 
     def words(self, value: Any, kept: list[Any]) -> list[int]:
-        """The value as 64-bit words, in the order in which numba passes it."""
-        if not self.dimensions:
-            form = "<d" if self.item == "f8" else "<q"
-            return [int(struct.unpack("<q", struct.pack(form, value))[0])]
+        """An array as 64-bit words, in the order in which numba passes it."""
         array = value
         if not (
             isinstance(array, np.ndarray)

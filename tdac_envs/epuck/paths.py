@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from functools import lru_cache
 
 import cv2
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.compiled import kernel
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.infrared import sees
@@ -65,45 +65,84 @@ def _nearest_place(ground: Ground, x: float, y: float) -> str:
 
 
 def entry(
-    ground: Ground, open_: NDArray[np.bool_], at: Point
+    ground: Ground, field: NDArray[np.float32], at: Point
 ) -> tuple[int, int] | None:
     """The nearest grid point (column, row) to which the body gets straight on.
 
     Args:
         ground: The ground.
-        open_: Shape (height, width): which grid points come into question.
+        field: Shape (height, width): below inf where grid points come into question.
         at: Where it is.
     """
-    for column, row in _near(ground, at):
-        if open_[row, column] and _may_hop(ground, at, ground.at(column, row)):
-            return column, row
-    return None
-
-
-def _near(ground: Ground, at: Point) -> Iterator[tuple[int, int]]:
-    """Grid points within 3 of a place, the nearest first."""
-    left, low, _, _ = ground.bounds
+    solid, (left, low, _, _) = ground.solid, ground.bounds
     u, v = (at[0] - left) / ground.spacing, (at[1] - low) / ground.spacing
-    height, width = ground.clear.shape
-    column, row = round(u), round(v)
-    found = [
-        (math.hypot(i - u, j - v), i, j)
-        for j in range(max(row - 3, 0), min(row + 4, height))
-        for i in range(max(column - 3, 0), min(column + 4, width))
-    ]
-    for _, i, j in sorted(found):
-        yield i, j
-
-
-def _may_hop(ground: Ground, begin: Point, end: Point) -> bool:
-    """Whether the body touches nothing on the straight line between two points."""
-    solid = ground.solid
-    heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
-    touch = first_touch(
-        solid.points, solid.first, solid.extent, *begin, heading,
-        math.dist(begin, end), 0.0, BODY_RADIUS,
+    cell = _entry_cell(
+        solid.points, solid.first, solid.extent, field,
+        *at, u, v, left, low, ground.spacing, BODY_RADIUS,
     )  # fmt: skip
-    return touch > 1.0
+    if cell < 0:
+        return None
+    row, column = divmod(cell, field.shape[1])
+    return column, row
+
+
+@kernel("f8[:,:] i8[:] f8[:,:] f4[:,:] f8 f8 f8 f8 f8 f8 f8 f8 -> i8")
+def _entry_cell(
+    points: NDArray[np.float64],
+    first: NDArray[np.int64],
+    extent: NDArray[np.float64],
+    field: NDArray[np.float32],
+    x: float,
+    y: float,
+    u: float,
+    v: float,
+    left: float,
+    low: float,
+    spacing: float,
+    radius: float,
+) -> int:
+    """Number of the grid point of `entry`, which is within 3 of (u, v); -1 if none."""
+    height, width = field.shape
+    column, row = math.floor(u + 0.5), math.floor(v + 0.5)
+    before, found = -1.0, -1
+    while True:
+        # The next one by distance, column and row.
+        best, cell = math.inf, -1
+        for i in range(max(column - 3, 0), min(column + 4, width)):
+            for j in range(max(row - 3, 0), min(row + 4, height)):
+                off = (i - u) * (i - u) + (j - v) * (j - v)
+                later = off > before or (off == before and i * height + j > found)
+                if later and off < best:
+                    best, cell = off, i * height + j
+        if cell < 0:
+            return -1
+        before, found = best, cell
+        i, j = cell // height, cell % height
+        if field[j, i] < math.inf:
+            off_x, off_y = left + i * spacing - x, low + j * spacing - y
+            heading = math.atan2(off_y, off_x)
+            way = math.sqrt(off_x * off_x + off_y * off_y)
+            touch = first_touch(
+                points, first, extent, x, y, heading, way, 0.0, radius
+            )  # fmt: skip
+            if touch > 1.0:
+                return int(j * width + i)
+
+
+def open_field(open_: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """What `entry` takes: 0 at the grid points that come into question, else inf."""
+    return np.where(open_, np.float32(0.0), np.float32(math.inf))
+
+
+def _nearest(ground: Ground, at: Point) -> tuple[int, int]:
+    """The grid point (column, row) nearest to a place."""
+    left, low, _, _ = ground.bounds
+    height, width = ground.clear.shape
+    column, row = (
+        round((at[0] - left) / ground.spacing),
+        round((at[1] - low) / ground.spacing),
+    )
+    return min(max(column, 0), width - 1), min(max(row, 0), height - 1)
 
 
 def route(ground: Ground, start: Point, goal: Point) -> NDArray[np.float32]:
@@ -118,10 +157,10 @@ def route(ground: Ground, start: Point, goal: Point) -> NDArray[np.float32]:
     Raises:
         TaskError: The body cannot get from start to goal; says how wide one could be.
     """
-    end = entry(ground, ground.free(BODY_RADIUS), goal)
+    end = entry(ground, open_field(ground.free(BODY_RADIUS)), goal)
     if end is not None:
         field = field_to(ground, end)
-        if entry(ground, np.isfinite(field), start) is not None:
+        if entry(ground, field, start) is not None:
             return field
     reason = _walled_off(ground, start, goal) or _too_narrow(ground, start, goal)
     raise TaskError(
@@ -164,7 +203,7 @@ def path_down(ground: Ground, field: NDArray[np.float32], start: Point) -> Path:
 
     It ends at the field's grid point; empty where there is none.
     """
-    begin = entry(ground, np.isfinite(field), start)
+    begin = entry(ground, field, start)
     if begin is None:
         return np.empty((0, 2))
     steps = np.asarray(field, np.float64) / ground.spacing
@@ -181,7 +220,7 @@ def widest_body(ground: Ground, start: Point, goal: Point) -> float:
 
     To the spacing of the grid.
     """
-    ends = [next(_near(ground, point))[::-1] for point in (start, goal)]
+    ends = [_nearest(ground, point)[::-1] for point in (start, goal)]
     low, high = 0.0, float(min(ground.clear[end] for end in ends))
 
     def joined(radius: float) -> bool:

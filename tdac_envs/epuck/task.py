@@ -154,7 +154,7 @@ def default_horizon(task: EPuckTask) -> int:
 
 def way(ground: Ground, field: NDArray[np.float32], at: Point) -> float:
     """Length of the shortest path from a place by a field of `route`, m."""
-    begin = entry(ground, np.isfinite(field), at)
+    begin = entry(ground, field, at)
     if begin is None:
         return math.inf
     column, row = begin
@@ -201,7 +201,7 @@ def _may_start(task: EPuckTask, pose: Pose) -> bool:
     ground = task.ground
     return (
         ground.gap(pose.x, pose.y) >= BODY_RADIUS + 1e-3
-        and entry(ground, np.isfinite(task.field), pose[:2]) is not None
+        and entry(ground, task.field, pose[:2]) is not None
         and not at_goal(ground, task.goal, task.goal_tolerance, pose.x, pose.y)
     )
 

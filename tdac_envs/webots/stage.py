@@ -13,7 +13,7 @@ from tdac_envs.arguments import finite_point
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
-from tdac_envs.epuck.paths import entry, field_to
+from tdac_envs.epuck.paths import entry, field_to, open_field
 from tdac_envs.epuck.source import started
 from tdac_envs.errors import WorldError
 from tdac_envs.wbt.fields import flag, text
@@ -185,7 +185,8 @@ def _find_robot(nodes: Iterable[Node], top: Frame, name: str) -> Found:
 def _farthest(world: World) -> tuple[float, float]:
     """The place that is farthest from the robot, for the body; its own if shut in."""
     ground = Ground.of(world)
-    begin = entry(ground, ground.free(BODY_RADIUS), world.robot.pose[:2])
+    free = open_field(ground.free(BODY_RADIUS))
+    begin = entry(ground, free, world.robot.pose[:2])
     if begin is None:
         return world.robot.pose[:2]
     field = field_to(ground, begin)

@@ -317,7 +317,7 @@ class TestArguments:
             (
                 {"start": (5, 5)},
                 TaskError,
-                "no free path .* they are in separate rooms",
+                "no free path .* the start is outside the arena's wall",
             ),
             (
                 {"start": (0.3, -0.14, 0)},

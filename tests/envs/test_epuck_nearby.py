@@ -13,6 +13,7 @@ from tdac_envs.epuck.gaps import nearest_gap, nearest_of
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import sense
 from tdac_envs.epuck.nearby import listed_at, surroundings
+from tdac_envs.epuck.paths import entry, open_field
 from tdac_envs.epuck.prisms import FIXED
 from tdac_envs.worlds import world_file
 
@@ -91,3 +92,30 @@ def test_what_can_be_pushed_is_in_every_list():
         starts = [*near.cells[:, :-1].ravel().tolist(), len(near.listed)]
         for begin, end in pairwise(starts):
             assert mobile <= set(near.listed[begin:end].tolist())
+
+
+@pytest.mark.parametrize("name", ["maze", "clutter"])
+def test_a_path_begins_at_the_nearest_point_that_the_body_gets_to(name):
+    """As found by sorting all grid points around and trying one after the other."""
+    ground = Ground.of(load_world(world_file(name)))
+    free, solid = ground.free(BODY_RADIUS), ground.solid
+    left, low, right, high = ground.bounds
+    found = 0
+    for at in np.random.default_rng(0).uniform((left, low), (right, high), (300, 2)):
+        u, v = (at - (left, low)) / ground.spacing
+        near = [
+            ((i - u) ** 2 + (j - v) ** 2, i, j)
+            for i in range(max(round(u) - 3, 0), min(round(u) + 4, free.shape[1]))
+            for j in range(max(round(v) - 3, 0), min(round(v) + 4, free.shape[0]))
+            if free[j, i]
+        ]
+        expected = None
+        for _, i, j in sorted(near):
+            off = np.subtract(ground.at(i, j), at)
+            way = (math.atan2(off[1], off[0]), math.hypot(*off), 0.0, BODY_RADIUS)
+            if first_touch(solid.points, solid.first, solid.extent, *at, *way) > 1:
+                expected = (i, j)
+                break
+        assert entry(ground, open_field(free), tuple(at.tolist())) == expected
+        found += expected is not None
+    assert 100 < found < 300
