@@ -1,5 +1,10 @@
 """Figures of runs and metrics, with matplotlib: vector, legible, colour-blind safe."""
 
+from tdac_agent.plots.baselines import (
+    plot_generalisation,
+    plot_learning_curves,
+    plot_success_by_policy,
+)
 from tdac_agent.plots.metrics import (
     plot_cumulative_panels,
     plot_cumulative_success,
@@ -17,7 +22,10 @@ __all__ = [
     "plot_cumulative_panels",
     "plot_cumulative_success",
     "plot_failures",
+    "plot_generalisation",
+    "plot_learning_curves",
     "plot_preprocessing",
+    "plot_success_by_policy",
     "plot_success_rates",
     "plot_timeline",
     "plot_trajectories",

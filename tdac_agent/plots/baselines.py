@@ -12,9 +12,17 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 from tdac_agent.exact import exact_interval
-from tdac_agent.plots.style import COLOURS, LINES, MARKERS, TEXT, colours_of, dress
+from tdac_agent.plots.style import (
+    COLOURS,
+    LINES,
+    MARKERS,
+    TEXT,
+    colours_of,
+    dress,
+    new_plot,
+)
 
-_COLUMNS = 4
+_COLUMNS = 3
 
 
 def plot_learning_curves(curves: pd.DataFrame) -> Figure:
@@ -136,8 +144,7 @@ def plot_generalisation(found: pd.DataFrame) -> Figure:
     rates = (cells["reached"] / cells["episodes"]).unstack(sort=False)
     seen = sums["seen"].first().unstack(sort=False)
     rows, columns = list(rates.index), list(rates.columns)
-    size = (2.2 + 0.52 * len(columns), 1.4 + 0.36 * len(rows))
-    figure = Figure(figsize=size, layout="constrained")
+    figure = new_plot(2.2 + 0.52 * len(columns), 1.4 + 0.36 * len(rows))
     axes = figure.add_subplot()
     axes.imshow(rates.to_numpy(float), cmap="cividis", vmin=0, vmax=1, aspect="auto")
     for y, trained in enumerate(rows):
@@ -176,8 +183,7 @@ def _panels(
     columns = min(_COLUMNS, count)
     rows = math.ceil(count / columns)
     left = 1.6 if shared else 0.3
-    size = (left + width * columns, 0.7 + height * rows)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = new_plot(left + width * columns, 0.7 + height * rows)
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     panels = [dress(axes) for axes in grid.flat]
     for axes in panels[count:]:

@@ -67,5 +67,5 @@ def test_it_needs_nothing_but_python(path):
 
 
 def test_there_are_notebooks():
-    """Pages in their order."""
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "03", "04", "05"]
+    """Five pages, in their order."""
+    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05"]
