@@ -1,25 +1,16 @@
-"""The fixtures that suites are written with; a public contract, see docs/suites.md."""
+"""How pytest runs a suite: which tests of it, in which order, with which plugins."""
 
 from __future__ import annotations
 
-import ast
-import functools
 import os
-from collections.abc import Callable
-from importlib.util import decode_source
 from pathlib import Path
-from typing import Any
 
 import pytest
 from _pytest.runner import runtestprotocol
 
-from tdac_agent.contract import MAX_SOURCE_BYTES
-from tdac_agent.judge import Judge, rollout_key
-from tdac_agent.oracle import Oracle
+from tdac_agent import suite_fixtures
+from tdac_agent.judge import Judge
 from tdac_agent.report import GROUPS, MAX_MESSAGE, group_of, id_of
-from tdac_agent.sandbox import ControllerError
-from tdac_agent.task import Task
-from tdac_agent.trajectory import Rollout
 
 # Some of these cost a verification more than its tests do.
 UNUSED_PLUGINS = (
@@ -34,57 +25,8 @@ UNUSED_PLUGINS = (
 )
 
 
-class Controller:
-    """The controller under test; its code runs in the sandbox, never here.
-
-    Attributes:
-        source: The file's text.
-    """
-
-    def __init__(self, judge: Judge) -> None:
-        self._judge = judge
-        self.source = judge.source.decode("utf-8", "replace")
-
-    @functools.cached_property
-    def tree(self) -> ast.Module:
-        """Syntax tree of the source; a source that does not parse fails the test."""
-        size = len(self._judge.source)
-        if size > MAX_SOURCE_BYTES:
-            limit = f"at most {MAX_SOURCE_BYTES} are allowed"
-            pytest.fail(f"the source has {size} bytes, {limit}", pytrace=False)
-        try:
-            # As Python itself reads a file, which may declare an encoding.
-            return ast.parse(decode_source(self._judge.source))
-        except SyntaxError as error:
-            line = f" (line {error.lineno})" if error.lineno else ""
-            reason = f"{error.msg}{line}"
-        except (ValueError, RecursionError, MemoryError) as error:
-            reason = str(error) or type(error).__name__
-        pytest.fail(f"the source does not parse: {reason}", pytrace=False)
-
-    def constant(self, name: str) -> Any:
-        """Value of a top-level name."""
-        return self._judge.unit().get(name)
-
-    def call(self, name: str, *args: Any, **kwargs: Any) -> Any:
-        """Calls a top-level function or class.
-
-        Exact Python types are kept. What cannot be sent as data comes back as a
-        `Remote`, with `call(method, ...)`, and may be passed on as an argument.
-        """
-        return self._judge.unit().call(name, *args, **kwargs)
-
-    def error_of(self, name: str, *args: Any, **kwargs: Any) -> ControllerError | None:
-        """The error that a call raises, or None where it returns."""
-        try:
-            self.call(name, *args, **kwargs)
-        except ControllerError as error:
-            return error
-        return None
-
-
 class JudgePlugin:
-    """Gives a suite its fixtures and notes what ran.
+    """Gives a suite its judge and notes what ran.
 
     Attributes:
         expected: Test ids of this profile, as collected before any of them ran.
@@ -97,42 +39,10 @@ class JudgePlugin:
             self._left_out.add("jitter")
         self.expected: list[str] = []
 
-    @pytest.fixture(scope="session")
-    def task(self) -> Task:
-        """The task: `params`, `nominal`, `spec`, `progress_steps`."""
-        return self._judge.task
-
-    @pytest.fixture(scope="session")
-    def controller(self) -> Controller:
-        """The controller under test."""
-        return Controller(self._judge)
-
-    @pytest.fixture(scope="session")
-    def oracle(self) -> Oracle:
-        """Exact answers to planning questions."""
-        return Oracle()
-
-    @pytest.fixture
-    def rollout(
-        self, record_property: Callable[[str, object], None]
-    ) -> Callable[..., Rollout]:
-        """`rollout(name, steps=None, drive="policy")`: a judged episode, run once.
-
-        Names are `nominal` and `jitter 1` … `jitter 5`; `drive="run_episode"` lets
-        the controller's own loop step an environment that the judge holds;
-        `drive="truncated run_episode"` ends that loop by `truncated`.
-        """
-
-        def run(
-            name: str = "nominal", *, steps: int | None = None, drive: str = "policy"
-        ) -> Rollout:
-            record_property("rollout", rollout_key(name, steps, drive))
-            return self._judge.rollout(name, steps=steps, drive=drive)
-
-        return run
-
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Declares the markers that choose tests by profile."""
+        """Declares the markers that choose tests by profile; adds the fixtures."""
+        config.stash[suite_fixtures.JUDGE] = self._judge
+        config.pluginmanager.register(suite_fixtures)
         config.addinivalue_line("markers", "paper: only in the profile `paper`")
         config.addinivalue_line("markers", "jitter: not with `--paper`")
 

@@ -33,6 +33,20 @@ def outcome(report, test="test_it"):
     return report.tests[f"own/test_mine.py::{test}"]
 
 
+STRICT = """
+def pytest_configure(config):
+    config.addinivalue_line("filterwarnings", "error")
+"""
+
+
+def test_the_fixtures_warn_of_nothing(check):
+    """A suite may take pytest's warnings for errors."""
+    text = "def test_it(task, controller, oracle, rollout):\n    rollout()\n"
+    report = check(text, STRICT)
+    assert report.failures == ()
+    assert outcome(report) == "passed"
+
+
 def test_a_users_test_takes_part(check):
     """It gets the documented fixtures, is expected, and is named as the user's."""
     text = '''
