@@ -71,8 +71,10 @@ class RepairRule(_Record):
     @property
     def passes_each(self) -> tuple[int, ...]:
         """How often each test of its evidence passed, in the order of the evidence."""
+        if len(self.passes) == len(self.evidence):
+            return self.passes
         # A record that does not tell the tests apart tells how often all of them did.
-        return self.passes or (self.cured,) * len(self.evidence)
+        return (self.cured,) * len(self.evidence)
 
     @property
     def benefit(self) -> float:

@@ -236,6 +236,7 @@ def test_a_record_that_does_not_tell_tests_apart():
         "cured 0 of 2 tests in 2 tries, 2 more in some of them"
     )
     assert old.observed(("b",), 9).rules[0].passes == (2, 1)
+    assert book.change("R1", tried=1, passes=(1, 1, 1)).rules[0].passes_each == (0, 0)
 
 
 def test_the_worst_rules_make_room():
