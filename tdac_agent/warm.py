@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
+from tdac_agent.crew import end_with_parent
 from tdac_agent.errors import Fault
 from tdac_agent.locks import wait_for
 from tdac_agent.nursery import Nursery
@@ -220,6 +221,7 @@ def _fork_server(
     if pid == 0:
         try:
             os.setsid()
+            end_with_parent()
             for number, descriptor in enumerate((theirs_in, theirs_out, log)):
                 os.dup2(descriptor, number)
             for descriptor in (theirs_in, theirs_out, requests, answers):

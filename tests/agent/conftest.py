@@ -86,6 +86,20 @@ def mentioning(text: str) -> list[int]:
     return found
 
 
+def left_running(folder: Path) -> list[int]:
+    """Processes that mention a folder after they had five seconds to end."""
+    deadline = time.monotonic() + 5.0
+    while (left := mentioning(str(folder))) and time.monotonic() < deadline:
+        os.sched_yield()
+    return left
+
+
+@pytest.fixture(name="left_running")
+def _left_running():
+    """The function of that name."""
+    return left_running
+
+
 @pytest.fixture
 def no_traces(tmp_path, monkeypatch):
     """After the test nothing runs that it started, and no temporary file is left."""
@@ -94,8 +108,5 @@ def no_traces(tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(base))
     monkeypatch.setattr("tempfile.tempdir", str(base))
     yield base
-    deadline = time.monotonic() + 5.0
-    while (left := mentioning(str(base))) and time.monotonic() < deadline:
-        os.sched_yield()
-    assert left == []
+    assert left_running(base) == []
     assert list(base.iterdir()) == []

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -326,27 +327,44 @@ def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     assert any("used 2 s of CPU time" in error for error in errors), errors
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
-    """A signal in the middle of a verification ends the judge and its children."""
-    task = write_small_task(tmp_path / "task")
-    path = tmp_path / "controller.py"
+def start_endless(folder, temporary):
+    """`tdac verify` of a controller that does not end, once it is being imported."""
+    task = write_small_task(folder / "task")
+    path = folder / "controller.py"
     path.write_text("while True:\n    pass\n")
     command = [sys.executable, "-m", "tdac_agent.cli", "verify", str(path)]
     process = subprocess.Popen(
         [*command, "--task", str(task)],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        env={**os.environ, "TMPDIR": str(no_traces)},
+        env={**os.environ, "TMPDIR": str(temporary)},
     )
     deadline = time.monotonic() + 60
     running = "**/tdac-child-*/*/work/controller.py"
-    while not list(no_traces.glob(running)) and time.monotonic() < deadline:
+    while not list(temporary.glob(running)) and time.monotonic() < deadline:
         time.sleep(0.02)
+    return process
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
+    """A signal in the middle of a verification ends the judge and its children."""
+    process = start_endless(tmp_path, no_traces)
     process.send_signal(number)
     _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130
     assert stderr.decode().strip().splitlines()[-1] == "interrupted"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel of Linux sees to it")
+def test_a_command_that_is_killed_takes_all_with_it(tmp_path, no_traces, left_running):
+    """No process outlives it, though nobody ends them; folders stay."""
+    process = start_endless(tmp_path, no_traces)
+    process.kill()
+    process.communicate(timeout=30)
+    assert left_running(no_traces) == []
+    for folder in no_traces.iterdir():
+        shutil.rmtree(folder)
 
 
 def test_the_report_is_json(small_task, warm):
