@@ -78,6 +78,7 @@ def plot_timeline(run: Run) -> Figure:
 
 def _draw(axes: Axes, entry: Entry, row: float, *, begins: bool) -> None:
     style: dict[str, Any] = {"va": "center", "fontsize": 8.5, "color": TEXT}
+    style["parse_math"] = False  # what a model wrote is no formula
     if begins and entry.k is not None:
         axes.text(5.4, row, f"k = {entry.k}", ha="right", **style)
         if row:

@@ -13,6 +13,7 @@ from tdac_agent.metrics import (
     success_rate,
 )
 from tdac_agent.plots import (
+    figure_bytes,
     plot_breakdown,
     plot_cumulative_panels,
     plot_cumulative_success,
@@ -165,16 +166,23 @@ def test_the_timeline_tells_why(run, small_task, good_source):
 
 
 def test_rules_are_told_where_they_came_from(run):
-    """By what changed, once; a fault and an end without success, too."""
-    rule = {"event": "rules", "seconds": 9, "k": 1, "notes": ["added R1: keep away"]}
+    """By what changed, to the letter; a fault and an end without success, too."""
+    rule = {
+        "event": "rules",
+        "seconds": 9,
+        "k": 1,
+        "notes": ["added R1: keep $\\away$"],
+    }
     fault = {"event": "call.fault", "seconds": 9, "k": 2, "reason": "status 503"}
     end = {"event": "run.end", "seconds": 9, "status": "budget", "reason": "too dear"}
     more = [rule | {"rules": []}, fault, end]
     lines = "".join("\n" + json.dumps(one) for one in more)
     with (run.folder / "journal.jsonl").open("a") as file:
         file.write(lines + "\n")
-    told = texts(plot_timeline(run))
-    for words in ("added R1: keep away", "status 503", "budget", "too dear"):
+    figure = plot_timeline(run)
+    assert figure_bytes(figure)
+    told = texts(figure)
+    for words in ("added R1: keep $\\away$", "status 503", "budget", "too dear"):
         assert told.count(words) == 1
 
 
