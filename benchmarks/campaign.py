@@ -7,7 +7,7 @@ and by two, in turns. Their speed-up is printed beside that of two bare loops, p
 the workers are, at the same moment: what the machine gives. Overhead is the time of one
 worker that is in no run: starting, planning, handing out, the tables, of `--runs` runs.
 With `--many`, that many scripted runs are made with `keep: records`, and the driver's
-memory and the files are counted; a campaign that `--seconds` has stopped counts, too.
+memory and the files are counted; `--seconds` stops such a campaign early.
 """
 
 from __future__ import annotations

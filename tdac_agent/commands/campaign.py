@@ -22,10 +22,9 @@ from tdac_agent.campaign.perform import Terms
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign_live import LiveView
-from tdac_agent.commands.campaign_table import show_summary, told_counts
-from tdac_agent.errors import ProviderError
+from tdac_agent.commands.campaign_table import make_console, show_summary, told_counts
 from tdac_agent.lifecycle import model_warnings
-from tdac_agent.provider import missing_for
+from tdac_agent.provider import Provider
 from tdac_agent.providers import choose_models
 from tdac_agent.tariff import bounds_of, tariffs_of
 
@@ -66,7 +65,7 @@ class Wanted:
 
 def run(wanted: Wanted, as_json: bool) -> int:
     """Carries out a campaign and prints; returns the exit code."""
-    console = Console(stderr=as_json, highlight=False, emoji=False)
+    console = make_console(stderr=as_json)
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
     config = with_limits(read_config(file), wanted.limits)
     with console.status("reading the tasks …"):
@@ -109,14 +108,11 @@ def check_models(
     Raises:
         ProviderError: With all that is missing.
     """
-    missing: dict[str, None] = {}
+    models: list[Provider] = []
     for cell in dict.fromkeys(planned.cell for planned in left):
         setting = plan.tasks[cell.task].setting
-        models = choose_models(cell.learner, cell.optimizer, setting, cell.base_url)
-        missing |= dict.fromkeys(line for one in models for line in missing_for(one))
-        bounds_of(models, tariffs_of(models), config.max_cost, config.max_tokens)
-    if missing:
-        raise ProviderError("; and ".join(missing))
+        models += choose_models(cell.learner, cell.optimizer, setting, cell.base_url)
+    bounds_of(models, tariffs_of(models), config.max_cost, config.max_tokens)
 
 
 def _make(

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from rich import box
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
@@ -17,7 +16,7 @@ from tdac_agent.campaign.config import find_config, read_config
 from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign import with_limits
-from tdac_agent.commands.campaign_table import labels_of
+from tdac_agent.commands.campaign_table import LABEL_WIDTH, labels_of, make_console
 from tdac_agent.lifecycle import model_warnings
 from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import PriceList, load_prices, price_file
@@ -57,7 +56,7 @@ def run(given: str, limits: dict[str, Any], part: str, as_json: bool) -> int:
         part: Of all runs, `i/n`.
         as_json: Whether to print JSON.
     """
-    console = Console(stderr=as_json, highlight=False, emoji=False)
+    console = make_console(stderr=as_json)
     shard, file = Shard.parse(part), find_config(given)
     config = with_limits(read_config(file), limits)
     for name in config.models:
@@ -107,7 +106,7 @@ def _table(cells: list[Cell], rows: list[Row]) -> Table:
     labels = labels_of(cells)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in labels.names:
-        table.add_column(name, overflow="fold")
+        table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
     for name in ("runs", "K", "J", "questions", "USD at most", "asked three times"):
         table.add_column(name, justify="right", no_wrap=True)
     for cell, row in zip(cells, rows, strict=True):

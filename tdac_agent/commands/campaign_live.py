@@ -17,6 +17,7 @@ from tdac_agent.campaign.perform import Outcome, Terms
 from tdac_agent.campaign.progress import Doing, Progress, Tally
 from tdac_agent.commands.campaign_table import (
     COLOURS,
+    LABEL_WIDTH,
     labels_of,
     told_counts,
     told_time,
@@ -102,7 +103,7 @@ class LiveView:
     def _table(self, tallies: Iterable[Tally]) -> Table:
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for name in self._labels.names:
-            table.add_column(name, overflow="fold")
+            table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
         for name in ("runs", "verified", "not", "halted", "tokens", "USD"):
             table.add_column(name, justify="right", no_wrap=True)
         for tally in tallies:

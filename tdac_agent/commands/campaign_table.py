@@ -19,6 +19,9 @@ from tdac_agent.campaign.progress import Progress
 from tdac_agent.metrics import Rate
 
 COLOURS = {"verified": "green", "not verified": "red"}
+LABEL_WIDTH = 6
+FILE_WIDTH = 130
+"""Of tables that are written into a file."""
 ALWAYS = ("task", "learner")
 SOMETIMES = ("optimizer", "prompt", "setting")
 
@@ -58,6 +61,14 @@ def _several(rows: Sequence[tuple[object, ...]], column: int) -> bool:
     return len({row[column] for row in rows}) > 1
 
 
+def make_console(*, stderr: bool) -> Console:
+    """A console; a file has room for wide tables."""
+    console = Console(stderr=stderr, highlight=False, emoji=False)
+    if not console.is_terminal:
+        console.width = max(console.width, FILE_WIDTH)
+    return console
+
+
 def show_summary(summary: pd.DataFrame, console: Console) -> None:
     """Prints the metrics of each kind of run that there is."""
     if summary.empty:
@@ -68,9 +79,12 @@ def show_summary(summary: pd.DataFrame, console: Console) -> None:
         names.insert(2, "optimizer")
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in names:
-        table.add_column(name, overflow="fold")
-    for name in ("R", "verified", "halted", "SR", "CS(K)", "first pass", "mean τ"):
+        table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
+    for name in ("R", "verified", "halted"):
         table.add_column(name, justify="right", no_wrap=True)
+    for name in ("SR", "CS(K)", "first pass"):
+        table.add_column(name, justify="right", min_width=len("[0.00,"))
+    table.add_column("mean τ", justify="right", no_wrap=True)
     paid = bool(summary["tokens_per_verified"].notna().any())
     if paid:
         table.add_column("tokens", justify="right", no_wrap=True)
@@ -83,8 +97,7 @@ def show_summary(summary: pd.DataFrame, console: Console) -> None:
         table.add_row(*labels, *_metrics(row), *(_spent(row) if paid else []))
     console.print(table)
     console.print(
-        "[dim]95 % intervals: SR by resampling runs, CS(K) and first pass exact "
-        "(docs/metrics.md)"
+        "[dim]95 % intervals; docs/metrics.md says what they take for granted"
         + ("; tokens and USD: each verified run's share of all" if paid else "")
         + "[/]",
         soft_wrap=True,

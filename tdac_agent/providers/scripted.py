@@ -1,13 +1,14 @@
 """`scripted:SCRIPT`: a stand-in for a model that draws from prepared controllers.
 
 No model is asked. It is for rehearsals and simulations of the loop: how often its
-controllers are right is known beforehand. What it answers depends on the script's seed
-and on which question of which run it is, and on nothing else.
+controllers are right is known beforehand. What it answers depends on the script's seed,
+the task, and on which question of which run it is, and on nothing else.
 """
 
 from __future__ import annotations
 
 import difflib
+import zlib
 from pathlib import Path
 from typing import Any, Literal
 
@@ -110,7 +111,10 @@ class Scripted:
         if not script.drawn:
             return min(k, len(choices)) - 1
         kind = _KINDS.index(request.kind)
-        random = np.random.default_rng([script.seed, run, k, j, kind, request.turn])
+        # Other tasks have other draws.
+        task = zlib.crc32(request.prompt[: request.stable].encode())
+        place = [script.seed, task, run, k, j, kind, request.turn]
+        random = np.random.default_rng(place)
         weights = np.array([choice.weight for choice in choices])
         return int(random.choice(len(choices), p=weights / weights.sum()))
 
