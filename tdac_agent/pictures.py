@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tdac_agent.setting import Setting
 from tdac_agent.task_map2d import Map2DSetting
 from tdac_agent.trajectory import Rollout
+from tdac_agent.units import Points
 from tdac_envs.canvas import Image
 from tdac_envs.closeup import Backdrop
-
-Points = NDArray[np.float64]
 
 
 class Pictures(Protocol):
@@ -41,9 +37,3 @@ def pictures_of(setting: Setting) -> Pictures:
     from tdac_agent.pictures_epuck import world_pictures
 
     return world_pictures(setting)
-
-
-def shown_steps(rollout: Rollout, stride: int) -> list[int]:
-    """Steps of which there is a frame: every so many, and the last one."""
-    last = rollout.trajectory.steps
-    return [*range(0, last, stride), last]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.pictures import Points, shown_steps
 from tdac_agent.setting import Setting
 from tdac_agent.task_epuck import EPuckSetting
 from tdac_agent.trajectory import Rollout
+from tdac_agent.units import Points
 from tdac_envs.canvas import Image
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.picture import EPuckScene
@@ -48,7 +48,7 @@ class WorldPictures:
         nominal, trajectory = self.setting.nominal, rollout.trajectory
         scene = EPuckScene(nominal, movable=False)
         gaps, last = rollout.distances("euclidean"), trajectory.steps
-        for step in shown_steps(rollout, stride):
+        for step in rollout.trajectory.every(stride):
             outcome = rollout.outcome if step == last else ""
             readings = trajectory.ranges[step]
             yield scene.frame(

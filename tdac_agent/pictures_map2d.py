@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from tdac_agent.pictures import Points, shown_steps
 from tdac_agent.task_map2d import Map2DSetting
 from tdac_agent.trajectory import Rollout
+from tdac_agent.units import Points
 from tdac_envs.canvas import Image
 from tdac_envs.closeup import Background
 from tdac_envs.render import Scene, Status, trajectory_picture
@@ -53,7 +53,7 @@ class MapPictures:
             robot_image=self.setting.robot_image,
         )
         gaps, last = rollout.distances("euclidean"), trajectory.steps
-        for step in shown_steps(rollout, stride):
+        for step in rollout.trajectory.every(stride):
             outcome = rollout.outcome if step == last else ""
             status = Status(step, nominal.horizon, float(gaps[step]), outcome)
             trail = trajectory.poses[: step + 1, :2]

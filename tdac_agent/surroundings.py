@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Protocol
 
-import numpy as np
-
 from tdac_agent.setting import Nominal
 from tdac_agent.touch import Touch
 from tdac_agent.trajectory import Rollout, Trajectory
@@ -61,13 +59,6 @@ def surroundings_of(task: Nominal) -> Surroundings:
     from tdac_agent.surroundings_epuck import world_surroundings
 
     return world_surroundings(task)
-
-
-def first_beyond(path: Path, x: float, y: float, far: float) -> Point:
-    """The first point of a path that is so far from (x, y), or its last one."""
-    distant = np.hypot(path[:, 0] - x, path[:, 1] - y) >= far
-    to_x, to_y = path[int(np.argmax(distant)) if distant.any() else -1].tolist()
-    return to_x, to_y
 
 
 def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:

@@ -11,7 +11,6 @@ import numpy as np
 
 from tdac_agent.reference import taut
 from tdac_agent.setting import Nominal
-from tdac_agent.surroundings import first_beyond
 from tdac_agent.touch import Touch
 from tdac_agent.trajectory import Trajectory
 from tdac_agent.units import METRES, Points, Units
@@ -21,7 +20,7 @@ from tdac_envs.epuck.gaps import part_gap
 from tdac_envs.epuck.infrared import PLACES
 from tdac_envs.epuck.prisms import Owned, Prisms
 from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.plan import Path
+from tdac_envs.plan import Path, first_beyond
 from tdac_envs.task2d import Pose
 from tdac_envs.world import Obstacle
 

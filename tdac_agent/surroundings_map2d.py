@@ -9,12 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tdac_agent.reference import pull
-from tdac_agent.surroundings import first_beyond
 from tdac_agent.touch import Touch, nearest_touch
 from tdac_agent.trajectory import Trajectory
 from tdac_agent.units import PIXELS, Points, Units
 from tdac_envs.grid import body_free
-from tdac_envs.plan import Path, descend
+from tdac_envs.plan import Path, descend, first_beyond
 from tdac_envs.task2d import Map2DTask, Pose
 from tdac_envs.terrain import entry
 

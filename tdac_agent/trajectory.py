@@ -41,6 +41,10 @@ class Trajectory:
         """Number of steps, T."""
         return len(self.actions)
 
+    def every(self, stride: int) -> list[int]:
+        """Every so many steps from the start on, and the last one."""
+        return [*range(0, self.steps, stride), self.steps]
+
     def save(self, path: Path) -> None:
         """Writes an `.npz` with one array per attribute."""
         np.savez_compressed(

@@ -182,3 +182,10 @@ def path_length(path: Path) -> float:
     if len(path) < 2:
         return 0.0
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def first_beyond(path: Path, x: float, y: float, far: float) -> tuple[float, float]:
+    """The first point of a path that is so far from (x, y), or its last one."""
+    distant = np.hypot(path[:, 0] - x, path[:, 1] - y) >= far
+    to_x, to_y = path[int(np.argmax(distant)) if distant.any() else -1].tolist()
+    return to_x, to_y
