@@ -15,7 +15,6 @@ from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.files import write_atomic
 from tdac_agent.locks import hold
-from tdac_agent.prices import FREE
 
 CONFIG_FILE = "campaign.yaml"
 RUNS = "runs"
@@ -35,7 +34,7 @@ class _Queue:
         """The next run; after all others, those that a fault ended, once more."""
         while self.todo:
             planned = self.todo.popleft()
-            if not (self.progress.exhausted and asks_models(planned)):
+            if not (self.progress.exhausted and planned.cell.asks_models):
                 return planned
         if not self.again:
             return None
@@ -88,12 +87,6 @@ def carry_out(
             if isinstance(update, Ended):
                 queue.ended(update)
             watch(update)
-
-
-def asks_models(planned: PlannedRun) -> bool:
-    """Whether a run may cost something."""
-    names = (planned.cell.learner, planned.cell.optimizer)
-    return not {name.partition(":")[0] for name in names} <= FREE
 
 
 @contextmanager

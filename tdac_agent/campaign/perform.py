@@ -16,7 +16,6 @@ from tdac_agent.budget import Budget
 from tdac_agent.campaign.gate import gated
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import Fault
-from tdac_agent.prices import FREE
 from tdac_agent.providers import choose_models
 from tdac_agent.records import JOURNAL, RUN_FILE, Run
 from tdac_agent.retry import RetryPolicy
@@ -55,9 +54,7 @@ class Terms:
 
     def budget(self, planned: PlannedRun) -> Budget:
         """The budget of a run: of its own where no model is asked."""
-        cell = planned.cell
-        kinds = {name.partition(":")[0] for name in (cell.learner, cell.optimizer)}
-        if kinds <= FREE:
+        if not planned.cell.asks_models:
             return Budget()
         ledger = Path(self.folder) / "ledger.jsonl"
         return Budget(self.max_cost, self.max_tokens, ledger)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
+from tdac_agent.prices import FREE
 from tdac_agent.prompt import VARIANTS, generate_prompt, load_template
 from tdac_agent.records import Setting
 from tdac_agent.task import Task, load_task
@@ -51,6 +52,11 @@ class Cell:
     refine: bool
     base_url: str | None
     max_output: int
+
+    @property
+    def asks_models(self) -> bool:
+        """Whether its runs may cost something."""
+        return not {n.partition(":")[0] for n in (self.learner, self.optimizer)} <= FREE
 
 
 @dataclass(frozen=True, slots=True)

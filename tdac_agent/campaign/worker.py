@@ -20,8 +20,8 @@ from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.crew import end_with_parent
 from tdac_agent.warm import WarmJudge
 
-TOLD = frozenset({"call.intent", "call.reply", "call.fault", "verify.start"})
-FACTS = ("event", "kind", "k", "j", "fault", "reason", "cost")
+TOLD = frozenset({"call.intent", "call.fault", "verify.start"})
+FACTS = ("event", "kind", "k", "j", "fault")
 
 
 def main(parent: int, terms: Terms) -> None:
@@ -41,8 +41,7 @@ def main(parent: int, terms: Terms) -> None:
 def _tell(answers: BinaryIO, record: dict[str, Any]) -> None:
     if record.get("event") in TOLD:
         facts = {name: record[name] for name in FACTS if name in record}
-        tokens = record.get("tokens_in", 0) + record.get("tokens_out", 0)
-        _say(answers, {"record": {**facts, "tokens": tokens}})
+        _say(answers, {"record": facts})
 
 
 def _say(answers: BinaryIO, message: dict[str, Any]) -> None:
