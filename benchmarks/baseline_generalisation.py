@@ -18,35 +18,40 @@ from tdac_agent.task_file import bundled_tasks
 from tdac_agent.training.plan import read_plan
 
 SEED = 0
-NOT_LEARNED = "follow-guidance"
 
 
 def drive_all(names: list[str], runs: Path) -> None:
     """Has policies drive wherever their robot can, where that is not on record."""
-    for training in trained(runs):
-        if training not in names or TRAININGS[training].algo != "ppo":
-            continue
+    wanted = [
+        (training, task)
+        for training in trained(runs)
+        if training in names
+        for task in _places(TRAININGS[training].tasks)
+    ]
+    # First where they were trained.
+    for training, task in sorted(wanted, key=lambda pair: not _seen(*pair)):
         known = _read(training, runs)
-        for task in _places(TRAININGS[training].tasks):
-            if task not in known:
-                print(f"{training}: {task}", flush=True)
-                known[task] = _drive(training, task, runs)
-                _write(training, known, runs)
+        if task not in known:
+            print(f"{training}: {task}", flush=True)
+            _write(training, {**known, task: _drive(training, task, runs)}, runs)
+
+
+def _seen(training: str, task: str) -> bool:
+    return task in TRAININGS[training].tasks
 
 
 def _drive(training: str, task: str, runs: Path) -> dict[str, int]:
     """Episodes in which the goal was reached, and with a contact."""
-    from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecMonitor
 
-    from tdac_agent.training.learning import evaluate_batch
+    from tdac_agent.training.learning import ALGOS, evaluate_batch
     from tdac_agent.training.plan import make_batch
 
     folder = runs / training
     plan = read_plan(folder).model_copy(
         update={"tasks": (task,), "task_sha256": (load_task(task).sha256(),)}
     )
-    model = PPO.load(folder / "policy.zip", device="cpu")
+    model: Any = ALGOS[plan.algo].load(trained(runs)[training], device="cpu")
     envs = VecMonitor(make_batch(plan, EPISODES), info_keywords=("collision",))
     found = evaluate_batch(model, envs, episode_seeds(SEED, EPISODES))
     envs.close()
@@ -60,9 +65,13 @@ def table(runs: Path) -> pd.DataFrame:
         [
             _row(training, task, counts)
             for training in trained(runs)
-            for task, counts in _read(training, runs).items()
+            for task, counts in sorted(_read(training, runs).items(), key=_order)
         ]
     )
+
+
+def _order(found: tuple[str, dict[str, int]]) -> int:
+    return bundled_tasks().index(found[0])
 
 
 def _row(training: str, task: str, counts: dict[str, int]) -> dict[str, Any]:
@@ -73,7 +82,7 @@ def _row(training: str, task: str, counts: dict[str, int]) -> dict[str, Any]:
         "trained_on": " ".join(asked.tasks),
         "seed": asked.seed,
         "evaluated_on": task,
-        "seen": task in asked.tasks,
+        "seen": _seen(training, task),
         "episodes": EPISODES,
         "reached": counts["reached"],
         "low": round(low, 6),

@@ -63,10 +63,15 @@ def _done(folder: Path) -> bool:
     return bool(curve) and curve[-1].steps >= read_plan(folder).steps
 
 
+def _begun(runs: Path) -> list[str]:
+    """The trainings in a folder that have been evaluated once at least."""
+    return [name for name in TRAININGS if (runs / name / FACTS).is_file()]
+
+
 def curve_table(runs: Path) -> pd.DataFrame:
     """All learning curves: a row for each evaluation."""
     curves = []
-    for name in trained(runs):
+    for name in _begun(runs):
         curve = pd.read_csv(runs / name / CURVE_FILE)
         curve.insert(0, "training", name)
         curves.append(curve)
@@ -74,8 +79,8 @@ def curve_table(runs: Path) -> pd.DataFrame:
 
 
 def training_table(runs: Path) -> pd.DataFrame:
-    """A row for each training."""
-    return pd.DataFrame([_row(name, runs / name) for name in trained(runs)])
+    """A row for each training, whether or not it is finished."""
+    return pd.DataFrame([_row(name, runs / name) for name in _begun(runs)])
 
 
 def _row(name: str, folder: Path) -> dict[str, Any]:

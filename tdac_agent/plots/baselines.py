@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from tdac_agent.exact import exact_interval
 from tdac_agent.plots.style import (
@@ -41,13 +41,20 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
             if not of.empty:
                 _curve(axes, of, algo.upper(), number)
         count = curves[curves["task"] == task].groupby("algo")["seed"].nunique()
-        seeds = ", ".join(f"{algo.upper()} {count[algo]}" for algo in count.index)
-        _name(axes, task.replace(" ", ", "), f"seeds: {seeds}")
+        seeds = ", ".join(
+            f"{algo.upper()}: {n} seed{'s' * (n > 1)}" for algo, n in count.items()
+        )
+        _name(axes, task.replace(" ", ", "), seeds)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.set_ylim(-0.03, 1.05)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:.0f}k"))
     _legend(figure, panels)
-    figure.supxlabel("steps of training, all robots together", fontsize=9, color=TEXT)
+    figure.supxlabel(
+        "steps of training, all robots together; each seed thin, their mean and range",
+        fontsize=9,
+        color=TEXT,
+    )
     figure.supylabel("evaluation episodes reached", fontsize=9, color=TEXT)
     return figure
 
