@@ -42,7 +42,7 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
                 _curve(axes, of, algo.upper(), number)
         count = curves[curves["task"] == task].groupby("algo")["seed"].nunique()
         seeds = ", ".join(
-            f"{algo.upper()}: {n} seed{'s' * (n > 1)}" for algo, n in count.items()
+            f"{str(algo).upper()}: {n} seed{'s' * (n > 1)}" for algo, n in count.items()
         )
         _name(axes, task.replace(" ", ", "), seeds)
         axes.xaxis.set_major_locator(MaxNLocator(4))
