@@ -381,7 +381,7 @@ def test_synth_says_no(tdac, tmp_path):
     (folder / "mine" / "test_no.py").write_text("def test_no():\n    assert 0, 'no'\n")
     code, out, _ = tdac("synth", "--task", folder, "-K", 1, "-J", 0)
     assert code == 1
-    assert "not verified after 1 iterations" in out
+    assert "not verified after 1 iteration;" in out
     assert Path("runs/small-1/run.json").is_file()
 
 

@@ -78,6 +78,7 @@ def judged(warm, task, folder, source, suite=None):
         seed=0,
         limits=Limits(),
         out=folder / "results",
+        trajectories=None,
     )
     job.out.mkdir()
     write_workdir(job.task, task)

@@ -221,8 +221,10 @@ def test_the_shipped_hyperparameters_are_whole(algo, env):
     found = read_hyperparameters(config_file(algo), env)
     assert found.wrappers == WRAPPERS
     arguments = model_arguments(found.model)
-    assert arguments["learning_rate"](0.0) == 0.0
-    assert arguments["learning_rate"](0.5) == pytest.approx(0.5e-3)
+    rate = arguments["learning_rate"]
+    assert rate(0.0) == 0.0
+    assert rate(0.5) == pytest.approx(rate(1.0) / 2)
+    assert 0.0 < rate(1.0) <= 1e-3
     kind = getattr(stable_baselines3, algo.upper())
     task = "rooms" if env == ENVS[0] else "epuck"
     envs = make_batch(make_plan((task,), algo), found.n_envs)

@@ -295,7 +295,7 @@ def test_providers_of_others(options, tmp_path, monkeypatch):
     assert model.complete(QUESTION).text == QUESTION.prompt
     with pytest.raises(ProviderError, match=r"'broken' .* cannot be loaded"):
         choose_model("broken", options)
-    with pytest.raises(ProviderError, match=r"RUN, broken:…, echo:…$"):
+    with pytest.raises(ProviderError, match=r"SCRIPT, broken:…, echo:…$"):
         choose_model("other", options)
 
 
