@@ -27,7 +27,6 @@ from tdac_agent.commands import (
     webots_flags,
 )
 from tdac_agent.commands.mistakes import explain, fail
-from tdac_agent.commands.options import with_heading
 
 app = typer.Typer(
     name="tdac",
@@ -92,6 +91,23 @@ def _names(part: typer.Typer) -> set[str | None]:
         if command.callback is not None
     }
     return commands | {group.name for group in part.registered_groups}
+
+
+def with_heading(words: list[str]) -> list[str]:
+    """A command line in which `--start X Y YAW` is `--start X Y --heading YAW`."""
+    for at, word in enumerate(words):
+        if word == "--start" and len(words) > at + 3 and _is_number(words[at + 3]):
+            rest = with_heading(words[at + 3 :])
+            return [*words[: at + 3], "--heading", *rest]
+    return words
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def main() -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.commands.options import BUDGET, Json
+from tdac_agent.commands.options import BUDGET, Json, finite_cost
 
 app = typer.Typer()
 
@@ -60,6 +59,7 @@ def campaign(
         typer.Option(
             "--max-cost",
             min=0.0,
+            callback=finite_cost,
             metavar="USD",
             help="Of all runs together.  [default: the file's]",
             rich_help_panel=BUDGET,
@@ -81,11 +81,8 @@ def campaign(
 
     The same command goes on where the last one ended; a finished run is never repeated.
     """
-    from tdac_agent.campaign.config import CampaignError
     from tdac_agent.commands import campaign as command
 
-    if max_cost is not None and not math.isfinite(max_cost):
-        raise CampaignError("expected --max-cost to be finite")
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
     given = {name: value for name, value in limits.items() if value is not None}
     if dry_run:

@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+import math
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Optional
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    Optional,
+    Protocol,
+    get_type_hints,
+)
 
 import typer
 
@@ -57,12 +69,29 @@ Heading = Annotated[
         "--heading", help="Start heading, rad, from +x towards +y (down on a map)."
     ),
 ]
+RobotImage = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--robot-image", help="Picture of the robot, nose to the right."),
+]
 Snap = Annotated[
     bool, typer.Option("--snap", help="Move start and goal to the nearest free place.")
 ]
 Metres = Annotated[
     bool,
     typer.Option("--metres", help="Lengths are metres in the map's frame (map.yaml)."),
+]
+Instructions = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--instructions", help="Your own text to the model, or a file with it."
+    ),
+]
+Suite = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--suite", help="Folder with your own test_*.py files, run as well."),
+]
+JitterSeed = Annotated[
+    int, typer.Option("--seed", min=0, help="Of the jittered starts.")
 ]
 Tier = Annotated[
     str,
@@ -113,11 +142,27 @@ MaxOutput = Annotated[
     ),
 ]
 BUDGET = "Budget"
+
+
+def finite_cost(value: float | None) -> float | None:
+    """A limit in USD as it is; `inf` and `nan` count as numbers on the command line.
+
+    Raises:
+        RunError: It is one of these.
+    """
+    if value is not None and not math.isfinite(value):
+        from tdac_agent.errors import RunError
+
+        raise RunError("expected --max-cost to be finite")
+    return value
+
+
 MaxCost = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
         "--max-cost",
         min=0.0,
+        callback=finite_cost,
         metavar="USD",
         help="Of the whole run; the worst case of each question is reserved before it "
         "is put.  [default: 2]",
@@ -166,36 +211,29 @@ Delay = Annotated[
 ]
 
 
-def with_heading(words: list[str]) -> list[str]:
-    """A command line in which `--start X Y YAW` is `--start X Y --heading YAW`."""
-    for at, word in enumerate(words):
-        if word == "--start" and len(words) > at + 3 and _is_number(words[at + 3]):
-            rest = with_heading(words[at + 3 :])
-            return [*words[: at + 3], "--heading", *rest]
-    return words
+class NamedTask(Protocol):
+    """What a command gets in the place of the flags that name its task.
 
+    What reads them loads much, and is loaded when it is called.
+    """
 
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    def __call__(self) -> TaskFlags:
+        """The task that they name."""
 
 
 def task_flags(
-    task: str | None,
-    map_image: str | None,
-    world: str | None,
-    ignore: list[str] | None,
-    start: tuple[float, float] | None,
-    goal: tuple[float, float] | None,
-    heading: float | None,
-    robot_radius: float | None,
-    robot_image: Path | None,
-    snap: bool,
-    metres: bool,
-    instructions: str | None,
+    task: TaskOption = None,
+    map_image: MapOption = None,
+    world: WorldOption = None,
+    ignore: Ignore = None,
+    start: Start = None,
+    goal: Goal = None,
+    heading: Heading = None,
+    robot_radius: Radius = None,
+    robot_image: RobotImage = None,
+    snap: Snap = False,
+    metres: Metres = False,
+    instructions: Instructions = None,
 ) -> TaskFlags:
     """The task that these flags of a command name."""
     from tdac_agent.commands.flags import TaskFlags
@@ -214,3 +252,46 @@ def task_flags(
         metres=metres,
         instructions=instructions,
     )
+
+
+Command = Callable[..., None]
+TOLD_TO_MODELS = ("robot_image", "instructions")
+"""Flags of a task that matter to nobody but a model."""
+
+
+def takes_task(
+    *, but: Collection[str] = TOLD_TO_MODELS
+) -> Callable[[Command], Command]:
+    """Gives a command the flags of `task_flags` where it has a parameter `named_task`.
+
+    Args:
+        but: Flags that it does not have.
+    """
+    flags = [flag for flag in _parameters(task_flags) if flag.name not in but]
+
+    def with_flags(command: Command) -> Command:
+        own = _parameters(command)
+        at = [parameter.name for parameter in own].index("named_task")
+
+        @functools.wraps(command)
+        def called(**given: Any) -> None:
+            named = {flag.name: given.pop(flag.name) for flag in flags}
+            command(**given, named_task=functools.partial(task_flags, **named))
+
+        # Typer reads both.
+        parameters = [*own[:at], *flags, *own[at + 1 :]]
+        called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        called.__annotations__ = {p.name: p.annotation for p in parameters}
+        return called
+
+    return with_flags
+
+
+def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
+    """The parameters of a function, their annotations evaluated."""
+    # The one name that is not there at run time is none of a parameter.
+    hints = get_type_hints(function, localns={"TaskFlags": object}, include_extras=True)
+    return [
+        parameter.replace(annotation=hints[name])
+        for name, parameter in inspect.signature(function).parameters.items()
+    ]

@@ -9,21 +9,12 @@ import typer
 
 from tdac_agent.commands.options import (
     Delay,
-    Goal,
-    Heading,
-    Ignore,
-    MapOption,
-    Metres,
     MotorLag,
-    Radius,
+    NamedTask,
     RangeNoise,
-    Snap,
-    Start,
-    TaskOption,
     Tier,
     WheelSlip,
-    WorldOption,
-    task_flags,
+    takes_task,
 )
 
 app = typer.Typer()
@@ -33,18 +24,10 @@ app = typer.Typer()
     epilog="Examples: `tdac play runs/maze-1 --video maze.mp4`; "
     "`tdac play runs/maze-1 --seed 17`"
 )
+@takes_task()
 def play(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
-    task: TaskOption = None,
-    map_image: MapOption = None,
-    world: WorldOption = None,
-    ignore: Ignore = None,
-    start: Start = None,
-    goal: Goal = None,
-    heading: Heading = None,
-    robot_radius: Radius = None,
-    snap: Snap = False,
-    metres: Metres = False,
+    named_task: NamedTask,
     video: Annotated[
         Optional[Path],  # noqa: UP045 - typer reads it at run time
         typer.Option(help="Write .mp4 or .gif instead of opening a window."),
@@ -73,11 +56,7 @@ def play(
     from tdac_agent.commands import play as command
     from tdac_agent.commands.robust_flags import DisturbanceFlags
 
-    spec = task_flags(
-        task, map_image, world, ignore, start, goal, heading, robot_radius, None, snap,
-        metres, None,
-    )  # fmt: skip
     disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
     raise typer.Exit(
-        command.run(controller, spec, video, episode, seed, disturbed, tier)
+        command.run(controller, named_task(), video, episode, seed, disturbed, tier)
     )

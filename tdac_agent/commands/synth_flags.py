@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -10,23 +9,15 @@ import typer
 
 from tdac_agent.commands.options import (
     BaseUrl,
-    Goal,
-    Heading,
-    Ignore,
+    JitterSeed,
     Json,
     Learner,
-    MapOption,
     MaxCost,
     MaxOutput,
     MaxTokens,
-    Metres,
+    NamedTask,
     Optimizer,
-    Radius,
-    Snap,
-    Start,
-    TaskOption,
-    WorldOption,
-    task_flags,
+    takes_task,
 )
 
 app = typer.Typer()
@@ -39,26 +30,10 @@ WITH_RESUME = frozenset({"resume", "max_cost", "max_tokens", "as_json"})
     "`tdac synth --learner anthropic:claude-sonnet-5-5`; "
     "`tdac synth --resume runs/maze-1`"
 )
+@takes_task(but=())
 def synth(
     context: typer.Context,
-    task: TaskOption = None,
-    map_image: MapOption = None,
-    world: WorldOption = None,
-    ignore: Ignore = None,
-    start: Start = None,
-    goal: Goal = None,
-    heading: Heading = None,
-    robot_radius: Radius = None,
-    robot_image: Annotated[
-        Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option(help="Picture of the robot, nose to the right."),
-    ] = None,
-    snap: Snap = False,
-    metres: Metres = False,
-    instructions: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(help="Your own text to the model, or a file with it."),
-    ] = None,
+    named_task: NamedTask,
     from_: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--from", help="Controller to begin with."),
@@ -109,24 +84,17 @@ def synth(
             "--resume", metavar="RUN", help="Go on with a run, as it was begun."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
+    seed: JitterSeed = 0,
     as_json: Json = False,
 ) -> None:
     """Write, test and repair a controller until it is verified."""
     from tdac_agent.commands import synth as command
-    from tdac_agent.errors import RunError
     from tdac_agent.provider import MAX_OUTPUT_TOKENS
 
-    if max_cost is not None and not math.isfinite(max_cost):
-        raise RunError("expected --max-cost to be finite")
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
     if resume is not None:
         _refuse_others(context)
         raise typer.Exit(command.resume(resume, limits, as_json))
-    spec = task_flags(
-        task, map_image, world, ignore, start, goal, heading, robot_radius, robot_image,
-        snap, metres, instructions,
-    )  # fmt: skip
     models = {
         "learner": learner,
         "optimizer": optimizer,
@@ -137,10 +105,10 @@ def synth(
     if dry_run:
         from tdac_agent.commands import dry_run as dry
 
-        raise typer.Exit(dry.run(spec, models, k, j, refine, as_json))
+        raise typer.Exit(dry.run(named_task(), models, k, j, refine, as_json))
     loop = {"iterations": k, "patience": j, "refine": refine, "seed": seed}
     wanted = {**models, **limits, **loop}
-    raise typer.Exit(command.run(spec, wanted, out, from_, as_json))
+    raise typer.Exit(command.run(named_task(), wanted, out, from_, as_json))
 
 
 def _refuse_others(context: typer.Context) -> None:

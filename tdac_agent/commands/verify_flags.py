@@ -10,23 +10,16 @@ import typer
 
 from tdac_agent.commands.options import (
     Delay,
-    Goal,
-    Heading,
-    Ignore,
+    JitterSeed,
     Json,
-    MapOption,
-    Metres,
     MotorLag,
+    NamedTask,
     Profile,
-    Radius,
     RangeNoise,
-    Snap,
-    Start,
-    TaskOption,
+    Suite,
     Tier,
     WheelSlip,
-    WorldOption,
-    task_flags,
+    takes_task,
 )
 
 app = typer.Typer()
@@ -36,28 +29,17 @@ app = typer.Typer()
     epilog="Examples: `tdac verify controller.py --task maze`; "
     "`tdac verify runs/maze-1`; `tdac verify runs/maze-1 --robust 200`"
 )
+@takes_task()
 def verify(
     controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
-    task: TaskOption = None,
-    map_image: MapOption = None,
-    world: WorldOption = None,
-    ignore: Ignore = None,
-    start: Start = None,
-    goal: Goal = None,
-    heading: Heading = None,
-    robot_radius: Radius = None,
-    snap: Snap = False,
-    metres: Metres = False,
+    named_task: NamedTask,
     profile: Profile = None,
     paper: Annotated[
         bool, typer.Option("--paper", help="Nominal start only, as in the paper.")
     ] = False,
-    suite: Annotated[
-        Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option(help="Folder with your own test_*.py files, run as well."),
-    ] = None,
+    suite: Suite = None,
     tier: Tier = "auto",
-    seed: Annotated[int, typer.Option(min=0, help="Of the jittered starts.")] = 0,
+    seed: JitterSeed = 0,
     junit: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(help="Write a JUnit XML report."),
@@ -118,15 +100,11 @@ def verify(
         from tdac_agent.commands import verify as command
         from tdac_agent.commands.robust_flags import DisturbanceFlags, RobustFlags
 
-        spec = task_flags(
-            task, map_image, world, ignore, start, goal, heading, robot_radius, None,
-            snap, metres, None,
-        )  # fmt: skip
         disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
         wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
         code = command.run(
             controller,
-            spec,
+            named_task(),
             profile,
             paper,
             suite,

@@ -1,5 +1,6 @@
 """The command line: exit codes, one clear line for each mistake, clean JSON."""
 
+import inspect
 import json
 import re
 import struct
@@ -12,9 +13,11 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 import pytest
+import typer
 from small import SHORT, small_cells, write_small_task
 
 from tdac_agent.cli import PARTS, command_line
+from tdac_agent.commands.options import task_flags
 
 COMMANDS = [
     "map", "world", "synth", "verify", "play", "evaluate", "train", "check-suite",
@@ -67,6 +70,24 @@ def test_a_command_reads_no_flags_of_another():
         assert len(command_line(words).registered_groups) == 1
     for words in ([], ["--help"], ["verfy"]):
         assert len(command_line(words).registered_groups) == len(PARTS)
+
+
+def test_a_task_is_named_by_the_same_flags_everywhere():
+    """All commands on one task have them in one order; `synth` two more, for models."""
+    told_to_models = ["robot_image", "instructions"]
+    shared = [
+        name
+        for name in inspect.signature(task_flags).parameters
+        if name not in told_to_models
+    ]
+    for command in ("synth", "verify", "play", "check-suite"):
+        group = typer.main.get_command(command_line([command]))
+        names = [parameter.name for parameter in group.commands[command].params]
+        at = names.index("task")
+        flags = [name for name in names[at:] if name in {*shared, *told_to_models}]
+        assert [name for name in flags if name not in told_to_models] == shared
+        extra = [name for name in flags if name in told_to_models]
+        assert extra == (told_to_models if command == "synth" else [])
 
 
 def test_the_help_is_quick():
