@@ -6,6 +6,7 @@ Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastruc
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from copy import copy
@@ -112,6 +113,8 @@ def _is_number(word: str) -> bool:
 
 def main() -> None:
     """Entry point of the `tdac` script: every known error is one clear line."""
+    # Its threads would keep a core busy, waiting for work that nothing here has.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:

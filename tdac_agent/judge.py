@@ -171,12 +171,14 @@ class Judge:
         }
 
     def begin(self, *, jitters: bool, own_loop: bool) -> None:
-        """Starts the episodes that every suite asks for, beside its other tests."""
-        for key in (NOMINAL, *(OWN_LOOPS if own_loop else ())):
+        """Starts the episodes that every suite asks for, beside its other tests.
+
+        The short ones come last, so that all who drive have done at about one time.
+        """
+        whole, *short = OWN_LOOPS if own_loop else (NOMINAL,)
+        jittered = [(f"jitter {n}", None, "policy") for n in range(1, JITTERS + 1)]
+        for key in (NOMINAL, whole, *(jittered if jitters else ()), *short):
             self._submit(key)
-        if jitters:
-            for number in range(1, JITTERS + 1):
-                self._submit((f"jitter {number}", None, "policy"))
 
     def settle(self) -> None:
         """Waits for the episodes under way; after this all costs are known."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib.metadata
 import platform
@@ -40,10 +41,11 @@ def origin(
         "sandbox": tier,
         "limits": asdict(limits),
         "warnings": (*((weak,) if tier == "rlimits" else ()), *task.params.notes),
-        "versions": versions(),
+        "versions": dict(versions()),
     }
 
 
+@functools.cache
 def versions() -> dict[str, str]:
     """Of Python and of the packages that a verdict may depend on."""
     packages = {name: importlib.metadata.version(name) for name in VERSIONED}

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+import pytest_reportlog.plugin
 from _pytest.runner import runtestprotocol
 
 from tdac_agent import suite_fixtures
@@ -104,8 +105,6 @@ def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
         f"--confcutdir={root}",
         "-c",
         os.devnull,
-        "-p",
-        "pytest_reportlog.plugin",
         f"--report-log={log}",
         *(word for name in UNUSED_PLUGINS for word in ("-p", f"no:{name}")),
         "--import-mode=importlib",
@@ -113,4 +112,5 @@ def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
         "--strict-markers",
         "-q",
     ]
-    pytest.main(arguments, plugins=plugins)
+    # By its name, pytest would look for it among all packages that are installed.
+    pytest.main(arguments, plugins=[pytest_reportlog.plugin, *plugins])

@@ -39,19 +39,24 @@ def kept(
         about: Everything that the code follows from, but the machine.
         make: Makes it.
     """
-    import llvmlite.binding as llvm
-
-    features = ",".join(
-        f"{k}{v}" for k, v in sorted(llvm.get_host_cpu_features().items())
-    )
-    here = [sys.version, version("numba"), llvm.get_host_cpu_name(), repr(features)]
-    key = hashlib.sha256("\n".join([*about, *here]).encode()).hexdigest()[:20]
+    key = hashlib.sha256("\n".join([*about, *_here()]).encode()).hexdigest()[:20]
     file = cache_folder() / f"{name}-{key}.obj"
     objects = _read(file)
     if objects is None:
         objects = make()
         _write(file, objects)
     return objects
+
+
+@functools.cache
+def _here() -> list[str]:
+    """What machine code depends on beside its source: the machine and what made it."""
+    import llvmlite.binding as llvm
+
+    features = ",".join(
+        f"{k}{v}" for k, v in sorted(llvm.get_host_cpu_features().items())
+    )
+    return [sys.version, version("numba"), llvm.get_host_cpu_name(), repr(features)]
 
 
 def assembled(text: str) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -15,8 +15,9 @@ from tdac_envs.errors import MapError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.params import MapParams
 from tdac_envs.plan import plan_path
-from tdac_envs.preprocessing import Source, as_image
-from tdac_envs.preview import draw_preview
+
+if TYPE_CHECKING:
+    from tdac_envs.preprocessing import Source
 
 FILES = ("occupancy.npy", "occupancy.png", "params.json", "preview.png")
 
@@ -41,6 +42,10 @@ def write_map(
     Raises:
         MapError: The folder cannot be written.
     """
+    # A task that writes a grid alone has no use for what reads and draws images.
+    from tdac_envs.preprocessing import as_image
+    from tdac_envs.preview import draw_preview
+
     folder = Path(folder)
     preview = draw_preview(
         as_image(image).colour, grid.cells, params, shortest_path(grid, params)

@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.robust_flags import RobustFlags
 from tdac_agent.errors import ControllerFileError
@@ -43,16 +41,17 @@ def run(
     robust.check()
     if out is not None:
         _make_folder(out)
-    console = Console(stderr=as_json, emoji=False)
-    with console.status("preparing the task …"):
-        file, task = controller_and_task(controller, flags)
+    file, task = _prepared(controller, flags)
     gc.freeze()
     gc.enable()
     with WarmJudge(nursery) as judge:
         # Loaded while the judge gets ready.
+        from rich.console import Console
+
         from tdac_agent.commands.report_view import show_report
         from tdac_agent.verification import verify
 
+        console = Console(stderr=as_json, emoji=False)
         with console.status(f"verifying {file.name} on {task.name} …"):
             report = verify(
                 file,
@@ -86,6 +85,16 @@ def run(
         console.print("robustness not measured: the controller is not verified")
     accepted = measured is None or measured.accepted
     return 0 if report.passed and accepted else 1
+
+
+def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
+    """The file and its task, which takes a while where it is not a run folder's own."""
+    if not flags.given():
+        return controller_and_task(controller, flags)
+    from rich.console import Console
+
+    with Console(stderr=True, emoji=False).status("preparing the task …"):
+        return controller_and_task(controller, flags)
 
 
 def _json(report: Report, robust: RobustFlags, measured: RobustReport | None) -> str:
