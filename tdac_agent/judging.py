@@ -26,6 +26,7 @@ import numpy as np
 from tdac_agent.crew import end_with_parent
 from tdac_agent.jobs import SUITE, Job
 from tdac_agent.nursery import Nursery
+from tdac_agent.starts import spread_starts
 from tdac_agent.suite_run import judge_suite
 from tdac_agent.task import load_task
 from tdac_envs.map2d import Map2DEnv
@@ -135,9 +136,11 @@ def _rehearse() -> None:
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     env.nominal.path_from(env.nominal.start)
+    spread_starts(env.nominal, 0, 1)
     world = gym.make("tdac_envs:TDAC-EPuck-v0")
     world.reset(seed=0)
     world.step(np.zeros(2, np.float32))
+    spread_starts(world.unwrapped.nominal, 0, 1)  # type: ignore[attr-defined]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "test_nothing.py").write_text("def test_nothing(): pass\n")

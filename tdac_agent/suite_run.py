@@ -31,12 +31,12 @@ def judge_suite(job: Job, nursery: Nursery, later: contextlib.ExitStack) -> None
 
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
     run_tests(job.suites, job.out / "report.jsonl", plugin)
-    judge.settle()
     with ThreadPoolExecutor() as pool:  # most of it is compression
         if job.trajectories is not None:
             for rollout in driven(judge):
                 name = f"{rollout.name.replace(' ', '_')}.npz"
                 if rollout.trajectory.steps:
                     pool.submit(rollout.trajectory.save, job.trajectories / name)
+        judge.settle()
         findings = findings_of(judge, plugin.expected).model_dump_json()
     (job.out / "findings.json").write_text(findings, encoding="utf-8")
