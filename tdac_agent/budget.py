@@ -10,12 +10,13 @@ import math
 import threading
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 from typing import Literal
 
 from tdac_agent.errors import RunError
-from tdac_agent.journal import append_record, mend, read_records
+from tdac_agent.journal import append_record, read_on
 from tdac_agent.locks import wait_for
 
 ROUNDING = 1e-9
@@ -77,6 +78,34 @@ class BudgetExhausted(Exception):
         return f"{self._limit} {math.ceil(100 * total.usd - ROUNDING) / 100:.12g}"
 
 
+@dataclass(slots=True)
+class _Taken:
+    """What calls have taken, by the last word on each of them, and the sum of it.
+
+    The sum is exact, and need not be made anew with each call.
+    """
+
+    of: dict[str, Amount] = field(default_factory=dict)
+    _tokens: int = 0
+    _usd: Fraction = field(default_factory=Fraction)
+
+    @property
+    def all(self) -> Amount:
+        return Amount(self._tokens, float(self._usd))
+
+    def but(self, call: str) -> Amount:
+        """All without a call."""
+        one = self.of.get(call, NOTHING)
+        usd = self._usd - Fraction(one.usd)
+        return Amount(self._tokens - one.tokens, float(usd))
+
+    def put(self, call: str, amount: Amount) -> None:
+        before = self.of.get(call, NOTHING)
+        self._tokens += amount.tokens - before.tokens
+        self._usd += Fraction(amount.usd) - Fraction(before.usd)
+        self.of[call] = amount
+
+
 class Budget:
     """Limits, and what has been taken of them. For any number of threads.
 
@@ -96,13 +125,14 @@ class Budget:
         self.max_tokens = max_tokens
         self._ledger = ledger
         self._lock = threading.Lock()
-        self._taken: dict[str, Amount] = {}
+        self._taken = _Taken()
+        self._read_to = 0
 
     @property
     def taken(self) -> Amount:
         """What is reserved or spent."""
         with self._open():
-            return _sum(self._taken)
+            return self._taken.all
 
     def reserve(self, call: str, worst: Amount) -> None:
         """Takes the most that a call can cost.
@@ -115,8 +145,7 @@ class Budget:
             BudgetExhausted: There is less left; nothing was taken.
         """
         with self._open():
-            others = {name: some for name, some in self._taken.items() if name != call}
-            self._check(_sum(others), worst)
+            self._check(self._taken.but(call), worst)
             self._take(call, worst)
 
     def settle(self, call: str, spent: Amount) -> None:
@@ -128,7 +157,7 @@ class Budget:
         """Takes over calls of an earlier process, also beyond the limits."""
         with self._open():
             for call, amount in calls.items():
-                if self._taken.get(call) != amount:
+                if self._taken.of.get(call) != amount:
                     self._take(call, amount)
 
     def _check(self, taken: Amount, worst: Amount) -> None:
@@ -157,7 +186,8 @@ class Budget:
         if self._ledger is not None:
             record = {"call": call, "tokens": amount.tokens, "usd": amount.usd}
             append_record(self._ledger, record)
-        self._taken[call] = amount
+            self._read_to = self._ledger.stat().st_size
+        self._taken.put(call, amount)
 
     @contextmanager
     def _open(self) -> Generator[None]:
@@ -167,9 +197,17 @@ class Budget:
                 yield
                 return
             with wait_for(self._ledger):
-                mend(self._ledger)
-                self._taken = _read(self._ledger)
+                self._catch_up(self._ledger)
                 yield
+
+    def _catch_up(self, ledger: Path) -> None:
+        """Takes in what was written since; all of it, if that is another file now."""
+        if ledger.stat().st_size < self._read_to:
+            self._taken, self._read_to = _Taken(), 0
+        calls, read_to = _read(ledger, self._read_to)
+        for call, amount in calls:
+            self._taken.put(call, amount)
+        self._read_to = read_to
 
 
 def told_usd(amount: float) -> str:
@@ -177,23 +215,15 @@ def told_usd(amount: float) -> str:
     return f"{amount:.2f} USD" if amount >= 0.1 or amount == 0 else f"{amount:.4f} USD"
 
 
-def _sum(taken: Mapping[str, Amount]) -> Amount:
-    return Amount(
-        sum(amount.tokens for amount in taken.values()),
-        math.fsum(amount.usd for amount in taken.values()),
-    )
-
-
-def _read(ledger: Path) -> dict[str, Amount]:
-    """What the calls in a file take, by its last word on each of them.
+def _read(ledger: Path, offset: int) -> tuple[list[tuple[str, Amount]], int]:
+    """What a file says of calls behind an offset, and the offset behind that.
 
     Raises:
         RunError: It is no such file.
     """
     try:
-        return {
-            record["call"]: Amount(record["tokens"], record["usd"])
-            for record in read_records(ledger)
-        }
+        records, end = read_on(ledger, offset)
+        calls = [(one["call"], Amount(one["tokens"], one["usd"])) for one in records]
     except (KeyError, TypeError, ValueError) as error:
         raise RunError(f"{ledger} is no record of a budget: {error}") from error
+    return calls, end

@@ -54,6 +54,30 @@ def read_records(path: Path) -> list[JournalRecord]:
         raw = path.read_bytes()
     except FileNotFoundError:
         return []
+    return _records(raw)
+
+
+def read_on(path: Path, offset: int) -> tuple[list[JournalRecord], int]:
+    """The records behind an offset, and the offset behind them; a torn end is mended.
+
+    Args:
+        path: A file that is there.
+        offset: Where a line begins, as the last call gave it, or 0.
+    """
+    raw = _behind(path, offset)
+    if raw and not raw.endswith(b"\n"):
+        mend(path)
+        raw = _behind(path, offset)
+    return _records(raw), offset + len(raw)
+
+
+def _behind(path: Path, offset: int) -> bytes:
+    with path.open("rb") as file:
+        file.seek(offset)
+        return file.read()
+
+
+def _records(raw: bytes) -> list[JournalRecord]:
     records = map(_record, raw.split(b"\n"))
     return [record for record in records if record is not None]
 

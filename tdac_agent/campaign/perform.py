@@ -56,8 +56,7 @@ class Terms:
         """The budget of a run: of its own where no model is asked."""
         if not planned.cell.asks_models:
             return Budget()
-        ledger = Path(self.folder) / "ledger.jsonl"
-        return Budget(self.max_cost, self.max_tokens, ledger)
+        return _budget(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +150,13 @@ def _synthesize(
         judge=judge,
         on_event=tell,
     )
+
+
+@functools.lru_cache(maxsize=1)
+def _budget(terms: Terms) -> Budget:
+    """The budget of all runs together, which has read its file as far as it is."""
+    ledger = Path(terms.folder) / "ledger.jsonl"
+    return Budget(terms.max_cost, terms.max_tokens, ledger)
 
 
 @functools.lru_cache(maxsize=4)

@@ -156,6 +156,54 @@ def test_processes_share_a_file(tmp_path):
     assert Budget(ledger=ledger).taken.tokens == sum(settled.values()) > 900
 
 
+def test_what_another_has_written_since_is_read_once(tmp_path):
+    """Two that share a file know of each other's calls at each moment."""
+    ledger = tmp_path / "ledger.jsonl"
+    one, two = Budget(max_tokens=100, ledger=ledger), Budget(ledger=ledger)
+    for number in range(3):
+        one.reserve(f"one/{number}", Amount(tokens=10))
+        assert two.taken.tokens == 20 * number + 10
+        two.reserve(f"two/{number}", Amount(tokens=20))
+        two.settle(f"two/{number}", Amount(tokens=10))
+        assert one.taken.tokens == 20 * number + 20
+    two.reserve("two/3", Amount(tokens=31))
+    with pytest.raises(BudgetExhausted, match="91 of 100 tokens"):
+        one.reserve("one/3", Amount(tokens=10))
+
+
+def test_a_line_that_was_torn_by_a_crash_takes_nothing(tmp_path):
+    """It is cut off, also by one who has read what was before it."""
+    ledger = tmp_path / "ledger.jsonl"
+    budget = Budget(max_tokens=100, ledger=ledger)
+    budget.reserve("a", Amount(tokens=10))
+    whole = ledger.read_bytes()
+    with ledger.open("ab") as file:
+        file.write(whole[: len(whole) // 2])
+    assert budget.taken.tokens == 10
+    assert ledger.read_bytes() == whole
+    budget.reserve("b", Amount(tokens=10))
+    assert budget.taken == Budget(ledger=ledger).taken == Amount(20)
+
+
+def test_a_new_file_in_the_place_of_the_old_one_counts(tmp_path):
+    ledger = tmp_path / "ledger.jsonl"
+    budget = Budget(ledger=ledger)
+    budget.reserve("a", Amount(tokens=10))
+    ledger.unlink()
+    assert budget.taken == NOTHING
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), AMOUNTS)))
+def test_the_sum_is_that_of_the_last_words(calls):
+    """However often a call is put: to the last digit, so no error adds up."""
+    budget = Budget()
+    for call, amount in calls:
+        budget.settle(call, amount)
+    last = dict(calls).values()
+    assert budget.taken.tokens == sum(amount.tokens for amount in last)
+    assert budget.taken.usd == math.fsum(amount.usd for amount in last)
+
+
 def test_a_foreign_file_is_no_ledger(tmp_path):
     """One line, and the file stays as it is."""
     file = tmp_path / "mine.jsonl"
