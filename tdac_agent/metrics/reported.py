@@ -16,6 +16,7 @@ from tdac_agent.metrics.frames import (
 )
 
 PAPER_K = 20
+LABELS = {*RUN_COLUMNS, "environment"} - {"tau"}
 _WORD = re.compile(r"(\d+)(\+?)")
 
 
@@ -25,12 +26,13 @@ def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
     Its column `tau` holds the iterations of the first successes, `1 2 5`; `2+` is a run
     that was ended after two iterations without success, by money, time or a fault.
     `invalid` counts iterations that gave no controller. Columns that are in
-    `RUN_COLUMNS`, too, are taken over; others only serve to choose rows.
+    `RUN_COLUMNS`, too, are taken over; `environment`, `2d` or `3d`, becomes part of the
+    runs' names, so that those of both may be joined. Others only serve to choose rows.
 
     Args:
         path: A CSV file.
         most: K.
-        only: Values of columns, of the rows that are wanted: `setting="2d"`.
+        only: Values of columns, of the rows that are wanted: `environment="2d"`.
 
     Raises:
         RunError: It cannot be read, or has no such column or row.
@@ -48,7 +50,7 @@ def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
         table = table[table[name] == value]
     if table.empty:
         raise RunError(f"{path} has no row with {only}")
-    labels = [name for name in table if name in RUN_COLUMNS and name != "tau"]
+    labels = [name for name in table if name in LABELS]
     return join_frames(
         *(_kind(row, labels, path, most) for row in table.to_dict("records"))
     )

@@ -45,11 +45,11 @@ taus = st.lists(st.none() | st.integers(1, 6), min_size=2, max_size=8)
 
 def paper_frames(row):
     """The frames of one bar of the paper."""
-    return load_reported(RESULTS, setting=row.setting, learner=row.learner)
+    return load_reported(RESULTS, environment=row.environment, learner=row.learner)
 
 
 @pytest.mark.parametrize(
-    "row", list(PAPER.itertuples()), ids=lambda r: r.setting + r.learner
+    "row", list(PAPER.itertuples()), ids=lambda r: r.environment + r.learner
 )
 def test_the_papers_bars_and_curves(row):
     """SR = R / sum of tau, within a percentage point of what is printed; CS(k)."""
@@ -64,9 +64,17 @@ def test_the_papers_bars_and_curves(row):
         assert value == sum(t <= k for t in tau) / len(tau)
 
 
+def test_a_table_of_both_environments_is_read_as_a_whole():
+    """No run of one is taken for a run of the other; `setting` is that of the loop."""
+    runs = load_reported(RESULTS).runs
+    assert len(runs) == 5 * len(PAPER)
+    assert runs["run"].is_unique
+    assert runs["setting"].isna().all()
+
+
 def test_both_rules_of_counting():
     """GPT-4o in 3D, two iterations without a controller: the formula, the bar."""
-    row = PAPER[(PAPER.setting == "3d") & (PAPER.learner == "GPT-4o")].iloc[0]
+    row = PAPER[(PAPER.environment == "3d") & (PAPER.learner == "GPT-4o")].iloc[0]
     frames = paper_frames(row)
     assert success_rate(frames).value == 5 / 21
     assert success_rate(frames, invalid=True).value == 5 / 23
@@ -77,13 +85,13 @@ def test_the_papers_figures_as_they_are_known():
     """The table of this repository is the list of the facts."""
     known = json.loads(FACTS.read_text())
     listed = {
-        (row.setting, row.learner): ([*map(int, row.tau.split())], row.sr_printed)
+        (row.environment, row.learner): ([*map(int, row.tau.split())], row.sr_printed)
         for row in PAPER.itertuples()
     }
     assert listed == {
-        (setting, learner): (facts["tau"], facts["SR_printed"])
-        for setting in ("2d", "3d")
-        for learner, facts in known[setting].items()
+        (environment, learner): (facts["tau"], facts["SR_printed"])
+        for environment in ("2d", "3d")
+        for learner, facts in known[environment].items()
     }
 
 
