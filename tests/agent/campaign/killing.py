@@ -6,7 +6,7 @@ import signal
 import subprocess
 from pathlib import Path
 
-from conftest import Small
+from few_runs import Small
 
 
 def children(pid):

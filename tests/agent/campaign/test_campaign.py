@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from conftest import Small
+from few_runs import Small
 
 from tdac_agent.metrics import CANDIDATE_COLUMNS, RUN_COLUMNS, find_runs
 
