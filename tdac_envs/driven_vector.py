@@ -82,6 +82,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
         self._vary = [setup.variation != "nominal" for setup in self.setups]
+        # Whether a robot's next task may be another one than its last.
+        self._drawn = any(self._vary)
         self._over = np.zeros(num_envs, np.bool_)
         self._commands = np.zeros((num_envs, 2))
         self.goals = np.array([task.goal for task in self.tasks], np.float32)
@@ -137,8 +139,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._place(resting, {})
         *seen, told = self._rows.call_all(self._over)
         observations = dict(zip(self._seen(), seen, strict=True))
-        outcome = told.T.copy()
-        rewards = outcome[stepping.REWARD]
+        outcome = told.T
+        rewards = outcome[stepping.REWARD].copy()
         terminated = outcome[stepping.TERMINATED] == 1.0
         truncated = outcome[stepping.TRUNCATED] == 1.0
         self._over = terminated | truncated
@@ -203,6 +205,16 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     def _place(self, robots: Index, options: dict[str, Any]) -> None:
         """Puts robots where their next episodes begin; the kernel `begin` does more."""
+        if not robots.size:
+            return
+        if options or self._drawn:
+            self._draw(robots, options)
+        starts = self._starts[robots]
+        self.robots.state[robots, : stepping.HEADING + 1] = starts[:, :3]
+        self.robots.outcome[robots, stepping.REMAINING] = starts[:, 3]
+
+    def _draw(self, robots: Index, options: dict[str, Any]) -> None:
+        """Gives robots the tasks that their next episodes are about."""
         drawn = [
             (i, self.setups[i].draw(options, self._random(i)))
             for i in robots.tolist()
@@ -210,12 +222,10 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         ]
         for i, task in drawn:
             self._give(i, task)
-        starts = self._starts[robots]
-        self.robots.state[robots, : stepping.HEADING + 1] = starts[:, :3]
-        self.robots.outcome[robots, stepping.REMAINING] = starts[:, 3]
 
     def _give(self, i: int, task: Any) -> None:
         """Gives a robot another task."""
+        self._drawn = True
         robot, before = self._each[i], self.tasks[i]
         self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
         self.goals[i] = task.goal
