@@ -105,7 +105,7 @@ def _options() -> argparse.Namespace:
     if options.maps is not None and not any(options.maps.glob("*.map.scen")):
         parser.error(f"{options.maps}: no *.map.scen in it")
     if find_spec("skimage") is None:
-        parser.error('scikit-image is missing: pip install "tdac[bench]"')
+        parser.error('scikit-image is missing: pip install ".[bench]"')
     return options
 
 

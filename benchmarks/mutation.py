@@ -4,7 +4,7 @@
                                   [--resume FILE]
 
 Mutants of good controllers get one change each: a mistake of the domain
-(`domain_mutations`, `lies`) or an operator of cosmic-ray (`pip install "tdac[bench]"`).
+(`domain_mutations`, `lies`) or an operator of cosmic-ray (`pip install ".[bench]"`).
 *Killed*: `tdac_agent.verify` does not pass it. *Harmful*: an independent judge, with
 oracles and starts of its own, finds that it violates the contract, or that it succeeds
 on less than 90 % of 50 jittered starts (e-puck: 20), where the original succeeds on all

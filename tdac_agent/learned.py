@@ -27,6 +27,7 @@ from tdac_agent.sandbox import ControllerFault
 from tdac_agent.setting import JudgedEnv
 from tdac_envs.driven import Observation
 from tdac_envs.errors import TaskError
+from tdac_envs.extras import install_command
 from tdac_envs.wrappers import wrap
 
 METADATA = "tdac.json"
@@ -39,7 +40,6 @@ _NETWORKS = {
 """By the module of the saved policy's class, the class for observations in a Box."""
 _FOR_TRAINING = {"optimizer_class", "optimizer_kwargs"}
 _ACTIVATION = re.compile(r"<class 'torch\.nn\.modules\.activation\.(\w+)'>")
-_INSTALL = 'SB3 policies need an extra: pip install "tdac[sb3]"'
 
 
 class SavedPolicy(BaseModel):
@@ -140,6 +140,11 @@ class Learned:
         return env.observation(self._seen(env.env, observation))
 
 
+def _without_extra() -> ControllerFault:
+    needed = f"SB3 policies need an extra: {install_command('sb3')}"
+    return ControllerFault(needed, "import")
+
+
 @dataclass(frozen=True, slots=True)
 class _Spaces:
     """Of observations and actions; compared by what they are in words."""
@@ -165,7 +170,7 @@ def _network(file: Path, fit: _Spaces) -> Any:
     try:
         import torch
     except ImportError as error:
-        raise ControllerFault(_INSTALL, "import") from error
+        raise _without_extra() from error
     torch.set_num_threads(1)
     with zipfile.ZipFile(file) as archive:
         data = json.loads(archive.read("data"))
@@ -217,7 +222,7 @@ def _class(data: dict[str, Any], several: bool) -> Any:
             name = "MultiInputActorCriticPolicy" if actor_critic else "MultiInputPolicy"
         return getattr(import_module(module), name)
     except ImportError as error:
-        raise ControllerFault(_INSTALL, "import") from error
+        raise _without_extra() from error
     except KeyError as error:
         raise ControllerFault(
             f"a policy of {module} cannot be evaluated, but of PPO, A2C, SAC and TD3",

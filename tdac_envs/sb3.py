@@ -1,4 +1,4 @@
-"""A batched environment as Stable-Baselines3 takes it; needs `pip install "tdac[sb3]"`.
+"""A batched environment as Stable-Baselines3 takes it; needs the extra `sb3`.
 
 ```python
 envs = SB3VecEnv(gym.make_vec("TDAC-Map2D-v0", 64, autoreset_mode="SameStep"))
@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 
 from tdac_envs.driven_vector import DrivenVectorEnv
 from tdac_envs.errors import TaskError
+from tdac_envs.extras import install_command
 from tdac_envs.wrapped_vector import Seen, WrappedVectorEnv
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError:
     raise ImportError(
-        'SB3VecEnv needs Stable-Baselines3: pip install "tdac[sb3]"'
+        f"SB3VecEnv needs Stable-Baselines3: {install_command('sb3')}"
     ) from None
 
 Indices = int | Iterable[int] | None

@@ -138,7 +138,7 @@ class Graphics:
         try:
             import pygame
         except ImportError:
-            hint = 'Graphics needs pygame: pip install "tdac[human]"'
+            hint = "Graphics needs pygame: pip install pygame-ce"
             raise ImportError(hint) from None
         self._pygame, self._robot = pygame, params["robot"]
         height, width = occ.shape
@@ -224,7 +224,8 @@ def show(
 
         from tdac_envs.video import write_video
     except ImportError:
-        raise SystemExit("show() needs the simulator: pip install tdac") from None
+        needed = "show() needs the simulator: use the Python that has tdac installed"
+        raise SystemExit(needed) from None
     mode = "human" if _has_window() else "rgb_array"
     name, arguments = _environment()
     env: Any = gymnasium.make(f"tdac_envs:{name}", render_mode=mode, **arguments)

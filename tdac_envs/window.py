@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 
 from tdac_envs.canvas import Image
+from tdac_envs.extras import install_command
 
 
 class Window:
@@ -28,7 +29,7 @@ class Window:
             import pygame
         except ImportError as error:
             raise DependencyNotInstalled(
-                'render_mode="human" needs pygame: pip install "tdac[human]"'
+                f'render_mode="human" needs pygame: {install_command("human")}'
             ) from error
         self._pygame: Any = pygame
         self._title, self._fps = title, fps

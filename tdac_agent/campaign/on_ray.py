@@ -17,6 +17,7 @@ from tdac_agent.campaign.perform import Outcome, Terms, perform
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import ProviderError
 from tdac_agent.warm import WarmJudge
+from tdac_envs.extras import install_command
 
 STORE_BYTES = 96 << 20
 """Of a cluster that is started here: runs pass through folders, not through Ray."""
@@ -86,7 +87,7 @@ def _start(workers: int) -> Any:
         import ray
     except ImportError as error:
         raise ProviderError(
-            '--executor ray needs a package: pip install "tdac[ray]"'
+            f"--executor ray needs a package: {install_command('ray')}"
         ) from error
     if os.environ.get("RAY_ADDRESS"):
         ray.init(log_to_driver=False, logging_level=logging.ERROR)

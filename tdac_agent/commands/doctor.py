@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 
 from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
 
 from tdac_agent.campaign.config import read_config
 from tdac_agent.commands.play import has_display
@@ -19,6 +20,7 @@ from tdac_agent.lifecycle import model_warnings, retired
 from tdac_agent.providers.choice import OFFLINE
 from tdac_agent.sandbox import available_tiers
 from tdac_agent.shipped import shipped, shipped_names
+from tdac_envs.extras import install_command
 
 EXTRAS = {
     "human": "pygame",
@@ -91,7 +93,7 @@ def _video() -> Check:
 
 def _window() -> Check:
     if importlib.util.find_spec("pygame") is None:
-        return Check("window", False, 'pip install "tdac[human]"')
+        return Check("window", False, install_command("human"))
     if not has_display():
         return Check("window", False, "no display here; videos work without one")
     return Check("window", True, "pygame")
@@ -101,7 +103,7 @@ def _extras() -> list[Check]:
     checks = []
     for extra, module in EXTRAS.items():
         found = importlib.util.find_spec(module) is not None
-        detail = module if found else f'optional: pip install "tdac[{extra}]"'
+        detail = module if found else f"optional: {install_command(extra)}"
         checks.append(Check(f"extra {extra}", found, detail))
     return checks
 
@@ -138,10 +140,15 @@ def _versions() -> dict[str, str]:
 
 def _show(checks: list[Check]) -> None:
     console = Console(emoji=False)
+    grid = Table.grid(padding=(0, 1, 0, 0))
+    grid.add_column()
+    grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
     for check in checks:
         mark = "[green]✔[/]" if check.works else "[yellow]–[/]"
         if check.needed and not check.works:
             mark = "[red]✘[/]"
-        console.print(f"{mark} {check.name:<26} {escape(check.detail)}")
+        grid.add_row(mark, escape(check.name), escape(check.detail))
+    console.print(grid)
     versions = ", ".join(f"{name} {value}" for name, value in _versions().items())
     console.print(f"\n{versions}", highlight=False)

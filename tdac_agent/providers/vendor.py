@@ -14,6 +14,7 @@ from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.providers.patience import CONNECT_SECONDS, STALL_SECONDS, within
 from tdac_agent.providers.secrets import one_line, public_url, read_key
+from tdac_envs.extras import install_command
 
 C = TypeVar("C")
 
@@ -64,7 +65,7 @@ class VendorModel(ABC, Generic[C]):
         vendor, found = self.vendor, []
         # To import them takes a second or two: that is done beside the first question.
         if importlib.util.find_spec(vendor.package) is None:
-            install = f'pip install "tdac[{vendor.package}]"'
+            install = install_command(vendor.package)
             found.append(f"{self.name} needs a package: {install}")
         try:
             self._read_key()

@@ -10,6 +10,7 @@ from tdac_agent.locks import LOCK_FILE, hold
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import PLAN_FILE, TrainingPlan, read_plan, write_plan
 from tdac_envs.errors import TaskError
+from tdac_envs.extras import install_command
 
 if TYPE_CHECKING:
     from tdac_agent.training.learning import Watch
@@ -37,7 +38,8 @@ def train(plan: TrainingPlan, folder: Path, watch: Watch | None = None) -> list[
     try:
         from tdac_agent.training.learning import learn
     except ImportError as error:
-        raise TaskError('training needs an extra: pip install "tdac[sb3]"') from error
+        needed = f"training needs an extra: {install_command('sb3')}"
+        raise TaskError(needed) from error
     _prepare(folder, plan)
     with hold(folder / LOCK_FILE) as held:
         if not held:

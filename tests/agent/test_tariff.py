@@ -17,6 +17,7 @@ from tdac_agent.records import load_run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.tariff import UNPRICED_TOKENS, Tariff, bounds_of, tariffs_of
 from tdac_agent.task import load_task
+from tdac_envs.extras import install_command
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 PRICE = Price(input=2, output=10, cache_read=0.1, cache_write=2.5)
@@ -180,7 +181,7 @@ def test_all_that_is_missing_is_said_at_once(tdac, monkeypatch):
     assert err.count("\n") == 1
     needed = [
         "set the environment variable OPENAI_API_KEY",
-        'anthropic:x needs a package: pip install "tdac[anthropic]"',
+        f"anthropic:x needs a package: {install_command('anthropic')}",
         "set the environment variable ANTHROPIC_API_KEY",
     ]
     for line in [*needed, "no price is known for openai:unheard-of"]:

@@ -1,6 +1,7 @@
 """Pictures: everything is where it belongs, at every size of map."""
 
 import math
+import re
 import sys
 
 import cv2
@@ -9,6 +10,7 @@ import pytest
 from gymnasium.error import DependencyNotInstalled
 
 from tdac_envs.canvas import FREE, GREEN, RED, TRAIL, WALL, Canvas, frame_scale
+from tdac_envs.extras import install_command
 from tdac_envs.marks import LEFT_RAYS, OUTCOMES, RIGHT_RAYS
 from tdac_envs.params import RobotParams
 from tdac_envs.render import Scene, Status, trajectory_picture
@@ -288,5 +290,6 @@ def test_the_window_shows_the_frame(monkeypatch):
 
 def test_the_window_names_the_extra_when_pygame_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(DependencyNotInstalled, match=r'pip install "tdac\[human\]"'):
+    expected = re.escape(install_command("human"))
+    with pytest.raises(DependencyNotInstalled, match=expected):
         Window("test", fps=20)

@@ -1,0 +1,51 @@
+"""How an extra is added to this installation."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+import sys
+from importlib import metadata
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+PACKAGE = "tdac"
+
+
+def install_command(extra: str) -> str:
+    """The command that adds an extra, from where the package itself came from.
+
+    That is on record beside an installed package unless it came from an index
+    (PEP 610).
+
+    Args:
+        extra: Of `pyproject.toml`, e.g. `sb3`.
+    """
+    return f"{_pip()} install {' '.join(_source(f'[{extra}]'))}"
+
+
+def _pip() -> str:
+    """As it is to be typed for this interpreter."""
+    found = shutil.which("pip")
+    if found is not None and Path(found).parent == Path(sys.executable).parent:
+        return "pip"
+    return f"{shlex.quote(sys.executable)} -m pip"
+
+
+def _source(extra: str) -> list[str]:
+    """What pip is told to install, an extra of it included."""
+    try:
+        text = metadata.distribution(PACKAGE).read_text("direct_url.json")
+    except metadata.PackageNotFoundError:
+        text = None
+    if text is None:
+        return [shlex.quote(PACKAGE + extra)]
+    origin = json.loads(text)
+    url = origin["url"]
+    if "dir_info" in origin:
+        folder = unquote(urlsplit(url).path)
+        editable = ["-e"] if origin["dir_info"].get("editable") else []
+        return [*editable, shlex.quote(folder + extra)]
+    system = f"{origin['vcs_info']['vcs']}+" if "vcs_info" in origin else ""
+    return [shlex.quote(f"{PACKAGE}{extra} @ {system}{url}")]
