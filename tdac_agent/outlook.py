@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from tdac_agent.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.dialogue import MAX_ASKS
 from tdac_agent.prices import PriceList
 from tdac_agent.prompt import FULL, PromptTemplate, generate_prompt
 from tdac_agent.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.tariff import OWN_MATTER
+from tdac_agent.tariff import MAX_COST, OWN_MATTER, UNPRICED_TOKENS, Tariff
 from tdac_agent.task import Task
 from tdac_agent.tokens import estimate_tokens, most_tokens
 from tdac_agent.workload import tokens_asked, whole
@@ -29,6 +30,13 @@ class Outlook(BaseModel):
     answer_tokens: int = Field(description="That the first answer may have.")
     first_cost: float | None = Field(
         description="USD that are reserved for the first question; None if unknown."
+    )
+    max_cost: float | None = Field(
+        description="USD that the run may spend; None where nothing has a price."
+    )
+    max_tokens: int | None = Field(description="That it may spend; None for no limit.")
+    first_needs: str = Field(
+        description="Flag that pays the first question; empty where the limits do."
     )
     questions: int = Field(description="Of the whole run, if nothing ever passes.")
     cost_once: float | None = Field(
@@ -56,6 +64,8 @@ def foresee(
     template: PromptTemplate = FULL,
     base_url: str | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
+    max_cost: float | None = None,
+    max_tokens: int | None = None,
 ) -> Outlook:
     """The first prompt of a run and its worst case; no model is asked, no key needed.
 
@@ -70,6 +80,8 @@ def foresee(
         template: Of the question for a new controller.
         base_url: Where the models are served, if not by the vendor.
         max_output: Tokens that an answer may have.
+        max_cost: USD that the run may spend; by default 2.
+        max_tokens: That it may spend; by default what `bounds_of` says.
 
     Raises:
         PromptError: The template cannot be used.
@@ -96,6 +108,13 @@ def foresee(
         if price is None
     ]
     own = [name for name in without if name.partition(":")[0] in OWN_MATTER]
+    if base_url is not None and max_tokens is None and len(without) > len(own):
+        max_tokens = UNPRICED_TOKENS
+    priced = any(price is not None and price.most(1, 1) > 0 for price in prices_of)
+    limit = (MAX_COST if max_cost is None else max_cost) if priced else None
+    worst = NOTHING
+    if first_cost != 0.0:
+        worst = Tariff(price=first).most(most_tokens(prompt), max_output)
     return Outlook(
         task=task.name,
         learner=learner,
@@ -106,6 +125,9 @@ def foresee(
         prompt_tokens=tokens,
         answer_tokens=max_output,
         first_cost=first_cost,
+        max_cost=limit,
+        max_tokens=max_tokens,
+        first_needs=_needed(Budget(limit, max_tokens), worst),
         questions=work.questions,
         cost_once=once,
         cost_most=most,
@@ -113,3 +135,12 @@ def foresee(
         uncounted=tuple(dict.fromkeys(own)),
         prices_dated=prices.dated.isoformat(),
     )
+
+
+def _needed(budget: Budget, worst: Amount) -> str:
+    """The flag with which a question can be paid; empty where the budget is enough."""
+    try:
+        budget.reserve("first", worst)
+    except BudgetExhausted as error:
+        return error.flag(worst)
+    return ""

@@ -10,10 +10,12 @@ from rich.markup import escape
 
 from tdac_agent.budget import told_usd
 from tdac_agent.commands.flags import TaskFlags
+from tdac_agent.commands.mistakes import fitted
 from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import SHIPPED, load_prices, price_file
 from tdac_agent.prompt import load_template
 from tdac_agent.providers.choice import Options, check_name, missing_before
+from tdac_agent.tariff import BY_VENDOR, MAX_COST
 
 
 def run(
@@ -28,8 +30,8 @@ def run(
 
     Args:
         flags: That name the task.
-        models: `learner`, `optimizer`, `base_url`, `prompt` and `max_output`, as for
-            `synthesize`.
+        models: `learner`, `optimizer`, `base_url`, `prompt`, `max_output`, `max_cost`
+            and `max_tokens`, as for `synthesize`.
         k: Iterations.
         j: Edits per iteration.
         refine: Whether failures become rules.
@@ -56,6 +58,8 @@ def run(
         template=template,
         base_url=models["base_url"],
         max_output=models["max_output"],
+        max_cost=models["max_cost"],
+        max_tokens=models["max_tokens"],
     )
     if as_json:
         sys.stdout.write(outlook.model_dump_json(indent=2) + "\n")
@@ -63,8 +67,9 @@ def run(
     sys.stdout.write(outlook.prompt)
     sys.stdout.flush()
     console = Console(stderr=True, highlight=False, emoji=False)
-    for line in [*_lines(outlook), *_needed(missing)]:
-        console.print(escape(line), soft_wrap=True)
+    unbounded = _unbounded(outlook) if models["base_url"] is None else []
+    for line in [*_lines(outlook), *_needed([*missing, *unbounded])]:
+        console.print(escape(fitted(line)), soft_wrap=True)
     return 0
 
 
@@ -86,7 +91,34 @@ def _lines(outlook: Outlook) -> list[str]:
             f": at most {told_usd(outlook.cost_once)}, or "
             f"{told_usd(outlook.cost_most)} if every answer is asked for three times"
         )
-    return [*lines, asked, *_prices(outlook)]
+    return [*lines, asked, *_budget(outlook), *_prices(outlook)]
+
+
+def _budget(outlook: Outlook) -> list[str]:
+    """What bounds a run, and whether its first question is within that."""
+    limits = []
+    if outlook.max_cost is not None:
+        default = ", by default" if outlook.max_cost == MAX_COST else ""
+        limits.append(f"{told_usd(outlook.max_cost)} (--max-cost{default})")
+    if outlook.max_tokens is not None:
+        limits.append(f"{outlook.max_tokens} tokens (--max-tokens)")
+    if not limits:
+        return []
+    told = "enough for the first question; it stops before one that does not fit in"
+    if outlook.first_needs:
+        told = f"not enough for the first question: give {outlook.first_needs} or more"
+    return [f"budget: {' and '.join(limits)}: {told}"]
+
+
+def _unbounded(outlook: Outlook) -> list[str]:
+    """Of models of vendors without a price; other servers have a limit of tokens."""
+    if outlook.max_tokens is not None:
+        return []
+    return [
+        f"--max-tokens N, since no price of {name} is known to bound the run by"
+        for name in outlook.unknown_prices
+        if name.partition(":")[0] in BY_VENDOR
+    ]
 
 
 def _prices(outlook: Outlook) -> list[str]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import shutil
 import sys
+import textwrap
 import traceback
 from typing import Any, NoReturn
 
@@ -28,8 +30,21 @@ def explain(error: Exception) -> NoReturn:
 def fail(message: str, code: int) -> NoReturn:
     """Ends the process with a line on stderr."""
     sys.stdout.flush()
-    print(" ".join(message.split()), file=sys.stderr)
+    print(fitted(" ".join(message.split())), file=sys.stderr)
     sys.exit(code)
+
+
+def fitted(line: str) -> str:
+    """A line for stderr; a terminal gets it in its width, no word or path broken."""
+    if not sys.stderr.isatty():
+        return line
+    return textwrap.fill(
+        line,
+        shutil.get_terminal_size().columns,
+        subsequent_indent="  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _explain_usage(error: Any) -> NoReturn:

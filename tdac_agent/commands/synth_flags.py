@@ -105,7 +105,9 @@ def synth(
     if dry_run:
         from tdac_agent.commands import dry_run as dry
 
-        raise typer.Exit(dry.run(named_task(), models, k, j, refine, as_json))
+        raise typer.Exit(
+            dry.run(named_task(), {**models, **limits}, k, j, refine, as_json)
+        )
     loop = {"iterations": k, "patience": j, "refine": refine, "seed": seed}
     wanted = {**models, **limits, **loop}
     raise typer.Exit(command.run(named_task(), wanted, out, from_, as_json))

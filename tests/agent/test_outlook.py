@@ -86,6 +86,43 @@ def test_a_dry_run_prints_the_prompt_and_nothing_else(tmp_path, tdac):
     assert "price of openai:unheard-of: unknown" in told
 
 
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("anthropic:claude-sonnet-5-5", "2.00 USD (--max-cost, by default): enough"),
+        (
+            "anthropic:claude-sonnet-5-5 --max-cost 0.01",
+            "0.0100 USD (--max-cost): not enough for the first question: give "
+            "--max-cost 0.",
+        ),
+        ("openai:mine --max-tokens 9", "9 tokens (--max-tokens): not enough for the"),
+        (
+            "openai:mine --base-url http://localhost:1/v1",
+            "1000000 tokens (--max-tokens): enough",
+        ),
+    ],
+)
+def test_a_dry_run_says_what_bounds_the_run(tmp_path, tdac, words, expected):
+    """Also what nobody said, and whether the first question can be paid with it."""
+    folder = write_small_task(tmp_path / "task")
+    dry = ("synth", "--task", folder, "--dry-run", "--learner", *words.split())
+    assert f"budget: {expected}" in tdac(*dry)[2]
+    facts = json.loads(tdac(*dry, "--json")[1])
+    needs = facts["first_needs"]
+    assert bool(needs) == ("not enough" in expected)
+    if needs:
+        assert json.loads(tdac(*dry, *needs.split(), "--json")[1])["first_needs"] == ""
+
+
+def test_a_dry_run_asks_for_a_limit_where_nothing_bounds_the_run(tmp_path, tdac):
+    """As the run would, which is refused without."""
+    folder = write_small_task(tmp_path / "task")
+    dry = ("synth", "--task", folder, "--dry-run", "--learner", "openai:mine")
+    needed = "still needed: --max-tokens N, since no price of openai:mine is known"
+    assert needed in tdac(*dry)[2]
+    assert needed not in tdac(*dry, "--max-tokens", 10**6)[2]
+
+
 def test_a_dry_run_with_models_of_ones_own(tmp_path, tdac):
     """What a program or a person costs is not told, and no folder is made."""
     folder = write_small_task(tmp_path / "task")

@@ -1,0 +1,30 @@
+"""A mistake is one line; on a terminal it is as wide as that."""
+
+import os
+import pty
+import sys
+
+import pytest
+
+from tdac_agent.commands.mistakes import fitted
+
+LINE = "error: " + "words that are rather many " * 6 + "/a/path/" + "x" * 99
+
+
+def test_a_line_stays_one_where_nobody_looks():
+    """A file or a pipe gets it whole."""
+    assert fitted(LINE) == LINE
+
+
+@pytest.mark.parametrize("columns", [40, 80])
+def test_a_terminal_gets_it_in_its_width(monkeypatch, columns):
+    """It goes on below its text; nothing is cut, no path broken."""
+    master, slave = pty.openpty()
+    monkeypatch.setenv("COLUMNS", str(columns))
+    with os.fdopen(slave, "w") as terminal, os.fdopen(master):
+        monkeypatch.setattr(sys, "stderr", terminal)
+        lines = fitted(LINE).splitlines()
+    assert len(lines) > 2
+    assert all(line.startswith("  ") for line in lines[1:])
+    assert " ".join(line.strip() for line in lines) == LINE
+    assert all(len(line) <= columns for line in lines[:-1])
