@@ -49,12 +49,14 @@ class OutOfBudget(Exception):
         # Twice what is needed at least, so that it does not stop at once again.
         twice = error.flag(worst, times=2)
         self.way_on = min(twice, whole, key=lambda flag: float(flag.split()[1]))
-        self.outlook = (
-            f"at most {rest.questions} questions are left: {least} is enough for the "
-            f"next one, {whole} for all of them"
-            if rest.questions > 1
-            else f"at most this question is left: {least} is enough"
-        )
+        self.outlook = f"at most this question is left: {least} is enough"
+        if rest.questions > 1:
+            self.outlook = (
+                f"at most {rest.questions} questions are left: {least} is enough for "
+                f"the next one, {whole} for all of them"
+            )
+            if self.way_on != whole:
+                self.outlook += "; to go on, twice the first is proposed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +105,7 @@ class Calls:
         except ProviderFault as fault:
             number = len(missed)
             times = "" if number == 1 else f" (asked {number} times)"
-            raise Fault(f"{model.name}: {fault.kind} fault: {fault}{times}") from None
+            raise Fault(f"{model.name}: {fault}{times}") from None
 
     def _answer(self, model: Provider, request: Request, missed: list[Missed]) -> Reply:
         """Asks a model again and again; each time is a call of its own."""

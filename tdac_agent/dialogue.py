@@ -10,6 +10,7 @@ from tdac_agent.extract import Answer, read_answer
 from tdac_agent.feedback import tell_attempt
 from tdac_agent.prompt import FULL, PromptTemplate, generate_prompt, repair_prompt
 from tdac_agent.provider import Kind, Provider, Reply, Request
+from tdac_agent.providers.secrets import one_line
 from tdac_agent.report import Report
 from tdac_agent.rule_answer import RuleAnswerError, apply, parse_operations
 from tdac_agent.rules import BEGIN, RuleBook
@@ -17,6 +18,7 @@ from tdac_agent.task import Task
 
 MAX_ASKS = 3
 MAX_EARLIER = 12
+EXCERPT_CHARS = 160
 _AGAIN = "\n## Your last answer could not be used\nThe reason: "
 _SAME = "the code of the attempt before came back"
 _ENDED = {"length": "it was cut off at its end", "refusal": "it was refused"}
@@ -157,7 +159,10 @@ class Dialogue:
         self, request: Request, reply: Reply, problem: str, asked: int
     ) -> Request:
         """The same question with what was wrong with the answer; the last word only."""
-        self.calls.recorder.unused(request, problem, asked, MAX_ASKS)
+        # It may be long, and begin with white space.
+        says = one_line(reply.text[:2000], EXCERPT_CHARS)
+        facts = {"problem": problem, "says": says, "asked": asked, "most": MAX_ASKS}
+        self.calls.recorder.unused(request, **facts)
         first = request.prompt.partition(_AGAIN)[0]
         prompt = f"{first}{_AGAIN}{problem}. Give the whole answer anew.\n"
         room = request.max_tokens

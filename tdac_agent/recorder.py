@@ -117,9 +117,13 @@ class Recorder:
         new = name not in REPEATED or not self.past.has_step(name, facts)
         if new:
             append_record(self.run.folder / JOURNAL, record)
+        self.tell(record)
+        return new
+
+    def tell(self, record: dict[str, Any]) -> None:
+        """Shows a record, and keeps nothing of it."""
         if self.on_event is not None:
             self.on_event(record)
-        return new
 
     def numbered(self, request: Request) -> Request:
         """A question that knows how many came before it that are like it."""
@@ -176,11 +180,10 @@ class Recorder:
         self.event("call.reply", **record)
         self._count(request, reply, cost)
 
-    def unused(self, request: Request, problem: str, asked: int, most: int) -> None:
+    def unused(self, request: Request, **facts: Any) -> None:
         """Keeps why an answer could not be used, and how often it was asked for."""
         _, k, j = request.sample
-        facts = {"kind": request.kind, "k": k, "j": j, "problem": problem}
-        self.event("call.unused", **facts, asked=asked, most=most)
+        self.event("call.unused", kind=request.kind, k=k, j=j, **facts)
 
     def recall(self, request: Request, key: str) -> Reply | None:
         """The answer on record to this very question, if there is one."""
@@ -190,8 +193,7 @@ class Recorder:
         if reply is not None:
             keep(self._call_file(request, "prompt"), request.prompt)
             self._count(request, reply, record.get("cost"))
-            if self.on_event is not None:
-                self.on_event(record)
+            self.tell(record)
         return reply
 
     def _count(self, request: Request, reply: Reply, cost: float | None) -> None:
@@ -226,8 +228,8 @@ class Recorder:
         notes: tuple[str, ...],
         *,
         unchanged: bool = False,
-    ) -> None:
-        """Keeps what came of a candidate.
+    ) -> bool:
+        """Keeps what came of a candidate; returns whether it is not on record yet.
 
         Args:
             k: Of the candidate.
@@ -247,8 +249,10 @@ class Recorder:
             unchanged=unchanged,
         )
         self.run.attempts.append(attempt)
-        if self.event("verify.end", **attempt.model_dump(mode="json")):
+        new = self.event("verify.end", **attempt.model_dump(mode="json"))
+        if new:
             self.save()
+        return new
 
     def rules(self, k: int, book: RuleBook, notes: tuple[str, ...] = ()) -> None:
         """Keeps the rules of the run, and what changed them in iteration k."""

@@ -89,7 +89,7 @@ def check_suite(
             times, verified = (1, short) if name == SLOW else (repeats, full)
             reports[name] = []
             for number in range(1, times + 1):
-                on_progress(f"{name}, {number} of {times}")
+                on_progress(name if times == 1 else f"{name}, {number} of {times}")
                 reports[name].append(verified())
     rows = [row_of(name, about_it) for name, about_it in reports.items()]
     return verdict_on_suite(reports[REFERENCE][0], rows, time.monotonic() - began)
@@ -103,6 +103,7 @@ def prove_suite(
     tier: str = "auto",
     seed: int = 0,
     judge: WarmJudge | None = None,
+    on_progress: Callable[[str], None] = lambda _: None,
 ) -> SuiteCheck:
     """The short form, for the beginning of a run; arguments as for `check_suite`.
 
@@ -120,6 +121,7 @@ def prove_suite(
         repeats=1,
         bad=(DO_NOTHING,),
         judge=judge,
+        on_progress=on_progress,
     )
     if not check.proven:
         first, *more = check.problems

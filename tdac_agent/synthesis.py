@@ -9,6 +9,7 @@ from tdac_agent.beginning import account_of, describe, hold_folder, open_record
 from tdac_agent.budget import Budget
 from tdac_agent.calls import Calls, OutOfBudget
 from tdac_agent.dialogue import Candidate, Dialogue
+from tdac_agent.errors import Fault
 from tdac_agent.extract import same_code
 from tdac_agent.figures import draw_trajectories
 from tdac_agent.files import write_atomic
@@ -24,6 +25,9 @@ from tdac_agent.suite_check import prove_suite
 from tdac_agent.task import Task
 from tdac_agent.verification import kept_report, load_trajectories, verify
 from tdac_agent.warm import WarmJudge
+
+MOST_SPENT = 3
+"""Iterations in a row in which a model that costs something may give no code."""
 
 
 def synthesize(
@@ -154,14 +158,20 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
     recorder = dialogue.calls.recorder
     run = recorder.run
     first = None if given is None else Candidate(given)
+    # Those on record do not count: who goes on with a run wants it to be tried again.
+    spent = 0
     for k in range(1, run.iterations + 1):
         candidate = (k == 1 and first) or dialogue.generate(k)
         parent, report = "", None
         for j in range(run.patience + 1):
             source, notes = candidate
             if source is None:
-                recorder.judged(k, j, None, notes)
+                new = recorder.judged(k, j, None, notes)
+                spent += new and j == 0
+                if dialogue.learner.paid and spent >= MOST_SPENT and k < run.iterations:
+                    raise _given_up(dialogue.learner, spent, notes)
                 break
+            spent = 0
             folder = recorder.candidate(k, j, source)
             if report is not None and same_code(source, parent):
                 recorder.judged(k, j, report, notes, unchanged=True)
@@ -181,6 +191,14 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
     recorder.finish("not verified")
 
 
+def _given_up(model: Provider, spent: int, notes: tuple[str, ...]) -> Fault:
+    """That a model gives no code, with what was noted of its last answers."""
+    return Fault(
+        f"{model.name}: {spent} iterations in a row without a controller; of the last "
+        f"one, {notes[-1]}"
+    )
+
+
 def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
     """Has the suite prove itself before an answer is paid for, once in a run.
 
@@ -189,8 +207,13 @@ def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
     """
     if recorder.past.proven:
         return
+
+    def tell(doing: str) -> None:
+        recorder.tell({"event": "prove.step", "doing": doing})
+
     recorder.event("prove.start")
-    proof = prove_suite(task, seed=recorder.run.seed, judge=judge)
+    seed = recorder.run.seed
+    proof = prove_suite(task, seed=seed, judge=judge, on_progress=tell)
     facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
     recorder.event("prove.end", **facts)
 

@@ -31,6 +31,7 @@ class Progress:
     def __init__(self, console: Console, heading: str) -> None:
         self._console = console
         self._heading = heading
+        self._has_quoted = False
         self._spinner = Spinner("dots", text="preparing")
 
     def __enter__(self) -> Progress:
@@ -53,7 +54,11 @@ class Progress:
         if kind in {"run.start", "run.resume"}:
             self._print_heading(record)
         elif kind == "prove.start":
-            self._spinner.update(text="the suite proves itself")
+            told = "checking the suite: reference must pass, do-nothing must fail"
+            self._console.print(f"  {told}", style="dim")
+            self._spinner.update(text="checking the suite")
+        elif kind == "prove.step":
+            self._spinner.update(text=f"checking the suite: {record['doing']} …")
         elif kind == "call.intent":
             verb = {"generate": "writing", "edit": "editing"}.get(
                 record["kind"], "writing rules from the failures of"
@@ -97,6 +102,10 @@ class Progress:
             why = f"answer {asked} of at most {most} cannot be used: "
             told = f"{why}{record['problem']}; asking again"
             self._say(f"  {at}", escape(told), "yellow")
+        if not self._has_quoted:
+            self._has_quoted = True
+            said = f"it says: “{record['says']}”" if record["says"] else "it is empty"
+            self._say(f"  {at}", escape(said), "dim")
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         if record["passed"]:
@@ -133,10 +142,11 @@ def _known(answers: dict[str, int]) -> str:
 
 
 def _open(record: dict[str, Any]) -> str:
-    """Questions that still have no answer, and what lost answers may have cost."""
+    """Questions without an answer on record, and what lost answers may have cost."""
     number, lost = record["unanswered"], record["lost_usd"]
     told = ""
     if number:
-        who = "one question is" if number == 1 else f"{number} questions are"
-        told = f"; {who} put again, without an answer so far"
+        one = number == 1
+        who = "one question has" if one else f"{number} questions have"
+        told = f"; {who} no answer on record and {'is' if one else 'are'} put again"
     return told + (f"; lost answers count with {told_usd(lost)}, at most" * bool(lost))

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.commands.run_view import told_tests
-from tdac_agent.records import load_rules, load_run
+from tdac_agent.records import Run, load_rules, load_run
 from tdac_agent.rules import RepairRule, RuleBook
 
 _COLOURS = {"in force": "green", "dropped": "red", "made room": "yellow"}
@@ -28,9 +28,7 @@ def run(folder: Path, as_json: bool) -> int:
         console.print(f"[bold]{escape(title)}[/]\n")
         console.print(_lives(book))
     else:
-        console.print(
-            f"{escape(title)}: no rules, since no iteration failed as a whole"
-        )
+        console.print(escape(f"{title}: no rules: {_why_none(record)}"))
     return 0
 
 
@@ -45,12 +43,25 @@ def _lives(book: RuleBook) -> Table:
             f"[bold]{escape(rule.text)}[/]",
             *(f"[dim]{escape(edit)}[/]" for edit in rule.edits),
             f"{state} · {rule.scope} · since k={rule.born}",
-            f"from: {escape(told_tests(rule.evidence, 4))}",
+            f"failed before it: {escape(told_tests(rule.evidence, 4))}",
             f"effect: {escape(_effect(rule))}",
             "",
         ]
         grid.add_row(rule.id, "\n".join(lines))
     return grid
+
+
+def _why_none(run: Run) -> str:
+    """What has to be known where there are no rules."""
+    if not run.refine:
+        return "this run leaves its prompt as it is (--no-refine)"
+    failed = [attempt for attempt in run.attempts if not attempt.passed]
+    if failed and not any(attempt.valid for attempt in run.attempts):
+        number = len({attempt.k for attempt in failed})
+        return f"no answer of {number} iteration{'s' * (number > 1)} could be used"
+    if any(attempt.j == run.patience and attempt.valid for attempt in failed):
+        return "the optimizer had none to add"
+    return "no iteration has failed as a whole"
 
 
 def _effect(rule: RepairRule) -> str:
@@ -59,7 +70,7 @@ def _effect(rule: RepairRule) -> str:
     cured = [test for test, count in pairs if rule.tried and count == rule.tried]
     if not 0 < len(cured) < len(rule.evidence):
         return rule.effect_told
-    return f"{rule.effect_told} ({told_tests(cured, 4)})"
+    return f"{rule.effect_told}; cured: {told_tests(cured, 4)}"
 
 
 def _state(rule: RepairRule) -> str:

@@ -110,11 +110,15 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
         table.add_column("task", no_wrap=True)
     table.add_column("learner", overflow="ellipsis", min_width=8)
     table.add_column("status", no_wrap=True)
-    for name in ("k", "tokens", "cost"):
+    figures = _figures(rows)
+    for name in figures:
         table.add_column(name, justify="right", no_wrap=True)
     if wide:
         table.add_column("started", no_wrap=True)
-    for row in rows:
+    if any("–" in column for column in figures.values()):
+        table.caption = "–: no model was asked, or it reports none"
+        table.caption_justify = "left"
+    for number, row in enumerate(rows):
         status = row["status"]
         task, started = row.get("task", ""), _when(row.get("started", ""))
         table.add_row(
@@ -123,23 +127,34 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
             # One word, so that it is not wrapped where it is cut.
             escape(row.get("learner", "").replace(" ", "\N{NO-BREAK SPACE}")),
             f"[{_COLOURS.get(status, 'yellow')}]{status}[/]",
-            *_figures(row),
+            *(column[number] for column in figures.values()),
             *([started] if wide else []),
         )
     return table
 
 
-def _figures(row: dict[str, Any]) -> list[str]:
+def _figures(rows: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Columns of figures by their names; without those that say nothing at all."""
+    lines = [_figures_of(row) for row in rows]
+    columns = {
+        name: [line[at] for line in lines]
+        for at, name in enumerate(("k", "tokens", "cost"))
+    }
+    return {name: told for name, told in columns.items() if set(told) - {"–", ""}}
+
+
+def _figures_of(row: dict[str, Any]) -> tuple[str, str, str]:
+    """How far a run came, its tokens and its cost; a dash where none are reported."""
     if "k" not in row:
-        return ["", "", ""]
+        return "", "", ""
     tokens = row["tokens_in"] + row["tokens_out"]
     cost = "unknown" if row["cost"] is None else told_usd(row["cost"])
     asked = tokens or row["cost"] != 0.0
-    return [
+    return (
         f"{row['k']}/{row['iterations']}",
         str(tokens) if tokens else "–",
         cost if asked else "–",
-    ]
+    )
 
 
 def _when(started: str) -> str:

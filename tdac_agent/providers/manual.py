@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 import time
+from datetime import datetime
 from pathlib import Path
 
 from tdac_agent.errors import ProviderError
@@ -53,7 +54,11 @@ class Manual:
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
         try:
-            return Reply(self._wait(self._number(request.prompt, request.repeat)))
+            there = set(self._folder.glob("*.reply.md"))
+            number = self._number(request.prompt, request.repeat)
+            reply = self._folder / f"{number:03}.reply.md"
+            self._tell(number, reply, is_there=reply in there)
+            return Reply(self._wait(reply))
         except OSError as error:
             raise PermanentFault(f"{error.filename}: {error.strerror}") from None
 
@@ -71,13 +76,18 @@ class Manual:
                 repeat -= 1
         raise AssertionError("unreachable")
 
-    def _wait(self, number: int) -> str:
-        """The text of an answer, once it is there and no longer grows."""
-        path = self._folder / f"{number:03}.reply.md"
+    def _tell(self, number: int, reply: Path, *, is_there: bool) -> None:
+        """Says what is waited for, or which older answer is taken."""
         question = self._folder / f"{number:03}.prompt.md"
+        told = f"waiting: answer {question} in {reply}"
+        if is_there:
+            written = datetime.fromtimestamp(reply.stat().st_mtime)
+            told = f"taking {reply}, which was there before, of {written:%F %H:%M}"
+        print(told, file=sys.stderr)
+
+    def _wait(self, path: Path) -> str:
+        """The text of an answer, once it is there and no longer grows."""
         before = None
-        if not path.exists():
-            print(f"waiting: answer {question} in {path}", file=sys.stderr)
         while True:
             now = path.read_bytes() if path.exists() else b""
             if now.strip() and now == before:

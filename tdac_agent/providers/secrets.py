@@ -49,9 +49,9 @@ def public_url(url: str) -> str:
         return "an address that is none"
 
 
-def one_line(text: str) -> str:
+def one_line(text: str, longest: int = LONGEST_LINE) -> str:
     """A text from elsewhere as one short line, for messages and records."""
     line = without_secrets(" ".join(text.split()))
     line = "".join(c for c in line if unicodedata.category(c)[0] != "C")
     kept = re.sub(r"\s+", " ", line).strip()
-    return kept if len(kept) <= LONGEST_LINE else f"{kept[: LONGEST_LINE - 1]}…"
+    return kept if len(kept) <= longest else f"{kept[: longest - 1]}…"

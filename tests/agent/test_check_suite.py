@@ -258,7 +258,11 @@ def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
     paid, out = Paid(good_source), tmp_path / "run"
     providers = {"learner": "builtin", who: paid}
-    assert synthesize(task, **providers, out=out, judge=warm).verified
+    told = []
+    run = synthesize(task, **providers, out=out, judge=warm, on_event=told.append)
+    assert run.verified
+    doing = [record["doing"] for record in told if record["event"] == "prove.step"]
+    assert doing == ["reference", "do-nothing"]
     assert paid.calls == (who == "learner")
     records = events(out)
     begun = [record["event"] for record in records][:4]

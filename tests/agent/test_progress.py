@@ -36,6 +36,7 @@ def verified_end(**facts):
 def test_why_an_answer_was_not_used():
     """The reason, and how often it was asked for; nothing is said twice."""
     unused = {"event": "call.unused", "kind": "generate", "k": 1, "j": 0, "most": 3}
+    unused["says"] = "lorem ipsum"
     reason = "it has no fenced block"
     end = verified_end(valid=False, notes=["x", f"none of 3 answers was: {reason}"])
     asked = [{**unused, "asked": n, "problem": reason} for n in (1, 2, 3)]
@@ -43,7 +44,22 @@ def test_why_an_answer_was_not_used():
     for n in (1, 2):
         assert f"k=1 j=0 answer {n} of at most 3 cannot be used: {reason};" in words
     assert words.count("asking again") == 2
+    assert words.count("it says: “lorem ipsum”") == 1
     assert words.endswith(f"– k=1 j=0 none of 3 answers was: {reason}")
+
+
+def test_an_answer_without_words_is_called_empty():
+    """So that nobody looks for what was not shown."""
+    unused = {"event": "call.unused", "kind": "generate", "k": 1, "j": 0, "most": 3}
+    _, words = shown({**unused, "asked": 1, "problem": "it is no code", "says": ""})
+    assert words.endswith("k=1 j=0 it is empty")
+
+
+def test_the_check_of_the_suite_is_said_when_it_begins():
+    """It may take half a minute, in which nothing else is to be seen."""
+    lines, _ = shown({"event": "prove.start"})
+    told = "  checking the suite: reference must pass, do-nothing must fail"
+    assert lines == [told]
 
 
 def test_a_long_line_goes_on_below_itself():
@@ -66,8 +82,8 @@ def test_a_long_line_goes_on_below_itself():
             1,
             0.25,
             "5 answers on record (2 controllers, 1 edit, 2 about the rules); one "
-            "question is put again, without an answer so far; lost answers count with "
-            "0.25 USD, at most",
+            "question has no answer on record and is put again; lost answers count "
+            "with 0.25 USD, at most",
         ),
     ],
 )
@@ -150,3 +166,15 @@ def test_runs_in_a_table(tdac, monkeypatch, columns):
     assert ("started" in out) == ("a:task:of mine" in row) == (columns == 120)
     assert max(map(len, out.splitlines())) <= columns
     assert "go on: tdac synth --resume runs/epuck-clutter-12" in out
+
+
+def test_no_column_of_dashes(tdac):
+    """What no run reports is left out; where some do, the dash is explained."""
+    facts = {"tokens_in": 0, "tokens_out": 0}
+    for name, tokens in (("a", {}), ("b", {"tokens_in": 7})):
+        run = run_with(f"runs/{name}", "interrupted", **{**facts, **tokens})
+        Path("runs", name).mkdir(parents=True)
+        Path("runs", name, "run.json").write_text(run.model_dump_json())
+        told = tdac("runs")[1]
+        assert ("tokens" in told.splitlines()[1]) == (name == "b")
+        assert ("–: no model was asked, or it reports none" in told) == (name == "b")

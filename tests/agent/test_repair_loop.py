@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from small import write_small_task
 
-from tdac_agent.records import load_rules, load_run
-from tdac_agent.rules import BEGIN
+from tdac_agent.records import Attempt, Run, load_rules, load_run
+from tdac_agent.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
 
@@ -198,6 +198,64 @@ def test_a_broken_template_leaves_no_folder(tmp_path, tdac):
     assert "'nothing' is undefined" in told
     assert told.count("\n") == 1
     assert not Path("run").exists()
+
+
+TESTS = tuple(f"test_end_to_end.py::test_{name}" for name in "abcdef")
+
+
+def book_of(folder, run, *rules):
+    """A run folder with a record and rules, and nothing else."""
+    folder.mkdir()
+    (folder / "run.json").write_text(run.model_dump_json())
+    (folder / "rules.json").write_text(RuleBook(rules=rules).model_dump_json())
+    return folder
+
+
+def record(folder, **facts):
+    plain = {"task": "a", "task_sha256": "", "learner": "l", "optimizer": "o"}
+    plain |= {"iterations": 2, "patience": 0, "seed": 0, "started": "2026-01-01"}
+    return Run(folder=folder, **{**plain, **facts})
+
+
+def test_what_a_rule_cured_is_said_by_name(tmp_path, tdac):
+    """The tests that passed each time, apart from those that did now and then."""
+    rule = RepairRule(
+        id="R1", text="Slow down.", born=1, evidence=TESTS, tried=2,
+        cured=0, passes=(2, 1, 0, 2, 0, 0),
+    )  # fmt: skip
+    folder = book_of(tmp_path / "run", record(tmp_path / "run"), rule)
+    _, shown, _ = tdac("rules", folder)
+    told = " ".join(shown.split())
+    assert (
+        "effect: cured 2 of 6 tests in 2 tries, 1 more in some of them; cured: "
+        "test_a, test_d" in told
+    )
+    assert "failed before it: test_a, test_b, test_c, test_d and 2 more" in told
+
+
+INVALID = Attempt(k=1, j=0, valid=False, passed=False)
+FAILED = Attempt(k=1, j=0, valid=True, passed=False, failed_tests=TESTS)
+
+
+@pytest.mark.parametrize(
+    ("facts", "why"),
+    [
+        ({}, "no iteration has failed as a whole"),
+        ({"attempts": [FAILED.model_copy(update={"passed": True})]}, "no iteration"),
+        ({"attempts": [INVALID]}, "no answer of 1 iteration could be used"),
+        (
+            {"attempts": [INVALID, INVALID.model_copy(update={"k": 2})]},
+            "no answer of 2 iterations could be used",
+        ),
+        ({"attempts": [INVALID, FAILED]}, "the optimizer had none to add"),
+        ({"attempts": [FAILED], "refine": False}, "leaves its prompt as it is"),
+    ],
+)
+def test_why_there_are_no_rules(tmp_path, tdac, facts, why):
+    """By what came of the run, not by what usually does."""
+    folder = book_of(tmp_path / "run", record(tmp_path / "run", **facts))
+    _, shown, _ = tdac("rules", folder)
+    assert f"no rules: {why}" in shown.replace("this run ", "")
 
 
 def test_rules_of_what_is_no_run(tmp_path, tdac):

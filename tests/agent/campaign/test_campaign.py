@@ -24,7 +24,7 @@ def test_runs_that_fail_stop_no_other_and_say_why(once):
     _, (code, said, complained), _ = once
     assert (code, complained) == (3, "")
     assert said.count("replay") > 0
-    assert "2 × fault: replay:demo: permanent fault: another question than" in said
+    assert "2 × fault: replay:demo: another question than" in said
     assert "2 of 4 runs have ended, 2 of them now" in said
     assert "go on: tdac campaign broken.yaml --workers 2 --out out" in said
     assert said.count(" fault, ") == 4  # tried once more, after all others

@@ -15,6 +15,7 @@ from tdac_agent.providers.manual import Manual
 from tdac_agent.records import load_run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
+from tdac_envs.extras import install_command
 
 QUESTION = Request("generate", "Wände? ÄÖ\n" * 20_000)
 STANDS = "def policy(obs):\n    return 0.0, 0.0\n"
@@ -96,7 +97,7 @@ def answer_in(folder, texts):
     return lambda: (given_up.set(), thread.join())
 
 
-def test_a_person_answers(tmp_path):
+def test_a_person_answers(tmp_path, capsys):
     """Questions and answers are numbered files; equal questions are put again."""
     folder = tmp_path / "mail"
     folder.mkdir()
@@ -107,10 +108,16 @@ def test_a_person_answers(tmp_path):
     texts = [model.complete(question).text for question in questions]
     done()
     assert texts == ["one", "two", "three"]
+    assert capsys.readouterr().err.count("waiting: answer") == 3
     assert (folder / "003.prompt.md").read_text() == "other"
     # A second life finds all answers, in the same order.
     again = Manual(folder, poll=0.005)
     assert [again.complete(question).text for question in questions] == texts
+    # They may be those of another run, so it says which it takes, and of when.
+    told = capsys.readouterr().err.splitlines()
+    replies = sorted(folder.glob("*.reply.md"))
+    assert [line.split(",")[0] for line in told] == [f"taking {x}" for x in replies]
+    assert all("which was there before, of 20" in line for line in told)
     assert len(list(folder.iterdir())) == 6
     # Who remembers the first answer asks for the second alone, and gets that one.
     assert Manual(folder, poll=0.005).complete(questions[1]).text == "two"
@@ -182,7 +189,7 @@ def test_a_run_is_replayed(policy_task, recorded, tmp_path, warm):
 
 def test_a_miss_is_an_error(policy_task, recorded, tmp_path, small_task, warm):
     """Another question, or one too many, is a fault that says where."""
-    with pytest.raises(Fault, match=r"permanent fault: another question than.*line"):
+    with pytest.raises(Fault, match=r"replay:.*: another question than.*line"):
         synthesize(small_task, f"replay:{recorded}", out=tmp_path / "other", judge=warm)
     (recorded / "iterations/k01/j1/edit.reply.md").unlink()
     with pytest.raises(Fault, match=r"answer 1 to edit k=1 j=1 is not in"):
@@ -258,7 +265,7 @@ def test_a_missing_package(options, vendor, monkeypatch, canary):
     monkeypatch.setitem(sys.modules, vendor, None)
     model = choose_model(f"{vendor}:x", options)
     (line,) = model.missing
-    assert line.endswith(f'pip install "tdac[{vendor}]"')
+    assert line.endswith(f": {install_command(vendor)}")
     with pytest.raises(PermanentFault, match=vendor):
         model.complete(QUESTION)
 

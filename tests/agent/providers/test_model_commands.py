@@ -48,9 +48,7 @@ def test_what_broke(tdac, server, task_file, tmp_path):
     code, out, err = tdac("synth", "--task", task_file, *words)
     assert code == 3
     last = err.splitlines()[-1]
-    expected = (
-        "infrastructure fault: openai:m: permanent fault: 403: permission_error: "
-    )
+    expected = "infrastructure fault: openai:m: 403: permission_error: "
     assert last == f"{expected}not for you (request req_7)"
     assert f"the run so far is in {tmp_path / 'run'}" in out
     assert json.loads((tmp_path / "run/run.json").read_text())["status"] == "fault"

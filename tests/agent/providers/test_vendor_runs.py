@@ -85,7 +85,7 @@ def test_a_fault_that_stays_ends_the_run(
         fails(ANTHROPIC, 401, "authentication_error", "no such key"),
     ]
     url = server.url(ANTHROPIC)
-    expected = "anthropic:m: permanent fault: 401: authentication_error: no such key"
+    expected = "anthropic:m: 401: authentication_error: no such key"
     with pytest.raises(Fault, match=expected):
         synthesize(
             load_task(task_file),
