@@ -26,7 +26,7 @@ from tdac_agent.files import write_atomic
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.setting import JudgedEnv
 from tdac_envs.driven import Observation
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import TaskError, first_problem
 from tdac_envs.extras import install_command
 from tdac_envs.wrappers import wrap
 
@@ -81,11 +81,8 @@ def read_metadata(file: Path) -> SavedPolicy | None:
     try:
         return SavedPolicy.model_validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise ControllerFileError(
-            f"{METADATA} of {file}: {where}: {first['msg']}"
-        ) from error
+        told = f"{METADATA} of {file}: {first_problem(error)}"
+        raise ControllerFileError(told) from error
 
 
 def write_metadata(file: Path, saved: SavedPolicy) -> None:

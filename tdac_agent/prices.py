@@ -7,10 +7,10 @@ from datetime import date
 from pathlib import Path
 from typing import Literal
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.provider import Reply
+from tdac_agent.yaml_file import read_yaml
 from tdac_envs.errors import TdacError
 
 SHIPPED = Path(__file__).parent / "prices.yaml"
@@ -90,12 +90,4 @@ def load_prices(path: Path | None = None) -> PriceList:
         PriceError: It cannot be read, or has a wrong or unknown key.
     """
     file = path or price_file()
-    try:
-        return PriceList.model_validate(yaml.safe_load(file.read_text("utf-8")))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise PriceError(f"{file}: {place}: {first['msg']}") from error
-    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise PriceError(f"cannot read the prices in {file}: {reason}") from error
+    return read_yaml(file, PriceList, "the prices in", PriceError)

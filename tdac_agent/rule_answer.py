@@ -17,6 +17,7 @@ from pydantic import (
 
 from tdac_agent.extract import fenced_blocks
 from tdac_agent.rules import MAX_RULE_CHARS, RepairRule, RuleBook, Scope, clean
+from tdac_envs.errors import first_problem
 
 MAX_OPERATIONS = 3
 _FOREIGN = re.compile(r"```|~~~|https?://")
@@ -101,16 +102,10 @@ def parse_operations(reply: str) -> list[Add | Edit | Drop]:
     try:
         return _Operations.validate_python(json.loads(blocks[0]))
     except ValidationError as error:
-        raise RuleAnswerError(_first_problem(error)) from error
+        raise RuleAnswerError(first_problem(error)) from error
     except (ValueError, RecursionError) as error:
         reason = str(error).partition("\n")[0]
         raise RuleAnswerError(f"the block is not JSON: {reason}") from error
-
-
-def _first_problem(error: ValidationError) -> str:
-    first = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}" if place else str(first["msg"])
 
 
 def apply(

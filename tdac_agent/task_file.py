@@ -9,7 +9,7 @@ from typing import Any, Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import TaskError, first_problem
 from tdac_envs.maps import bundled_maps
 from tdac_envs.worlds import bundled_worlds
 
@@ -121,9 +121,7 @@ def checked(data: dict[str, Any], source: str) -> TaskFile:
     try:
         spec = TaskFile.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise TaskError(f"{source}: {where}: {first['msg']}") from error
+        raise TaskError(f"{source}: {first_problem(error)}") from error
     for env, keys in OWN_KEYS.items():
         for key in spec.model_fields_set.intersection(keys):
             if env != spec.env:

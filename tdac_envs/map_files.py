@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from tdac_envs.errors import MapError
+from tdac_envs.errors import MapError, first_problem
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import ColourImage, MapImage, check_size, decode, read_bytes
 
@@ -64,9 +64,7 @@ def _parse_ros(text: bytes, path: Path) -> RosMap:
     try:
         return RosMap.model_validate(fields)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise MapError(f"{path}: {where}: {first['msg']}") from None
+        raise MapError(f"{path}: {first_problem(error)}") from None
 
 
 def _known_free(colour: ColourImage, ros: RosMap) -> BoolGrid:

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from tdac_envs.errors import MapError
+from tdac_envs.errors import MapError, first_problem
 
 PIXELS_PER_METRE = 3779.52
 """Pixels per metre of the paper's 2-D setting (96 dpi)."""
@@ -88,6 +88,4 @@ class MapParams(BaseModel):
         except OSError as error:
             raise MapError(f"cannot read {path}: {error.strerror}") from error
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "the file"
-            raise MapError(f"{path}: {where}: {first['msg']}") from error
+            raise MapError(f"{path}: {first_problem(error)}") from error

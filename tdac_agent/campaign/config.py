@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal, Self
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tdac_agent.errors import RunError
 from tdac_agent.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.providers.choice import OFFLINE
 from tdac_agent.records import Setting
 from tdac_agent.shipped import shipped, shipped_names
+from tdac_agent.yaml_file import read_yaml
 
 SAME = "same"
 """As an optimizer: the learner itself."""
@@ -106,13 +106,4 @@ def read_config(file: Path) -> CampaignConfig:
     Raises:
         CampaignError: It cannot be read, or has a wrong or unknown key.
     """
-    try:
-        return CampaignConfig.model_validate(yaml.safe_load(file.read_text("utf-8")))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"])) or "campaign"
-        reason = first["msg"].removeprefix("Value error, ")
-        raise CampaignError(f"{file}: {place}: {reason}") from error
-    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise CampaignError(f"cannot read the campaign {file}: {reason}") from error
+    return read_yaml(file, CampaignConfig, "the campaign", CampaignError)

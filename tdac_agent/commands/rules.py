@@ -28,7 +28,7 @@ def run(folder: Path, as_json: bool) -> int:
         console.print(f"[bold]{escape(title)}[/]\n")
         console.print(_lives(book))
     else:
-        console.print(escape(f"{title}: no rules: {_why_none(record)}"))
+        console.print(escape(f"{title}; no rules: {_why_none(record)}"))
     return 0
 
 

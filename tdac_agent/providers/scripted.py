@@ -13,17 +13,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tdac_agent.builtin import builtin_for
 from tdac_agent.builtin.parameters import names_of
 from tdac_agent.errors import ProviderError
 from tdac_agent.provider import Kind, Reply, Request
 from tdac_agent.providers.choice import Options
-from tdac_agent.providers.secrets import one_line
 from tdac_agent.setting import Setting
 from tdac_agent.shipped import shipped
+from tdac_agent.yaml_file import read_yaml
 
 _KINDS: tuple[Kind, ...] = ("generate", "edit")
 
@@ -69,7 +68,7 @@ def make(words: str, options: Options) -> Scripted:
         raise ProviderError("which script? As in scripted:weak, or scripted:my.yaml")
     own = shipped(f"scripts/{words}.yaml")
     file = own if own.is_file() else Path(words)
-    script = _read(file)
+    script = read_yaml(file, Script, "the script", ProviderError)
     sources = {
         kind: tuple(_source(choice, file, options.setting) for choice in choices)
         for kind, choices in zip(_KINDS, (script.generate, script.edit), strict=True)
@@ -117,23 +116,6 @@ class Scripted:
         random = np.random.default_rng(place)
         weights = np.array([choice.weight for choice in choices])
         return int(random.choice(len(choices), p=weights / weights.sum()))
-
-
-def _read(file: Path) -> Script:
-    """A script.
-
-    Raises:
-        ProviderError: There is none, or it has a wrong or unknown key.
-    """
-    try:
-        return Script.model_validate(yaml.safe_load(file.read_text("utf-8")))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise ProviderError(f"{file}: {place}: {first['msg']}") from error
-    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) else one_line(str(error))
-        raise ProviderError(f"cannot read the script {file}: {reason}") from error
 
 
 def _source(choice: Choice, script: Path, setting: Setting) -> str:

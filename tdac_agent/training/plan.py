@@ -18,7 +18,7 @@ from tdac_agent.training.hyperparameters import (
     config_file,
     read_hyperparameters,
 )
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import TaskError, first_problem
 from tdac_envs.wrappers import check_wrappers
 
 PLAN_FILE = "training.json"
@@ -126,9 +126,7 @@ def read_plan(folder: Path) -> TrainingPlan:
         reason = error.strerror
         raise RunError(f"no training in {str(folder)!r}: {file}: {reason}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise RunError(f"{file}: {where}: {first['msg']}") from error
+        raise RunError(f"{file}: {first_problem(error)}") from error
 
 
 def tasks_of(plan: TrainingPlan) -> list[Task]:

@@ -1,0 +1,32 @@
+"""A YAML file of a known form, read whole or refused in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from tdac_envs.errors import TdacError, first_problem
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def read_yaml(file: Path, form: type[M], what: str, refusal: type[TdacError]) -> M:
+    """What a file says.
+
+    Args:
+        file: To read.
+        form: Of its contents.
+        what: It holds, for messages: `the prices in`.
+        refusal: Raised where it cannot be read, or has a wrong or unknown key.
+    """
+    try:
+        return form.model_validate(yaml.safe_load(file.read_text("utf-8")))
+    except ValidationError as error:
+        raise refusal(f"{file}: {first_problem(error)}") from error
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        told = error.strerror if isinstance(error, OSError) else None
+        reason = told or " ".join(str(error).split())
+        raise refusal(f"cannot read {what} {file}: {reason}") from error
