@@ -9,8 +9,8 @@ from tdac_agent.setting import Setting
 from tdac_agent.task_map2d import Map2DSetting
 from tdac_agent.trajectory import Rollout
 from tdac_agent.units import Points
+from tdac_envs.backdrop import Backdrop
 from tdac_envs.canvas import Image
-from tdac_envs.closeup import Backdrop
 
 
 class Pictures(Protocol):

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from tdac_agent.task_map2d import Map2DSetting
 from tdac_agent.trajectory import Rollout
 from tdac_agent.units import Points
+from tdac_envs.backdrop import Background
 from tdac_envs.canvas import Image
-from tdac_envs.closeup import Background
 from tdac_envs.render import Scene, Status, trajectory_picture
 
 

@@ -20,7 +20,6 @@ from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 from tdac_agent.crew import end_with_parent
 from tdac_agent.errors import Fault
@@ -135,12 +134,7 @@ class WarmJudge:
     def __enter__(self) -> WarmJudge:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _line(

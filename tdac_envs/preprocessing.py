@@ -2,70 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import cache, partial
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.astar import Guide
-from tdac_envs.cleanup import cleanings
+from tdac_envs.candidates import Candidate, Preset, ranked
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.image import MapImage, from_array, load_image
-from tdac_envs.params import MapParams, RobotParams, ScoreTerms
-from tdac_envs.readings import plain_reading, readings
+from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.readings import readings
 from tdac_envs.scene import Reading, Scene
-from tdac_envs.score import (
-    Point,
-    explain,
-    guide_of,
-    nearest_free,
-    score,
-    terms_of,
-)
+from tdac_envs.score import Point, nearest_free
 
-Preset = Literal["default", "paper"]
 Source = str | Path | NDArray[np.generic] | MapImage
-
-INFLATIONS = (0, 1, 2, 3)
-PAPER_CLEANUPS = (0, 4, 8, 12, 16)
-MAX_DETOUR = 0.1
-"""Most that the planner's margin may lengthen the path, as a share."""
-THREADS = 2
-"""Readings judged at a time; compiled code and OpenCV let other threads run."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
-    """A reading of the map with a planner's margin, judged.
-
-    Attributes:
-        reading: Which pixels are obstacles.
-        inflation: Planner's margin around the body, px.
-        reason: Tells why the task is infeasible on it; None where it is feasible.
-            To find out what would work takes longer than the verdict.
-        terms: Terms of the score; None without a task or where it is infeasible.
-    """
-
-    reading: Reading
-    inflation: int = 0
-    reason: Callable[[], str] | None = None
-    terms: ScoreTerms | None = None
-
-    @property
-    def failure(self) -> str | None:
-        """Why the task is infeasible on it; None where it is feasible."""
-        return None if self.reason is None else self.reason()
-
-    @property
-    def score(self) -> float:
-        """Score of Algorithm 1; -inf where there is none."""
-        return -np.inf if self.terms is None else score(self.terms)
 
 
 def preprocess(
@@ -105,7 +56,7 @@ def preprocess(
             pixel = _snapped(source, name, pixel, robot_radius, notes)
         ends.append(pixel)
     scene = Scene.of(source, ends[0], ends[1], robot_radius)
-    best = _ranked(scene, preset)[0]
+    best = ranked(scene, preset)[0]
     if best.reason is not None:
         raise TaskError(f"{source.name}: {best.reason()}")
     grid = OccupancyGrid(best.reading.cells, source.resolution, source.origin)
@@ -120,111 +71,8 @@ def rank_candidates(
     *,
     preset: Preset = "default",
 ) -> list[Candidate]:
-    """Every candidate that was looked at, the chosen one first.
-
-    Feasible ones come by falling score, then the infeasible ones in the order in
-    which they were tried, each with its failure.
-    """
-    return _ranked(Scene.of(as_image(image), start, goal, robot_radius), preset)
-
-
-def _ranked(scene: Scene, preset: Preset) -> list[Candidate]:
-    if scene.start is not None and scene.start == scene.goal:
-        raise TaskError(
-            f"start and goal are the same pixel {scene.start}; give two places"
-        )
-    if not scene.radius > 0:
-        raise TaskError(f"expected a robot radius above 0 px, got {scene.radius:g}")
-    search = _paper_grid if preset == "paper" else _staged_search
-    tried = list(search(scene))
-    # The plainest reading's failure comes first: the others only explain more away.
-    return sorted(tried, key=lambda c: (c.reason is not None, -c.score))
-
-
-def _staged_search(scene: Scene) -> Iterator[Candidate]:
-    """Reading after reading, up to the first feasible one; its margins by score."""
-    for reading in readings(scene):
-        candidates = _with_margins(scene, reading)
-        yield candidates[0]
-        yield from (_without_detour(c, candidates[0]) for c in candidates[1:])
-        if candidates[0].reason is None:
-            return
-
-
-def _without_detour(candidate: Candidate, plain: Candidate) -> Candidate:
-    """Refuses a margin that sends the robot another way: clearance is not all."""
-    if candidate.terms is None or plain.terms is None:
-        return candidate
-    longer = candidate.terms.path_length / max(plain.terms.path_length, 1.0) - 1
-    if longer <= MAX_DETOUR:
-        return candidate
-    why = f"the margin of {candidate.inflation} px makes the path {longer:.0%} longer"
-    return replace(candidate, reason=lambda: why, terms=None)
-
-
-def _paper_grid(scene: Scene) -> list[Candidate]:
-    """Polarity x cleanup x inflation, literally, but nothing computed twice."""
-    given = scene.image.occupied
-    bases = (
-        [plain_reading(scene, light_free) for light_free in (True, False)]
-        if given is None
-        else [Reading(given, "given", scene.image.method)]
-    )
-    with ThreadPoolExecutor(THREADS) as pool:
-        families = list(pool.map(partial(_family, scene), bases))
-        # Readings of which cleanup has made the same share their array.
-        jobs = {id(r.cells): (r, guide) for family, guide in families for r in family}
-        found = pool.map(lambda job: _terms(scene, *job), jobs.values())
-        terms = dict(zip(jobs, found, strict=True))
-    readings_ = [reading for family, _ in families for reading in family]
-    return [c for r in readings_ for c in _candidates(scene, r, terms[id(r.cells)])]
-
-
-def _family(scene: Scene, base: Reading) -> tuple[list[Reading], Guide | None]:
-    """The reading at each strength of cleanup, and a guide for paths on all."""
-    cleaned = cleanings(base.cells, PAPER_CLEANUPS)
-    family = [
-        replace(base, cells=cells, cleanup=strength)
-        for cells, strength in zip(cleaned, PAPER_CLEANUPS, strict=True)
-    ]
-    if scene.trip is None:
-        return family, None
-    clear = clearance(np.logical_and.reduce(cleaned))
-    return family, guide_of(clear, scene.trip)
-
-
-def _terms(
-    scene: Scene, reading: Reading, guide: Guide | None
-) -> list[ScoreTerms | None]:
-    """Terms of the score with each margin, up to the first that is infeasible."""
-    if scene.trip is None or guide is None:
-        return [None]
-    clear = clearance(reading.cells)
-    return list(terms_of(reading.cells, clear, scene.trip, INFLATIONS, guide))
-
-
-def _with_margins(scene: Scene, reading: Reading) -> list[Candidate]:
-    """The reading with each margin; only the first where that is infeasible."""
-    terms: Iterable[ScoreTerms | None] = [None]
-    if scene.trip is not None:
-        clear = clearance(reading.cells)
-        guide = guide_of(clear, scene.trip)
-        if guide is not None:
-            terms = terms_of(reading.cells, clear, scene.trip, INFLATIONS, guide)
-    return _candidates(scene, reading, terms)
-
-
-def _candidates(
-    scene: Scene, reading: Reading, terms: Iterable[ScoreTerms | None]
-) -> list[Candidate]:
-    if scene.trip is None:
-        return [Candidate(reading)]
-    candidates = []
-    for inflation, each in zip(INFLATIONS, terms, strict=False):
-        why = cache(partial(explain, reading.cells, scene.trip, inflation))
-        reason = why if each is None else None
-        candidates.append(Candidate(reading, inflation, reason, each))
-    return candidates
+    """Every candidate that was looked at, the chosen one first; see `ranked`."""
+    return ranked(Scene.of(as_image(image), start, goal, robot_radius), preset)
 
 
 def as_image(image: Source) -> MapImage:

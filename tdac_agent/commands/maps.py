@@ -12,12 +12,13 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.commands.flags import check_finite, in_pixels
+from tdac_envs.candidates import Candidate, Preset
 from tdac_envs.errors import TaskError
 from tdac_envs.image import load_image
 from tdac_envs.map_folder import write_map
 from tdac_envs.maps import bundled_map, bundled_maps
 from tdac_envs.params import MapParams, RobotParams
-from tdac_envs.preprocessing import Candidate, Preset, preprocess, rank_candidates
+from tdac_envs.preprocessing import preprocess, rank_candidates
 
 SHOWN = 8
 Point = tuple[float, float]

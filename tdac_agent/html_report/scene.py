@@ -12,8 +12,8 @@ from PIL import Image
 
 from tdac_agent.pictures import pictures_of
 from tdac_agent.task import Task
+from tdac_envs.backdrop import Chart
 from tdac_envs.canvas import Image as Picture
-from tdac_envs.closeup import Chart
 
 LARGEST = 880
 COLOURS = 48

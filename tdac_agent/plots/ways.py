@@ -24,7 +24,7 @@ from tdac_agent.plots.style import (
 )
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Trajectory
-from tdac_envs.closeup import Chart
+from tdac_envs.backdrop import Chart
 
 WIDTH = 7.0
 """Of the map, inches; less where it is higher than wide."""

@@ -15,8 +15,9 @@ from tdac_agent.figures import event_of
 from tdac_agent.reference import Reference
 from tdac_agent.report import Episode, Report
 from tdac_agent.verification import verify
+from tdac_envs.backdrop import CLOSE_UP, Background
 from tdac_envs.canvas import TRAIL
-from tdac_envs.closeup import CLOSE_UP, COLUMN, EVENT, MARGIN, Background, run_picture
+from tdac_envs.closeup import COLUMN, EVENT, MARGIN, run_picture
 
 WALL = "def policy(obs):\n    return 1.0, 1.0\n"
 
