@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from tdac_agent.commands.mistakes import begun
 from tdac_agent.commands.options import (
     JitterSeed,
     Json,
@@ -36,7 +37,8 @@ def check_suite(
     as_json: Json = False,
 ) -> None:
     """Let a suite prove itself: a reference must pass it, bad controllers must not."""
-    from tdac_agent.commands import check_suite as command
+    with begun():
+        from tdac_agent.commands import check_suite as command
 
     raise typer.Exit(
         command.run(named_task(), profile, suite, tier, seed, repeats, as_json)

@@ -1,4 +1,4 @@
-"""What goes wrong as one clear line on stderr, and the exit code that says so."""
+"""Lines on stderr: what goes wrong, with its exit code, and that a command begins."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import shutil
 import sys
 import textwrap
 import traceback
+from collections.abc import Generator
+from contextlib import contextmanager
 from typing import Any, NoReturn
 
 
@@ -32,6 +34,19 @@ def fail(message: str, code: int) -> NoReturn:
     sys.stdout.flush()
     print(fitted(" ".join(message.split())), file=sys.stderr)
     sys.exit(code)
+
+
+@contextmanager
+def begun() -> Generator[None]:
+    """Shows on a terminal that a command loads what it needs: that may take seconds."""
+    shown = sys.stderr.isatty()
+    if shown:
+        print("starting …", end="\r", file=sys.stderr, flush=True)
+    try:
+        yield
+    finally:
+        if shown:
+            print("\x1b[2K", end="", file=sys.stderr, flush=True)
 
 
 def fitted(line: str) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
+from tdac_agent.commands.mistakes import begun
 from tdac_agent.commands.options import (
     BaseUrl,
     JitterSeed,
@@ -88,7 +89,8 @@ def synth(
     as_json: Json = False,
 ) -> None:
     """Write, test and repair a controller until it is verified."""
-    from tdac_agent.commands import synth as command
+    with begun():
+        from tdac_agent.commands import synth as command
     from tdac_agent.provider import MAX_OUTPUT_TOKENS
 
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tdac_agent.commands.mistakes import fitted
+from tdac_agent.commands.mistakes import begun, fitted
 
 LINE = "error: " + "words that are rather many " * 6 + "/a/path/" + "x" * 99
 
@@ -28,3 +28,15 @@ def test_a_terminal_gets_it_in_its_width(monkeypatch, columns):
     assert all(line.startswith("  ") for line in lines[1:])
     assert " ".join(line.strip() for line in lines) == LINE
     assert all(len(line) <= columns for line in lines[:-1])
+
+
+def test_that_a_command_begins_is_said_on_a_terminal_alone(monkeypatch, capsys):
+    """At once, and it is gone when there is something to show."""
+    master, slave = pty.openpty()
+    with begun():
+        assert capsys.readouterr().err == ""
+    with os.fdopen(slave, "w") as terminal, os.fdopen(master) as screen:
+        monkeypatch.setattr(sys, "stderr", terminal)
+        with begun():
+            assert os.read(screen.fileno(), 99).decode() == "starting …\r"
+        assert os.read(screen.fileno(), 99) == b"\x1b[2K"
