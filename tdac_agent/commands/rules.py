@@ -65,12 +65,18 @@ def _why_none(run: Run) -> str:
 
 
 def _effect(rule: RepairRule) -> str:
-    """What came of it; of several tests, those that it cured by name."""
-    pairs = zip(rule.evidence, rule.passes_each, strict=True)
-    cured = [test for test, count in pairs if rule.tried and count == rule.tried]
-    if not 0 < len(cured) < len(rule.evidence):
-        return rule.effect_told
-    return f"{rule.effect_told}; cured: {told_tests(cured, 4)}"
+    """What came of it; where it did not cure all tests, those that it did by name."""
+    pairs = list(zip(rule.evidence, rule.passes_each, strict=True))
+    cured = [test for test, count in pairs if count == rule.tried]
+    some = [test for test, count in pairs if 0 < count < rule.tried]
+    told = rule.effect_told
+    if not rule.tried or len(cured) == len(pairs):
+        return told
+    if cured:
+        told += f"; cured: {told_tests(cured, 4)}"
+    if some:
+        told += f"; cured in some: {told_tests(some, 4)}"
+    return told
 
 
 def _state(rule: RepairRule) -> str:
