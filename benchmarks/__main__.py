@@ -4,18 +4,16 @@
 
 Without names, all of them. Every bench times its floor and what it is compared with
 in the same run, in turns; only the ratios carry over to another machine. `--quick`
-shows that all of it works, on sizes that say nothing. `--profile` prints where the
-time of each bench goes instead of its rows.
+shows that all of it works, on sizes that say nothing. `--profile` prints instead
+where the CPU time of each bench goes, that of its threads, too.
 """
 
 from __future__ import annotations
 
 import argparse
-import cProfile
 import json
 import os
 import platform
-import pstats
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -23,6 +21,12 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
 from benchmarks.timing import Bench, Effort, show
 
@@ -62,11 +66,27 @@ def _bench(name: str, options: argparse.Namespace) -> Callable[[], Sequence[Benc
 
 
 def _profile(name: str, run: Callable[[], object]) -> None:
-    print(f"\n{name}")
-    profile = cProfile.Profile()
-    profile.runcall(run)
-    statistics = pstats.Stats(profile, stream=sys.stdout)
-    statistics.strip_dirs().sort_stats("tottime").print_stats(PROFILED)
+    import yappi
+
+    # The standard library's profiler sees one thread alone.
+    yappi.set_clock_type("cpu")
+    with yappi.run(builtins=True):
+        run()
+    calls = sorted(yappi.get_func_stats(), key=lambda call: -call.tsub)[:PROFILED]
+    yappi.clear_stats()
+    table = Table("function", title=name, title_justify="left", box=SIMPLE)
+    for heading in ("calls", "own, s", "with calls, s"):
+        table.add_column(heading, justify="right")
+    for call in calls:
+        own, whole = f"{call.tsub:.3f}", f"{call.ttot:.3f}"
+        table.add_row(_place(call), str(call.ncall), own, whole)
+    Console().print(table)
+
+
+def _place(call: Any) -> str:
+    """Where a function is; one that is not Python's has no line."""
+    file = Path(call.module).name
+    return escape(f"{file}:{call.lineno} {call.name}" if call.lineno else call.name)
 
 
 def _too_long(bench: Bench) -> bool:
@@ -104,8 +124,9 @@ def _options() -> argparse.Namespace:
         parser.error(f"no bench {wrong[0]!r}; there are {', '.join(NAMES)}")
     if options.maps is not None and not any(options.maps.glob("*.map.scen")):
         parser.error(f"{options.maps}: no *.map.scen in it")
-    if find_spec("skimage") is None:
-        parser.error('scikit-image is missing: pip install ".[bench]"')
+    for package in ("skimage", "yappi"):
+        if find_spec(package) is None:
+            parser.error(f'{package} is missing: pip install ".[bench]"')
     return options
 
 
