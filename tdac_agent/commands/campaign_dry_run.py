@@ -104,10 +104,10 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> Row:
 
 def _table(cells: list[Cell], rows: list[Row]) -> Table:
     labels = labels_of(cells)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for name in labels.names:
         table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
-    for name in ("runs", "K", "J", "questions", "USD at most", "asked three times"):
+    for name in ("runs", "K", "J", "asked", "USD at\nmost", "asked 3\ntimes"):
         table.add_column(name, justify="right", no_wrap=True)
     for cell, row in zip(cells, rows, strict=True):
         table.add_row(

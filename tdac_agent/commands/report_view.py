@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from tdac_agent.report import Report
+from tdac_agent.report import Report, is_of_paper_alone
 from tdac_agent.trajectory import nominal_first
 from tdac_agent.units import UNITS
 
@@ -57,9 +57,10 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
 
 
 def _only_drives(report: Report) -> bool:
-    """Whether the profile `paper` alone stands in the way."""
+    """Whether tests of the profile `paper` alone stand in the way."""
     reached = all(episode.outcome == "reached" for episode in report.episodes)
-    return report.provenance.profile == "paper" and bool(report.episodes) and reached
+    asked = all(is_of_paper_alone(failure.test) for failure in report.failures)
+    return bool(report.episodes) and reached and asked
 
 
 def _show_files(out: Path, console: Console) -> None:
