@@ -12,8 +12,9 @@ import os
 import queue
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from tdac_agent.errors import Fault
@@ -27,6 +28,10 @@ T = TypeVar("T")
 class Crew(Generic[P, T]):
     """Forked from this process, which should have a single thread then.
 
+    While a member works, it stays on a core that no other one has, and so do the
+    children that it takes: a judge and a controller answer in turns, and to wake a
+    process on another core takes longer than most answers do.
+
     Args:
         work: What a member does when asked. Arguments and results are pickled; all
             else it refers to is as it was at the fork.
@@ -38,6 +43,7 @@ class Crew(Generic[P, T]):
         self, work: Callable[P, T], end: Callable[[], None], size: int = SIZE
     ) -> None:
         context = multiprocessing.get_context("fork")
+        cores = Cores()
         self._ends: list[Connection] = []
         self._idle: queue.SimpleQueue[Connection] = queue.SimpleQueue()
         self._members = []
@@ -45,7 +51,7 @@ class Crew(Generic[P, T]):
             ours, theirs = context.Pipe()
             self._ends.append(ours)
             member = context.Process(
-                target=_serve, args=(work, end, theirs, self._ends), daemon=True
+                target=_serve, args=(work, end, theirs, self._ends, cores), daemon=True
             )
             member.start()
             theirs.close()
@@ -84,6 +90,49 @@ class Crew(Generic[P, T]):
             member.join()
 
 
+class Cores:
+    """The cores that this process may use, shared out among its forks."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("fork")
+        self._all = sorted(os.sched_getaffinity(0))
+        self._lock = context.Lock()
+        self._taken = context.RawArray("b", len(self._all))
+
+    @contextlib.contextmanager
+    def one(self) -> Generator[None]:
+        """Stays on the core where this process is, or on a free one where it is taken.
+
+        With no free one, it goes where the system sends it.
+        """
+        place = self._take()
+        if place is None:
+            yield
+            return
+        os.sched_setaffinity(0, {self._all[place]})
+        try:
+            yield
+        finally:
+            os.sched_setaffinity(0, self._all)
+            self._taken[place] = 0
+
+    def _take(self) -> int | None:
+        here = _core()
+        with self._lock:
+            free = [i for i, taken in enumerate(self._taken) if not taken]
+            if not free:
+                return None
+            place = next((i for i in free if self._all[i] == here), free[0])
+            self._taken[place] = 1
+        return place
+
+
+def _core() -> int:
+    """The core on which this process runs; see `man proc_pid_stat`."""
+    fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+    return int(fields[36])
+
+
 def end_with_parent() -> None:
     """Lets the kernel kill this process when the one that forked it ends (Linux)."""
     if sys.platform == "linux":
@@ -96,6 +145,7 @@ def _serve(
     end: Callable[[], None],
     judge: Connection,
     ends_of_judge: list[Connection],
+    cores: Cores,
 ) -> None:
     end_with_parent()
     # The others' ends, too: a member ends when the judge has closed its own.
@@ -105,7 +155,9 @@ def _serve(
         while True:
             args, kwargs = judge.recv()
             try:
-                judge.send((work(*args, **kwargs), None))
+                with cores.one():
+                    result = work(*args, **kwargs)
+                judge.send((result, None))
             except Exception as error:
                 judge.send((None, error))
     end()

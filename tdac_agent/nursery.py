@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import threading
@@ -50,12 +51,17 @@ class Nursery:
     def take(self, tier: str, limits: Limits) -> Child:
         """A child that has no controller yet; several threads may ask at once.
 
+        It may use the cores that the caller may use.
+
         Raises:
             SandboxError: The tier does not work here.
         """
-        child = self._ready_child(tier, limits)
-        if child is not None:
-            return child
+        child = self._ready_child(tier, limits) or self._new_child(tier, limits)
+        with contextlib.suppress(OSError):  # it has ended, which its first call finds
+            os.sched_setaffinity(child.pid, os.sched_getaffinity(0))
+        return child
+
+    def _new_child(self, tier: str, limits: Limits) -> Child:
         with self._lock:
             if tier != "auto":
                 return self._child(find_tier(tier), limits)

@@ -1,5 +1,6 @@
 """Processes that work side by side."""
 
+import multiprocessing
 import os
 import signal
 from concurrent.futures import ThreadPoolExecutor
@@ -47,6 +48,25 @@ def test_members_work_at_the_same_time():
     assert len(set(members)) == 2
     for descriptor in (read_a, write_a, read_b, write_b):
         os.close(descriptor)
+
+
+def test_members_at_work_have_a_core_each():
+    """They stay on it while they work; one more than there are cores goes anywhere."""
+    cores = os.sched_getaffinity(0)
+    size = len(cores) + 1
+    barrier = multiprocessing.get_context("fork").Barrier(size)
+
+    def work():
+        barrier.wait(60)
+        mine = os.sched_getaffinity(0)
+        barrier.wait(60)
+        return mine
+
+    with closing(Crew(work, no_end, size)) as crew, ThreadPoolExecutor(size) as pool:
+        for _ in range(2):
+            found = sorted(pool.map(lambda _: crew.do(), range(size)), key=len)
+            assert [len(mine) for mine in found] == [1] * len(cores) + [len(cores)]
+            assert set().union(*found[: len(cores)]) == cores
 
 
 def test_errors_come_back_whole():

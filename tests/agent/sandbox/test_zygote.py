@@ -189,3 +189,20 @@ def test_children_that_were_ready_and_not_wanted_end():
     nursery.close()
     with pytest.raises(SandboxError):
         unwanted.load()
+
+
+def test_a_child_stays_where_its_taker_is(tier):
+    """It may use the cores that the process which takes it may use."""
+    every = os.sched_getaffinity(0)
+    nursery = Nursery(ahead=False)
+    try:
+        os.sched_setaffinity(0, {min(every)})
+        bound = nursery.take(tier, Limits())
+    finally:
+        os.sched_setaffinity(0, every)
+    free = nursery.take(tier, Limits())
+    assert os.sched_getaffinity(bound.pid) == {min(every)}
+    assert os.sched_getaffinity(free.pid) == every
+    for child in (bound, free):
+        child.close()
+    nursery.close()
