@@ -12,8 +12,8 @@ Prints the median and the range of the wall times, s. The judge is given time to
 ready before each run of the loop, as a learner gives it. Two figures say how fast the
 machine was meanwhile: a step of CartPole-v1 through `gym.make`, and an interpreter
 that imports numpy, which is as little as a judge and its sandbox can start with; our
-share is also given in such starts. Byte code is on disk, as wherever the package has been
-used before.
+share is also given in such starts. Byte code is on disk, as wherever the package has
+been used before.
 """
 
 from __future__ import annotations
