@@ -109,11 +109,11 @@ class Cores:
         if place is None:
             yield
             return
-        os.sched_setaffinity(0, {self._all[place]})
+        _stay_on([self._all[place]])
         try:
             yield
         finally:
-            os.sched_setaffinity(0, self._all)
+            _stay_on(self._all)
             self._taken[place] = 0
 
     def _take(self) -> int | None:
@@ -125,6 +125,11 @@ class Cores:
             place = next((i for i in free if self._all[i] == here), free[0])
             self._taken[place] = 1
         return place
+
+
+def _stay_on(cores: list[int]) -> None:
+    with contextlib.suppress(OSError):  # a system that forbids it decides by itself
+        os.sched_setaffinity(0, cores)
 
 
 def _core() -> int:
