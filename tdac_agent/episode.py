@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -17,6 +17,7 @@ from tdac_agent.sandbox import (
     ControllerTimeout,
     EnvRefusalError,
 )
+from tdac_agent.sandbox.waiting import Line
 from tdac_agent.setting import JudgedEnv
 from tdac_agent.trajectory import Outcome, Rollout, Trajectory
 from tdac_envs.driven import Observation
@@ -179,25 +180,31 @@ def run_policy(
         deadline: When to stop at the latest, by `time.monotonic`.
     """
     calls: list[float] = []
+    own = Line("thread-self")
+
+    def kept_waiting() -> float:
+        # On a starved machine this process, too, gets a CPU long after an answer.
+        return child.waited() + own.waited()
+
     waited = 0.0
     error: str | ControllerFault | EnvRefusalError | None = None
     try:
         observation, _ = record.reset()
         child.reset(observation)
-        waited = child.waited()
+        waited = kept_waiting()
         while record.outcome is None:
             began = time.perf_counter()
             action = child.policy(observation)
             calls.append(time.perf_counter() - began)
             observation = record.step(action)[0]
-            error = _too_slow(calls, record.env.nominal.dt, child, waited)
+            error = _too_slow(calls, record.env.nominal.dt, kept_waiting, waited)
             if time.monotonic() > deadline:
                 error = "stopped: the verification as a whole took too long"
             if error is not None:
                 break
     except (ControllerFault, EnvRefusalError) as fault:
         error = fault
-    mean = _mean_call(calls, child, waited)
+    mean = _mean_call(calls, kept_waiting, waited)
     return _rollout(record, name, held_out, error, calls, mean)
 
 
@@ -233,27 +240,29 @@ def _ended_early(record: Record, max_steps: int) -> str:
 
 
 def _too_slow(
-    calls: list[float], dt: float, child: Driver, waited: float
+    calls: list[float], dt: float, kept_waiting: Callable[[], float], waited: float
 ) -> str | None:
     if len(calls) < SLOW_AFTER_CALLS or len(calls) % SLOW_AFTER_CALLS:
         return None
     if math.fsum(calls) <= SLOW_FACTOR * dt * len(calls):
         return None
-    mean = _mean_call(calls, child, waited)
+    mean = _mean_call(calls, kept_waiting, waited)
     if mean <= SLOW_FACTOR * dt:
         return None
     return f"policy takes {1000 * mean:.0f} ms a call, {1000 * dt:.0f} ms are allowed"
 
 
-def _mean_call(calls: list[float], child: Driver, waited: float) -> float:
-    """Seconds of a call, without what the child stood in line for a CPU.
+def _mean_call(
+    calls: list[float], kept_waiting: Callable[[], float], waited: float
+) -> float:
+    """Seconds of a call, without what was stood in line for a CPU.
 
     Args:
         calls: Seconds of each.
-        child: Was called.
-        waited: What it said before the first call.
+        kept_waiting: Seconds that policy and judge have stood in line so far.
+        waited: The same before the first call.
     """
-    line = max(0.0, child.waited() - waited)
+    line = max(0.0, kept_waiting() - waited)
     return max(0.0, math.fsum(calls) - line) / max(1, len(calls))
 
 

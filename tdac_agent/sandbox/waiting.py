@@ -20,10 +20,10 @@ class Line:
     """A process's place among those that want a CPU; sleepers are not in line.
 
     Attributes:
-        pid: Its id.
+        pid: Its id, or `thread-self` for the thread that asks.
     """
 
-    pid: int
+    pid: int | str
 
     def waited(self) -> float:
         """Seconds in line since it began, up to when it last got a CPU."""

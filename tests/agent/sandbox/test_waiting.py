@@ -3,11 +3,15 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from small import SHORT, write_small_task
 
+from tdac_agent.episode import Record, run_policy
 from tdac_agent.sandbox import ControllerTimeout, Limits
+from tdac_agent.task import load_task
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/schedstat").exists(), reason="the kernel does not tell"
@@ -33,25 +37,31 @@ LIMITS = Limits(call_seconds=1.0, import_seconds=60.0, start_seconds=60.0)
 
 
 @pytest.fixture
-def crowded(launch):
-    """Starts children on a CPU for which others compete all the time."""
+def crowd():
+    """A CPU for which others compete all the time."""
     cpu = min(os.sched_getaffinity(0))
     command = [sys.executable, "-c", "print(flush=True)\nwhile True: pass"]
     others = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(OTHERS)]
     for other in others:
         other.stdout.readline()  # it is at work
         os.sched_setaffinity(other.pid, {cpu})
+    yield cpu
+    for other in others:
+        other.kill()
+        other.communicate()
+
+
+@pytest.fixture
+def crowded(launch, crowd):
+    """Starts children on the crowded CPU."""
 
     def start(source):
         child = launch(source, limits=LIMITS)
         child.load()
-        os.sched_setaffinity(child.pid, {cpu})
+        os.sched_setaffinity(child.pid, {crowd})
         return child
 
-    yield start
-    for other in others:
-        other.kill()
-        other.communicate()
+    return start
 
 
 def test_standing_in_line_for_a_cpu_is_not_the_controllers_time(crowded):
@@ -72,3 +82,61 @@ def test_on_a_busy_machine_sleeping_is_the_controllers_time(crowded):
     """A controller that waits is not in line."""
     with pytest.raises(ControllerTimeout, match="policy"):
         crowded(IDLE).policy(30.0)
+
+
+class Thinking:
+    """A policy in the judge's process that stands still.
+
+    Args:
+        seconds: Of CPU that a call needs.
+    """
+
+    def __init__(self, seconds):
+        self.seconds = seconds
+
+    def reset(self, observation):
+        pass
+
+    def policy(self, observation):
+        end = time.thread_time() + self.seconds
+        while time.thread_time() < end:
+            pass
+        return (0.0, 0.0)
+
+    def waited(self):
+        return 0.0
+
+
+@pytest.fixture
+def judged_in_the_crowd(tmp_path, crowd):
+    """Has a policy drive an episode of 50 steps of 20 ms, in a process in a crowd."""
+    task = load_task(write_small_task(tmp_path, **SHORT, horizon=50))
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {crowd})
+    yield lambda driver: run_policy(
+        driver,
+        Record(task.make_env(), None, 50),
+        "nominal",
+        held_out=False,
+        deadline=float("inf"),
+    )
+    os.sched_setaffinity(0, before)
+
+
+def test_where_the_judge_stands_in_line_no_policy_is_slow(judged_in_the_crowd):
+    """15 ms of work a call are within a step, however long the judge waits for a CPU.
+
+    By the clock they are more than the 40 ms at which a policy is cut off.
+    """
+    rollout = judged_in_the_crowd(Thinking(0.015))
+    assert (rollout.outcome, rollout.error) == ("out of time", None)
+    assert not rollout.timed_out
+    assert rollout.calls.mean() > 0.04
+
+
+def test_on_a_busy_machine_a_slow_policy_is_slow(judged_in_the_crowd):
+    """60 ms of work a call are too much in steps of 20 ms."""
+    rollout = judged_in_the_crowd(Thinking(0.06))
+    assert rollout.outcome == "error"
+    assert "ms a call, 20 ms are allowed" in rollout.error
+    assert rollout.timed_out
