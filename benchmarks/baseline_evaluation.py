@@ -94,6 +94,13 @@ def table(runs: Path) -> pd.DataFrame:
     return found if found.empty else found.astype(dict.fromkeys(whole, "Int64"))
 
 
+def _note(row: dict[str, Any]) -> str | None:
+    """What is to be known of a row: errors, time-outs among them, are not hidden."""
+    told = [row["note"]] if row["note"] else []
+    told += [f"{count} × {reason}" for reason, count in row["reasons"].items()]
+    return "; ".join(told) or None
+
+
 def _folder(entry: Entry, runs: Path) -> Path:
     return runs / "evaluated" / entry.task / entry.name
 
@@ -130,5 +137,5 @@ def _row(entry: Entry, runs: Path) -> dict[str, Any]:
         "clearance_mean": row["clearance_mean"],
         "unit": found["tasks"][0]["unit"],
         "ms_per_step": timing.median_ms,
-        "note": row["note"],
+        "note": _note(row),
     }

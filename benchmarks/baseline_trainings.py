@@ -20,7 +20,7 @@ SEEDS = (0, 1, 2)
 PPO_TASKS = ("maze", "epuck", "office", "cave", "rooms", "epuck-maze")
 SAC_TASKS = ("maze", "epuck")
 FOUR_MAPS = ("maze", "office", "cave", "rooms")
-LONGER = {"epuck-maze": 600_000, "four-maps": 1_200_000}
+LONGER = {"four-maps": 1_200_000}
 """Steps of PPO, where they are not those of the hyperparameters' file."""
 
 

@@ -98,7 +98,7 @@ def speed(case: Case, steps: int) -> Speed:
 def of_task(name: str, wrappers: tuple[str, ...] | None = None) -> Callable[[], Any]:
     """The batch on which `tdac train` trains."""
     plan = make_plan((name,), wrappers=wrappers)
-    return lambda: make_batch(plan, plan.n_envs)
+    return lambda: make_batch(plan, plan.n_envs, training=True)
 
 
 def main() -> None:

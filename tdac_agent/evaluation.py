@@ -72,7 +72,8 @@ def evaluate(
         tasks: Tasks, or what `load_task` takes.
         episodes: Of each policy on each task.
         seed: Of the episodes.
-        variation: Of the starts: `nominal`, `jitter`, or `random` with the goals too.
+        variation: Of the starts: `nominal`, `jitter`, `mixed`, or `random` with the
+            goals too.
         wrappers: Of saved policies that do not say what they were trained with.
         tier: Sandbox tier, `auto` for the best one here.
         limits: Of a controller's process in each episode.

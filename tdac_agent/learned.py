@@ -51,7 +51,7 @@ class SavedPolicy(BaseModel):
     algo: str = Field(description="ppo, sac, …")
     tasks: tuple[str, ...] = Field((), description="That it was trained on.")
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
-    variation: str = "jitter"
+    variation: str = Field("jitter", description="Of the starts in training.")
     steps: int | None = Field(None, description="Of training.")
     seed: int | None = None
 

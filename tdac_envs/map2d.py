@@ -20,7 +20,7 @@ from tdac_envs.source2d import MapSource, prepare
 from tdac_envs.stepping import info_of
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
 
-VARIATIONS = ("nominal", "jitter", "random")
+VARIATIONS = ("nominal", "jitter", "mixed", "random")
 
 
 class Map2DEnv(DrivenEnv):
@@ -59,7 +59,8 @@ class Map2DEnv(DrivenEnv):
 
     ## Starting State
     `variation="nominal"`: the given start. `"jitter"`: within one body radius of it,
-    heading +- 0.5 rad. `"random"`: any feasible start and goal.
+    heading +- 0.5 rad. `"mixed"`: so, or in every second episode on average any
+    feasible start. `"random"`: any feasible start and goal.
     `reset(options={"start": (x, y, heading), "goal": (x, y)})` sets them.
 
     ## Episode End
@@ -85,7 +86,7 @@ class Map2DEnv(DrivenEnv):
         horizon: Steps. Default: max(2500, 6 * d0 / (max_wheel_speed * dt)).
         goal_tolerance: px. Default: min(20, d0 / 4).
         on_collision: `"terminate"` or `"block"`.
-        variation: `"nominal"`, `"jitter"` or `"random"`.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
         range_noise: Standard deviation of each range, relative to it.
         wheel_slip: Standard deviation of each wheel's speed, relative to it.
         motor_lag: Time constant of the wheel speeds, s.

@@ -1,4 +1,4 @@
-"""Reward of TDAC-Map2D-v0, as pure functions of one step."""
+"""Reward of both environments, as pure functions of one step."""
 
 from __future__ import annotations
 

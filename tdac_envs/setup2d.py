@@ -20,6 +20,7 @@ from tdac_envs.task2d import (
     default_horizon,
     jittered_start,
     make_task,
+    mixed_start,
     random_task,
 )
 
@@ -30,7 +31,7 @@ class Setup:
 
     Attributes:
         nominal: The task as given.
-        variation: `"nominal"`, `"jitter"` or `"random"`.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
         fixed_horizon: Whether the horizon was given, or follows from the task.
         on_collision: `"terminate"` or `"block"`.
         range_noise: Standard deviation of each range, relative to it.
@@ -104,6 +105,8 @@ class Setup:
             )
         elif self.variation == "random":
             drawn = random_task(task, random)
+        elif self.variation == "mixed":
+            return task.moved(mixed_start(task, random))
         elif self.variation == "jitter":
             return task.moved(jittered_start(task, random))
         else:

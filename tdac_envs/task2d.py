@@ -219,6 +219,24 @@ def jittered_pose(
     return nominal._replace(heading=pose.heading)
 
 
+def mixed_start(task: Map2DTask, random: np.random.Generator) -> Pose:
+    """A jittered start or, in every second episode on average, any feasible one.
+
+    These are drawn from the free pixels connected to the goal: who learns need not
+    first drive to what is to be learnt.
+    """
+    if random.random() < 0.5:
+        return jittered_start(task, random)
+    width = task.field.shape[1]
+    connected = np.flatnonzero(np.isfinite(task.field))
+    for _ in range(MAX_DRAWS):
+        y, x = divmod(int(random.choice(connected)), width)
+        heading = wrapped(random.uniform(-math.pi, math.pi))
+        if not at_goal(task.terrain, task.goal, task.goal_tolerance, x, y):
+            return Pose(x, y, heading)
+    return task.start
+
+
 def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
     """The same map and robot with any feasible start and goal; horizon kept.
 

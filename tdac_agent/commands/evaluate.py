@@ -29,7 +29,7 @@ def run(
     tasks: list[str],
     episodes: int,
     seed: int,
-    variation: Literal["nominal", "jitter", "random"],
+    variation: Literal["nominal", "jitter", "mixed", "random"],
     wrappers: list[str] | None,
     csv: Path | None,
     out: Path | None,

@@ -39,10 +39,10 @@ def evaluate(
         int, typer.Option(min=0, help="Of the episodes, the same for all policies.")
     ] = 0,
     variation: Annotated[
-        Literal["nominal", "jitter", "random"],
+        Literal["nominal", "jitter", "mixed", "random"],
         typer.Option(
-            help="Starts: the task's own, within a body radius of it, or anywhere, "
-            "with any goal."
+            help="Starts: the task's own, within a body radius of it, mixed with "
+            "any start, or any start and goal."
         ),
     ] = "jitter",
     wrappers: Annotated[

@@ -61,7 +61,11 @@ def _table(
 ) -> Table:
     units = UNITS[task.unit]
     places = 0 if task.unit == "m" else 1
-    starts = {"jitter": "moved starts", "random": "random starts and goals"}
+    starts = {
+        "jitter": "moved starts",
+        "mixed": "moved starts and any",
+        "random": "random starts and goals",
+    }
     title = (
         f"{task.name}: {found.episodes} episodes each, "
         f"{starts.get(found.variation, 'the nominal start')}, seed {found.seed}"

@@ -143,9 +143,16 @@ def _heading(plan: TrainingPlan, folder: Path) -> str:
     sees = ", ".join(plan.wrappers) or "the environment's own observations"
     return (
         f"[bold]{plan.algo.upper()}[/] on [bold]{escape(', '.join(plan.tasks))}[/]: "
-        f"{plan.steps:,} steps of {plan.n_envs} robots, {plan.variation} starts, seed "
+        f"{plan.steps:,} steps of {plan.n_envs} robots, {_starts(plan)}, seed "
         f"{plan.seed}; sees {sees}; {escape(str(folder))}"
     )
+
+
+def _starts(plan: TrainingPlan) -> str:
+    trained = plan.env_kwargs.get("variation", plan.variation)
+    if trained == plan.variation:
+        return f"{trained} starts"
+    return f"{trained} starts ({plan.variation} to evaluate)"
 
 
 def _line(point: Point, best: bool) -> str:

@@ -87,10 +87,11 @@ def train(
         ),
     ] = None,
     variation: Annotated[
-        Optional[Literal["nominal", "jitter", "random"]],  # noqa: UP045
+        Optional[Literal["nominal", "jitter", "mixed", "random"]],  # noqa: UP045
         typer.Option(
-            help="Starts: the task's own, within a body radius of it, or anywhere, "
-            "with any goal.  [default: jitter]",
+            help="Starts: the task's own, within a body radius of it, mixed with "
+            "any start, or any start and goal.  [default: mixed to train, jitter to "
+            "evaluate]",
             rich_help_panel=DISTURBED,
         ),
     ] = None,

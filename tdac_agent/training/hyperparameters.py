@@ -27,6 +27,7 @@ class Hyperparameters:
         n_envs: Robots that are driven at a time.
         steps: Of training, of all robots together.
         policy: Of stable-baselines3.
+        env: Arguments of the environments that are trained in.
         model: Further arguments of the algorithm's class, as the file has them.
     """
 
@@ -34,6 +35,7 @@ class Hyperparameters:
     n_envs: int
     steps: int
     policy: str
+    env: dict[str, Any]
     model: dict[str, Any]
 
 
@@ -66,6 +68,7 @@ def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
             int(model.pop("n_envs", 1)),
             int(model.pop("n_timesteps")),
             str(model.pop("policy", "MlpPolicy")),
+            dict(model.pop("env_kwargs", {})),
             model,
         )
     except (KeyError, TypeError, ValueError) as error:

@@ -54,7 +54,9 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
     """
     # More threads than one make networks of this size slower.
     torch.set_num_threads(1)
-    envs = VecMonitor(make_batch(plan, plan.n_envs), info_keywords=("is_success",))
+    envs = VecMonitor(
+        make_batch(plan, plan.n_envs, training=True), info_keywords=("is_success",)
+    )
     trials = VecMonitor(make_batch(plan, plan.episodes), info_keywords=("collision",))
     try:
         model = _model(plan, folder, envs)

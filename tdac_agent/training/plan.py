@@ -22,7 +22,7 @@ from tdac_envs.errors import TaskError, first_problem
 from tdac_envs.wrappers import check_wrappers
 
 PLAN_FILE = "training.json"
-Variation = Literal["nominal", "jitter", "random"]
+Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
 
 
@@ -36,7 +36,12 @@ class TrainingPlan(BaseModel):
     tasks: tuple[str, ...] = Field(description="Robot i has the task i modulo these.")
     task_sha256: tuple[str, ...]
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
-    variation: Variation = "jitter"
+    variation: Variation = Field("jitter", description="Of the evaluations' starts.")
+    env_kwargs: dict[str, Any] = Field(
+        default_factory=dict,
+        description="Of the environments that are trained in, where they differ from "
+        "those of the evaluations.",
+    )
     disturbance: Disturbance
     steps: int = Field(description="Of all robots together.")
     seed: int = 0
@@ -53,7 +58,7 @@ def make_plan(
     *,
     steps: int | None = None,
     seed: int = 0,
-    variation: Variation = "jitter",
+    variation: Variation | None = None,
     disturbance: Disturbance | None = None,
     wrappers: tuple[str, ...] | None = None,
     n_envs: int | None = None,
@@ -67,7 +72,8 @@ def make_plan(
         algo: Algorithm.
         steps: Of all robots together.
         seed: Of networks, starts and noise.
-        variation: Of the starts.
+        variation: Of the starts in training and evaluation; by default `jitter` to
+            evaluate, and to train what the hyperparameters' file says.
         disturbance: Noise and lateness; none by default.
         wrappers: Names of wrappers, innermost first.
         n_envs: Robots that are driven at a time.
@@ -96,7 +102,8 @@ def make_plan(
         tasks=tuple(map(_lasting, tasks)),
         task_sha256=tuple(task.sha256() for task in loaded),
         wrappers=names,
-        variation=variation,
+        variation=variation or "jitter",
+        env_kwargs=_env_kwargs(given, variation, loaded[0]),
         disturbance=disturbance or Disturbance(0.0, 0.0, 0.0, 0),
         steps=wanted,
         seed=seed,
@@ -142,20 +149,48 @@ def tasks_of(plan: TrainingPlan) -> list[Task]:
     return tasks
 
 
-def make_batch(plan: TrainingPlan, count: int) -> Any:
-    """Robots on a plan's tasks, seen through its wrappers, in one batch for SB3."""
+def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any:
+    """Robots on a plan's tasks, seen through its wrappers, in one batch for SB3.
+
+    Args:
+        plan: Of the training.
+        count: Number of robots.
+        training: Whether they are to learn; else they are to be evaluated.
+
+    Raises:
+        TaskError: A task has changed since the plan was made, or cannot be used.
+    """
     from tdac_envs.sb3 import SB3VecEnv
     from tdac_envs.wrapped_vector import WrappedVectorEnv
 
     each = []
     tasks = tasks_of(plan)
+    own = plan.env_kwargs if training else {}
     for task in tasks:
         options = plan.disturbance.env_options()
         noise = task.setting.noise(options.pop("range_noise"))
-        varied = {**options, **noise, "variation": plan.variation}
+        varied = {**options, **noise, "variation": plan.variation, **own}
         each.append({**task.env_kwargs(), **varied})
-    batch = _batch_class(tasks[0])(count, autoreset_mode="SameStep", each=each)
+    try:
+        batch = _batch_class(tasks[0])(count, autoreset_mode="SameStep", each=each)
+    except TypeError as error:
+        told = str(error).partition("() ")[2]
+        raise TaskError(f"env_kwargs of the hyperparameters: {told}") from error
     return SB3VecEnv(WrappedVectorEnv(batch, plan.wrappers))
+
+
+def _env_kwargs(
+    given: Hyperparameters, variation: Variation | None, task: Task
+) -> dict[str, Any]:
+    """Arguments of the environments that are trained in.
+
+    Raises:
+        TaskError: They contradict the task.
+    """
+    for name in given.env:
+        if name in task.env_kwargs():
+            raise TaskError(f"env_kwargs: {name} is the task's; leave it out")
+    return given.env | ({} if variation is None else {"variation": variation})
 
 
 def _batch_class(task: Task) -> Any:

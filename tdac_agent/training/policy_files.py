@@ -33,7 +33,7 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> 
         algo=plan.algo,
         tasks=plan.tasks,
         wrappers=plan.wrappers,
-        variation=plan.variation,
+        variation=plan.env_kwargs.get("variation", plan.variation),
         steps=found.steps,
         seed=plan.seed,
     )

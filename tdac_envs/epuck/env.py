@@ -32,7 +32,7 @@ from tdac_envs.stepping import TOUCHED, info_of
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
 
-VARIATIONS = ("nominal", "jitter", "random")
+VARIATIONS = ("nominal", "jitter", "mixed", "random")
 
 
 class EPuckEnv(DrivenEnv):
@@ -78,7 +78,8 @@ class EPuckEnv(DrivenEnv):
 
     ## Starting State
     `variation="nominal"`: the given start. `"jitter"`: within one body radius of it,
-    heading +- 0.5 rad. `"random"`: any feasible start and goal.
+    heading +- 0.5 rad. `"mixed"`: so, or in every second episode on average any
+    feasible start. `"random"`: any feasible start and goal.
     `reset(options={"start": (x, y, heading), "goal": (x, y)})` sets them.
 
     ## Episode End
@@ -99,7 +100,7 @@ class EPuckEnv(DrivenEnv):
         horizon: Steps. Default: max(2500, 6 * d0 / (full speed * dt)).
         max_wheel_speed: rad/s. Default: 6.28, or 7.536 of an e-puck of version 2.
         on_collision: `"terminate"` or `"block"`.
-        variation: `"nominal"`, `"jitter"` or `"random"`.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
         sensor_noise: Factor on the published noise of the infra-red sensors.
         reflectance: `"ideal"`: everything is seen as in the sensor's table;
             `"webots"`: with the reflectance of the file's materials, so that for

@@ -21,6 +21,7 @@ from tdac_envs.epuck.task import (
     default_horizon,
     jittered_start,
     make_task,
+    mixed_start,
     random_task,
 )
 from tdac_envs.rewards import RewardWeights
@@ -33,7 +34,7 @@ class Setup:
     Attributes:
         nominal: The task as given.
         around: What may be touched and seen at each place.
-        variation: `"nominal"`, `"jitter"` or `"random"`.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
         fixed_horizon: Whether the horizon was given, or follows from the task.
         on_collision: `"terminate"` or `"block"`.
         wheel_slip: Standard deviation of each wheel's speed, relative to it.
@@ -134,6 +135,8 @@ class Setup:
             )
         elif self.variation == "random":
             drawn = random_task(task, random)
+        elif self.variation == "mixed":
+            return task.moved(mixed_start(task, random))
         elif self.variation == "jitter":
             return task.moved(jittered_start(task, random))
         else:

@@ -168,6 +168,23 @@ def jittered_start(task: EPuckTask, random: np.random.Generator) -> Pose:
     )
 
 
+def mixed_start(task: EPuckTask, random: np.random.Generator) -> Pose:
+    """A jittered start or, in every second episode on average, any feasible one.
+
+    These are drawn from the grid points connected to the goal.
+    """
+    if random.random() < 0.5:
+        return jittered_start(task, random)
+    ground = task.ground
+    connected = np.flatnonzero(np.isfinite(task.field))
+    for _ in range(MAX_DRAWS):
+        start = ground.at(*_place(task, int(random.choice(connected))))
+        heading = wrapped(random.uniform(-math.pi, math.pi))
+        if not at_goal(ground, task.goal, task.goal_tolerance, *start):
+            return Pose(*start, heading)
+    return task.start
+
+
 def random_task(task: EPuckTask, random: np.random.Generator) -> EPuckTask:
     """The same world with any feasible start and goal; horizon kept.
 

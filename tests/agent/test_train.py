@@ -200,6 +200,23 @@ def test_several_tasks_and_noise_reach_the_robots(tmp_path, config):
     envs.close()
 
 
+def test_robots_that_learn_start_where_the_hyperparameters_say(small, config):
+    """Those of the evaluations start as the task's do; a flag is for both."""
+    file = config(env_kwargs={"variation": "mixed", "on_collision": "block"})
+
+    def made(variation=None, **which):
+        plan = make_plan((small,), variation=variation, config=file)
+        envs = make_batch(plan, 2, **which)
+        setup = envs.batch.unwrapped.setups[0]
+        envs.close()
+        return setup.variation, setup.on_collision
+
+    assert made(training=True) == ("mixed", "block")
+    assert made() == ("jitter", "terminate")
+    assert made("nominal", training=True) == ("nominal", "block")
+    assert made("nominal") == ("nominal", "terminate")
+
+
 def test_the_batch_is_told_what_single_environments_are_told(small, config):
     """Trained on the batch, a policy drives in the wrapped environment of its task."""
     plan = make_plan((small,), config=config())
@@ -268,6 +285,11 @@ def test_wrong_hyperparameters_are_refused(tmp_path, small, config):
         train(plan, tmp_path / "rate")
     with pytest.raises(TaskError, match="env_wrapper: expected some of"):
         make_plan((small,), config=config(env_wrapper=["gymnasium.wrappers.Other"]))
+    with pytest.raises(TaskError, match="env_kwargs: goal is the task's; leave it out"):
+        make_plan((small,), config=config(env_kwargs={"goal": [1, 2]}))
+    plan = make_plan((small,), **given, config=config(env_kwargs={"walls": 3}))
+    with pytest.raises(TaskError, match=r"env_kwargs .*: got an unexpected .*'walls'"):
+        train(plan, tmp_path / "walls")
     file = tmp_path / "empty.yml"
     file.write_text("{}")
     with pytest.raises(TaskError, match="no hyperparameters for TDAC-Map2D-v0"):

@@ -269,6 +269,24 @@ class TestVariations:
         assert np.abs(poses[:, 2] - nominal.heading).max() <= 0.5 + 1e-6
         assert len(np.unique(poses[:, 0])) == 40
 
+    def test_mixed_starts_near_or_all_over_the_world_and_keeps_the_goal(self):
+        env = EPuckEnv("room", variation="mixed")
+        left, low, right, high = env.nominal.ground.bounds
+        poses = []
+        for seed in range(60):
+            observation, info = env.reset(seed=seed)
+            poses.append(observation["pose"])
+            assert 0.0 < info["path_distance"] < math.inf
+            assert info["clearance"] >= 0.037
+            assert env.task.goal == env.nominal.goal
+            assert env.task.horizon == env.nominal.horizon
+        x, y, heading = np.array(poses).T
+        assert np.ptp(x) > (right - left) / 2
+        assert np.ptp(y) > (high - low) / 2
+        assert np.ptp(heading) > 6.0
+        start = env.nominal.start
+        assert 15 < (np.hypot(x - start.x, y - start.y) <= 0.037).sum() < 45
+
     def test_random_draws_feasible_starts_and_goals(self):
         env = EPuckEnv("room", variation="random")
         for seed in range(30):

@@ -353,6 +353,24 @@ class TestVariations:
         assert len(np.unique(poses[:, 0])) == 50
         np.testing.assert_array_equal(env.reset(seed=7)[0]["pose"], poses[7])
 
+    def test_mixed_starts_near_or_all_over_the_map_and_keeps_the_goal(self):
+        env = walled_env(variation="mixed")
+        poses = []
+        for seed in range(60):
+            observation, info = env.reset(seed=seed)
+            poses.append(observation["pose"])
+            assert observation in env.observation_space
+            assert 0.0 < info["path_distance"] < math.inf
+            assert info["clearance"] >= 15
+            assert env.task.goal == env.nominal.goal
+            assert env.task.horizon == env.nominal.horizon
+        x, y, heading = np.array(poses).T
+        assert min(np.ptp(x), np.ptp(y)) > 200
+        assert np.ptp(heading) > 6.0
+        near = (np.hypot(x - 50, y - 200) <= 15) & (np.abs(heading) <= 0.5)
+        assert 15 < near.sum() < 45
+        np.testing.assert_array_equal(env.reset(seed=7)[0]["pose"], poses[7])
+
     def test_random_draws_start_and_goal_with_their_own_horizon(self):
         env = walled_env(variation="random", dt=0.01)
         for seed in range(10):

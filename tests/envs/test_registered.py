@@ -43,6 +43,7 @@ VARIANTS = [
         },
     ),
     ("TDAC-EPuck-v0", {"world": "maze", "variation": "random"}),
+    ("TDAC-EPuck-v0", {"world": "maze", "variation": "mixed"}),
 ]
 variants = pytest.mark.parametrize(("name", "options"), VARIANTS)
 every_env = pytest.mark.parametrize("name", IDS)

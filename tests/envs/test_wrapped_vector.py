@@ -17,6 +17,7 @@ CASES = [
     (("goal-relative",), "SameStep", "jitter", EACH),
     (("goal-relative", "guidance", "flatten"), "SameStep", "random", EACH),
     (("goal-relative", "guidance", "flatten"), "NextStep", "jitter", EACH),
+    (("goal-relative", "guidance", "flatten"), "SameStep", "mixed", EACH),
     (("guidance",), "SameStep", "jitter", [{"map": "rooms"}]),
     (("flatten", "flatten"), "SameStep", "random", [{"map": "rooms"}]),
     ((), "NextStep", "nominal", [{"map": "rooms"}]),
