@@ -24,6 +24,7 @@ OURS = {
     "reference": "reference",
     "follow-guidance": "follow-guidance",
     "go-to-goal": "go-to-goal",
+    "random": "random",
 }
 MODEL = "recorded model"
 ASK = "tdac synth --task {0} --learner manual:DIR; controller.py to results/genuine/{0}"

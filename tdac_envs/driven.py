@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.arguments import not_negative, one_of, wheel_speeds, whole_number
 from tdac_envs.render import ending
-from tdac_envs.rewards import RewardWeights
+from tdac_envs.rewards import weights_of
 from tdac_envs.stepping import HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, info_of
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         wheel_slip: Standard deviation of each wheel's speed, relative to it.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Steps by which an action takes effect late.
+        reward_weights: Those of the reward that are to differ, by their names.
         dt: Duration of a step, s.
         render_mode: `"rgb_array"`, `"human"` or None.
 
@@ -53,6 +54,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         wheel_slip: float,
         motor_lag: float,
         delay: int,
+        reward_weights: Mapping[str, float] | None,
         dt: float,
         render_mode: str | None,
     ) -> None:
@@ -62,7 +64,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.wheel_slip = not_negative("wheel_slip", wheel_slip)
         self.motor_lag = not_negative("motor_lag", motor_lag)
         self.delay = whole_number("delay", delay, 0)
-        self.weights = RewardWeights()
+        self.weights = weights_of(reward_weights)
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": max(round(1.0 / dt), 1)}
         self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)

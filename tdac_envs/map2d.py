@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,8 @@ class Map2DEnv(DrivenEnv):
         wheel_slip: Standard deviation of each wheel's speed, relative to it.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Steps by which an action takes effect late.
+        reward_weights: Those of the reward that are to differ, by the names of
+            `RewardWeights`; who compares rewards leaves them.
         snap: Move start and goal to the nearest place that holds the body.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
@@ -127,6 +129,7 @@ class Map2DEnv(DrivenEnv):
         wheel_slip: float = 0.0,
         motor_lag: float = 0.0,
         delay: int = 0,
+        reward_weights: Mapping[str, float] | None = None,
         snap: bool = False,
         render_mode: str | None = None,
     ) -> None:
@@ -161,6 +164,7 @@ class Map2DEnv(DrivenEnv):
             wheel_slip=wheel_slip,
             motor_lag=motor_lag,
             delay=delay,
+            reward_weights=reward_weights,
             dt=self.nominal.dt,
             render_mode=render_mode,
         )

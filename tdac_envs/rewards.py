@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
+from tdac_envs.arguments import not_negative, one_of
 from tdac_envs.compiled import kernel
 
 
@@ -22,6 +24,19 @@ class RewardWeights(NamedTuple):
     goal: float = 10.0
     collision: float = 10.0
     time: float = 0.01
+
+
+def weights_of(given: Mapping[str, float] | None) -> RewardWeights:
+    """The weights that are given by their names, and the default of the others.
+
+    Raises:
+        TaskError: A name is unknown, or a weight is not a finite number of at least 0.
+    """
+    weights = {}
+    for name, value in (given or {}).items():
+        one_of("a name in reward_weights", name, RewardWeights._fields)
+        weights[name] = not_negative(f"reward_weights[{name!r}]", value)
+    return RewardWeights(**weights)
 
 
 @kernel()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -109,6 +109,8 @@ class EPuckEnv(DrivenEnv):
         wheel_slip: Standard deviation of each wheel's speed, relative to it.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Steps by which an action takes effect late.
+        reward_weights: Those of the reward that are to differ, by the names of
+            `RewardWeights`; who compares rewards leaves them.
         ignore: Names or types of nodes that may be solid and are not modelled.
         ground_sensors: Whether to observe `ground`.
         gps: Whether to observe `gps`.
@@ -144,6 +146,7 @@ class EPuckEnv(DrivenEnv):
         wheel_slip: float = 0.0,
         motor_lag: float = 0.0,
         delay: int = 0,
+        reward_weights: Mapping[str, float] | None = None,
         ignore: Sequence[str] = (),
         ground_sensors: bool = False,
         gps: bool = False,
@@ -173,6 +176,7 @@ class EPuckEnv(DrivenEnv):
             wheel_slip=wheel_slip,
             motor_lag=motor_lag,
             delay=delay,
+            reward_weights=reward_weights,
             dt=self.nominal.dt,
             render_mode=render_mode,
         )

@@ -236,6 +236,18 @@ class TestReward:
         assert np.mean(rewards) == pytest.approx(0.1 - 0.01, abs=1e-3)
         assert env.step(-FULL)[1] == pytest.approx(-0.1 - 0.01, abs=0.01)
 
+    def test_weights_that_are_given_differ_and_the_others_stay(self):
+        rewards = []
+        for weights in (None, {"collision": 2.0, "time": 0.5}):
+            env = walled_env(on_collision="block", reward_weights=weights)
+            env.reset(seed=0)
+            steps = [env.step(FULL) for _ in range(60)]
+            rewards.append([step[1] for step in steps])
+        hits = np.array([step[4]["collision"] for step in steps])
+        assert 0 < hits.sum() < 60
+        differ = np.subtract(*rewards[::-1])
+        np.testing.assert_allclose(differ, 8.0 * hits - 0.49, atol=1e-9)
+
     def test_progress_sums_to_the_way_that_was_driven(self):
         env = walled_env(on_collision="block")
         _, info = env.reset(seed=0)
@@ -435,6 +447,8 @@ class TestArguments:
             ({"start": (math.nan, 3)}, TaskError, "expected start to be 2 finite"),
             ({"on_collision": "stop"}, TaskError, "on_collision to be one of 'termin"),
             ({"variation": "wild"}, TaskError, "variation to be one of 'nominal', 'j"),
+            ({"reward_weights": {"wall": 1}}, TaskError, "one of 'progress', 'goal'"),
+            ({"reward_weights": {"time": -1}}, TaskError, "'time'] of at least 0"),
             ({"render_mode": "ansi"}, TaskError, "render_mode to be one of None, 'rg"),
             ({"n_rays": 0}, TaskError, "expected n_rays to be a whole number from 1"),
             ({"n_rays": 2.5}, TaskError, "expected n_rays to be a whole number from 1"),

@@ -96,6 +96,7 @@ def test_threads_change_nothing(threads):
 def test_each_robot_may_have_its_own_map_and_options():
     """Robot i has the arguments of entry i, which begin anew after the last."""
     each = [{"map": "maze"}, {"map": "cave", "dt": 0.02}, {"map": "office"}]
+    each[0]["reward_weights"] = {"time": 0.5}
     more = {"variation": "random", "on_collision": "block", "range_noise": 0.1}
     each[2]["range_noise"] = 0.0
     batch = Map2DVectorEnv(4, each=each, **more)
