@@ -15,12 +15,13 @@ from tdac_agent.training.hyperparameters import Algo
 from tdac_agent.training.plan import make_plan, read_plan
 from tdac_agent.training.policy_files import FACTS, POLICY
 from tdac_agent.training.train import train
+from tdac_envs.rewards import RewardWeights
 
 SEEDS = (0, 1, 2)
 PPO_TASKS = ("maze", "epuck", "office", "cave", "rooms", "epuck-maze")
-SAC_TASKS = ("maze", "epuck")
+SAC_TASKS = ("rooms", "epuck")
 FOUR_MAPS = ("maze", "office", "cave", "rooms")
-LONGER = {"four-maps": 1_200_000}
+OTHERWISE = {"four-maps": 800_000}
 """Steps of PPO, where they are not those of the hyperparameters' file."""
 
 
@@ -35,7 +36,7 @@ class Training:
 
 
 TRAININGS = {
-    f"{algo}-{name}-{seed}": Training(algo, tasks, seed, LONGER.get(name))
+    f"{algo}-{name}-{seed}": Training(algo, tasks, seed, OTHERWISE.get(name))
     for algo, sets in (
         ("ppo", {task: (task,) for task in PPO_TASKS} | {"four-maps": FOUR_MAPS}),
         ("sac", {task: (task,) for task in SAC_TASKS}),
@@ -87,11 +88,14 @@ def _row(name: str, folder: Path) -> dict[str, Any]:
     plan, best = read_plan(folder), json.loads((folder / FACTS).read_text())
     last = pd.read_csv(folder / CURVE_FILE).iloc[-1]
     found = best["evaluation"]
+    weights = plan.env_kwargs.get("reward_weights", {})
     return {
         "training": name,
         "algo": plan.algo,
         "task": " ".join(plan.tasks),
         "seed": plan.seed,
+        "starts": plan.env_kwargs.get("variation", plan.variation),
+        "contact": weights.get("collision", RewardWeights().collision),
         "steps_planned": plan.steps,
         "steps": int(last.steps),
         "seconds": last.seconds,
