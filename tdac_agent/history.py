@@ -10,7 +10,16 @@ from typing import Literal, TypeVar
 from tdac_agent.errors import RunError
 from tdac_agent.journal import read_records
 from tdac_agent.learnt import Learnt, what_was_learnt
-from tdac_agent.records import JOURNAL, RUN_FILE, Attempt, Run, load_rules, load_run
+from tdac_agent.records import (
+    JOURNAL,
+    RUN_FILE,
+    Attempt,
+    Run,
+    at_work,
+    load_rules,
+    load_run,
+    status_now,
+)
 from tdac_agent.report import Report
 from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, load_task
@@ -69,6 +78,7 @@ class Told:
 
     Attributes:
         run: Its record.
+        status: Of the moment: `running` and `killed` are told apart.
         task: Its task, unless that cannot be read.
         tried: Its candidates, oldest first.
         report: On the verified controller, or on the last candidate that has one.
@@ -78,6 +88,7 @@ class Told:
     """
 
     run: Run
+    status: str
     task: Task | None
     tried: tuple[Tried, ...]
     report: Report | None
@@ -101,8 +112,10 @@ def gather_run(source: Path | Run) -> Told:
     Raises:
         RunError: The folder has no readable `run.json`.
     """
+    folder = source.folder if isinstance(source, Run) else source
+    before, problems = at_work(folder), list[str]()
     run = source if isinstance(source, Run) else load_run(source)
-    folder, problems = run.folder, list[str]()
+    status = status_now(run, before=before)
     tried = tuple(_candidates(run, problems))
     reports = [one.report for one in tried if one.report is not None]
     sources = [one.source for one in tried if one.source is not None]
@@ -114,6 +127,7 @@ def gather_run(source: Path | Run) -> Told:
             problems.append("controller.py of the verified run is missing")
     return Told(
         run,
+        status,
         _kept(problems, lambda: load_task(folder)),
         tried,
         report or (reports[-1] if reports else None),

@@ -128,9 +128,22 @@ def setting_of(iterations: int, patience: int, *, refine: bool) -> Setting:
     return "one shot" if iterations == 1 else "best of N"
 
 
-def status_now(run: Run) -> str:
-    """Its status; `killed` where the process that wrote `running` is gone."""
-    if is_held(run.folder / LOCK_FILE):
+def at_work(folder: Path) -> bool:
+    """Whether a process is at work on a run."""
+    return is_held(folder / LOCK_FILE)
+
+
+def status_now(run: Run, *, before: bool) -> str:
+    """Its status; `killed` where the process that wrote `running` is gone.
+
+    Args:
+        run: The run.
+        before: Whether it was at work before its record was read. Without that, one
+            that ends in between would seem to have been killed.
+    """
+    if run.finished:
+        return run.status
+    if before or at_work(run.folder):
         return "running"
     return "killed" if run.status == "running" else run.status
 

@@ -16,7 +16,7 @@ from rich.table import Table
 from tdac_agent.budget import told_usd
 from tdac_agent.commands.run_view import way_on
 from tdac_agent.errors import RunError
-from tdac_agent.records import JOURNAL, RUN_FILE, load_run, status_now
+from tdac_agent.records import JOURNAL, RUN_FILE, at_work, load_run, status_now
 
 WIDE = 100
 """Characters, with which there is room for all columns."""
@@ -70,12 +70,13 @@ def _is_run(place: Path) -> bool:
 
 def _row(folder: Path) -> dict[str, Any]:
     """What there is to say of a run folder, also of a torn one."""
+    before = at_work(folder)
     try:
         run = load_run(folder)
     except RunError as error:
         reason = str(error).removeprefix(f"{folder} is not a run folder: ")
         return {"run": str(folder), "status": "unreadable", "reason": reason}
-    status = status_now(run)
+    status = status_now(run, before=before)
     return {
         "run": str(folder),
         "task": run.task,

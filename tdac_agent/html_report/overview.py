@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
 
+from tdac_agent.history import Told
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.metrics import (
     ASSUMPTIONS,
@@ -21,7 +23,6 @@ from tdac_agent.metrics import (
 )
 from tdac_agent.metrics.table import KIND
 from tdac_agent.plots import figure_bytes, plot_cumulative_success, plot_success_rates
-from tdac_agent.records import Run
 
 MOST_CURVES = 8
 
@@ -41,17 +42,23 @@ class Overview:
     figures: tuple[tuple[str, str], ...]
 
 
-def overview_of(runs: list[Run]) -> Overview:
+def overview_of(told: Sequence[Told]) -> Overview:
     """The overview of some runs of any kinds."""
-    frames = frames_of(runs)
+    frames = frames_of([one.run for one in told])
     table = summarise(frames).to_dict("records")
-    kinds = tuple(_kind(row) for row in table)
     groups = [frames.only(**{name: row[name] for name in KIND}) for row in table]
+    working = {str(one.run.folder) for one in told if one.status == "running"}
+    kinds = tuple(
+        _kind(row, int(group.runs["run"].isin(working).sum()))
+        for row, group in zip(table, groups, strict=True)
+    )
     return Overview(kinds, _assumptions(groups), _figures(frames))
 
 
-def _kind(row: dict[str, Any]) -> dict[str, Any]:
+def _kind(row: dict[str, Any], working: int) -> dict[str, Any]:
     return row | {
+        "at_work": working,
+        "cut_short": row["censored"] - working,
         "sr": _rate(row, "sr"),
         "first_pass": _rate(row, "first_pass"),
         "cs_K": _rate(row, "cs_K"),

@@ -19,7 +19,6 @@ from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
 from tdac_agent.html_report.overview import overview_of, told_seconds
 from tdac_agent.html_report.scene import Scene, scene_of
 from tdac_agent.html_report.section import broken, section_of
-from tdac_agent.records import status_now
 
 MOST_BYTES = 24 << 20
 """Of the details of all runs; those beyond it are only listed."""
@@ -72,7 +71,7 @@ def make_page(place: Path) -> Page:
         name=place.name,
         runs=runs,
         unreadable=unreadable,
-        overview=overview_of([one.run for one in told]),
+        overview=overview_of(told),
         details=details,
         scenes={key: _for_player(scene) for key, scene in scenes.items()},
         style=Markup(_text("page.css")),
@@ -139,7 +138,6 @@ def _environment() -> jinja2.Environment:
         "learner": learner_named,
         "python": highlighted,
         "shortened": shortened,
-        "status": status_now,
         "test": short_test,
         "usd": told_usd,
     }

@@ -15,7 +15,7 @@ from tdac_agent.html_report.animation import animations
 from tdac_agent.html_report.overview import drawn, told_seconds
 from tdac_agent.html_report.scene import Scene
 from tdac_agent.plots import plot_breakdown
-from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, status_now
+from tdac_agent.records import GIVEN_FILE, PROMPT_FILE
 from tdac_agent.report import Diagnosis, Report
 from tdac_agent.units import UNITS
 
@@ -60,7 +60,6 @@ def section_of(
         "name": name,
         "told": told,
         "run": told.run,
-        "status": status_now(told.run),
         "learner": learner_named(told.run.learner),
         "iterations": _iterations(told),
         "failures": list(_failures(told)),
@@ -176,7 +175,7 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     yield shlex.join([*words, "--seed", str(run.seed)]), "asks anew"
     again = ["tdac", "synth", "--task", name, "--learner", f"replay:{name}"]
     yield shlex.join(again), "the answers on record again; nobody is asked"
-    if not run.finished:
+    if not run.finished and told.status != "running":
         more = run.enough.split()
         yield shlex.join(["tdac", "synth", "--resume", name, *more]), "goes on with it"
     if run.verified:

@@ -14,7 +14,8 @@ from tdac_agent.errors import RunError
 from tdac_agent.history import gather_run
 from tdac_agent.html_report import make_page
 from tdac_agent.html_report.page import shortened
-from tdac_agent.records import load_rules, load_run
+from tdac_agent.locks import LOCK_FILE, hold
+from tdac_agent.records import load_rules, load_run, status_now
 from tdac_agent.report import Report
 
 VOID = {"meta", "link", "input", "br", "img"}
@@ -193,6 +194,32 @@ def test_a_run_that_was_killed(copied):
     assert "killed" in shown[:200]
     assert "k=1 j=1 not judged to its end" in shown
     assert "tdac synth --resume run" in shown
+
+
+def test_a_run_that_is_still_at_work(copied):
+    """Its lock says so; it was not killed or cut short, and nobody is to go on."""
+    run = load_run(copied)
+    left = {"status": "running", "tau": None, "attempts": run.attempts[:1]}
+    (copied / "run.json").write_text(run.model_copy(update=left).model_dump_json())
+    with hold(copied / LOCK_FILE):
+        text = make_page(copied).html.decode()
+    shown = " ".join("".join(Outline(text).shown).split())
+    assert "running after 2 candidates" in shown
+    assert "A process is at work on it" in shown
+    assert "1 at work" in shown
+    for word in ("killed", "cut short", "--resume"):
+        assert word not in shown
+
+
+def test_a_run_that_ends_while_its_record_is_read_was_not_killed(copied):
+    """What was at work before that has ended as its next record says."""
+    run = load_run(copied)
+    assert status_now(run, before=True) == "verified"
+    left = run.model_copy(update={"status": "running"})
+    assert status_now(left, before=True) == "running"
+    assert status_now(left, before=False) == "killed"
+    with hold(copied / LOCK_FILE):
+        assert status_now(left, before=False) == "running"
 
 
 def test_a_run_that_has_only_begun(copied):
