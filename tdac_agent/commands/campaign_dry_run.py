@@ -7,7 +7,6 @@ import sys
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rich import box
 from rich.markup import escape
 from rich.table import Table
 
@@ -16,7 +15,7 @@ from tdac_agent.campaign.config import find_config, read_config
 from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign import with_limits
-from tdac_agent.commands.campaign_table import LABEL_WIDTH, labels_of, make_console
+from tdac_agent.commands.campaign_table import labels_of, make_console, make_table
 from tdac_agent.lifecycle import model_warnings
 from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import PriceList, load_prices, price_file
@@ -104,11 +103,8 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> Row:
 
 def _table(cells: list[Cell], rows: list[Row]) -> Table:
     labels = labels_of(cells)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
-    for name in labels.names:
-        table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
-    for name in ("runs", "K", "J", "asked", "USD at\nmost", "asked 3\ntimes"):
-        table.add_column(name, justify="right", no_wrap=True)
+    figures = ("runs", "K", "J", "asked", "USD at\nmost", "asked 3\ntimes")
+    table = make_table(labels.names, figures)
     for cell, row in zip(cells, rows, strict=True):
         table.add_row(
             *map(escape, labels.of(cell)),

@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable
 
-from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.markup import escape
+from rich.padding import Padding
+from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from tdac_agent.campaign.executor import Died, Ended, Update
@@ -16,14 +17,15 @@ from tdac_agent.campaign.perform import Outcome, Terms
 from tdac_agent.campaign.progress import Doing, Progress, Tally
 from tdac_agent.commands.campaign_table import (
     COLOURS,
-    LABEL_WIDTH,
     labels_of,
+    make_table,
     told_counts,
     told_time,
 )
 
-FRAME_LINES = 8
+FRAME_LINES = 10
 """Around the rows of the table."""
+BAR_WIDTH = 60
 
 
 class LiveView:
@@ -39,7 +41,9 @@ class LiveView:
         self._console = console
         self._progress = progress
         self._terms = terms
-        self._labels = labels_of([t.cell for t in progress.tallies.values()])
+        cells = [tally.cell for tally in progress.tallies.values()]
+        self._labels = labels_of(cells)
+        self._paid = any(cell.asks_models for cell in cells)
         self._live = Live(
             get_renderable=self._render,
             console=console,
@@ -81,12 +85,10 @@ class LiveView:
         tallies = list(self._progress.tallies.values())
         shown = sorted(tallies, key=self._interest)[:room]
         table = self._table(tally for tally in tallies if tally in shown)
-        lines = [self._doing(one) for one in doing]
-        if len(shown) < len(tallies):
-            lines.insert(
-                0, f"[dim]and {len(tallies) - len(shown)} more kinds of run[/]"
-            )
-        return Group(table, *lines, told_counts(self._progress, going=True))
+        more = len(tallies) - len(shown)
+        others = [f"[dim]and {more} more kinds of run[/]"] if more else []
+        counts = told_counts(self._progress, going=True)
+        return Group(table, *others, self._doing(doing), self._bar(), counts)
 
     def _interest(self, tally: Tally) -> tuple[bool, bool, bool]:
         """Kinds under way first, then those with something wrong, then unfinished."""
@@ -95,29 +97,49 @@ class LiveView:
         return tally.cell.folder not in at_work, not tally.halted, not unfinished
 
     def _table(self, tallies: Iterable[Tally]) -> Table:
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        for name in self._labels.names:
-            table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
-        for name in ("runs", "verified", "not", "halted", "tokens", "USD"):
-            table.add_column(name, justify="right", no_wrap=True)
+        spent = ("tokens", "USD") if self._paid else ()
+        table = make_table(
+            self._labels.names,
+            ("ended", "verified", "not verified", "halted", *spent),
+        )
         for tally in tallies:
-            table.add_row(*map(escape, self._labels.of(tally.cell)), *_figures(tally))
+            figures = [*_counts(tally), *(_spent(tally) if self._paid else [])]
+            table.add_row(*map(escape, self._labels.of(tally.cell)), *figures)
         return table
 
-    def _doing(self, one: Doing) -> str:
-        seconds = told_time(time.monotonic() - one.since)
-        return f"[cyan]▸[/] {escape(one.planned.name)} [dim]{seconds}[/] {one.said}"
+    def _doing(self, doing: Iterable[Doing]) -> Table:
+        """What is under way: which run, for how long, and what it is at."""
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(overflow="fold")
+        grid.add_column(justify="right", no_wrap=True)
+        grid.add_column(no_wrap=True)
+        for one in doing:
+            labels = " ".join(self._labels.of(one.planned.cell))
+            name = f"[cyan]▸[/] {escape(labels)} [dim]r{one.planned.index:04d}[/]"
+            grid.add_row(name, told_time(time.monotonic() - one.since), one.said)
+        return grid
+
+    def _bar(self) -> Padding:
+        progress = self._progress
+        bar = ProgressBar(progress.planned, progress.finished, BAR_WIDTH)
+        return Padding(bar, (1, 0, 0, 0))  # which ends the bar's line, too
 
 
-def _figures(tally: Tally) -> list[str]:
+def _counts(tally: Tally) -> list[str]:
     ended = tally.ended
     return [
         f"{tally.finished}/{tally.planned}",
         _number(ended["verified"], "green"),
         _number(ended["not verified"], "red"),
         _number(tally.halted, "yellow"),
+    ]
+
+
+def _spent(tally: Tally) -> list[str]:
+    cost = tally.cost
+    return [
         f"{tally.tokens:,}" if tally.tokens else "",
-        "?" if tally.cost is None else f"{tally.cost:.2f}" if tally.cost else "",
+        "?" if cost is None else f"{cost:.2f}" if cost else "",
     ]
 
 

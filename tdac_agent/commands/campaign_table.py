@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ COLOURS = {"verified": "green", "not verified": "red"}
 LABEL_WIDTH = 6
 FILE_WIDTH = 130
 """Of tables that are written into a file."""
+WIDE = 110
+"""Columns in which a rate and its interval are beside each other."""
 ALWAYS = ("task", "learner")
 SOMETIMES = ("optimizer", "prompt", "setting")
 
@@ -77,56 +80,58 @@ def show_summary(summary: pd.DataFrame, console: Console) -> None:
     names += [n for n in SOMETIMES[1:] if summary[n].nunique() > 1]
     if (summary["optimizer"] != summary["learner"]).any():
         names.insert(2, "optimizer")
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in names:
-        table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
-    for name in ("R", "verified", "halted"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for name in ("SR", "CS(K)", "first pass"):
-        table.add_column(name, justify="right", min_width=len("[0.00,"))
-    table.add_column("mean τ", justify="right", no_wrap=True)
-    paid = bool(summary["tokens_per_verified"].notna().any())
-    if paid:
-        table.add_column("tokens", justify="right", no_wrap=True)
-        table.add_column("USD", justify="right", no_wrap=True)
-    for row in summary.to_dict("records"):
-        labels = [
-            escape(Path(str(row[n])).name if n == "prompt" else str(row[n]))
-            for n in names
-        ]
-        table.add_row(*labels, *_metrics(row), *(_spent(row) if paid else []))
+    between = " " if console.width >= WIDE else "\n"
+    rows = summary.to_dict("records")
+    figures = [_figures(row, between) for row in rows]
+    # A column in which nobody has anything is left out.
+    told = [name for name in figures[0] if any(one[name] for one in figures)]
+    table = make_table(names, told)
+    for row, known in zip(rows, figures, strict=True):
+        labels = [Path(str(row[n])).name if n == "prompt" else row[n] for n in names]
+        table.add_row(*(escape(str(n)) for n in labels), *(known[n] for n in told))
     console.print(table)
-    console.print(
-        "[dim]95 % intervals; docs/metrics.md says what they take for granted"
-        + ("; tokens and USD: each verified run's share of all" if paid else "")
-        + "[/]",
-        soft_wrap=True,
-    )
+    remark = "95 % intervals, and τ, the mean iteration of success: docs/metrics.md"
+    if "tokens" in told:
+        remark += "\ntokens and USD: each verified run's share of all"
+    console.print(f"[dim]{remark}[/]", soft_wrap=True)
 
 
-def _metrics(row: dict[Any, Any]) -> list[str]:
-    halted = int(row["censored"])
-    tau = row["tau_mean"]
-    return [
-        str(row["R"]),
-        f"[green]{row['verified']}[/]" if row["verified"] else "0",
-        f"[yellow]{halted}[/]" if halted else "[dim]–[/]",
-        *(_rate(row, name) for name in ("sr", "cs_K", "first_pass")),
-        "–" if pd.isna(tau) else f"{tau:.1f}",
-    ]
+def make_table(labels: Iterable[str], figures: Iterable[str]) -> Table:
+    """A table of kinds of run; where it is narrow, the labels are folded."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    for name in labels:
+        table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
+    for name in figures:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
 
 
-def _rate(row: dict[Any, Any], name: str) -> str:
+def _figures(row: dict[Any, Any], between: str) -> dict[str, str]:
+    """What the table says of a kind, by column; nothing where there is nothing."""
+    done, halted = row["verified"], int(row["censored"])
+    cost = row["cost_per_verified"] if row["tokens_per_verified"] > 0 else math.nan
+    verified = f"[{'green' if done else 'red'}]{done}[/]/{row['R']}"
+    if halted:
+        verified += f"{between}[yellow]{halted} halted[/]"
+    return {
+        "verified": verified,
+        "SR": _rate(row, "sr", between),
+        "CS(K)": _rate(row, "cs_K", between),
+        "first pass": _rate(row, "first_pass", between),
+        "τ": _number(row["tau_mean"], ".1f"),
+        "tokens": _number(row["tokens_per_verified"], ",.0f"),
+        "USD": _number(cost, ".3f"),
+    }
+
+
+def _number(value: float, form: str) -> str:
+    return "" if pd.isna(value) else format(value, form)
+
+
+def _rate(row: dict[Any, Any], name: str, between: str) -> str:
     low, high = row[f"{name}_low"], row[f"{name}_high"]
-    return escape(str(Rate(row[name], 0, 0, low, high, "")))
-
-
-def _spent(row: dict[Any, Any]) -> list[str]:
-    tokens, cost = row["tokens_per_verified"], row["cost_per_verified"]
-    return [
-        "–" if pd.isna(tokens) else f"{tokens:,.0f}",
-        "–" if pd.isna(cost) else f"{cost:.3f}",
-    ]
+    told = str(Rate(row[name], 0, 0, low, high, "")).replace(" ", between, 1)
+    return escape(told)
 
 
 def told_counts(progress: Progress, *, going: bool = False) -> str:

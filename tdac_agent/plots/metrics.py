@@ -146,8 +146,11 @@ def plot_cumulative_panels(
     rows = max(1, math.ceil(len(curves) / columns))
     figure = new_plot(2.7 * columns, 2.1 * rows + 0.5)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes in grid.flat[len(curves) :]:
+    for number, axes in enumerate(grid.flat[len(curves) :], len(curves)):
         axes.set_axis_off()
+        # The panel above it is the lowest one of its column.
+        if number >= columns:
+            grid.flat[number - columns].tick_params(labelbottom=True)
     for number, (name, curve) in enumerate(curves.items()):
         axes, colour = dress(grid.flat[number]), COLOURS[number % len(COLOURS)]
         for other in curves.values():

@@ -63,9 +63,15 @@ def plot_failures(run: Run) -> Figure:
     _label_tests(axes, shown)
     _label_candidates(axes, run.attempts)
     more = f"; {len(left_out)} further tests left out" if left_out else ""
-    told = "no test ever failed" if not failed else f"{len(failed)} tests ever failed"
+    count = (
+        f"{len(failed)} test{'' if len(failed) == 1 else 's'}" if failed else "no test"
+    )
     learner = learner_named(run.learner)
-    title(axes, f"What failed in {run.folder.name}", f"{learner}; {told}{more}")
+    title(
+        axes,
+        f"What failed in {run.folder.name}",
+        f"{learner}; {count} ever failed{more}",
+    )
     names = {PALE: "passed", FAILED: "× failed", NOTHING: "no code"}
     there = [colour for number, colour in enumerate(names) if (cells == number).any()]
     figure.legend(

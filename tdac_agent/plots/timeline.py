@@ -116,6 +116,8 @@ def _verdict(record: JournalRecord, tried: Tried | None) -> Entry:
     if not record["valid"]:
         return Entry(k, f"{at}  no code", _wrapped(notes), TROUBLE)
     head = f"{at}  {len(record['failed_tests'])} failed"
+    if record.get("unchanged"):
+        return Entry(k, head, _wrapped(["the same code again", *notes]), FAILED)
     return Entry(k, head, (*_causes(record, tried), *_wrapped(notes)), FAILED)
 
 
