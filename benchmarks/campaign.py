@@ -6,8 +6,12 @@ The same short runs (`builtin` on a small map, verified at once) are made by one
 and by two, in turns. Their speed-up is printed beside that of two bare loops, pinned as
 the workers are, at the same moment: what the machine gives. Overhead is the time of one
 worker that is in no run: starting, planning, handing out, the tables, of `--runs` runs.
-With `--many`, that many scripted runs are made with `keep: records`, and the driver's
-memory and the files are counted; `--seconds` stops such a campaign early.
+
+With `--many`, that many scripted runs of one iteration are made with `keep: records`.
+They are as short as runs can be: about one in ten has an answer that is tested in the
+sandbox, and drives or imports what it may not; those of the others are no Python, and
+are asked for three times. Memory of the driver on the way, its CPU time and the files
+are printed, and what the same command takes when nothing is left to do.
 """
 
 from __future__ import annotations
@@ -32,6 +36,17 @@ from tdac_agent.metrics import find_runs
 
 LOOP = 20_000_000
 LOOK_SECONDS = 0.2
+PARTS = (0.1, 0.5, 0.9)
+"""Of a campaign's time, when the driver's memory is told."""
+BROKEN = """def policy(obs)
+    return 0.5, 0.5
+"""
+FORBIDDEN = """import socket
+
+
+def policy(obs):
+    return 0.5, 0.5
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +57,8 @@ class Made:
         runs: That were made.
         wall: Of the driver's process, s.
         in_runs: Sum over the runs, s.
-        driver_mb: Most memory of the driver's process.
+        driver_cpu: CPU time of the driver's process, s.
+        driver_mb: Its memory when parts of the time were over; in the end, the most.
         files: In its folder.
         megabytes: Of these.
     """
@@ -50,7 +66,8 @@ class Made:
     runs: int
     wall: float
     in_runs: float
-    driver_mb: float
+    driver_cpu: float
+    driver_mb: dict[str, float]
     files: int
     megabytes: float
 
@@ -60,19 +77,28 @@ def main() -> None:
     options = _options()
     with _place() as folder:
         if options.many:
-            _write(folder, options.many, ["scripted:weak"], keep="records")
-            found = {"many": asdict(_make(folder, 2, "many", options.seconds))}
+            _write_many(folder, options.many)
+            found = {
+                "all of them": asdict(_make(folder, 2, "many")),
+                "once more": asdict(_make(folder, 2, "many")),
+            }
         else:
             found = _scaling(folder, options.runs)
     if options.json:
         print(json.dumps(found, indent=1))
         return
     for name, figures in found.items():
-        told = ", ".join(f"{key} {value:.4g}" for key, value in figures.items())
+        told = ", ".join(f"{key} {_told(value)}" for key, value in figures.items())
         print(f"{name}: {told}")
 
 
-def _scaling(folder: Path, runs: int) -> dict[str, dict[str, float]]:
+def _told(value: object) -> str:
+    if isinstance(value, dict):
+        return "/".join(f"{part:.0f}" for part in value.values())
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _scaling(folder: Path, runs: int) -> dict[str, dict[str, object]]:
     _write(folder, runs, ["builtin"])
     bare_one = _loops(1)
     one = _make(folder, 1, "one")
@@ -89,29 +115,27 @@ def _scaling(folder: Path, runs: int) -> dict[str, dict[str, float]]:
     }
 
 
-def _make(folder: Path, workers: int, out: str, seconds: float = 1e9) -> Made:
+def _make(folder: Path, workers: int, out: str) -> Made:
     """Carries out the campaign; its driver is looked at meanwhile."""
     words = ["campaign", "bench.yaml", "--workers", str(workers), "--out", out]
-    began = time.perf_counter()
+    began, memory, cpu = time.perf_counter(), [0.0], 0.0
     with subprocess.Popen(
         [sys.executable, "-m", "tdac_agent.cli", *words],
         cwd=folder,
         stdout=subprocess.DEVNULL,
     ) as driver:
-        peak = 0.0
         while driver.poll() is None:
-            peak = max(peak, _resident(driver.pid))
-            if time.perf_counter() - began > seconds:
-                driver.terminate()
-                driver.wait()
-                break
+            memory.append(_resident(driver.pid))
+            cpu = max(cpu, _cpu_seconds(driver.pid))
             time.sleep(LOOK_SECONDS)
     wall = time.perf_counter() - began
     made = [run for run in find_runs(folder / out) if run.finished]
     files = [path for path in (folder / out).rglob("*") if path.is_file()]
     size = sum(path.stat().st_size for path in files) / 1e6
     in_runs = sum(run.seconds for run in made)
-    return Made(len(made), wall, in_runs, peak, len(files), size)
+    megabytes = {f"{part:.0%}": memory[int(part * len(memory))] for part in PARTS}
+    megabytes["most"] = max(memory)
+    return Made(len(made), wall, in_runs, cpu, megabytes, len(files), size)
 
 
 def _resident(pid: int) -> float:
@@ -121,6 +145,15 @@ def _resident(pid: int) -> float:
     except (OSError, IndexError):
         return 0.0
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def _cpu_seconds(pid: int) -> float:
+    """CPU time of a process without its children, s."""
+    try:
+        words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _loops(count: int) -> float:
@@ -145,7 +178,22 @@ def _loop(core: int) -> None:
         pass
 
 
-def _write(folder: Path, runs: int, learners: list[str], keep: str = "all") -> None:
+def _write_many(folder: Path, runs: int) -> None:
+    """A campaign of the shortest runs that are verified."""
+    (folder / "forbidden.py").write_text(FORBIDDEN)
+    (folder / "broken.py").write_text(BROKEN)
+    drawn = [
+        {"weight": 1},
+        {"weight": 1, "file": "forbidden.py"},
+        {"weight": 58, "file": "broken.py"},
+    ]
+    script = {"schema": 1, "generate": drawn, "edit": drawn}
+    (folder / "script.yaml").write_text(yaml.safe_dump(script))
+    learner = f"scripted:{folder / 'script.yaml'}"
+    _write(folder, runs, [learner], settings=["one shot"], keep="records")
+
+
+def _write(folder: Path, runs: int, learners: list[str], **more: object) -> None:
     """A campaign on a room of 160 × 120 px with a wall in it."""
     cells = np.zeros((120, 160), np.bool_)
     cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = True
@@ -168,9 +216,8 @@ def _write(folder: Path, runs: int, learners: list[str], keep: str = "all") -> N
         "tasks": ["small.yaml"],
         "learners": learners,
         "runs": runs,
-        "keep": keep,
     }
-    (folder / "bench.yaml").write_text(yaml.safe_dump(campaign))
+    (folder / "bench.yaml").write_text(yaml.safe_dump(campaign | more))
 
 
 @contextmanager
@@ -186,7 +233,6 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--runs", type=int, default=200, help="of each campaign")
     parser.add_argument("--many", type=int, default=0, help="scripted runs instead")
-    parser.add_argument("--seconds", type=float, default=1e9, help="stop --many then")
     parser.add_argument("--json", action="store_true", help="print JSON")
     return parser.parse_args()
 
