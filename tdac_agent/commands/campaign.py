@@ -23,6 +23,7 @@ from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign_live import LiveView
 from tdac_agent.commands.campaign_table import make_console, show_summary, told_counts
+from tdac_agent.commands.sentences import tell
 from tdac_agent.lifecycle import model_warnings
 from tdac_agent.provider import Provider
 from tdac_agent.providers import choose_models
@@ -153,20 +154,19 @@ def _tell_heading(
 
 def _tell_remarks(console: Console, plan: Plan, terms: Terms) -> None:
     for line in model_warnings(models_of(plan.cells)):
-        console.print(f"[yellow]note: {escape(line)}[/]", soft_wrap=True)
+        tell(console, f"note: {line}", "yellow")
     others = foreign(plan, terms.runs)
     if others:
         told = f"{len(others)} other kinds of run are in {terms.runs}: of an earlier "
         told += "file, task, suite or version; they are left alone"
-        console.print(f"[yellow]note: {escape(told)}[/]", soft_wrap=True)
+        tell(console, f"note: {told}", "yellow")
 
 
 def _tell_ending(
     console: Console, progress: Progress, folder: Path, wanted: Wanted
 ) -> None:
     for problem, count in progress.problems.most_common():
-        told = f"{count} × {problem}"
-        console.print(f"[yellow]{escape(told)}[/]", soft_wrap=True)
+        tell(console, f"{count} × {problem}", "yellow")
     console.print(told_counts(progress), soft_wrap=True)
     console.print(
         f"  tables: {folder}/runs.csv, candidates.csv, summary.csv\n"

@@ -16,6 +16,7 @@ from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign import with_limits
 from tdac_agent.commands.campaign_table import labels_of, make_console, make_table
+from tdac_agent.commands.sentences import tell
 from tdac_agent.lifecycle import model_warnings
 from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import PriceList, load_prices, price_file
@@ -71,8 +72,10 @@ def run(given: str, limits: dict[str, Any], part: str, as_json: bool) -> int:
         sys.stdout.write(json.dumps([asdict(row) for row in rows], indent=2) + "\n")
         return 0
     console.print(_table([t.cell for t in progress.tallies.values()], rows))
-    for line in _lines(rows, plan, config.max_cost, config.max_tokens, prices):
-        console.print(line, soft_wrap=True)
+    for line in _lines(rows, config.max_cost, config.max_tokens, prices):
+        tell(console, line)
+    for line in model_warnings(models_of(plan.cells)):
+        tell(console, f"note: {line}", "yellow")
     return 0
 
 
@@ -117,7 +120,6 @@ def _table(cells: list[Cell], rows: list[Row]) -> Table:
 
 def _lines(
     rows: list[Row],
-    plan: Plan,
     max_cost: float | None,
     max_tokens: int | None,
     prices: PriceList,
@@ -135,9 +137,8 @@ def _lines(
         bounds = [told_usd(max_cost)] if max_cost is not None else []
         bounds += [f"{max_tokens} tokens"] if max_tokens is not None else []
         lines.append(f"all runs together stop at {' and '.join(bounds) or 'nothing'}")
-        lines.append(escape(f"prices of {prices.dated}: {price_file()}"))
-    notes = model_warnings(models_of(plan.cells))
-    return [*lines, *(f"[yellow]note: {escape(line)}[/]" for line in notes)]
+        lines.append(f"prices of {prices.dated}: {price_file()}")
+    return lines
 
 
 def _usd(cost: float | None) -> str:

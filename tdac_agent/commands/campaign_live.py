@@ -22,6 +22,7 @@ from tdac_agent.commands.campaign_table import (
     told_counts,
     told_time,
 )
+from tdac_agent.commands.sentences import tell
 
 FRAME_LINES = 10
 """Around the rows of the table."""
@@ -65,7 +66,7 @@ class LiveView:
         match update:
             case Died():
                 told = f"the process of {update.planned.name} died; it goes on"
-                self._console.print(f"[yellow]{escape(told)}[/]", soft_wrap=True)
+                tell(self._console, told, "yellow")
             case Ended() if not self._console.is_terminal:
                 self._console.print(self._line(update.outcome), soft_wrap=True)
             case Ended() if not update.outcome.finished:

@@ -8,9 +8,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
 from tdac_agent.commands.flags import TaskFlags, check_tier
+from tdac_agent.commands.sentences import tell
 from tdac_agent.privileged import REFERENCE
 from tdac_agent.suite_check import check_suite
 from tdac_agent.suite_proof import Row, SuiteCheck
@@ -53,9 +53,9 @@ def run(
 
 def _show(check: SuiteCheck, console: Console) -> None:
     for note in check.notes:
-        console.print(f"[yellow]note: {escape(note)}[/]", soft_wrap=True)
+        tell(console, f"note: {note}", "yellow")
     for problem in check.problems:
-        console.print(Text(problem, style="red"), soft_wrap=True)
+        tell(console, problem, "red")
     console.print(_table(check))
     colour, word = ("green", "proven") if check.proven else ("red", "not proven")
     console.print(

@@ -6,11 +6,10 @@ import sys
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 
 from tdac_agent.budget import told_usd
 from tdac_agent.commands.flags import TaskFlags
-from tdac_agent.commands.mistakes import fitted
+from tdac_agent.commands.sentences import tell
 from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import SHIPPED, load_prices, price_file
 from tdac_agent.prompt import load_template
@@ -69,7 +68,7 @@ def run(
     console = Console(stderr=True, highlight=False, emoji=False)
     unbounded = _unbounded(outlook) if models["base_url"] is None else []
     for line in [*_lines(outlook), *_needed([*missing, *unbounded])]:
-        console.print(escape(fitted(line)), soft_wrap=True)
+        tell(console, line)
     return 0
 
 

@@ -8,8 +8,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
+from tdac_agent.commands.sentences import tell
 from tdac_agent.evaluation_report import (
     Comparison,
     EvaluatedTask,
@@ -45,7 +45,7 @@ def show_evaluation(found: Evaluation, console: Console) -> None:
         console.print(_table(found, task, rows, timings))
         console.print()
         for line in _remarks(rows):
-            console.print(Text(f"  {line}"), soft_wrap=True, highlight=False)
+            tell(console, line, indent=2)
     console.print(LEGEND, style="dim", highlight=False)
     if found.comparisons:
         console.print()

@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from tdac_agent.commands.sentences import tell
 from tdac_agent.errors import RunError
 from tdac_agent.files import write_atomic
 from tdac_agent.html_report import make_page
@@ -31,7 +32,7 @@ def run(place: Path, out: Path | None) -> int:
         raise RunError(f"cannot write {file}: {error.strerror}") from error
     console = Console(emoji=False)
     for line in page.unreadable:
-        console.print(f"[yellow]not readable: {escape(line)}[/]", soft_wrap=True)
+        tell(console, f"not readable: {line}", "yellow")
     runs = "1 run" if page.runs == 1 else f"{page.runs} runs"
     told = f"{escape(str(file))}: {runs}, {page.verified} verified"
     console.print(f"{told}; {len(page.html) / 1e6:.1f} MB", soft_wrap=True)

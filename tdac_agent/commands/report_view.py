@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from tdac_agent.commands.sentences import tell
 from tdac_agent.report import Report, is_of_paper_alone
 from tdac_agent.trajectory import nominal_first
 from tdac_agent.units import UNITS
@@ -32,14 +33,14 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
         tests.setdefault(failure.message, []).append(failure.test)
     for message, names in tests.items():
         console.print(f"[red]failed[/] [bold]{escape(', '.join(names))}[/]")
-        console.print(Text(f"  {message}"), style="default", soft_wrap=True)
+        tell(console, message, indent=2)
     shown: set[str] = set()
     for failure in report.failures:
         diagnosis = failure.diagnosis
         if diagnosis is not None and diagnosis.text not in shown:
             shown.add(diagnosis.text)
             console.print(f"[cyan]diagnosis[/] {escape(diagnosis.cause)}")
-            console.print(Text(f"  {diagnosis.text}"), soft_wrap=True)
+            tell(console, diagnosis.text, indent=2)
     console.print(episode_table(report))
     if out is not None:
         _show_files(out, console)

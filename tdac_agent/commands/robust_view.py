@@ -8,8 +8,8 @@ from functools import partial
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
+from tdac_agent.commands.sentences import tell
 from tdac_agent.robust_report import Interval, RobustReport, SequentialResult
 from tdac_agent.seeded import SeededEpisode
 from tdac_agent.units import UNITS, Units
@@ -26,14 +26,14 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
         console: Where to.
         play: Command line that plays an episode, but for its seed.
     """
-    # A command and a message are for copying: they are not wrapped.
-    whole = partial(console.print, soft_wrap=True, highlight=False)
     say = partial(console.print, highlight=False)
     say(worst_table(report))
     for error in _errors(report):
-        whole(Text(f"  {error}"))
+        tell(console, error, indent=2)
     replay = shlex.join([*play, "--seed", str(report.worst[0].seed)])
-    whole(f"  replay the first of them: [bold]{escape(replay)}[/]")
+    # A command is for copying: it is not wrapped.
+    told = f"  replay the first of them: [bold]{escape(replay)}[/]"
+    console.print(told, soft_wrap=True, highlight=False)
     say(f"  disturbance: {report.provenance.disturbance}")
     outcomes = report.outcomes.items()
     others = ", ".join(f"{count} {name}" for name, count in outcomes if name != REACHED)

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from tdac_agent.budget import told_usd
 from tdac_agent.commands.run_view import way_on
+from tdac_agent.commands.sentences import tell
 from tdac_agent.errors import RunError
 from tdac_agent.records import JOURNAL, RUN_FILE, at_work, load_run, status_now
 
@@ -46,8 +47,7 @@ def run(folder: Path, as_json: bool) -> int:
         console.print(_table(rows, console.width))
         for row in rows:
             if row["status"] == "unreadable":
-                told = f"[red]{escape(row['run'])}: {escape(row['reason'])}[/]"
-                console.print(told, soft_wrap=True)
+                tell(console, f"{row['run']}: {row['reason']}", "red")
             elif row["go_on"]:
                 console.print(f"go on: {escape(row['go_on'])}", soft_wrap=True)
     else:

@@ -54,29 +54,28 @@ class Command:
         answer = self._run(request.prompt.encode("utf-8", "replace"), request.seconds)
         text = answer.decode("utf-8", "replace")
         if len(text) > MAX_CHARS:
-            raise ProviderFault(f"{self._argv[0]} wrote {len(text)} characters")
+            raise ProviderFault(f"an answer of {len(text)} characters")
         return Reply(without_secrets(text))
 
     def _run(self, prompt: bytes, seconds: float) -> bytes:
         """What the program writes; it and what it has started end with this call."""
         pipe = subprocess.PIPE
-        program = self._argv[0]
         try:
             process = subprocess.Popen(
                 self._argv, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
             )
         except OSError as error:
-            raise ProviderFault(f"{program}: {error.strerror}") from None
+            raise ProviderFault(f"it cannot be started: {error.strerror}") from None
         try:
             out, err = process.communicate(prompt, timeout=seconds)
         except subprocess.TimeoutExpired:
-            raise ProviderFault(f"{program}: no answer in {seconds:.0f} s") from None
+            raise ProviderFault(f"no answer in {seconds:.0f} s") from None
         finally:
             _end(process)
         if process.returncode != 0:
             last = err.decode("utf-8", "replace").strip().rpartition("\n")[2]
             told = f": {last}" if last else ""
-            raise ProviderFault(one_line(f"{program}: {_ending(process)}{told}"))
+            raise ProviderFault(one_line(f"{_ending(process)}{told}"))
         return out
 
 

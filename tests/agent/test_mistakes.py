@@ -1,12 +1,15 @@
-"""A mistake is one line; on a terminal it is as wide as that."""
+"""Lines and sentences: whole in a file, on a terminal as wide as that."""
 
+import io
 import os
 import pty
 import sys
 
 import pytest
+from rich.console import Console
 
 from tdac_agent.commands.mistakes import begun, fitted
+from tdac_agent.commands.sentences import tell
 
 LINE = "error: " + "words that are rather many " * 6 + "/a/path/" + "x" * 99
 
@@ -40,3 +43,18 @@ def test_that_a_command_begins_is_said_on_a_terminal_alone(monkeypatch, capsys):
         with begun():
             assert os.read(screen.fileno(), 99).decode() == "starting …\r"
         assert os.read(screen.fileno(), 99) == b"\x1b[2K"
+
+
+@pytest.mark.parametrize("indent", [0, 2])
+def test_sentences_on_a_console(indent):
+    """Each goes on below its text on a terminal, and is one line elsewhere."""
+    words = f"{LINE}\n[red]no markup[/]"
+    for terminal in (False, True):
+        console = Console(file=io.StringIO(), width=60, force_terminal=terminal)
+        tell(console, words, indent=indent)
+        lines = console.file.getvalue().splitlines()
+        assert lines[-1] == " " * indent + "[red]no markup[/]"
+        assert lines[0].startswith(" " * indent + "error: words")
+        assert " ".join(line.strip() for line in lines[:-1]) == LINE
+        assert (len(lines) == 2) != terminal
+        assert all(line.startswith("  ") for line in lines[1:-1])
