@@ -53,10 +53,15 @@ def fitted(line: str) -> str:
     """A line for stderr; a terminal gets it in its width, no word or path broken."""
     if not sys.stderr.isatty():
         return line
+    return folded(line, shutil.get_terminal_size().columns)
+
+
+def folded(line: str, width: int, hanging: int = 2) -> str:
+    """A line in a width, what goes on indented; no word or path is broken."""
     return textwrap.fill(
         line,
-        shutil.get_terminal_size().columns,
-        subsequent_indent="  ",
+        width,
+        subsequent_indent=" " * hanging,
         break_long_words=False,
         break_on_hyphens=False,
     )

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
-
 from rich.console import Console
 from rich.text import Text
+
+from tdac_agent.commands.mistakes import folded
 
 
 def tell(console: Console, words: str, style: str = "", *, indent: int = 0) -> None:
@@ -20,11 +20,5 @@ def tell(console: Console, words: str, style: str = "", *, indent: int = 0) -> N
     for line in words.splitlines():
         told = " " * indent + line
         if console.is_terminal:
-            told = textwrap.fill(
-                told,
-                console.width,
-                subsequent_indent=" " * (indent or 2),
-                break_long_words=False,
-                break_on_hyphens=False,
-            )
+            told = folded(told, console.width, indent or 2)
         console.print(Text(told, style), soft_wrap=True)
