@@ -119,22 +119,28 @@ def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
     modules = _random_modules(tree)
     for node in calls(tree):
         function = node.func
-        seeds = [*node.args, *(keyword.value for keyword in node.keywords)]
-        seeded = any(ast.unparse(seed) != "None" for seed in seeds)
         if isinstance(function, ast.Attribute):
-            owner = ast.unparse(function.value)
-            if owner not in modules:
+            if _spelled(function.value) not in modules:
                 continue
             name = function.attr
         elif isinstance(function, ast.Name) and function.id in modules:
             name = function.id
         else:
             continue
+        seeds = [*node.args, *(keyword.value for keyword in node.keywords)]
+        seeded = any(ast.unparse(seed) != "None" for seed in seeds)
         if name in SEEDED_CONSTRUCTORS and seeded:
             continue
         if name == "seed" and seeded:
             continue
         yield f"line {node.lineno}: {ast.unparse(function)}()"
+
+
+def _spelled(node: ast.expr) -> str:
+    """A name with dots, such as `np.random`; else an empty text."""
+    if isinstance(node, ast.Attribute):
+        return f"{_spelled(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
 
 
 def _random_modules(tree: ast.Module) -> set[str]:

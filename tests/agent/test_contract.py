@@ -1,6 +1,9 @@
 """The static checks, one pattern at a time."""
 
 import ast
+import dataclasses
+import inspect
+import typing
 
 import pytest
 
@@ -167,3 +170,12 @@ def test_top_level_names(code, names):
 def test_main_guard(code, guarded):
     """Only the usual guard that calls `main` counts."""
     assert contract.has_main_guard(ast.parse(code)) is guarded
+
+
+@pytest.mark.parametrize("module", [ast, contract, dataclasses, typing])
+def test_all_nodes_in_order(module):
+    """The same nodes as of the standard library's own walk, in its order."""
+    tree = ast.parse(inspect.getsource(module))
+    ours, theirs = contract.nodes_of(tree), list(ast.walk(tree))
+    assert len(ours) == len(theirs)
+    assert all(our is their for our, their in zip(ours, theirs, strict=True))
