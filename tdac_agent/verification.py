@@ -6,6 +6,7 @@ import contextlib
 import json
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from tdac_agent.errors import ControllerFileError
@@ -40,6 +41,7 @@ def verify(
     limits: Limits | None = None,
     out: Path | None = None,
     judge: WarmJudge | None = None,
+    meanwhile: Callable[[], None] | None = None,
 ) -> Report:
     """Tests a controller in the sandbox against everything the task asks for.
 
@@ -57,6 +59,7 @@ def verify(
         out: Folder for `report.json` and `trajectories/`, with a picture of each
             episode that failed; none by default.
         judge: A warm one, for several verifications; one of its own by default.
+        meanwhile: Called now and then while the judge is at work.
 
     Returns:
         The report; a failing controller is a report, never an exception.
@@ -85,7 +88,7 @@ def verify(
         _prepare(job, task, source, suites)
         with contextlib.ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge())
-            output = _run_judge(job, folder, warm)
+            output = _run_judge(job, folder, warm, meanwhile)
         findings = read_findings(job.out, output)
         tests, failures = read_outcomes(job.out / "report.jsonl", findings)
         report = Report(
@@ -194,11 +197,13 @@ def _suite_folder(path: Path) -> Path:
     return path.resolve()
 
 
-def _run_judge(job: Job, folder: Path, judge: WarmJudge) -> str:
+def _run_judge(
+    job: Job, folder: Path, judge: WarmJudge, meanwhile: Callable[[], None] | None
+) -> str:
     """Has the job done; returns what was printed meanwhile."""
     request = folder / "job.json"
     request.write_text(job.model_dump_json(), encoding="utf-8")
-    judge.run(request, DEADLINE_SECONDS)
+    judge.run(request, DEADLINE_SECONDS, meanwhile)
     output = (folder / "output.txt").read_bytes().decode("utf-8", "replace")
     return output.replace(f"{folder}/", "")
 

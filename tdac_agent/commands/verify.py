@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.robust_flags import RobustFlags
+from tdac_agent.commands.spinner import Spinner
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
 from tdac_agent.nursery import Nursery
@@ -46,13 +47,9 @@ def run(
     gc.enable()
     with WarmJudge(nursery) as judge:
         # Loaded while the judge gets ready.
-        from rich.console import Console
-
-        from tdac_agent.commands.report_view import show_report
         from tdac_agent.verification import verify
 
-        console = Console(stderr=as_json, emoji=False)
-        with console.status(f"verifying {file.name} on {task.name} …"):
+        with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
             report = verify(
                 file,
                 task,
@@ -63,9 +60,15 @@ def run(
                 seed=seed,
                 out=out,
                 judge=judge,
+                meanwhile=spinner,
             )
         if junit is not None:
             write_junit(report, junit)
+        from rich.console import Console
+
+        from tdac_agent.commands.report_view import show_report
+
+        console = Console(stderr=as_json, emoji=False)
         if not as_json:
             show_report(report, console, out)
         measured = None
