@@ -37,10 +37,15 @@ class Crew(Generic[P, T]):
             else it refers to is as it was at the fork.
         end: What a member does last of all.
         size: Number of members.
+        first: What a member does before it is asked for anything.
     """
 
     def __init__(
-        self, work: Callable[P, T], end: Callable[[], None], size: int = SIZE
+        self,
+        work: Callable[P, T],
+        end: Callable[[], None],
+        size: int = SIZE,
+        first: Callable[[], None] | None = None,
     ) -> None:
         context = multiprocessing.get_context("fork")
         cores = Cores()
@@ -51,7 +56,9 @@ class Crew(Generic[P, T]):
             ours, theirs = context.Pipe()
             self._ends.append(ours)
             member = context.Process(
-                target=_serve, args=(work, end, theirs, self._ends, cores), daemon=True
+                target=_serve,
+                args=(first, work, end, theirs, self._ends, cores),
+                daemon=True,
             )
             member.start()
             theirs.close()
@@ -146,6 +153,7 @@ def end_with_parent() -> None:
 
 
 def _serve(
+    first: Callable[[], None] | None,
     work: Callable[..., Any],
     end: Callable[[], None],
     judge: Connection,
@@ -157,6 +165,8 @@ def _serve(
     for other in ends_of_judge:
         other.close()
     with contextlib.suppress(EOFError, KeyboardInterrupt):
+        if first is not None:
+            first()
         while True:
             args, kwargs = judge.recv()
             try:

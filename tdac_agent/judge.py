@@ -6,11 +6,11 @@ import json
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, replace
+from contextlib import ExitStack
+from functools import cached_property, partial
 from pathlib import Path
 
 from tdac_agent.crew import SIZE, Crew
-from tdac_agent.episode import Record, run_own_loop, run_policy
 from tdac_agent.errors import Fault
 from tdac_agent.nursery import Nursery
 from tdac_agent.remote import Unit
@@ -19,16 +19,24 @@ from tdac_agent.sandbox import (
     ControllerFault,
     ControllerTimeout,
     Limits,
-    SandboxError,
 )
 from tdac_agent.starts import spread_starts
+from tdac_agent.suite_episode import (
+    Brief,
+    Order,
+    SuiteCrew,
+    drive,
+    fresh_child,
+    load_controller,
+    not_driven,
+    skipped,
+)
 from tdac_agent.task import Task
-from tdac_agent.trajectory import Outcome, Rollout
+from tdac_agent.trajectory import Rollout
 from tdac_agent.turns import Turns
 from tdac_envs.task2d import Pose
 
 JITTERS = 5
-SHOWN_JITTERS = 2
 # As many as a suite has: the nominal one, the jittered ones, those of `run_episode`.
 EPISODES = 1 + JITTERS + 3
 WALL_SECONDS = 600.0
@@ -42,23 +50,6 @@ OWN_LOOPS: tuple[Key, ...] = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Driven:
-    """An episode as it was driven.
-
-    Attributes:
-        rollout: What came of it.
-        cpu_seconds: CPU time of its child.
-        tier: Sandbox tier of its child.
-        import_fault: Why the controller could not be imported, where it could not.
-    """
-
-    rollout: Rollout
-    cpu_seconds: float
-    tier: str
-    import_fault: ControllerFault | None = None
-
-
 class Judge:
     """Everything a suite may ask about one controller on one task.
 
@@ -70,6 +61,7 @@ class Judge:
         seed: Of the jittered starts.
         limits: Of each child; `cpu_seconds` is for all of them together.
         nursery: Where children are started ahead; one of its own by default.
+        crew: Processes that drive; of its own by default, forked now.
         at_a_time: How many episodes may go on side by side.
 
     Attributes:
@@ -88,22 +80,28 @@ class Judge:
         seed: int = 0,
         limits: Limits | None = None,
         nursery: Nursery | None = None,
+        crew: SuiteCrew | None = None,
         at_a_time: int = min(SIZE, EPISODES),
     ) -> None:
         self.task = task
         self.source = source
-        self.tier = self._wanted_tier = tier
+        self.tier = tier
         self.cpu_seconds = 0.0
         self.fault: str | None = None
-        self._workdir = workdir
-        starts = spread_starts(task.nominal, seed, JITTERS)
-        self._starts = {f"jitter {n}": pose for n, pose in enumerate(starts, 1)}
+        self._seed = seed
         self._limits = limits or Limits()
         self._deadline = time.monotonic() + WALL_SECONDS
-        self._nursery = nursery or Nursery(ahead=False)
-        self._owns_nursery = nursery is None
-        # Before the first thread.
-        self._crew = Crew(self._in_crew, self._nursery.close, at_a_time)
+        self._brief = Brief(source, workdir, tier, self._limits, self._deadline)
+        self._own = ExitStack()
+        if nursery is None:
+            nursery = Nursery(ahead=False)
+            self._own.callback(nursery.close)
+        self._nursery = nursery
+        if crew is None:
+            # Before the first thread.
+            crew = Crew(partial(drive, task, nursery), nursery.close, at_a_time)
+            self._own.callback(crew.close)
+        self._crew = crew
         self._pool = ThreadPoolExecutor(max_workers=at_a_time)
         # The suite's own calls are made beside the episodes.
         self._turns = Turns(at_a_time + 1)
@@ -186,11 +184,9 @@ class Judge:
         self._end_unit()
 
     def close(self) -> None:
-        """Settles, and ends what is left."""
+        """Settles, and ends what it has made itself."""
         self.settle()
-        self._crew.close()
-        if self._owns_nursery:
-            self._nursery.close()
+        self._own.close()
 
     def _end_unit(self) -> None:
         if self._unit is not None:
@@ -223,10 +219,16 @@ class Judge:
             )
         return self._starts[name]
 
+    @cached_property
+    def _starts(self) -> dict[str, Pose]:
+        starts = spread_starts(self.task.nominal, self._seed, JITTERS)
+        return {f"jitter {n}": pose for n, pose in enumerate(starts, 1)}
+
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
         if name != "nominal" and not self._submit(NOMINAL).result().reached:
             reason = "not run, since the nominal episode failed"
-            return self._skipped(name, "not run", reason)
+            order = self._order(name, steps, drive)
+            return skipped(self.task, order, "not run", reason)
         with self._turns.beside():
             rollout = self.drive(name, steps, drive)
         if not rollout.timed_out:
@@ -251,11 +253,12 @@ class Judge:
             drive: By what.
             final: A time-out will not be tried once more.
         """
+        order = self._order(name, steps, drive)
         try:
             self._may_start()
-            driven = self._crew.do(name, steps, drive)
+            driven = self._crew.do(self._brief, order)
         except ControllerFault as fault:
-            return self._not_driven(name, fault)
+            return not_driven(self.task, order, fault)
         except Fault as fault:
             self.fault = str(fault)
             raise
@@ -265,34 +268,12 @@ class Judge:
             self._remember(driven.import_fault, final=final)
         # Children side by side may together use more than each may by itself.
         if self.cpu_seconds > self._limits.cpu_seconds:
-            return self._skipped(name, "error", f"the controller {self._overspent()}")
+            reason = f"the controller {self._overspent()}"
+            return skipped(self.task, order, "error", reason)
         return driven.rollout
 
-    def _in_crew(self, name: str, steps: int | None, drive: str) -> Driven:
-        """The same in a process of the crew."""
-        limit = steps if steps is not None else self.task.nominal.horizon
-        record = Record(self.task.make_env(), self.start_pose(name), limit)
-        if drive == "truncated run_episode":
-            record.truncates, record.collisions_before = True, 2
-        child = self._child()
-        try:
-            self._import(child)
-        except ControllerFault as fault:
-            cpu_seconds = child.close().cpu_seconds
-            rollout = self._not_driven(name, fault)
-            return Driven(rollout, cpu_seconds, child.tier, fault)
-        try:
-            if drive != "policy":
-                seconds = child.limits.reset_seconds + 2 * limit * self.task.nominal.dt
-                rollout = run_own_loop(child, record, name, timeout=seconds)
-            else:
-                held_out = self._held_out(name)
-                rollout = run_policy(
-                    child, record, name, held_out=held_out, deadline=self._deadline
-                )
-        finally:
-            cpu_seconds = child.close().cpu_seconds
-        return Driven(rollout, cpu_seconds, child.tier)
+    def _order(self, name: str, steps: int | None, drive: str) -> Order:
+        return Order(name, self.start_pose(name), steps, drive)
 
     def _overspent(self) -> str:
         return f"used {self._limits.cpu_seconds} s of CPU time, all it may"
@@ -316,9 +297,14 @@ class Judge:
             ControllerFault: It cannot be imported; the same at each later request.
         """
         self._may_start()
-        child = self._child()
         try:
-            self._import(child)
+            child = fresh_child(self._nursery, self._brief)
+        except Fault as fault:
+            self.fault = str(fault)
+            raise
+        self.tier = child.tier
+        try:
+            load_controller(child, self._brief)
         except ControllerFault as fault:
             self._account(child.close().cpu_seconds)
             self._remember(fault, final=final)
@@ -344,43 +330,6 @@ class Judge:
         """An import that failed is not tried again, unless for want of time."""
         if final or not isinstance(fault, ControllerTimeout):
             self._import_fault = fault
-
-    def _not_driven(self, name: str, fault: ControllerFault) -> Rollout:
-        late = isinstance(fault, ControllerTimeout)
-        return replace(self._skipped(name, "error", str(fault)), timed_out=late)
-
-    def _skipped(self, name: str, outcome: Outcome, reason: str) -> Rollout:
-        record = Record(self.task.make_env(), self.start_pose(name), 1)
-        record.reset()
-        task = self.task.nominal
-        return Rollout(
-            name,
-            self._held_out(name),
-            outcome,
-            record.trajectory(),
-            task.goal,
-            task.body_radius,
-            task.goal_tolerance,
-            error=reason,
-        )
-
-    def _held_out(self, name: str) -> bool:
-        return name != "nominal" and int(name.split()[1]) > SHOWN_JITTERS
-
-    def _child(self) -> Child:
-        """A child without files."""
-        try:
-            child = self._nursery.take(self._wanted_tier, self._limits)
-        except SandboxError as error:
-            self.fault = f"the sandbox failed: {error}"
-            raise Fault(self.fault) from error
-        self.tier = child.tier
-        return child
-
-    def _import(self, child: Child) -> None:
-        """Gives a child its files, and has it import the controller."""
-        child.furnish(self._workdir, self.source)
-        child.load()
 
 
 def rollout_key(name: str, steps: int | None, drive: str) -> str:

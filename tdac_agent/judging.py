@@ -12,10 +12,13 @@ import importlib
 import io
 import json
 import os
+import pickle
 import select
 import sys
 import tempfile
 import traceback
+from functools import partial
+from math import inf
 from pathlib import Path
 from typing import NoReturn
 
@@ -23,12 +26,17 @@ import cv2
 import gymnasium as gym
 import numpy as np
 
-from tdac_agent.crew import end_with_parent
+from tdac_agent.crew import Crew, end_with_parent
+from tdac_agent.episode import Record, run_policy
 from tdac_agent.jobs import SUITE, Job
 from tdac_agent.nursery import Nursery
+from tdac_agent.sandbox.inner.decode import decode
+from tdac_agent.sandbox.inner.encode import encode
 from tdac_agent.starts import spread_starts
+from tdac_agent.suite_episode import SuiteCrew, drive_known
 from tdac_agent.suite_run import judge_suite
 from tdac_agent.task import load_task
+from tdac_envs.driven import Observation
 from tdac_envs.map2d import Map2DEnv
 
 # Exit codes of a worker; a suite may well end it with another one.
@@ -82,19 +90,29 @@ def work(nursery: Nursery) -> NoReturn:
     """Prepares children, waits for a job on standard input, does it and ends."""
     os.setpgid(0, 0)
     end_with_parent()
+    answers = os.dup(1)
+    os.dup2(2, 1)
+    # Nothing but what is worth while before the job has come.
     while not _is_readable(0) and nursery.prepare():
         continue
+    crew = None
+    if not _is_readable(0):
+        # After the children, which its members share.
+        crew = _ready_crew(nursery)
+        _run_a_test()
     request = _read_line(0)
-    code, answers = NO_JOB, os.dup(1)
+    code = NO_JOB
     try:
         with contextlib.ExitStack() as later:
             later.callback(nursery.close)
+            if crew is not None:
+                later.callback(crew.close)
             if request:
                 with (Path(request).parent / "output.txt").open("wb") as output:
                     os.dup2(output.fileno(), 1)
                     os.dup2(output.fileno(), 2)
                 code = 1
-                do_job(Path(request), nursery, later)
+                do_job(Path(request), nursery, crew, later)
                 code = DID_JOB
                 _flush()
                 _say(DONE, answers)
@@ -129,10 +147,7 @@ def _rehearse() -> None:
     """Loads what is compiled, and has pytest load what it needs for a suite."""
     for name in LOADED_LATE:
         importlib.import_module(name)
-    from tdac_agent.suite_plugin import run_tests
-
-    cells = np.zeros((40, 60), np.bool_)
-    env = Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
+    env = _small_env()
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     env.nominal.path_from(env.nominal.start)
@@ -141,6 +156,12 @@ def _rehearse() -> None:
     world.reset(seed=0)
     world.step(np.zeros(2, np.float32))
     spread_starts(world.unwrapped.nominal, 0, 1)  # type: ignore[attr-defined]
+    _run_a_test()
+
+
+def _run_a_test() -> None:
+    from tdac_agent.suite_plugin import run_tests
+
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "test_nothing.py").write_text("def test_nothing(): pass\n")
@@ -148,12 +169,48 @@ def _rehearse() -> None:
             run_tests([folder], folder / "report.jsonl")
 
 
-def do_job(request: Path, nursery: Nursery, later: contextlib.ExitStack) -> None:
+def _small_env() -> Map2DEnv:
+    cells = np.zeros((40, 60), np.bool_)
+    return Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
+
+
+def _ready_crew(nursery: Nursery) -> SuiteCrew:
+    """Processes that have used what an episode uses: forks share it until then."""
+    work = partial(drive_known, nursery)
+    return Crew(work, nursery.close, first=_drive_a_little)
+
+
+def _drive_a_little() -> None:
+    record = Record(_small_env(), None, max_steps=20)
+    rollout = run_policy(_Still(), record, "nominal", held_out=False, deadline=inf)
+    pickle.dumps(rollout)
+
+
+class _Still:
+    """A policy of ours that does not move, and speaks as a child would."""
+
+    def reset(self, observation: Observation) -> object:
+        return self.policy(observation)
+
+    def policy(self, observation: Observation) -> object:
+        decode(encode(observation))
+        return decode(encode((0.0, 0.0)))
+
+    def waited(self) -> float:
+        return 0.0
+
+
+def do_job(
+    request: Path,
+    nursery: Nursery,
+    crew: SuiteCrew | None,
+    later: contextlib.ExitStack,
+) -> None:
     """Does a job of either kind, in its folder; `later` is to be closed after it."""
     text = request.read_text(encoding="utf-8")
     os.chdir(request.parent)
     if json.loads(text)["kind"] == SUITE:
-        judge_suite(Job.model_validate_json(text), nursery, later)
+        judge_suite(Job.model_validate_json(text), nursery, crew, later)
     else:
         # It loads policies of all kinds.
         from tdac_agent.seeded import SeededJob, judge_seeds

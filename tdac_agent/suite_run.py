@@ -8,10 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 from tdac_agent.jobs import Job
 from tdac_agent.judge import Judge
 from tdac_agent.nursery import Nursery
+from tdac_agent.suite_episode import SuiteCrew
 from tdac_agent.task import load_task
 
 
-def judge_suite(job: Job, nursery: Nursery, later: contextlib.ExitStack) -> None:
+def judge_suite(
+    job: Job, nursery: Nursery, crew: SuiteCrew | None, later: contextlib.ExitStack
+) -> None:
     """Runs a suite as asked, and writes the findings."""
     task = load_task(job.task)
     judge = Judge(
@@ -22,6 +25,7 @@ def judge_suite(job: Job, nursery: Nursery, later: contextlib.ExitStack) -> None
         seed=job.seed,
         limits=job.limits,
         nursery=nursery,
+        crew=crew,
     )
     later.callback(judge.close)
     judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")

@@ -5,6 +5,7 @@ import os
 import signal
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from functools import partial
 
 import pytest
 
@@ -30,6 +31,19 @@ def test_work_is_done_elsewhere():
     assert first[0] == second[0] != os.getpid()
     assert first[1:] == (21, 1)
     assert second[1:] == (28, 2)
+    assert seen == []
+
+
+def test_a_member_gets_ready_by_itself():
+    """What comes first is done once, in the member, before its first work."""
+    seen = []
+    work = partial(list, seen)
+
+    def get_ready():
+        seen.append(os.getpid())
+
+    with closing(Crew(work, no_end, 1, first=get_ready)) as crew:
+        assert crew.do() == crew.do() == crew.members
     assert seen == []
 
 
