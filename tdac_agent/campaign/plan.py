@@ -15,6 +15,7 @@ from typing import Any
 from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
 from tdac_agent.prices import FREE
 from tdac_agent.prompt import VARIANTS, generate_prompt, load_template
+from tdac_agent.providers.choice import Options, answers_sha256
 from tdac_agent.records import Setting
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import bundled_task
@@ -204,6 +205,11 @@ def _cell(
         "version": importlib.metadata.version("tdac"),
         "seed": config.seed,
     }
+    options = Options(task.setting, config.base_url)
+    for model in (facts["learner"], facts["optimizer"]):
+        answers = answers_sha256(model, options)
+        if answers is not None:
+            about[f"answers of {model}"] = answers
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
     shown = [task.name, learner, setting, *([prompt] if prompt != "full" else [])]
     folder = f"{slug('-'.join(shown))}-{digest[:8]}"

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
+from typing import Any
 from urllib.parse import urlsplit
 
 from tdac_agent.errors import ProviderError
@@ -29,6 +30,8 @@ FORMS = (
     "scripted:SCRIPT"
 )
 OFFLINE = frozenset({"builtin", "command", "manual", "replay", "scripted"})
+IN_FILES = frozenset({"replay", "scripted"})
+"""Those whose answers are all known beforehand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +110,18 @@ def missing_before(name: str, options: Options) -> tuple[str, ...]:
     if kind not in OWN or (kind == "manual" and words):
         return ()
     return missing_for(choose_model(name, options))
+
+
+def answers_sha256(name: str, options: Options) -> str | None:
+    """Hash of all that a model may answer, where that is in files; else None.
+
+    Raises:
+        ProviderError: The files cannot be used.
+    """
+    if name.partition(":")[0] not in IN_FILES:
+        return None
+    model: Any = choose_model(name, options)
+    return str(model.answers_sha256())
 
 
 def check_name(name: str) -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.journal import JournalRecord, read_records
 from tdac_agent.past import reply_of
+from tdac_agent.provenance import sha256_of
 from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.records import JOURNAL, load_run
@@ -66,6 +68,10 @@ class Replay:
         self._folder = folder
         self._reworded = reworded
         self._replies = [r for r in journal if r.get("event") == "call.reply"]
+
+    def answers_sha256(self) -> str:
+        """Hash of all that it may answer."""
+        return sha256_of(json.dumps(self._replies, sort_keys=True).encode())
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""

@@ -8,6 +8,7 @@ the task, and on which question of which run it is, and on nothing else.
 from __future__ import annotations
 
 import difflib
+import json
 import zlib
 from pathlib import Path
 from typing import Any, Literal
@@ -18,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from tdac_agent.builtin import builtin_for
 from tdac_agent.builtin.parameters import names_of
 from tdac_agent.errors import ProviderError
+from tdac_agent.provenance import sha256_of
 from tdac_agent.provider import Kind, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.setting import Setting
@@ -93,6 +95,11 @@ class Scripted:
         self.name = f"scripted:{words}"
         self._script = script
         self._sources = sources
+
+    def answers_sha256(self) -> str:
+        """Hash of all that it may answer, and of how it is drawn."""
+        known = [self._script.model_dump(mode="json"), self._sources]
+        return sha256_of(json.dumps(known, sort_keys=True).encode())
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`. It has no rules to give."""

@@ -57,6 +57,21 @@ def test_a_changed_task_gives_other_runs(written, tmp_path):
     assert planned(written()).cells[0].folder != before
 
 
+def test_a_changed_script_gives_other_runs(written, tmp_path):
+    """Also where it is a controller that was changed, which the script but names."""
+    script, controller = tmp_path / "own.yaml", tmp_path / "own.py"
+    choices = [{"file": "own.py"}]
+    names = []
+    for seed, source in ((0, "A = 1"), (1, "A = 1"), (1, "A = 2"), (0, "A = 1")):
+        content = {"schema": 1, "seed": seed, "generate": choices, "edit": choices}
+        script.write_text(yaml.safe_dump(content))
+        controller.write_text(source)
+        (cell,) = planned(written(learners=[f"scripted:{script}"])).cells
+        names.append(cell.folder)
+    assert names[0] == names[3]
+    assert len(set(names)) == 3
+
+
 def test_all_kinds_have_their_first_run_before_any_has_its_second(written):
     """What there is of a stopped campaign is of all kinds alike; seeds are paired."""
     runs = list(planned(written(seed=5)).all())
