@@ -25,7 +25,7 @@ def measure(
     tier: str,
     out: Path | None,
     judge: WarmJudge,
-    console: Console,
+    as_json: bool,
 ) -> RobustReport:
     """Runs the disturbed episodes, with a bar for whoever watches."""
     assert wanted.robust is not None
@@ -36,6 +36,7 @@ def measure(
         TextColumn("{task.fields[successes]} reached"),
         TimeLeft(),
     )
+    console = Console(stderr=as_json, emoji=False)
     # Drawn where there is something new, and not ten times a second.
     bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
     seen = (0, 0)

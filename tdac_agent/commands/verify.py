@@ -64,28 +64,19 @@ def run(
             )
         if junit is not None:
             write_junit(report, junit)
-        from rich.console import Console
-
-        from tdac_agent.commands.report_view import show_report
-
-        console = Console(stderr=as_json, emoji=False)
         if not as_json:
-            show_report(report, console, out)
+            _show(report, out)
         measured = None
         if robust.robust is not None and report.passed:
             from tdac_agent.commands.robust import measure
 
             measured = measure(
-                file, task, robust, tier=tier, out=out, judge=judge, console=console
+                file, task, robust, tier=tier, out=out, judge=judge, as_json=as_json
             )
     if as_json:
         sys.stdout.write(_json(report, robust, measured) + "\n")
-    elif measured is not None:
-        from tdac_agent.commands.robust_view import show_robust
-
-        show_robust(measured, console, _replay(controller, flags, robust, tier))
     elif robust.robust is not None:
-        console.print("robustness not measured: the controller is not verified")
+        _show_robust(measured, _replay(controller, flags, robust, tier))
     accepted = measured is None or measured.accepted
     return 0 if report.passed and accepted else 1
 
@@ -98,6 +89,26 @@ def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
 
     with Console(stderr=True, emoji=False).status("preparing the task …"):
         return controller_and_task(controller, flags)
+
+
+def _show(report: Report, out: Path | None) -> None:
+    from rich.console import Console
+
+    from tdac_agent.commands.report_view import show_report
+
+    show_report(report, Console(emoji=False), out)
+
+
+def _show_robust(measured: RobustReport | None, replay: list[str]) -> None:
+    from rich.console import Console
+
+    from tdac_agent.commands.robust_view import show_robust
+
+    console = Console(emoji=False)
+    if measured is None:
+        console.print("robustness not measured: the controller is not verified")
+    else:
+        show_robust(measured, console, replay)
 
 
 def _json(report: Report, robust: RobustFlags, measured: RobustReport | None) -> str:
