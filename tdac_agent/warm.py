@@ -35,7 +35,8 @@ KEPT_VARIABLES = frozenset(
 # The judge starts the controllers, so it holds no keys: on the weakest tier they may
 # read its environment.
 SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
-START_SECONDS = 120.0
+# One that has died is noticed at once; a starved machine may take minutes.
+START_SECONDS = 600.0
 FAREWELL_SECONDS = 5.0
 POLL_SECONDS = 0.2
 
