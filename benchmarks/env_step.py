@@ -12,6 +12,7 @@ are all that it costs.
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable, Mapping
 from itertools import cycle, islice
 from typing import Any
@@ -136,6 +137,17 @@ def raced(
     return compared(title, times, FLOOR, REFERENCE, notes=notes)
 
 
+def scaled(title: str, bursts: dict[str, Burst], rounds: int) -> Bench:
+    """The same of cases on one thread and on two, with what two are worth."""
+    times = in_turn({**yardsticks(), **bursts}, rounds)
+    notes = {}
+    for two in (name for name in times if name.endswith("2 threads")):
+        one = two.replace("2 threads", "1 thread")
+        gains = [a / b for a, b in zip(times[one], times[two], strict=True)]
+        notes[two] = f"{statistics.median(gains):.2f} × one thread"
+    return compared(title, times, FLOOR, REFERENCE, notes=notes)
+
+
 def batch_burst(envs: Any) -> Burst:
     """Some steps of a batch, which has been reset."""
     steps = max(BATCH_STEPS // envs.num_envs, 1)
@@ -168,7 +180,7 @@ def batches(rounds: int) -> Bench:
             envs.reset(seed=0)
             name = f"{count} robots, {threads} thread{'s' * (threads > 1)}"
             bursts[name] = batch_burst(envs)
-    return raced("Batches of robots on the maze", bursts, rounds)
+    return scaled("Batches of robots on the maze", bursts, rounds)
 
 
 def more_rays(rounds: int) -> Bench:

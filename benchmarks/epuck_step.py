@@ -22,6 +22,7 @@ from benchmarks.env_step import (
     batch_burst,
     raced,
     random_driving,
+    scaled,
     single_burst,
 )
 from benchmarks.timing import Bench, Effort
@@ -87,7 +88,7 @@ def batches(rounds: int) -> Bench:
             for threads in THREADS:
                 name = f"{world}, {count} robots, {threads} thread{'s' * (threads > 1)}"
                 bursts[name] = batch(count, world=world, threads=threads)
-    return raced("Batches of e-pucks", bursts, rounds)
+    return scaled("Batches of e-pucks", bursts, rounds)
 
 
 def more_things(rounds: int) -> Bench:

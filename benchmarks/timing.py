@@ -20,7 +20,7 @@ Call = Callable[[], int | object]
 Times = Mapping[str, Sequence[float]]
 """Of each case, s, one for each round."""
 
-WIDTH = 130
+WIDTH = 140
 """Columns of a table that is not cut."""
 
 
