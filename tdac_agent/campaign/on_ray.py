@@ -15,7 +15,7 @@ from tdac_agent.campaign.cores import own_core
 from tdac_agent.campaign.executor import Begun, Bereaved, Ended, Next, Update
 from tdac_agent.campaign.perform import Outcome, Terms, perform
 from tdac_agent.campaign.plan import PlannedRun
-from tdac_agent.errors import ProviderError
+from tdac_agent.errors import Fault, ProviderError
 from tdac_agent.warm import WarmJudge
 from tdac_envs.extras import install_command
 
@@ -33,6 +33,7 @@ def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
 
     Raises:
         ProviderError: Ray is not installed.
+        Fault: Ray does not start, or cannot be reached.
     """
     ray = _start(terms.workers)
     # A task whose process dies is ours to put again, as with the other executor.
@@ -80,6 +81,7 @@ def _start(workers: int) -> Any:
 
     Raises:
         ProviderError: It is not installed.
+        Fault: It does not start, or cannot be reached.
     """
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -91,14 +93,15 @@ def _start(workers: int) -> Any:
         raise ProviderError(
             f"--executor ray needs a package: {install_command('ray')}"
         ) from error
-    if os.environ.get("RAY_ADDRESS"):
-        ray.init(log_to_driver=False, logging_level=logging.ERROR)
-    else:
-        ray.init(
-            num_cpus=workers,
-            object_store_memory=STORE_BYTES,
-            include_dashboard=False,
-            log_to_driver=False,
-            logging_level=logging.ERROR,
-        )
+    own: dict[str, Any] = {
+        "num_cpus": workers,
+        "object_store_memory": STORE_BYTES,
+        "include_dashboard": False,
+    }
+    given = {} if os.environ.get("RAY_ADDRESS") else own
+    try:
+        ray.init(log_to_driver=False, logging_level=logging.ERROR, **given)
+    except Exception as error:  # of all kinds, also a bare one after 30 s
+        reason = " ".join(str(error).split())[:300]
+        raise Fault(f"Ray did not start: {reason}") from error
     return ray
