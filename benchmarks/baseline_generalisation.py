@@ -79,6 +79,7 @@ def _row(training: str, task: str, counts: dict[str, int]) -> dict[str, Any]:
     low, high = exact_interval(counts["reached"], EPISODES)
     return {
         "training": training,
+        "algo": asked.algo,
         "trained_on": " ".join(asked.tasks),
         "seed": asked.seed,
         "evaluated_on": task,

@@ -25,8 +25,15 @@ def read_yaml(file: Path, form: type[M], what: str, refusal: type[TdacError]) ->
     try:
         return form.model_validate(yaml.safe_load(file.read_text("utf-8")))
     except ValidationError as error:
-        raise refusal(f"{file}: {first_problem(error)}") from error
+        # A key may have another name in a file than in Python.
+        known = [field.alias or name for name, field in form.model_fields.items()]
+        raise refusal(f"{file}: {first_problem(error, known)}") from error
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        told = error.strerror if isinstance(error, OSError) else None
-        reason = told or " ".join(str(error).split())
-        raise refusal(f"cannot read {what} {file}: {reason}") from error
+        raise refusal(f"cannot read {what} {file}: {_reason(error)}") from error
+
+
+def _reason(error: Exception) -> str:
+    told = " ".join(str(error).split())
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark:
+        return f"line {error.problem_mark.line + 1}: {error.problem}"
+    return (error.strerror or told) if isinstance(error, OSError) else told

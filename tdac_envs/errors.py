@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -28,9 +30,28 @@ class WorldFileError(WorldError):
     """A `.wbt` file is broken; the message begins with file, line and column."""
 
 
-def first_problem(error: ValidationError) -> str:
-    """The first thing that a model refuses: `place.in.it: what is wrong`."""
-    first = error.errors(include_url=False)[0]
+def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
+    """The first thing that a model refuses: `place.in.it: what is wrong`.
+
+    A key that it does not know comes first: another one may be missing for that.
+
+    Args:
+        error: The refusal.
+        known: The model's keys, one of which may be meant.
+    """
+    problems = error.errors(include_url=False)
+    unknown = (p for p in problems if p["type"] == "extra_forbidden")
+    first = next(unknown, problems[0])
     place = ".".join(map(str, first["loc"]))
-    reason = first["msg"].removeprefix("Value error, ")
+    reason = _PLAINLY.get(first["type"], first["msg"].removeprefix("Value error, "))
+    if first["type"] == "extra_forbidden":
+        near = difflib.get_close_matches(place, list(known), n=1)
+        reason += f" (did you mean {near[0]!r}?)" if near else ""
     return f"{place}: {reason}" if place else reason
+
+
+_PLAINLY = {
+    "extra_forbidden": "there is no such key",
+    "missing": "is missing",
+    "model_type": "expected keys with their values",
+}

@@ -7,9 +7,9 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from tdac_agent.errors import RunError
+from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.providers.choice import OFFLINE
+from tdac_agent.providers.choice import OFFLINE, check_name
 from tdac_agent.records import Setting
 from tdac_agent.shipped import shipped, shipped_names
 from tdac_agent.yaml_file import read_yaml
@@ -71,6 +71,11 @@ class CampaignConfig(BaseModel):
                 raise ValueError(f"{name}: {again.pop()!r} is there twice")
         if any(name.partition(":")[0] == "manual" for name in self.models):
             raise ValueError("a manual: folder is for one run, not for a campaign")
+        for name in self.models:
+            try:
+                check_name(name)
+            except ProviderError as error:
+                raise ValueError(str(error)) from None
         online = sorted(n for n in self.models if n.partition(":")[0] not in OFFLINE)
         if online and self.max_cost is None and self.max_tokens is None:
             raise ValueError(

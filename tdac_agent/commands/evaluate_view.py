@@ -20,7 +20,8 @@ from tdac_agent.evaluation_report import (
 from tdac_agent.units import UNITS
 
 NONE = "–"
-WIDEST = 24
+# Of the policies' names, where a table has to fit into 80 columns.
+WIDEST = 12
 LEGEND = (
     "95 %: exact interval of the rate (Clopper-Pearson). hit: episodes with a contact. "
     "time, path: in those of the shortest way at full speed; SPARC: smoothness, "

@@ -176,6 +176,13 @@ def _show(
         highlight=False,
         soft_wrap=True,
     )
+    if last.steps != best.steps:
+        console.print(
+            f"at the end: {last.success_rate:.0%} reached, "
+            f"{last.collision_rate:.0%} hit something; the best one is kept",
+            highlight=False,
+            soft_wrap=True,
+        )
     tasks = " ".join(f"--task {shlex.quote(name)}" for name in plan.tasks)
     words = f"tdac evaluate {shlex.quote(str(file))} follow-guidance reference {tasks}"
     console.print(f"compare: {escape(words)}", soft_wrap=True, highlight=False)

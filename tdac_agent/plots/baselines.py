@@ -86,7 +86,8 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
             there is no such policy.
     """
     tasks = list(evaluation["task"].drop_duplicates())
-    policies = list(evaluation["policy"].drop_duplicates())
+    learned = evaluation.dropna(subset=["training"])
+    policies = list(pd.concat([learned, evaluation])["policy"].drop_duplicates())
     colours = colours_of(sorted(evaluation["knows"].drop_duplicates()))
     width, height = 1.9, 0.7 + 0.24 * len(policies)
     figure, panels = _panels(len(tasks), width, height, shared=True)
@@ -144,9 +145,14 @@ def plot_generalisation(found: pd.DataFrame) -> Figure:
 
     Args:
         found: A row for each policy on each place, with `trained_on`, `evaluated_on`,
-            `seen`, `episodes` and `reached`.
+            `seen`, `episodes` and `reached`; `algo`, where there are several.
     """
-    sums = found.groupby(["trained_on", "evaluated_on"], sort=False)
+    trained = found["trained_on"].str.replace(" ", ", ")
+    if "algo" in found:
+        trained = found["algo"].str.upper() + ": " + trained
+    sums = found.assign(trained=trained).groupby(
+        ["trained", "evaluated_on"], sort=False
+    )
     cells = sums[["reached", "episodes"]].sum()
     rates = (cells["reached"] / cells["episodes"]).unstack(sort=False)
     seen = sums["seen"].first().unstack(sort=False)
@@ -154,12 +160,11 @@ def plot_generalisation(found: pd.DataFrame) -> Figure:
     figure = new_plot(2.2 + 0.52 * len(columns), 1.4 + 0.36 * len(rows))
     axes = figure.add_subplot()
     axes.imshow(rates.to_numpy(float), cmap="cividis", vmin=0, vmax=1, aspect="auto")
-    for y, trained in enumerate(rows):
+    for y, policy in enumerate(rows):
         for x, place in enumerate(columns):
-            _cell(axes, x, y, rates.loc[trained, place], seen.loc[trained, place])
+            _cell(axes, x, y, rates.loc[policy, place], seen.loc[policy, place])
     axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right", fontsize=8)
-    labels = [name.replace(" ", ", ") for name in rows]
-    axes.set_yticks(range(len(rows)), labels, fontsize=8)
+    axes.set_yticks(range(len(rows)), rows, fontsize=8)
     axes.tick_params(length=0, colors=TEXT)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("evaluated on (framed: trained on it)", fontsize=9, color=TEXT)

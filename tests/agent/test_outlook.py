@@ -187,7 +187,7 @@ def test_the_shipped_prices_can_be_read():
     [
         ("[", "cannot read the prices in"),
         ("schema: 2\ndated: 2026-01-01\nmodels: {}\n", "schema"),
-        ("schema: 1\nmodels: {}\n", "dated: Field required"),
+        ("schema: 1\nmodels: {}\n", "dated: is missing"),
         (
             "dated: 2026-01-01\nmodels: {openai:x: {input: -1, output: 1}}\n",
             "greater than or equal to 0",

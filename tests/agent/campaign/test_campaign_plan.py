@@ -112,7 +112,11 @@ def test_a_setting_is_a_loop_and_the_loop_tells_the_setting(setting, loop, writt
     ("changes", "message"),
     [
         ({"runs": 0}, "few.yaml: runs: .*greater than or equal to 1"),
-        ({"runz": 3}, "few.yaml: runz: Extra inputs"),
+        (
+            {"runz": 3},
+            r"yaml: runz: there is no such key \(did you mean 'runs'\?\)",
+        ),
+        ({"learners": ["nosuch"]}, "unknown model 'nosuch'; known: builtin"),
         ({"tasks": ["small", "small"]}, "tasks: 'small' is there twice"),
         ({"learners": ["manual:here"]}, "for one run, not for a campaign"),
         ({"learners": ["openai:gpt-6-sol"]}, "max_cost: say how many USD"),
