@@ -22,7 +22,8 @@ def run(place: Path, out: Path | None) -> int:
         RunError: There is no run that can be read, or the file cannot be written.
     """
     file = out or place / DEFAULT
-    if file.is_dir() or not file.resolve().parent.is_dir():
+    # A place that is not there is told by who reads it.
+    if place.exists() and (file.is_dir() or not file.resolve().parent.is_dir()):
         reason = "it is a folder" if file.is_dir() else "there is no such folder"
         raise RunError(f"cannot write {file}: {reason}")
     page = make_page(place)

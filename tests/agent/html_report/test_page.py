@@ -266,6 +266,8 @@ def test_the_command(copied, tdac):
     assert "there is no such folder" in err
     code, _, err = tdac("report", copied / "iterations")
     assert (code, err.count("\n")) == (2, 1)
+    code, _, err = tdac("report", copied / "none")
+    assert (code, err) == (2, f"error: there is no folder {copied / 'none'}\n")
 
 
 def test_rules_of_the_run(outline, hostile):
