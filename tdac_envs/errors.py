@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -45,6 +44,8 @@ def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
     place = ".".join(map(str, first["loc"]))
     reason = _PLAINLY.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "extra_forbidden":
+        import difflib  # not when the environments are imported
+
         near = difflib.get_close_matches(place, list(known), n=1)
         reason += f" (did you mean {near[0]!r}?)" if near else ""
     return f"{place}: {reason}" if place else reason
