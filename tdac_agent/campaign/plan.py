@@ -206,7 +206,7 @@ def _cell(
         "seed": config.seed,
     }
     options = Options(task.setting, config.base_url)
-    for model in (facts["learner"], facts["optimizer"]):
+    for model in {facts["learner"], facts["optimizer"]}:
         answers = answers_sha256(model, options)
         if answers is not None:
             about[f"answers of {model}"] = answers
