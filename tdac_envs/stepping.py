@@ -96,12 +96,13 @@ def settle(constants: Array, state: Array, outcome: Array, before: float) -> Non
 
 def info_of(outcome: list[float]) -> dict[str, Any]:
     """The `info` of a step, from its `outcome` as a list."""
+    _, _, _, reached, touched, collisions, clipped, gap, remaining, room = outcome
     return {
-        "is_success": outcome[REACHED] == 1.0,
-        "collision": outcome[TOUCHED] == 1.0,
-        "collisions": int(outcome[COLLISIONS]),
-        "clipped": int(outcome[CLIPPED]),
-        "distance_to_goal": outcome[GAP],
-        "path_distance": outcome[REMAINING],
-        "clearance": outcome[ROOM],
+        "is_success": reached == 1.0,
+        "collision": touched == 1.0,
+        "collisions": int(collisions),
+        "clipped": int(clipped),
+        "distance_to_goal": gap,
+        "path_distance": remaining,
+        "clearance": room,
     }
