@@ -96,7 +96,8 @@ def settle(constants: Array, state: Array, outcome: Array, before: float) -> Non
 
 def info_of(outcome: list[float]) -> dict[str, Any]:
     """The `info` of a step, from its `outcome` as a list."""
-    _, _, _, reached, touched, collisions, clipped, gap, remaining, room = outcome
+    told = outcome[REACHED : ROOM + 1]
+    reached, touched, collisions, clipped, gap, remaining, room = told
     return {
         "is_success": reached == 1.0,
         "collision": touched == 1.0,
