@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from tdac_agent.provenance import sha256_of
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
 from tdac_agent.verification import read_source
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import TaskError, hint
 from tdac_envs.wrappers import WRAPPERS
 
 OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
@@ -81,11 +80,10 @@ def _entrant(word: str, wrappers: Sequence[str] | None) -> Entrant:
         return _controller(word, path / "controller.py")
     if not path.is_file():
         names = (*OURS, BUILTIN)
-        close = difflib.get_close_matches(word, names, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
         raise ControllerFileError(
             f"no policy {word!r}: expected a controller.py, a run folder, a .zip of "
-            f"stable-baselines3, or one of {', '.join(sorted(names))}{hint}"
+            f"stable-baselines3, or one of {', '.join(sorted(names))}"
+            f"{hint(word, names)}"
         )
     if path.suffix == ".zip":
         return _learned(word, path, wrappers)

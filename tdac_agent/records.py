@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from pathlib import Path
 from typing import Literal
@@ -12,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tdac_agent.errors import RunError
 from tdac_agent.locks import LOCK_FILE, is_held
 from tdac_agent.rules import RuleBook
+from tdac_envs.errors import nearest
 
 Status = Literal[
     "running", "verified", "not verified", "interrupted", "fault", "budget"
@@ -173,9 +173,10 @@ def _missing(folder: Path) -> str:
     if folder.is_dir():
         return f"it has no {RUN_FILE}"
     beside = [path.parent.name for path in folder.parent.glob(f"*/{RUN_FILE}")]
-    near = difflib.get_close_matches(folder.name, beside, n=1)
-    hint = f"; did you mean {folder.parent / near[0]}?" if near else ""
-    return f"there is no such folder{hint}"
+    meant = nearest(folder.name, beside)
+    return "there is no such folder" + (
+        f" (did you mean {folder.parent / meant}?)" if meant else ""
+    )
 
 
 def load_rules(folder: Path) -> RuleBook:

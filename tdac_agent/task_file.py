@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from tdac_envs.errors import TaskError, first_problem
+from tdac_envs.errors import TaskError, first_problem, hint
 from tdac_envs.maps import bundled_maps
 from tdac_envs.worlds import bundled_worlds
 
@@ -94,11 +93,9 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
         data = yaml.safe_load(path.read_text())
     except OSError as error:
         known = bundled_tasks()
-        names = ", ".join(known)
-        close = difflib.get_close_matches(str(asked), known, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
         raise TaskError(
-            f"no task {str(asked)!r}: {error.strerror}{hint}; bundled tasks: {names}"
+            f"no task {str(asked)!r}: {error.strerror}{hint(str(asked), known)}; "
+            f"bundled tasks: {', '.join(known)}"
         ) from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         reason = " ".join(str(error).split())

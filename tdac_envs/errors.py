@@ -44,11 +44,21 @@ def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
     place = ".".join(map(str, first["loc"]))
     reason = _PLAINLY.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "extra_forbidden":
-        import difflib  # not when the environments are imported
-
-        near = difflib.get_close_matches(place, list(known), n=1)
-        reason += f" (did you mean {near[0]!r}?)" if near else ""
+        reason += hint(place, known)
     return f"{place}: {reason}" if place else reason
+
+
+def hint(typed: str, known: Iterable[str]) -> str:
+    """In brackets, the name that may be meant; empty where none is like it."""
+    meant = nearest(typed, known)
+    return f" (did you mean {meant!r}?)" if meant else ""
+
+
+def nearest(typed: str, known: Iterable[str]) -> str | None:
+    """The one of some names that is most like what was typed, where one is."""
+    import difflib  # not when the environments are imported
+
+    return next(iter(difflib.get_close_matches(typed, list(known), n=1)), None)
 
 
 _PLAINLY = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import math
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.arguments import finite, finite_numbers, finite_point, positive
-from tdac_envs.errors import MapError, TaskError
+from tdac_envs.errors import MapError, TaskError, hint
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.image import load_image, read_bytes
 from tdac_envs.maps import BundledMap, bundled_map, bundled_maps
@@ -272,10 +271,8 @@ def _read_cells(path: Path) -> OccupancyGrid:
 def _check_exists(path: Path) -> None:
     if path.exists():
         return
-    hint = ""
+    known = ""
     if not path.suffix:
         names = bundled_maps()
-        close = difflib.get_close_matches(str(path), names, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        hint += f" (bundled maps: {', '.join(names)})"
-    raise MapError(f"no map {str(path)!r}: no such file{hint}")
+        known = f"{hint(str(path), names)}; bundled maps: {', '.join(names)}"
+    raise MapError(f"no map {str(path)!r}: no such file{known}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import shutil
 import sys
 import textwrap
@@ -84,6 +83,8 @@ def _explain_usage(error: Any) -> NoReturn:
 
 def _nearest(typed: str, options: list[str]) -> str | None:
     """The option that may be meant, whatever its case and number of dashes."""
+    from tdac_envs.errors import nearest
+
     bare = {option.lstrip("-").lower(): option for option in options}
-    found = difflib.get_close_matches(typed.lstrip("-").lower(), bare, n=1)
-    return bare[found[0]] if found else None
+    found = nearest(typed.lstrip("-").lower(), bare)
+    return bare[found] if found else None

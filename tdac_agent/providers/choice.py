@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
@@ -13,6 +12,7 @@ from urllib.parse import urlsplit
 from tdac_agent.errors import ProviderError
 from tdac_agent.provider import Provider, missing_for
 from tdac_agent.setting import Setting
+from tdac_envs.errors import hint
 
 GROUP = "tdac.providers"
 # Each is imported only when it is chosen: so are the packages that it needs.
@@ -134,10 +134,9 @@ def check_name(name: str) -> None:
     others = {point.name for point in entry_points(group=GROUP)}
     if kind in OWN or kind in others:
         return
-    near = difflib.get_close_matches(kind, [*OWN, *others], n=1)
-    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    meant = hint(kind, [*OWN, *others])
     also = "".join(f", {other}:…" for other in sorted(others))
-    raise ProviderError(f"unknown model {name!r}{hint}; known: {FORMS}{also}")
+    raise ProviderError(f"unknown model {name!r}{meant}; known: {FORMS}{also}")
 
 
 def _load(point: EntryPoint) -> Make:

@@ -7,7 +7,6 @@ the task, and on which question of which run it is, and on nothing else.
 
 from __future__ import annotations
 
-import difflib
 import json
 import zlib
 from pathlib import Path
@@ -25,6 +24,7 @@ from tdac_agent.providers.choice import Options
 from tdac_agent.setting import Setting
 from tdac_agent.shipped import shipped
 from tdac_agent.yaml_file import read_yaml
+from tdac_envs.errors import hint
 
 _KINDS: tuple[Kind, ...] = ("generate", "edit")
 
@@ -146,11 +146,9 @@ def _filled_in(values: dict[str, float], script: Path, setting: Setting) -> str:
     template: Any = builtin_for(setting)
     known = names_of(template.kind)
     for name in set(values) - set(known):
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
         raise ProviderError(
-            f"{script}: the template has no parameter {name!r}{hint}; known: "
-            f"{', '.join(known)}"
+            f"{script}: the template has no parameter {name!r}{hint(name, known)}; "
+            f"known: {', '.join(known)}"
         )
     source: str = template.render(template.kind().changed(**values))
     return source

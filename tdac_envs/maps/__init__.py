@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_envs.errors import MapError
+from tdac_envs.errors import MapError, hint
 
 _FOLDER = Path(__file__).parent
 
@@ -49,10 +48,10 @@ def bundled_map(name: str) -> BundledMap:
     """
     names = bundled_maps()
     if name not in names:
-        close = difflib.get_close_matches(name, names, n=1)
-        known = f"there are {', '.join(names)}"
-        hint = f"did you mean {close[0]!r}?" if close else known
-        raise MapError(f"no bundled map is called {name!r}; {hint}")
+        raise MapError(
+            f"no bundled map is called {name!r}{hint(name, names)}; there are "
+            f"{', '.join(names)}"
+        )
     task = json.loads((_FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     return BundledMap(
         name=name,

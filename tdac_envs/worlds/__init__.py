@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
-from tdac_envs.errors import WorldError
+from tdac_envs.errors import WorldError, hint
 
 _FOLDER = Path(__file__).parent
 _DEFAULT = "arena"
@@ -32,6 +31,7 @@ def world_file(source: str | Path) -> Path:
     if path.exists() or path.suffix or len(path.parts) != 1:
         return path
     names = bundled_worlds()
-    close = difflib.get_close_matches(str(source), names, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(names)}"
-    raise WorldError(f"no bundled world is called {str(source)!r}; {hint}")
+    raise WorldError(
+        f"no bundled world is called {str(source)!r}{hint(str(source), names)}; "
+        f"there are {', '.join(names)}"
+    )

@@ -98,7 +98,7 @@ def test_a_run_that_is_not_there(tmp_path):
         load_run(tmp_path / "runs" / "maze-1")
     (tmp_path / "maze-1").mkdir()
     (tmp_path / "maze-1" / "run.json").touch()
-    with pytest.raises(RunError, match=rf"did you mean {tmp_path / 'maze-1'}\?$"):
+    with pytest.raises(RunError, match=rf"did you mean {tmp_path / 'maze-1'}\?\)$"):
         load_run(tmp_path / "maz-1")
 
 

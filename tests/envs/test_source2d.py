@@ -178,7 +178,7 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("source", "message"),
         [
-            ("mase", r"no map 'mase': no such file; did you mean 'maze'\?"),
+            ("mase", r"no map 'mase': no such file \(did you mean 'maze'\?\)"),
             ("nowhere/map.png", "no map 'nowhere/map.png': no such file"),
             (np.zeros((4, 4)), "expected a bool array .* got float64"),
             ([[0, 1], [0]], "rows of the same length"),
