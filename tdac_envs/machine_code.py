@@ -43,9 +43,18 @@ def kept(
     file = cache_folder() / f"{name}-{key}.obj"
     objects = _read(file)
     if objects is None:
+        _tell()
         objects = make()
         _write(file, objects)
     return objects
+
+
+@functools.cache
+def _tell() -> None:
+    """Says on a terminal what takes so long, once a process."""
+    if sys.stderr.isatty():
+        told = "compiling for this machine; kept on disk for the next time …"
+        print(told, file=sys.stderr, flush=True)
 
 
 @functools.cache

@@ -14,7 +14,6 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from tdac_agent.campaign.collect import collect, write_tables
 from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
 from tdac_agent.campaign.drive import campaign_folder, carry_out, foreign, look
 from tdac_agent.campaign.executor import Executor
@@ -22,7 +21,7 @@ from tdac_agent.campaign.perform import Terms
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign_live import LiveView
-from tdac_agent.commands.campaign_table import make_console, show_summary, told_counts
+from tdac_agent.commands.campaign_table import make_console, told_counts
 from tdac_agent.commands.sentences import tell
 from tdac_agent.lifecycle import model_warnings
 from tdac_agent.provider import Provider
@@ -88,6 +87,10 @@ def run(wanted: Wanted, as_json: bool) -> int:
             if left:
                 _make(progress, left, terms, wanted.executor, console)
         finally:
+            # With pandas and scipy, which take seconds: a refusal does without.
+            from tdac_agent.campaign.collect import collect, write_tables
+            from tdac_agent.commands.campaign_summary import show_summary
+
             summary = write_tables(collect(plan, terms.runs), folder)
             show_summary(summary, console)
             _tell_ending(console, progress, folder, wanted)

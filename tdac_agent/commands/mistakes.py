@@ -70,7 +70,8 @@ def _explain_usage(error: Any) -> NoReturn:
     """What is wrong with the words typed, and whose help says more."""
     context = getattr(error, "ctx", None)
     option = getattr(error, "option_name", None)
-    reason = error.format_message().rstrip(".")
+    # typer says of a choice what pydantic says of a value.
+    reason = error.format_message().rstrip(".").replace("Value error, ", "")
     # Without any word there is help, and nothing more to say.
     if not reason:
         sys.exit(2)

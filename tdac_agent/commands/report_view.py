@@ -14,6 +14,9 @@ from tdac_agent.report import Report, is_of_paper_alone
 from tdac_agent.trajectory import nominal_first
 from tdac_agent.units import UNITS
 
+MOST_NAMES, SOME_NAMES = 6, 3
+"""Of tests that fail for one reason: how many are named, and how many of more."""
+
 
 def show_report(report: Report, console: Console, out: Path | None = None) -> None:
     """Prints the verdict, the failures with their diagnosis, and the episodes.
@@ -32,7 +35,7 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
     for failure in report.failures:
         tests.setdefault(failure.message, []).append(failure.test)
     for message, names in tests.items():
-        console.print(f"[red]failed[/] [bold]{escape(', '.join(names))}[/]")
+        console.print(f"[red]failed[/] [bold]{escape(_told(names))}[/]")
         tell(console, message, indent=2)
     shown: set[str] = set()
     for failure in report.failures:
@@ -55,6 +58,13 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
             "it drives, but has not all functions that the profile paper asks for: "
             "--profile policy asks for policy(obs) alone"
         )
+
+
+def _told(tests: list[str]) -> str:
+    """Names of tests that fail for one reason; of many, the first ones."""
+    if len(tests) <= MOST_NAMES:
+        return ", ".join(tests)
+    return f"{', '.join(tests[:SOME_NAMES])} and {len(tests) - SOME_NAMES} more tests"
 
 
 def _only_drives(report: Report) -> bool:

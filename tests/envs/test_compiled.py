@@ -1,6 +1,7 @@
 """Kernels: compiled once, kept on disk, and the same as the Python they are made of."""
 
 import math
+import os
 import pickle
 import subprocess
 import sys
@@ -36,6 +37,11 @@ def _sum(values, factor, count, out):
 @kernel("i8 i8 -> i8")
 def _divide(a, b):
     return a // b
+
+
+@kernel("i8 -> i8")
+def _raised(a):
+    return a + 5
 
 
 @pytest.fixture
@@ -98,6 +104,19 @@ def test_machine_code_is_kept(cache, monkeypatch):
     file.write_bytes(whole[: len(whole) // 2])
     assert fresh(_divide)(9, 3) == 3
     assert len(file.read_bytes()) == len(whole)
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_compiling_is_told_on_a_terminal(cache, monkeypatch, terminal):
+    """Once: it takes seconds, and nobody asked for it."""
+    machine_code._tell.cache_clear()
+    reading, writing = os.openpty() if terminal else os.pipe()
+    with open(writing, "w") as stderr, open(reading, "rb", buffering=0) as seen:
+        monkeypatch.setattr("sys.stderr", stderr)
+        assert fresh(_divide)(9, 3) == fresh(_raised)(3) - 5 == 3
+        stderr.write("the end\n")
+        stderr.flush()
+        assert seen.read(1000).count(b"compiling") == terminal
 
 
 def test_a_changed_constant_is_other_code(monkeypatch):
