@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,21 +28,21 @@ class Journal:
     def answers(
         self, pool: ProcessPoolExecutor, ask: Callable[[Any], Any], items: Sequence[Any]
     ) -> Iterator[Any]:
-        """The answer for each item, in order."""
-        new = [item for item in items if self._key(item) not in self._known]
-        fresh = zip(new, pool.map(ask, new), strict=True)
-        for item in items:
-            key = self._key(item)
-            while key not in self._known:
-                asked, answer = next(fresh)
-                self._note(self._key(asked), answer)
-            yield self._known[key]
+        """The answer for each item, in order; each is kept as soon as it is there."""
+        keys = [self._key(item) for item in items]
+        asked: dict[str, Future[Any]] = {}
+        for key, item in zip(keys, items, strict=True):
+            if key not in self._known and key not in asked:
+                asked[key] = pool.submit(ask, item)
+                asked[key].add_done_callback(partial(self._note, key))
+        for key in keys:
+            yield asked[key].result() if key in asked else self._known[key]
 
     def _key(self, item: Any) -> str:
         return hashlib.sha256((self._about + item.text).encode()).hexdigest()[:16]
 
-    def _note(self, key: str, answer: Any) -> None:
-        self._known[key] = answer
-        if self._path is not None:
-            with self._path.open("a") as file:
-                file.write(json.dumps([key, answer]) + "\n")
+    def _note(self, key: str, asked: Future[Any]) -> None:
+        if self._path is None or asked.cancelled() or asked.exception() is not None:
+            return
+        with self._path.open("a") as file:
+            file.write(json.dumps([key, asked.result()]) + "\n")
