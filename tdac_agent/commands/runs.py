@@ -1,10 +1,11 @@
-"""`tdac runs [DIR]`: the run folders in a folder, and how to go on with them."""
+"""`tdac runs [DIR]`: the runs and trainings in a folder, and how to go on with them."""
 
 from __future__ import annotations
 
 import json
+import shlex
 import sys
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,13 @@ from tdac_agent.commands.run_view import way_on
 from tdac_agent.commands.sentences import tell
 from tdac_agent.errors import RunError
 from tdac_agent.records import JOURNAL, RUN_FILE, at_work, load_run, status_now
+from tdac_agent.training.curve import PLAN_FILE, read_curve
 
 WIDE = 100
 """Characters, with which there is room for all columns."""
 _COLOURS = {
     "verified": "green",
+    "trained": "green",
     "not verified": "red",
     "running": "cyan",
     "unreadable": "red",
@@ -48,7 +51,10 @@ def run(folder: Path, as_json: bool) -> int:
         for row in rows:
             if row["status"] == "unreadable":
                 tell(console, f"{row['run']}: {row['reason']}", "red")
-            elif row["go_on"]:
+                continue
+            if "steps" in row:
+                tell(console, _learnt(row))
+            if row["go_on"]:
                 console.print(f"go on: {escape(row['go_on'])}", soft_wrap=True)
     else:
         console.print(f"no runs in {folder}; `tdac synth` makes one", soft_wrap=True)
@@ -63,13 +69,47 @@ def _folders(folder: Path) -> list[Path]:
 
 def _is_run(place: Path) -> bool:
     try:
-        return (place / RUN_FILE).is_file() or (place / JOURNAL).is_file()
+        return any((place / name).is_file() for name in (RUN_FILE, JOURNAL, PLAN_FILE))
     except OSError:
         return False
 
 
+def _training(folder: Path) -> dict[str, Any]:
+    from tdac_agent.training.plan import read_plan  # with all of Gymnasium
+
+    try:
+        plan, points = read_plan(folder), read_curve(folder)
+    except RunError as error:
+        return {"run": str(folder), "status": "unreadable", "reason": str(error)}
+    last = max((point.steps for point in points), default=0)
+    best = max(points, key=lambda point: point.worth, default=None)
+    over = last >= plan.steps
+    return {
+        "run": str(folder),
+        "task": ", ".join(plan.tasks),
+        "learner": plan.algo,
+        "status": "trained" if over else "not at its end",
+        "steps": last,
+        "of_steps": plan.steps,
+        "success_rate": None if best is None else best.success_rate,
+        "started": datetime.fromtimestamp(
+            (folder / PLAN_FILE).stat().st_mtime, UTC
+        ).isoformat(),
+        "go_on": "" if over else shlex.join(["tdac", "train", "--resume", str(folder)]),
+    }
+
+
+def _learnt(row: dict[str, Any]) -> str:
+    """How far a training is, and what its best policy does."""
+    rate = row["success_rate"]
+    best = "" if rate is None else f", the best policy reached {rate:.0%} of the goals"
+    return f"{row['run']}: {row['steps']:,} of {row['of_steps']:,} steps{best}"
+
+
 def _row(folder: Path) -> dict[str, Any]:
-    """What there is to say of a run folder, also of a torn one."""
+    """What there is to say of a folder, also of a torn one."""
+    if (folder / PLAN_FILE).is_file():
+        return _training(folder)
     before = at_work(folder)
     try:
         run = load_run(folder)

@@ -59,7 +59,7 @@ def runs_command(
     ),
     as_json: Json = False,
 ) -> None:
-    """List run folders: how far each came, what it took, how to go on with it."""
+    """List runs and trainings: how far each came, what it took, how to go on."""
     from tdac_agent.commands import runs
 
     raise typer.Exit(runs.run(folder, as_json))

@@ -11,6 +11,8 @@ from tdac_agent.errors import RunError
 from tdac_agent.files import write_atomic
 
 CURVE_FILE = "learning_curve.csv"
+PLAN_FILE = "training.json"
+"""Of the same folder."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.files import write_atomic
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import EPUCK, bundled_task
+from tdac_agent.training.curve import PLAN_FILE
 from tdac_agent.training.hyperparameters import (
     Algo,
     Hyperparameters,
@@ -21,7 +22,6 @@ from tdac_agent.training.hyperparameters import (
 from tdac_envs.errors import TaskError, first_problem
 from tdac_envs.wrappers import check_wrappers
 
-PLAN_FILE = "training.json"
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
 

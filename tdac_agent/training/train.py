@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from tdac_agent.errors import RunError
 from tdac_agent.locks import LOCK_FILE, hold
-from tdac_agent.training.curve import Point
-from tdac_agent.training.plan import PLAN_FILE, TrainingPlan, read_plan, write_plan
+from tdac_agent.training.curve import PLAN_FILE, Point
+from tdac_agent.training.plan import TrainingPlan, read_plan, write_plan
 from tdac_envs.errors import TaskError
 from tdac_envs.extras import install_command
 

@@ -23,7 +23,7 @@ from tdac_agent.training.hyperparameters import (
     model_arguments,
     read_hyperparameters,
 )
-from tdac_agent.training.plan import make_batch, make_plan, read_plan
+from tdac_agent.training.plan import make_batch, make_plan, read_plan, write_plan
 from tdac_agent.training.train import train
 from tdac_envs.errors import TaskError
 from tdac_envs.wrappers import wrap
@@ -65,6 +65,28 @@ def config(tmp_path):
 @pytest.fixture
 def small(tmp_path):
     return str(write_small_task(tmp_path / "small", horizon=60))
+
+
+@pytest.mark.parametrize("steps", [256, 512, None])
+def test_it_is_among_the_runs(tdac, tmp_path, small, config, steps):
+    """With how far it came, and the way on; or why it cannot be read."""
+    folder = tmp_path / "runs" / "ppo"
+    folder.mkdir(parents=True)
+    plan = make_plan((small,), steps=512, config=config())
+    write_plan(folder, plan)
+    if steps is None:
+        (folder / "training.json").write_text("{")
+    else:
+        write_curve(folder, [Point(steps, 1.0, 0.25, 0.5, 1.0, 9.0, 0.5)])
+    told = tdac("runs", folder.parent)[1]
+    (row,) = json.loads(tdac("runs", folder.parent, "--json")[1])
+    if steps is None:
+        assert row["status"] == "unreadable"
+        assert "training.json: " in told
+        return
+    assert f"{steps} of 512 steps, the best policy reached 25% of the goals" in told
+    assert (row["status"] == "trained") == (steps == 512)
+    assert (f"go on: tdac train --resume {folder}" in told) == (steps == 256)
 
 
 def without_seconds(points):
