@@ -148,6 +148,8 @@ def _fixed_grids() -> list[tuple[str, BoolGrid, Point, Point]]:
     diagonal = empty()
     for k in range(30):
         diagonal[k, 10 + k] = True
+    speck = empty()
+    speck[10, 12] = True
     return [
         ("open grid", empty(), (2, 3), (47, 26)),
         ("start is the goal", empty(), (7, 8), (7, 8)),
@@ -157,4 +159,6 @@ def _fixed_grids() -> list[tuple[str, BoolGrid, Point, Point]]:
         ("diagonal wall, no corner cutting", diagonal, (5, 25), (45, 4)),
         ("occupied start", wall, (25, 3), (3, 3)),
         ("occupied goal", wall, (3, 3), (25, 3)),
+        ("start in a lone obstacle", speck, (12, 10), (40, 20)),
+        ("goal in a lone obstacle", speck, (40, 20), (12, 10)),
     ]
