@@ -208,16 +208,25 @@ def run_policy(
     return _rollout(record, name, held_out, error, calls, mean)
 
 
-def run_own_loop(child: Child, record: Record, name: str, *, timeout: float) -> Rollout:
+def run_own_loop(
+    child: Child, record: Record, name: str, *, timeout: float, deadline: float
+) -> Rollout:
     """Lets the controller's `run_episode` step the judge's environment.
 
     Its `max_steps` is out of reach where the environment itself truncates.
+
+    Args:
+        child: With the controller imported.
+        record: Steps the environment.
+        name: Of the episode.
+        timeout: Seconds that the controller itself may take.
+        deadline: When to stop at the latest, by `time.monotonic`.
     """
     max_steps = 2 * record.max_steps if record.truncates else record.max_steps
     error: str | ControllerFault | None = None
     returned = None
     try:
-        returned = child.run_episode(record, max_steps, timeout)
+        returned = child.run_episode(record, max_steps, timeout, deadline)
     except ControllerFault as fault:
         error = fault
     if error is None and record.outcome is None:

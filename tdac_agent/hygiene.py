@@ -128,12 +128,16 @@ def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
         else:
             continue
         seeds = [*node.args, *(keyword.value for keyword in node.keywords)]
-        seeded = any(ast.unparse(seed) != "None" for seed in seeds)
+        seeded = any(not _is_none(seed) for seed in seeds)
         if name in SEEDED_CONSTRUCTORS and seeded:
             continue
         if name == "seed" and seeded:
             continue
-        yield f"line {node.lineno}: {ast.unparse(function)}()"
+        yield f"line {node.lineno}: {_spelled(function)}()"
+
+
+def _is_none(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value is None
 
 
 def _spelled(node: ast.expr) -> str:

@@ -14,6 +14,7 @@ import json
 import os
 import pickle
 import select
+import signal
 import sys
 import tempfile
 import traceback
@@ -39,6 +40,7 @@ from tdac_agent.task import load_task
 from tdac_envs.driven import Observation
 from tdac_envs.map2d import Map2DEnv
 
+FAREWELL_SECONDS = 2.0
 # Exit codes of a worker; a suite may well end it with another one.
 NO_JOB, DID_JOB = 77, 78
 DONE = b"done"
@@ -59,6 +61,8 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
+    # What a controller returned is told in messages, and may be long.
+    np.set_printoptions(threshold=16, edgeitems=2)
     if nursery is None:
         nursery = Nursery()
         _rehearse()
@@ -73,13 +77,28 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
         if worker == 0:
             work(nursery)
         _say(b"worker %d" % worker)
-        code = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
+        code = os.waitstatus_to_exitcode(_status_of(worker))
         nursery.kill()
         more = code != NO_JOB
         if more:
             nursery = Nursery()
         if code != DID_JOB:
             _say(DONE)
+
+
+def _status_of(worker: int) -> int:
+    """Of a worker that has ended; one whose caller has gone has no more to do."""
+    if sys.platform == "linux":
+        ended, watch = os.pidfd_open(worker), select.poll()
+        watch.register(ended, select.POLLIN)
+        watch.register(0, 0)  # tells when nobody can write any more
+        watch.poll()
+        watch.unregister(0)
+        # Without a job it ends by itself.
+        if not watch.poll(1000 * FAREWELL_SECONDS):
+            os.killpg(worker, signal.SIGKILL)
+        os.close(ended)
+    return os.waitpid(worker, 0)[1]
 
 
 def _say(word: bytes, descriptor: int = 1) -> None:

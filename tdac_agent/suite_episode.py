@@ -115,7 +115,9 @@ def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
     try:
         if order.drive != "policy":
             seconds = child.limits.reset_seconds + 2 * limit * task.nominal.dt
-            rollout = run_own_loop(child, record, order.name, timeout=seconds)
+            rollout = run_own_loop(
+                child, record, order.name, timeout=seconds, deadline=brief.deadline
+            )
         else:
             rollout = run_policy(
                 child,

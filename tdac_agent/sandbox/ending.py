@@ -78,7 +78,7 @@ def _end(forked: Forked) -> ChildUsage:
         output_bytes=channel.output_count,
         output_head=channel.output_head.decode("utf-8", "replace"),
         output_tail=channel.output_tail.decode("utf-8", "replace"),
-        status=_signal_of_wrapper(status),
+        status=status,
     )
 
 
@@ -96,11 +96,6 @@ def has_ended(pid: int, seconds: float) -> bool:
         return bool(poll.poll(seconds * 1000))
     finally:
         os.close(descriptor)
-
-
-def _signal_of_wrapper(status: int) -> int:
-    """Undo the shell's way of reporting a signal, which wrapping programs use."""
-    return 128 - status if 128 < status <= 128 + signal.NSIG else status
 
 
 def _usage_of_tree(pid: int) -> tuple[float, int]:

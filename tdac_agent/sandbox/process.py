@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import weakref
 from collections.abc import Callable
@@ -175,15 +176,29 @@ class Child:
         seconds = timeout or self.limits.call_seconds
         return self._talk.request(Kind.POLICY, observation, "policy", seconds)
 
-    def run_episode(self, env: EpisodeEnv, max_steps: int, timeout: float) -> Any:
+    def run_episode(
+        self,
+        env: EpisodeEnv,
+        max_steps: int,
+        timeout: float,
+        deadline: float = math.inf,
+    ) -> Any:
         """Call `run_episode(env, max_steps)`, each step of which is the judge's.
 
         Args:
             env: Answers the controller's requests, here, in this process.
             max_steps: Passed on.
             timeout: Seconds that the controller itself may take in all.
+            deadline: By `time.monotonic`, when it ends whoever took the time.
         """
-        return self._answer(Kind.RUN_EPISODE, max_steps, "run_episode", env, timeout)
+        return self._answer(
+            Kind.RUN_EPISODE,
+            max_steps,
+            "run_episode",
+            env,
+            timeout,
+            lambda: deadline - time.monotonic(),
+        )
 
     def run_program(
         self, world: ProgramWorld, arguments: list[str], timeout: float, grace: float
@@ -204,7 +219,7 @@ class Child:
             "the run",
             world,
             timeout,
-            lambda: grace if world.is_over else timeout,
+            lambda: grace if world.is_over else math.inf,
         )
 
     def _answer(
@@ -214,7 +229,7 @@ class Child:
         phase: str,
         env: Answering,
         timeout: float,
-        most: Callable[[], float] | None = None,
+        most: Callable[[], float],
     ) -> Any:
         """Have the controller do something, and answer what it asks meanwhile.
 
@@ -226,9 +241,8 @@ class Child:
             timeout: Seconds that the controller itself may take in all.
             most: Bound, from now on, on the seconds that are left.
         """
-        now = time.monotonic()
-        self._talk.send(kind, value, phase, now + timeout, timeout)
-        left = timeout
+        left = min(timeout, most())
+        self._talk.send(kind, value, phase, time.monotonic() + left, timeout)
         while True:
             start = time.monotonic()
             asked, value = self._talk.receive(phase, start + left, timeout)
@@ -245,8 +259,7 @@ class Child:
             except BaseException:
                 self.close()
                 raise
-            if most is not None:
-                left = min(left, most())
+            left = min(left, most())
             self._talk.send(*reply, phase, time.monotonic() + left, timeout)
 
 

@@ -96,7 +96,10 @@ def test_run_episode_agrees_with_the_judge(rollout, task):
     check_claims(rollout("nominal", steps=SCHEMA_STEPS, drive="run_episode"), task)
     check_claims(rollout("nominal", steps=20, drive="truncated run_episode"), task)
     if rollout("nominal").reached:
-        check_claims(rollout("nominal", drive="run_episode"), task)
+        whole = rollout("nominal", drive="run_episode")
+        check_claims(whole, task)
+        good = whole.reached and whole.collisions == 0
+        assert good, f"run_episode: {whole.outcome}, where policy reaches the goal"
 
 
 def check_claims(episode, task):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .wire import (
+    ARRAY_ITEMS,
     CODES,
     DTYPES,
     F64,
@@ -19,6 +20,7 @@ from .wire import (
     MAX_DIMENSIONS,
     MAX_INT_BYTES,
     MAX_ITEMS,
+    ODD_KEY,
     U32,
     Handle,
     RemoteError,
@@ -146,15 +148,28 @@ def _take_dict(r: _Reader) -> dict[Any, Any]:
     r.depth -= 1
     if r.depth < 0 or r.dict_room < 0:
         raise WireError("a value is nested too deep or has too many dict items")
-    value = {_take(r): _take(r) for _ in range(count)}
+    value = {_take_key(r): _take(r) for _ in range(count)}
     r.depth += 1
     if len(value) != count:
         raise WireError("a dict with the same key twice")
     return value
 
 
+def _take_key(r: _Reader) -> Any:
+    room = r.room
+    key = _take(r)
+    if type(key) is not str:
+        r.dict_room -= ODD_KEY * (1 + room - r.room) - 1
+        if r.dict_room < 0:
+            raise WireError("a value has too many dict items")
+    return key
+
+
 def _take_array(r: _Reader) -> Any:
     data, pos = r.data, r.pos
+    r.room -= ARRAY_ITEMS
+    if r.room < 0:
+        raise WireError("a value has too many arrays")
     code, dimensions = data[pos], data[pos + 1]
     if dimensions > MAX_DIMENSIONS:
         raise WireError(f"an array of {dimensions} dimensions")

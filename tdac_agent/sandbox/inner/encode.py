@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .wire import (
+    ARRAY_ITEMS,
     CODES,
     DTYPES,
     F64,
@@ -18,6 +19,7 @@ from .wire import (
     MAX_DIMENSIONS,
     MAX_INT_BYTES,
     MAX_ITEMS,
+    ODD_KEY,
     U32,
     Handle,
     RemoteError,
@@ -147,18 +149,29 @@ def _put_tuple(w: _Writer, value: tuple[Any, ...]) -> None:
 
 
 def _put_dict(w: _Writer, value: dict[Any, Any]) -> None:
-    w.dict_room -= len(value)
-    if w.dict_room < 0:
-        raise WireError(f"a value has more than {MAX_DICT_ITEMS} dict items")
+    _count_keys(w, len(value))
     _descend(w)
     w.add(b"d" + U32.pack(len(value)))
     for key, item in value.items():
+        room = w.room
         _put(w, key)
+        if not isinstance(key, str):
+            _count_keys(w, ODD_KEY * (1 + room - w.room) - 1)
         _put(w, item)
     w.depth += 1
 
 
+def _count_keys(w: _Writer, count: int) -> None:
+    w.dict_room -= count
+    if w.dict_room < 0:
+        most = f"{MAX_DICT_ITEMS} dict items (a key that is no text counts {ODD_KEY})"
+        raise WireError(f"a value has more than {most}")
+
+
 def _put_array(w: _Writer, value: Any) -> None:
+    w.room -= ARRAY_ITEMS
+    if w.room < 0:
+        raise WireError(f"a value has more than {MAX_ITEMS // ARRAY_ITEMS} arrays")
     code = CODES.get(value.dtype)
     shape = value.shape
     if code is None or len(shape) > MAX_DIMENSIONS:

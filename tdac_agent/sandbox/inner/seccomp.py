@@ -14,6 +14,8 @@ _ALLOW, _KILL, _DENY = 0x7FFF0000, 0x80000000, 0x00050000 | errno.EPERM
 _X32 = 0x40000000
 _IOCTLS = (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451)
 _FCNTLS = (0, 1, 2, 3, 1030)
+# Wait, wake, requeue, and those with a mask or by the wall clock, each of them private.
+_FUTEXES = (128, 129, 131, 132, 137, 138, 384, 393)
 
 Instruction = tuple[int, int, int, int]
 
@@ -69,6 +71,8 @@ def _guards(lifeline: int) -> dict[str, list[Instruction]]:
         "ioctl": [*_one_of(1, _IOCTLS), (_RETURN, 0, 0, _ALLOW)],
         "kill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
         "tgkill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
+        # On memory of its own: others map the same files.
+        "futex": [*_one_of(1, _FUTEXES), (_RETURN, 0, 0, _ALLOW)],
         # May read its own limits and set none.
         "prlimit64": [
             *_one_of(0, (0, own)),

@@ -66,7 +66,9 @@ class Server:
             return self._module.policy(value)
         if kind == Kind.RESET:
             reset = getattr(self._module, "reset", None)
-            return None if reset is None else reset(value)
+            if reset is not None:
+                reset(value)
+            return None
         if kind in (Kind.CALL, Kind.CALL_EACH, Kind.GET):
             return self._use(kind, *value)
         if kind == Kind.RUN_EPISODE:

@@ -18,8 +18,12 @@ import numpy as np
 HEADER = struct.Struct("<IBI")
 MAX_DEPTH = 32
 MAX_ITEMS = 1_000_000
-# Keys chosen to collide make a dict quadratic; this many still cost under a second.
+# Keys chosen to collide make a dict quadratic; texts are hashed with a secret, other
+# keys count ten times, as do the items of a key: they still cost under a second.
 MAX_DICT_ITEMS = 10_000
+ODD_KEY = 10
+# An array is printed more slowly than any other item.
+ARRAY_ITEMS = 10
 # Below CPython's limit of 4300 decimal digits, so that every int can be printed.
 MAX_INT_BYTES = 1024
 MAX_DIMENSIONS = 8
