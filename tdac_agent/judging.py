@@ -40,7 +40,7 @@ from tdac_agent.task import load_task
 from tdac_envs.driven import Observation
 from tdac_envs.map2d import Map2DEnv
 
-FAREWELL_SECONDS = 2.0
+FAREWELL_SECONDS = 1.0
 # Exit codes of a worker; a suite may well end it with another one.
 NO_JOB, DID_JOB = 77, 78
 DONE = b"done"

@@ -1,5 +1,6 @@
 """Verdicts: what passes, what fails, and that nothing else does either."""
 
+import glob
 import json
 import os
 import re
@@ -338,21 +339,33 @@ def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     assert any("used 2 s of CPU time" in error for error in errors), errors
 
 
-def start_endless(folder, temporary):
+COMMAND = ["-m", "tdac_agent.cli", "verify"]
+SCRIPT = """
+import sys
+from pathlib import Path
+from tdac_agent import load_task, verify
+from tdac_agent.warm import WarmJudge
+with WarmJudge() as judge:
+    source = Path(sys.argv[1]).read_bytes()
+    verify(source, load_task(sys.argv[3]), judge=judge)
+"""
+
+
+def start_endless(folder, temporary, program=COMMAND):
     """`tdac verify` of a controller that does not end, once it is being imported."""
     task = write_small_task(folder / "task")
     path = folder / "controller.py"
     path.write_text("while True:\n    pass\n")
-    command = [sys.executable, "-m", "tdac_agent.cli", "verify", str(path)]
     process = subprocess.Popen(
-        [*command, "--task", str(task)],
+        [sys.executable, *program, str(path), "--task", str(task)],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "TMPDIR": str(temporary)},
     )
     deadline = time.monotonic() + 60
-    running = "**/tdac-child-*/*/work/controller.py"
-    while not list(temporary.glob(running)) and time.monotonic() < deadline:
+    running = f"{temporary}/**/tdac-child-*/*/work/controller.py"
+    # Unlike Path.glob it does not mind folders that go meanwhile.
+    while not glob.glob(running, recursive=True) and time.monotonic() < deadline:
         time.sleep(0.02)
     return process
 
@@ -368,9 +381,12 @@ def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel of Linux sees to it")
-def test_a_command_that_is_killed_takes_all_with_it(tmp_path, no_traces, left_running):
+@pytest.mark.parametrize("program", [COMMAND, ["-c", SCRIPT]], ids=["tdac", "script"])
+def test_a_caller_that_is_killed_takes_all_with_it(
+    tmp_path, no_traces, left_running, program
+):
     """No process outlives it, though nobody ends them; folders stay."""
-    process = start_endless(tmp_path, no_traces)
+    process = start_endless(tmp_path, no_traces, program)
     process.kill()
     process.communicate(timeout=30)
     assert left_running(no_traces) == []

@@ -2,6 +2,7 @@
 
 import pickle
 import textwrap
+import time
 
 import numpy as np
 import pytest
@@ -213,6 +214,43 @@ def test_the_time_of_run_episode_is_the_controllers_own(launch):
 
     with pytest.raises(ControllerTimeout, match=r"run_episode .* 0.3 s"):
         child.run_episode(Env(), 10, 0.3)
+
+
+def test_but_not_without_end(launch):
+    """The judge's own time is nobody's; a deadline holds whoever took it."""
+    child = launch(
+        "def run_episode(env, n):\n    env.reset()\n    while True: env.step(0)\n"
+    )
+    child.load()
+
+    class Env:
+        def reset(self):
+            return OBS, {}
+
+        def step(self, action):
+            time.sleep(0.05)
+            return OBS, 0.0, False, False, {}
+
+    began = time.monotonic()
+    with pytest.raises(ControllerTimeout, match="run_episode"):
+        child.run_episode(Env(), 10, 60.0, began + 0.5)
+    assert time.monotonic() - began < 30.0
+
+
+def test_what_reset_returns_is_not_sent(launch):
+    """It need not be what the wire can carry."""
+    child = launch("def reset(obs):\n    return {(k,): 0 for k in range(20_000)}\n")
+    child.load()
+    assert child.reset(OBS) is None
+
+
+@pytest.mark.parametrize("code", [137, 152])
+def test_an_exit_code_is_no_signal(launch, code):
+    """Whatever shells make of it."""
+    child = launch(f"import os\ndef policy(obs):\n    os._exit({code})\n")
+    child.load()
+    with pytest.raises(ControllerDied, match=f"exit code {code} at policy"):
+        child.policy(OBS)
 
 
 def test_printing_is_kept_and_counted(child):
