@@ -98,9 +98,9 @@ def _names(part: typer.Typer) -> set[str | None]:
 def with_heading(words: list[str]) -> list[str]:
     """A command line in which `--start X Y YAW` is `--start X Y --heading YAW`."""
     for at, word in enumerate(words):
-        if word == "--start" and len(words) > at + 3 and _is_number(words[at + 3]):
-            rest = with_heading(words[at + 3 :])
-            return [*words[: at + 3], "--heading", *rest]
+        pose = words[at + 1 : at + 4]
+        if word == "--start" and len(pose) == 3 and all(map(_is_number, pose)):
+            return [*words[: at + 3], "--heading", *with_heading(words[at + 3 :])]
     return words
 
 
@@ -119,7 +119,8 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
-        words = with_heading(sys.argv[1:])
+        words = sys.argv[1:]
+        words = words if words[:1] == ["map"] else with_heading(words)
         code = command_line(words)(words, prog_name="tdac", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         code = 130

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import yaml
 
 from tdac_agent.contenders import Contender, Kind
 from tdac_agent.errors import ControllerFileError
@@ -30,11 +32,13 @@ class Entrant:
         contender: Who drives; of `builtin`, whose file is written for each task, a
             controller without a file.
         sha256: Of its file.
+        env: Environment that it was written for, where its run folder says so.
     """
 
     name: str
     contender: Contender
     sha256: str | None = None
+    env: str | None = None
 
     @property
     def is_builtin(self) -> bool:
@@ -77,7 +81,7 @@ def _entrant(word: str, wrappers: Sequence[str] | None) -> Entrant:
         return Entrant(word, Contender("controller"))
     path = Path(word)
     if path.is_dir():
-        return _controller(word, path / "controller.py")
+        return replace(_controller(word, path / "controller.py"), env=_env_of(path))
     if not path.is_file():
         names = (*OURS, BUILTIN)
         raise ControllerFileError(
@@ -95,6 +99,14 @@ def _controller(word: str, file: Path) -> Entrant:
         raise ControllerFileError(f"no controller.py in {word!r}")
     sha256 = sha256_of(read_source(file))
     return Entrant(word, Contender("controller", file.resolve()), sha256)
+
+
+def _env_of(run_folder: Path) -> str | None:
+    try:
+        task = yaml.safe_load((run_folder / "task.yaml").read_bytes())
+        return str(task["env"])
+    except (OSError, yaml.YAMLError, TypeError, KeyError):
+        return None
 
 
 def _learned(word: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:

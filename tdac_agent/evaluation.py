@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
+import itertools
 import platform
 import tempfile
 from collections.abc import Callable, Sequence
@@ -95,6 +96,12 @@ def evaluate(
     one_of("variation", variation, VARIATIONS)
     entrants = entrants_of(policies, wrappers)
     loaded = load_tasks(tasks)
+    for entrant, task in itertools.product(entrants, loaded):
+        if entrant.env not in (None, task.spec.env):
+            raise TaskError(
+                f"{entrant.name} was written for {entrant.env}; the task "
+                f"{task.name!r} is of {task.spec.env}"
+            )
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
     seeds = episode_seeds(seed, episodes)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.commands.options import Goal, Json, Metres, Radius, Snap, Start
+from tdac_agent.commands.options import Goal, Json, Metres, Radius, Snap
 
 app = typer.Typer()
 
@@ -15,7 +15,10 @@ app = typer.Typer()
 @app.command("map", epilog="Example: `tdac map plan.png --start 90 302 --goal 178 386`")
 def map_command(
     image: Annotated[str, typer.Argument(help="Map image or map file.")],
-    start: Start = None,
+    start: Annotated[
+        Optional[tuple[float, float]],  # noqa: UP045 - typer reads it at run time
+        typer.Option("--start", metavar="X Y", help="Start, px."),
+    ] = None,
     goal: Goal = None,
     robot_radius: Radius = None,
     snap: Snap = False,

@@ -21,6 +21,8 @@ from tdac_agent.errors import RunError
 from tdac_agent.records import JOURNAL, RUN_FILE, at_work, load_run, status_now
 from tdac_agent.training.curve import PLAN_FILE, read_curve
 
+USUAL = Path("runs")
+"""Where runs are written to; before the first one it is not there."""
 WIDE = 100
 """Characters, with which there is room for all columns."""
 _COLOURS = {
@@ -41,7 +43,9 @@ def run(folder: Path, as_json: bool) -> int:
     try:
         rows = sorted(map(_row, _folders(folder)), key=_age)
     except OSError as error:
-        raise RunError(f"cannot read {folder}: {error.strerror}") from error
+        if folder != USUAL or folder.exists():
+            raise RunError(f"cannot read {folder}: {error.strerror}") from error
+        rows = []
     if as_json:
         sys.stdout.write(json.dumps(rows, indent=2) + "\n")
         return 0

@@ -115,6 +115,8 @@ def test_the_help_is_quick():
         ("synth --Learner builtin", "did you mean --learner?"),
         ("synth --xyzzy", "No such option: --xyzzy; see tdac synth --help"),
         ("webots run", "see tdac webots run --help"),
+        ("map x.png --start 1 2 0.5", "unexpected extra argument(s) (0.5)"),
+        ("synth --start 330 --goal 99 100", "Invalid value for '--start'"),
         ("syth", "No such command 'syth'"),
         ("verify", "Missing argument 'controller'; see tdac verify --help"),
     ],

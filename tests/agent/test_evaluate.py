@@ -433,6 +433,10 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
         (["reference", "reference"], "the policy 'reference' is given twice"),
         (["referenc"], "no policy 'referenc': .* did you mean 'reference'"),
         (["empty"], "no controller.py in 'empty'"),
+        (
+            ["world"],
+            "world was written for TDAC-EPuck-v0; the task 'maze' is of TDAC-M",
+        ),
         (["text.zip"], "'text.zip' is no policy of stable-baselines3"),
         (["plain.zip"], "does not say which observations .* --wrapper NAME"),
         (["random", "--wrapper", "flat"], "unknown wrapper 'flat'; expected some of"),
@@ -446,6 +450,9 @@ def test_usage_errors_are_one_line(tdac, words, message, tmp_path):
     """Said before anything is driven, with exit code 2."""
     here = tmp_path / "here"
     (here / "empty").mkdir()
+    (here / "world").mkdir()
+    (here / "world" / "task.yaml").write_text("env: TDAC-EPuck-v0")
+    (here / "world" / "controller.py").write_text("def policy(obs): return 0, 0")
     (here / "text.zip").write_text("no zip")
     with zipfile.ZipFile(here / "plain.zip", "w") as archive:
         for name in ("data", "policy.pth"):

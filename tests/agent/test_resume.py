@@ -304,6 +304,7 @@ def test_runs_are_listed(tdac, halted, once_verified):
 def test_no_runs(tdac, tmp_path):
     """An empty folder has none; one that is not there is one clear line."""
     assert "no runs in" in tdac("runs", tmp_path)[1]
+    assert tdac("runs")[:2] == (0, "no runs in runs; `tdac synth` makes one\n")
     exit_code, _, err = tdac("runs", tmp_path / "none")
     assert exit_code == 2
     assert err.startswith("error: cannot read")
