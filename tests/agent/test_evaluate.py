@@ -431,7 +431,7 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
     ("words", "message"),
     [
         (["reference", "reference"], "the policy 'reference' is given twice"),
-        (["referenc"], "no policy 'referenc': .* did you mean 'reference'"),
+        (["referenc"], "no policy 'referenc': .*did you mean 'reference'"),
         (["empty"], "no controller.py in 'empty'"),
         (
             ["world"],
