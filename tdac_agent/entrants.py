@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import yaml
-
 from tdac_agent.contenders import Contender, Kind
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.learned import read_metadata
 from tdac_agent.provenance import sha256_of
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
+from tdac_agent.task_file import read_task_file
 from tdac_agent.verification import read_source
 from tdac_envs.errors import TaskError, hint
 from tdac_envs.wrappers import WRAPPERS
@@ -102,10 +101,10 @@ def _controller(word: str, file: Path) -> Entrant:
 
 
 def _env_of(run_folder: Path) -> str | None:
+    file = run_folder / "task.yaml"
     try:
-        task = yaml.safe_load((run_folder / "task.yaml").read_bytes())
-        return str(task["env"])
-    except (OSError, yaml.YAMLError, TypeError, KeyError):
+        return read_task_file(file, file).env
+    except TaskError:
         return None
 
 

@@ -87,7 +87,8 @@ def evaluate(
         The evaluation. A policy that fails, however it does, is a row of failures.
 
     Raises:
-        TaskError: A task or a number makes no sense.
+        TaskError: A task or a number makes no sense, or a run is of another
+            environment than a task.
         ControllerFileError: A policy's file cannot be read.
         Fault: The sandbox is broken.
     """

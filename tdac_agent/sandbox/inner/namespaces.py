@@ -108,7 +108,7 @@ def _stand_by(pid: int, descriptors: list[int]) -> None:
     _, status = os.waitpid(pid, 0)
     code = os.waitstatus_to_exitcode(status)
     if code < 0:
-        if code not in (-signal.SIGKILL, -signal.SIGSTOP):
+        if code != -signal.SIGKILL:
             signal.signal(-code, signal.SIG_DFL)
             signal.pthread_sigmask(signal.SIG_UNBLOCK, [-code])
         os.kill(os.getpid(), -code)

@@ -199,41 +199,41 @@ def test_a_failing_env_is_not_the_controllers_fault(child):
         child.policy(OBS)
 
 
+ENDLESS_LOOP = """
+def run_episode(env, n):
+    env.reset()
+    while True: env.step(0)
+"""
+
+
+class EndlessEnv:
+    """Takes some seconds a step, and never ends."""
+
+    def __init__(self, seconds):
+        self.seconds = seconds
+
+    def reset(self):
+        return OBS, {}
+
+    def step(self, _):
+        time.sleep(self.seconds)
+        return OBS, 0.0, False, False, {}
+
+
 def test_the_time_of_run_episode_is_the_controllers_own(launch):
-    child = launch(
-        "def run_episode(env, n):\n    env.reset()\n    while True: env.step(0)\n"
-    )
+    child = launch(ENDLESS_LOOP)
     child.load()
-
-    class Env:
-        def reset(self):
-            return OBS, {}
-
-        def step(self, action):
-            return OBS, 0.0, False, False, {}
-
     with pytest.raises(ControllerTimeout, match=r"run_episode .* 0.3 s"):
-        child.run_episode(Env(), 10, 0.3)
+        child.run_episode(EndlessEnv(0.0), 10, 0.3)
 
 
 def test_but_not_without_end(launch):
     """The judge's own time is nobody's; a deadline holds whoever took it."""
-    child = launch(
-        "def run_episode(env, n):\n    env.reset()\n    while True: env.step(0)\n"
-    )
+    child = launch(ENDLESS_LOOP)
     child.load()
-
-    class Env:
-        def reset(self):
-            return OBS, {}
-
-        def step(self, action):
-            time.sleep(0.05)
-            return OBS, 0.0, False, False, {}
-
     began = time.monotonic()
     with pytest.raises(ControllerTimeout, match="run_episode"):
-        child.run_episode(Env(), 10, 60.0, began + 0.5)
+        child.run_episode(EndlessEnv(0.05), 10, 60.0, began + 0.5)
     assert time.monotonic() - began < 30.0
 
 
