@@ -22,7 +22,6 @@ from tdac_envs.closeup import Event, run_picture
 from tdac_envs.task2d import Pose
 
 MAX_FACT = 240
-_ERRORS = ("error", "time-out", "contract")
 
 
 def draw_trajectories(
@@ -76,14 +75,8 @@ def draw_failures(
 
 
 def _diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
-    """The diagnosis of an episode, not that of another run of its start."""
-    for failure in report.failures:
-        found = failure.diagnosis
-        if found is None or found.episode != episode.name:
-            continue
-        if (found.cause in _ERRORS) == (episode.outcome == "error"):
-            return found
-    return None
+    found = (failure.diagnosis for failure in report.failures)
+    return next((d for d in found if d is not None and d.episode == episode.name), None)
 
 
 def file_stem(name: str) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.jobs import Findings
-from tdac_agent.judge import Judge, rollout_key
+from tdac_agent.judge import Judge, Key, rollout_key
 from tdac_agent.report import Episode
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Rollout
@@ -23,7 +25,9 @@ def findings_of(judge: Judge, expected: list[str]) -> Findings:
     """The findings of a judge that has settled, of tests that had to run."""
     task = judge.task
     diagnoses = {
-        rollout_key(*key): diagnose(rollout, task.nominal).model_dump_json()
+        rollout_key(*key): diagnose(
+            _named(key, rollout), task.nominal
+        ).model_dump_json()
         for key, rollout in judge.rollouts.items()
         if rollout.outcome != "not run"
         and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))
@@ -36,6 +40,11 @@ def findings_of(judge: Judge, expected: list[str]) -> Findings:
         child_cpu_seconds=round(judge.cpu_seconds, 3),
         fault=judge.fault,
     )
+
+
+def _named(key: Key, rollout: Rollout) -> Rollout:
+    """The episode under the name of what drove it: two begin at the nominal start."""
+    return rollout if key[2] == "policy" else replace(rollout, name="run_episode")
 
 
 def _episode(rollout: Rollout, task: Task) -> Episode:

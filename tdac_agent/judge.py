@@ -17,7 +17,6 @@ from tdac_agent.remote import Unit
 from tdac_agent.sandbox import (
     Child,
     ControllerFault,
-    ControllerTimeout,
     Limits,
 )
 from tdac_agent.starts import spread_starts
@@ -126,17 +125,16 @@ class Judge:
             self._unit = Unit(self._loaded(), self._deadline)
         return self._unit
 
-    def call_timed_out(self) -> bool:
-        """Whether the latest call of a function of the controller took too long.
+    def call_may_pass(self) -> bool:
+        """Whether the latest call took too long, and maybe by the machine's doing.
 
         Where it did, the episodes under way are waited for: what follows is alone.
         """
-        late = self._unit is not None and isinstance(
-            self._unit.fault, ControllerTimeout
-        )
-        if late:
-            wait(self._episodes.values())
-        return late
+        fault = None if self._unit is None else self._unit.fault
+        if fault is None or not fault.may_pass:
+            return False
+        wait(self._episodes.values())
+        return True
 
     def rollout(
         self, name: str = "nominal", *, steps: int | None = None, drive: str = "policy"
@@ -231,7 +229,7 @@ class Judge:
             return skipped(self.task, order, "not run", reason)
         with self._turns.beside():
             rollout = self.drive(name, steps, drive)
-        if not rollout.timed_out:
+        if not rollout.may_pass:
             return rollout
         # It may be the machine's doing, or that of those beside it.
         with self._turns.alone():
@@ -251,7 +249,7 @@ class Judge:
             name: As for `rollout`, as are the next two.
             steps: Most steps.
             drive: By what.
-            final: A time-out will not be tried once more.
+            final: It will not be tried once more.
         """
         order = self._order(name, steps, drive)
         try:
@@ -279,19 +277,21 @@ class Judge:
         return f"used {self._limits.cpu_seconds} s of CPU time, all it may"
 
     def _loaded(self) -> Child:
-        """A fresh child with the controller imported; a time-out is tried again."""
+        """A fresh child with the controller imported; what may pass is tried again."""
         try:
             with self._turns.beside():
                 return self._load()
-        except ControllerTimeout:
-            with self._turns.alone():
-                return self._load(final=True)
+        except ControllerFault as fault:
+            if not fault.may_pass:
+                raise
+        with self._turns.alone():
+            return self._load(final=True)
 
     def _load(self, *, final: bool = False) -> Child:
         """A fresh child with the controller imported.
 
         Args:
-            final: A time-out will not be tried once more.
+            final: It will not be tried once more.
 
         Raises:
             ControllerFault: It cannot be imported; the same at each later request.
@@ -327,8 +327,8 @@ class Judge:
             )
 
     def _remember(self, fault: ControllerFault, *, final: bool) -> None:
-        """An import that failed is not tried again, unless for want of time."""
-        if final or not isinstance(fault, ControllerTimeout):
+        """An import that failed is not tried again, unless it may pass."""
+        if final or not fault.may_pass:
             self._import_fault = fault
 
 

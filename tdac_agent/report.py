@@ -43,7 +43,9 @@ class Diagnosis(_Record):
 
     cause: Cause
     text: str = Field(description="One paragraph, deterministic, no paths.")
-    episode: str | None = Field(None, description="`nominal`, `jitter 1` ….")
+    episode: str | None = Field(
+        None, description="`nominal`, `jitter 1` … or `run_episode`."
+    )
     step: int | None = Field(None, description="Of the event.")
     x: float | None = Field(None, description="Of the robot at that step.")
     y: float | None = None

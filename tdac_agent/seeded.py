@@ -103,6 +103,7 @@ class Kept:
         figures: A line of the results.
         tier: Sandbox tier; empty where nothing was started.
         late: Whether it took too long.
+        may_pass: Whether that may have been the machine's doing.
         poses: Shape (T + 1, 3), float32; of an evaluation, as is the next one.
         calls: Shape (T,), float32, seconds.
     """
@@ -110,6 +111,7 @@ class Kept:
     figures: SeededEpisode | Measured
     tier: str
     late: bool
+    may_pass: bool
     poses: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), "f4"))
     calls: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, "f4"))
 
@@ -183,11 +185,13 @@ def _kept(stage: Stage, measured: bool, seed: int, given_up: bool) -> Kept:
     rollout = driven.rollout
     late = rollout.outcome == "error" and rollout.timed_out
     if not measured:
-        return Kept(figures(driven, seed, stage.task), driven.tier, late)
+        found = figures(driven, seed, stage.task)
+        return Kept(found, driven.tier, late, rollout.may_pass)
     return Kept(
         measure(rollout, seed, driven.task),
         driven.tier,
         late,
+        rollout.may_pass,
         rollout.trajectory.poses.astype(np.float32),
         rollout.calls.astype(np.float32),
     )
@@ -209,16 +213,16 @@ def _in_turn(
 ) -> Kept:
     """An episode.
 
-    A time-out may be the machine's doing, so it is tried once more, alone.
+    A time-out that may be the machine's doing is tried once more, alone.
     """
     given_up = len(late) >= patience
     with turns.beside():
         kept = crew.do(seed, given_up)
-    if kept.late and len(late) < patience:
+    if kept.late and kept.may_pass and len(late) < patience:
         with turns.alone():
             kept = crew.do(seed, False)
-        if kept.late:
-            late.append(seed)
+    if kept.late:
+        late.append(seed)
     return kept
 
 

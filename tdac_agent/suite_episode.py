@@ -155,8 +155,11 @@ def load_controller(child: Child, brief: Brief) -> None:
 
 def not_driven(task: Task, order: Order, fault: ControllerFault) -> Rollout:
     """The episode of a controller that cannot be imported, or may use no more."""
-    late = isinstance(fault, ControllerTimeout)
-    return replace(skipped(task, order, "error", str(fault)), timed_out=late)
+    return replace(
+        skipped(task, order, "error", str(fault)),
+        timed_out=isinstance(fault, ControllerTimeout),
+        may_pass=fault.may_pass,
+    )
 
 
 def skipped(task: Task, order: Order, outcome: Outcome, reason: str) -> Rollout:

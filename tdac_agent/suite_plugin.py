@@ -72,10 +72,10 @@ class JudgePlugin:
     def pytest_runtest_protocol(
         self, item: pytest.Item, nextitem: pytest.Item | None
     ) -> bool:
-        """Runs a test; one in which a call took too long is run once more."""
+        """Runs a test; one that failed for want of time is run once more."""
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
         reports = runtestprotocol(item, log=False, nextitem=nextitem)
-        if self._judge.call_timed_out():
+        if self._judge.call_may_pass():
             item._initrequest()  # type: ignore[attr-defined]
             reports = runtestprotocol(item, log=False, nextitem=nextitem)
         for report in reports:

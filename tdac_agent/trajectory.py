@@ -125,6 +125,7 @@ class Rollout:
             line for a CPU, and 99th percentile with it, ms.
         returned: What `run_episode` returned, for an episode driven by it.
         timed_out: Whether the controller was too slow, in one call or on average.
+        may_pass: Whether that may have been the machine's doing, and is worth a retry.
         rooms: Shape (T + 1,): distance from the robot's centre to what is solid, px (of
             the pixel's centre) or m; empty where it was not recorded.
         calls: Shape (T,): seconds that each policy call took; empty likewise.
@@ -141,6 +142,7 @@ class Rollout:
     call_ms: tuple[float, float] = (0.0, 0.0)
     returned: Any = None
     timed_out: bool = False
+    may_pass: bool = False
     rooms: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     calls: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 

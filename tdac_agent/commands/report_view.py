@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.commands.sentences import tell
-from tdac_agent.report import Report, is_of_paper_alone
+from tdac_agent.report import Failure, Report, is_of_paper_alone
 from tdac_agent.trajectory import nominal_first
 from tdac_agent.units import UNITS
 
@@ -31,13 +31,15 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
         console.print(f"[yellow]warning: {escape(warning)}[/]")
     for node in about.left_out:
         console.print(f"[yellow]left out of the world: {escape(node)}[/]")
-    tests: dict[str, list[str]] = {}
-    for failure in report.failures:
-        tests.setdefault(failure.message, []).append(failure.test)
-    for message, names in tests.items():
-        console.print(f"[red]failed[/] [bold]{escape(_told(names))}[/]")
-        tell(console, message, indent=2)
     shown: set[str] = set()
+    failures: dict[str, list[Failure]] = {}
+    for failure in report.failures:
+        failures.setdefault(failure.message, []).append(failure)
+    for message, group in failures.items():
+        console.print(f"[red]failed[/] [bold]{escape(_told(group))}[/]")
+        text = _whole(message, group)
+        shown.add(text)
+        tell(console, text, indent=2)
     for failure in report.failures:
         diagnosis = failure.diagnosis
         if diagnosis is not None and diagnosis.text not in shown:
@@ -60,8 +62,17 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
         )
 
 
-def _told(tests: list[str]) -> str:
+def _whole(message: str, group: list[Failure]) -> str:
+    """A message, or the diagnosis that quotes it, so that it is told once."""
+    for failure in group:
+        if failure.diagnosis is not None and message in failure.diagnosis.text:
+            return failure.diagnosis.text
+    return message
+
+
+def _told(group: list[Failure]) -> str:
     """Names of tests that fail for one reason; of many, the first ones."""
+    tests = [failure.test for failure in group]
     if len(tests) <= MOST_NAMES:
         return ", ".join(tests)
     return f"{', '.join(tests[:SOME_NAMES])} and {len(tests) - SOME_NAMES} more tests"

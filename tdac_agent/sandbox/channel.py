@@ -18,6 +18,8 @@ KEPT_OUTPUT = 4000
 # Most answers come sooner; after this, waiting for a CPU is looked at.
 SOON_SECONDS = 0.25
 MOST_WAITED_SECONDS = 300.0
+# Of the time that a child did not stand in line; so much on a CPU is all of it.
+BUSY_SHARE = 0.9
 
 
 class ChannelClosedError(Exception):
@@ -25,7 +27,15 @@ class ChannelClosedError(Exception):
 
 
 class DeadlineError(Exception):
-    """The deadline passed before a whole frame had come or gone."""
+    """The deadline passed before a whole frame had come or gone.
+
+    Args:
+        busy: Whether the child was on a CPU all the time that it had.
+    """
+
+    def __init__(self, *, busy: bool) -> None:
+        super().__init__()
+        self.busy = busy
 
 
 class FrameError(Exception):
@@ -58,7 +68,8 @@ class Channel:
         line: Line,
     ) -> None:
         self._line = line
-        self._deadline, self._waited_before = 0.0, 0.0
+        # When the child was looked at, its times then, and of which deadline.
+        self._looked, self._before, self._deadline = 0.0, (0.0, 0.0), 0.0
         self._requests, self._answers, self._output = requests, answers, output
         self._frame_bytes, self._output_bytes = frame_bytes, output_bytes
         self._buffer = b""
@@ -133,12 +144,22 @@ class Channel:
             events = self._poll.poll(math.ceil(SOON_SECONDS * 1000))
             if events:
                 return events
-            self._deadline, self._waited_before = deadline, self._line.waited()
+            self._looked, self._before = time.monotonic(), self._line.times()
+            self._deadline = deadline
         while (left := self._left(deadline)) > 0:
             events = self._poll.poll(math.ceil(left * 1000))
             if events:
                 return events
-        raise DeadlineError
+        raise DeadlineError(busy=self._was_busy(deadline))
+
+    def _was_busy(self, deadline: float) -> bool:
+        if self._deadline != deadline:
+            return False
+        ran, waited = (
+            now - then
+            for now, then in zip(self._line.times(), self._before, strict=True)
+        )
+        return ran >= BUSY_SHARE * (time.monotonic() - self._looked - waited) > 0
 
     def _left(self, deadline: float) -> float:
         """Seconds until a deadline, put off by what the machine kept from the child."""
@@ -147,7 +168,7 @@ class Channel:
             return left
         if self._line.stands():
             return SOON_SECONDS
-        return left + self._line.waited() - self._waited_before
+        return left + self._line.waited() - self._before[1]
 
     def _drain(self) -> bool:
         """Read what has been printed; return whether more can come."""

@@ -127,7 +127,7 @@ class Conversation:
 
     def _fail(self, error: Exception, phase: str, seconds: float) -> NoReturn:
         if isinstance(error, DeadlineError):
-            self.give_up(ControllerTimeout(phase, seconds))
+            self.give_up(ControllerTimeout(phase, seconds, busy=error.busy))
         if isinstance(error, FrameError):
             self.breach(str(error), phase)
         if isinstance(error, OutputFloodError):

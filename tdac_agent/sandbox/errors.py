@@ -15,7 +15,12 @@ class ControllerFault(Exception):
     Args:
         message: One sentence that a user can read.
         phase: What the controller was doing: "import", "reset", "policy", ...
+
+    Attributes:
+        may_pass: Whether it may have been the machine's doing, and is worth a retry.
     """
+
+    may_pass = False
 
     def __init__(self, message: str, phase: str) -> None:
         super().__init__(message)
@@ -63,11 +68,14 @@ class ControllerTimeout(ControllerFault):
     Args:
         phase: What the controller was doing.
         seconds: How long it was given.
+        busy: Whether it was on a CPU all that time; else it may have been kept
+            waiting for something.
     """
 
-    def __init__(self, phase: str, seconds: float) -> None:
+    def __init__(self, phase: str, seconds: float, *, busy: bool = False) -> None:
         super().__init__(f"{phase} did not end within {seconds:g} s", phase)
         self.seconds = seconds
+        self.may_pass = not busy
 
 
 class ControllerDied(ControllerFault):

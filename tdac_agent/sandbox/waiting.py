@@ -27,7 +27,12 @@ class Line:
 
     def waited(self) -> float:
         """Seconds in line since it began, up to when it last got a CPU."""
-        return self._statistics()[1] / 1e9
+        return self.times()[1]
+
+    def times(self) -> tuple[float, float]:
+        """Seconds on a CPU, and in line for one."""
+        ran, waited = self._statistics()
+        return ran / 1e9, waited / 1e9
 
     def stands(self) -> bool:
         """Whether it is ready to run, and gets no CPU; looks for some 25 ms."""

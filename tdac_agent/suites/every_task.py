@@ -154,6 +154,7 @@ def test_policy_is_fast_enough(rollout, task):
 def test_progress(rollout, task):
     """d_min <= 0.7 d0 within max(400, 0.16 horizon) steps."""
     episode, spec, units = rollout("nominal"), task.spec.progress, task.setting.units
+    assert episode.trajectory.steps > 0, episode.error or "the episode has no step"
     distances = episode.distances(spec.distance)[: task.progress_steps + 1]
     d0, d_min = (float(d) * units.scale for d in (distances[0], distances.min()))
     assert d_min <= spec.fraction * d0, (

@@ -198,8 +198,11 @@ def test_the_users_pytest_does_not_change_a_verdict(
     assert not verify(nothing, small_task, profile="policy", paper=True).passed
 
 
-def test_a_call_that_takes_too_long_is_tried_once_more(check, tmp_path):
-    """The test that made it runs again; it fails only if it is too slow again."""
+@pytest.mark.parametrize(
+    ("body", "tests_run"), [("time.sleep(99)", "xyy"), ("while True: pass", "xy")]
+)
+def test_a_call_that_is_kept_waiting_is_tried_once_more(tmp_path, body, tests_run):
+    """The test runs again, unless the call had a CPU all the time that it may take."""
     text = """
 import time
 from pathlib import Path
@@ -220,7 +223,7 @@ def test_slow(controller):
 def test_after(controller):
     assert controller.call("_octile", (0, 0), (3, 0)) == 3
 """
-    hang = "\n\ndef hang():\n    while True:\n        pass\n"
+    hang = f"\n\nimport time\n\n\ndef hang():\n    {body}\n"
     folder = tmp_path / "mine"
     folder.mkdir()
     (folder / "test_mine.py").write_text(text)
@@ -229,15 +232,15 @@ def test_after(controller):
     report = verify(
         source, task, profile="policy", paper=True, suite=folder, limits=QUICK
     )
-    assert (folder / "count").read_text() == "xyy"
+    assert (folder / "count").read_text() == tests_run
     assert outcome(report, "test_after") == "passed"
     messages = {f.test.rpartition("::")[2]: f.message for f in report.failures}
     assert messages["test_slow"] == "hang did not end within 1.5 s"
     assert "AttributeError at nearest_free" in messages["test_it"]
 
 
-def test_an_episode_that_is_slow_once_is_run_again(small_task, tmp_path, quick):
-    """A time-out counts only if the controller is too slow a second time."""
+def test_an_episode_that_is_kept_waiting_is_run_again(small_task, tmp_path, quick):
+    """Its time-out counts only if it comes a second time."""
     write_workdir(tmp_path, small_task)
     source = b"import time\n\n\ndef policy(obs):\n    time.sleep(9)\n"
     judge = Judge(small_task, source, tmp_path, limits=quick)
@@ -247,6 +250,21 @@ def test_an_episode_that_is_slow_once_is_run_again(small_task, tmp_path, quick):
     assert rollout.timed_out
     assert rollout.error == "policy did not end within 1.5 s"
     assert os.times().elapsed - began >= 3.0
+
+
+@pytest.mark.parametrize(
+    "source",
+    [b"while True:\n    pass\n", b"def policy(obs):\n    while True:\n        pass\n"],
+)
+def test_a_loop_without_end_is_waited_for_once(small_task, tmp_path, quick, source):
+    """It had a CPU all the time, and would need it all again."""
+    write_workdir(tmp_path, small_task)
+    judge = Judge(small_task, source, tmp_path, limits=quick)
+    rollout = judge.rollout("nominal")
+    judge.close()
+    assert rollout.timed_out
+    assert not rollout.may_pass
+    assert 1.0 < judge.cpu_seconds < 2.5
 
 
 def test_provenance_names_what_was_tested(small_task, check):
