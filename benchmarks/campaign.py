@@ -120,7 +120,7 @@ def _make(folder: Path, workers: int, out: str) -> Made:
     words = ["campaign", "bench.yaml", "--workers", str(workers), "--out", out]
     began, memory, cpu = time.perf_counter(), [0.0], 0.0
     with subprocess.Popen(
-        [sys.executable, "-m", "tdac_agent.cli", *words],
+        [sys.executable, "-m", "tdac_agent", *words],
         cwd=folder,
         stdout=subprocess.DEVNULL,
     ) as driver:

@@ -23,7 +23,7 @@ STEP = (
 CASES = {
     FLOOR: ["-c", "pass"],
     REFERENCE: ["-c", "import numpy"],
-    "tdac --help": ["-m", "tdac_agent.cli", "--help"],
+    "tdac --help": ["-m", "tdac_agent", "--help"],
     "import gymnasium": ["-c", "import gymnasium"],
     "import gymnasium, tdac_envs": ["-c", "import gymnasium, tdac_envs"],
     "make, reset and step TDAC-Map2D-v0": ["-c", STEP],

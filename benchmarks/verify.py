@@ -164,7 +164,7 @@ Measure = Callable[[], tuple[float, float, bool]]
 
 def _from_cli(run: Path) -> Measure:
     """Wall time, CPU time of the controller's processes, verdict; from outside."""
-    command = [sys.executable, "-m", "tdac_agent.cli", "verify", str(run), "--json"]
+    command = [sys.executable, "-m", "tdac_agent", "verify", str(run), "--json"]
 
     def measure() -> tuple[float, float, bool]:
         began = time.perf_counter()

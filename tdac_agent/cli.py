@@ -113,7 +113,7 @@ def _is_number(word: str) -> bool:
 
 
 def main() -> None:
-    """Entry point of the `tdac` script: every known error is one clear line."""
+    """Does what the command line says: every known error is one clear line."""
     # Its threads would keep a core busy, waiting for work that nothing here has.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in (signal.SIGTERM, signal.SIGHUP):
@@ -131,7 +131,3 @@ def main() -> None:
     # A last search for garbage would take longer than much of the rest.
     gc.freeze()
     sys.exit(code or 0)
-
-
-if __name__ == "__main__":
-    main()

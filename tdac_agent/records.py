@@ -165,7 +165,7 @@ def load_run(folder: Path) -> Run:
     except (OSError, ValueError, TypeError, RecursionError) as error:
         told = error.strerror if isinstance(error, OSError) else str(error)
         reason = str(told).partition("\n")[0]
-        raise RunError(f"{folder} is not a run folder: {reason}") from error
+        raise RunError(f"{folder} is not a run folder: {RUN_FILE}: {reason}") from error
 
 
 def _missing(folder: Path) -> str:

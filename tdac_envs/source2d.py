@@ -78,6 +78,7 @@ def prepare(
         return _from_image(bundled.image, given.or_else(bundled))
     path = Path(source)
     if path.is_dir():
+        _check_is_map_folder(path)
         return _settled(_from_folder(path), given)
     if path.suffix == ".npy":
         return _settled(_from_npy(path), given)
@@ -178,6 +179,7 @@ def metres_to_pixels(
     """
     _check_exists(Path(source))
     if Path(source).is_dir():
+        _check_is_map_folder(Path(source))
         grid = _from_folder(Path(source)).grid
     else:
         image = load_image(source)
@@ -266,6 +268,14 @@ def _read_cells(path: Path) -> OccupancyGrid:
     if cells.dtype != np.bool_:
         raise MapError(f"{path}: expected a bool array, got {cells.dtype}")
     return OccupancyGrid(cells)
+
+
+def _check_is_map_folder(folder: Path) -> None:
+    if not (folder / "params.json").is_file():
+        raise MapError(
+            f"{folder} is a folder without a params.json: give a map file, or a folder "
+            "that `tdac map` wrote"
+        )
 
 
 def _check_exists(path: Path) -> None:

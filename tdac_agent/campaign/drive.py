@@ -10,14 +10,13 @@ from pathlib import Path
 
 from tdac_agent.campaign.config import CampaignError
 from tdac_agent.campaign.executor import Ended, Executor, Update
-from tdac_agent.campaign.perform import Outcome, Terms, read_outcome
+from tdac_agent.campaign.perform import RUNS, Outcome, Terms, read_outcome
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.files import write_atomic
 from tdac_agent.locks import hold
 
 CONFIG_FILE = "campaign.yaml"
-RUNS = "runs"
 Watch = Callable[[Update], None]
 
 

@@ -26,6 +26,8 @@ from tdac_envs.errors import TdacError
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
 """Nobody waits for a single answer of a campaign."""
+RUNS = "runs"
+"""Folder of the runs, in that of a campaign."""
 KEPT = frozenset({RUN_FILE, JOURNAL, "task.yaml", "controller.py", "report.json"})
 
 
@@ -50,7 +52,7 @@ class Terms:
     @property
     def runs(self) -> Path:
         """The folder of all runs."""
-        return Path(self.folder) / "runs"
+        return Path(self.folder) / RUNS
 
     def budget(self, planned: PlannedRun) -> Budget:
         """The budget of a run: of its own where no model is asked."""

@@ -51,6 +51,10 @@ class Wanted:
     shard: str
     out: Path | None
 
+    def folder(self, config: CampaignConfig) -> Path:
+        """The campaign's folder, by default one of its name."""
+        return self.out or FOLDER / config.name
+
     def command(self) -> str:
         """The words that go on with it."""
         words = ["tdac", "campaign", self.given]
@@ -70,7 +74,7 @@ def run(wanted: Wanted, as_json: bool) -> int:
     config = with_limits(read_config(file), wanted.limits)
     with console.status("reading the tasks …"):
         plan = make_plan(config, file.parent)
-    folder = wanted.out or FOLDER / config.name
+    folder = wanted.folder(config)
     with campaign_folder(folder, shard, file.read_text("utf-8")):
         terms = Terms(
             folder=str(folder.resolve()),

@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.budget import told_usd
 from tdac_agent.campaign.config import find_config, read_config
+from tdac_agent.campaign.drive import look
+from tdac_agent.campaign.perform import RUNS
 from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
-from tdac_agent.campaign.progress import Progress
-from tdac_agent.commands.campaign import with_limits
+from tdac_agent.commands.campaign import Wanted, with_limits
 from tdac_agent.commands.campaign_table import labels_of, make_console, make_table
 from tdac_agent.commands.sentences import tell
 from tdac_agent.lifecycle import model_warnings
@@ -22,6 +22,12 @@ from tdac_agent.outlook import Outlook, foresee
 from tdac_agent.prices import PriceList, load_prices, price_file
 from tdac_agent.prompt import load_template
 from tdac_agent.providers.choice import check_name
+
+LEGEND = (
+    "K iterations with up to J repairs each; asked: questions of all runs if nothing "
+    "ever passes; USD if each is answered at once, and if each answer has to be asked "
+    "for three times"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,23 +53,22 @@ class Row:
     cost_most: float | None
 
 
-def run(given: str, limits: dict[str, Any], part: str, as_json: bool) -> int:
+def run(wanted: Wanted, as_json: bool) -> int:
     """Prints the plan; no model is asked, no key is needed, nothing is written.
 
     Args:
-        given: The campaign's file, or the name of a shipped one.
-        limits: `max_cost` and `max_tokens`, where they are not the file's.
-        part: Of all runs, `i/n`.
+        wanted: What the command was asked for.
         as_json: Whether to print JSON.
     """
     console = make_console(stderr=as_json)
-    shard, file = Shard.parse(part), find_config(given)
-    config = with_limits(read_config(file), limits)
+    shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
+    config = with_limits(read_config(file), wanted.limits)
     for name in config.models:
         check_name(name)
     with console.status("reading the tasks …"):
         plan = make_plan(config, file.parent)
-    prices, progress = load_prices(), Progress.of(plan, shard)
+    prices, folder = load_prices(), wanted.folder(config)
+    progress, _ = look(plan, shard, folder / RUNS)
     rows = [
         _row(tally.cell, tally.planned, plan, prices)
         for tally in progress.tallies.values()
@@ -72,6 +77,10 @@ def run(given: str, limits: dict[str, Any], part: str, as_json: bool) -> int:
         sys.stdout.write(json.dumps([asdict(row) for row in rows], indent=2) + "\n")
         return 0
     console.print(_table([t.cell for t in progress.tallies.values()], rows))
+    tell(console, LEGEND, "dim")
+    if progress.before:
+        done = f"{progress.before} of {progress.planned} runs have come to their end"
+        tell(console, f"{done} before, and are counted here, too: {folder}")
     for line in _lines(rows, config.max_cost, config.max_tokens, prices):
         tell(console, line)
     for line in model_warnings(models_of(plan.cells)):

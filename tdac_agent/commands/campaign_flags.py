@@ -85,9 +85,9 @@ def campaign(
 
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
     given = {name: value for name, value in limits.items() if value is not None}
+    wanted = command.Wanted(config, given, executor, workers, shard, out)
     if dry_run:
         from tdac_agent.commands import campaign_dry_run as dry
 
-        raise typer.Exit(dry.run(config, given, shard, as_json))
-    wanted = command.Wanted(config, given, executor, workers, shard, out)
+        raise typer.Exit(dry.run(wanted, as_json))
     raise typer.Exit(command.run(wanted, as_json))

@@ -15,7 +15,8 @@ _ABOUT = (
     "A language model's answers to the [bold]{prompt}[/] prompt for the task "
     "[bold]{task}[/], recorded {date}: unedited, each from a fresh conversation that "
     "held the printed prompt alone. The controllers run, and every test is made, here "
-    "and now. By hand:\n"
+    "and now; where that makes a question other than it was then, a line says so. By "
+    "hand:\n"
     "  tdac synth --task {task} --prompt {prompt} --learner replay:demo\n"
 )
 

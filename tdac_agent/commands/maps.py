@@ -63,7 +63,10 @@ def run(
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
         return
     console = Console(emoji=False)
-    console.print(_table(ranked))
+    if start is None:  # no candidate has a figure, nor a place in an order
+        console.print(f"reading: {escape(_describe(ranked[0]))}", highlight=False)
+    else:
+        console.print(_table(ranked))
     _print_choice(console, params, folder)
 
 

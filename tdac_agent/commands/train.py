@@ -26,7 +26,7 @@ from tdac_agent.training.plan import (
     read_plan,
 )
 from tdac_agent.training.policy_files import POLICY
-from tdac_agent.training.train import train
+from tdac_agent.training.train import check_extra, train
 from tdac_envs.errors import TaskError
 
 NOISES = ("range_noise", "wheel_slip", "motor_lag", "delay")
@@ -52,6 +52,7 @@ def run(
     """
     console = Console(stderr=as_json, emoji=False)
     with console.status("preparing the tasks …"):
+        check_extra()
         plan, folder = _asked_for(given, steps, out, resume)
     console.print(_heading(plan, folder), soft_wrap=True, highlight=False)
     columns = (

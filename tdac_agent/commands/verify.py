@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -142,13 +143,23 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
     if path.is_dir():
         file = path / "controller.py"
         if not file.is_file():
-            raise ControllerFileError(f"no controller.py in {controller!r}")
+            raise ControllerFileError(_without_controller(path))
         return file, flags.load() if flags.given() else load_task(path)
     if not path.is_file():
         raise ControllerFileError(f"no controller {controller!r}: no such file")
     if not flags.given() and (path.parent / "task.yaml").is_file():
         return path, load_task(path.parent)
     return path, flags.load()
+
+
+def _without_controller(folder: Path) -> str:
+    """Why a folder has no controller, and what to do."""
+    from tdac_agent.records import RUN_FILE  # its models take a while to build
+
+    if (folder / RUN_FILE).is_file():
+        words = f"tdac synth --resume {shlex.quote(str(folder))}"
+        return f"the run {folder} has no controller yet; go on with it: {words}"
+    return f"{folder} is a folder without a controller.py"
 
 
 def write_junit(report: Report, path: Path) -> None:

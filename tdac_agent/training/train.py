@@ -35,16 +35,27 @@ def train(plan: TrainingPlan, folder: Path, watch: Watch | None = None) -> list[
             used, or another process trains in it.
         TaskError: The extra is missing, or a task has changed.
     """
-    try:
-        from tdac_agent.training.learning import learn
-    except ImportError as error:
-        needed = f"training needs an extra: {install_command('sb3')}"
-        raise TaskError(needed) from error
+    check_extra()
+    from tdac_agent.training.learning import learn
+
     _prepare(folder, plan)
     with hold(folder / LOCK_FILE) as held:
         if not held:
             raise RunError(f"another process trains in {folder}")
         return learn(plan, folder, watch or (lambda *_: None))
+
+
+def check_extra() -> None:
+    """Whether what trains is installed.
+
+    Raises:
+        TaskError: It is not, with the command that does it.
+    """
+    try:
+        import tdac_agent.training.learning  # noqa: F401
+    except ImportError as error:
+        needed = f"training needs an extra: {install_command('sb3')}"
+        raise TaskError(needed) from error
 
 
 def _prepare(folder: Path, plan: TrainingPlan) -> None:

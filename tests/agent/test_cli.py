@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import re
 import struct
 import subprocess
@@ -88,6 +89,20 @@ def test_a_task_is_named_by_the_same_flags_everywhere():
         assert [name for name in flags if name not in told_to_models] == shared
         extra = [name for name in flags if name in told_to_models]
         assert extra == (told_to_models if command == "synth" else [])
+
+
+def test_ctrl_c_while_the_command_line_is_loaded_is_one_line(tmp_path):
+    """There is no traceback, however early it comes."""
+    interrupts = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n"
+    (tmp_path / "typer.py").write_text(interrupts)
+    process = subprocess.run(
+        [sys.executable, "-m", "tdac_agent", "--version"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{os.getcwd()}"},
+    )
+    assert (process.returncode, process.stderr) == (130, "interrupted\n")
 
 
 def test_the_help_is_quick():

@@ -145,7 +145,7 @@ def test_an_interrupted_synth_leaves_a_readable_run(tmp_path, no_traces, number)
     """Exit 130, status `interrupted`, nothing left running."""
     out = tmp_path / "run"
     process = subprocess.Popen(
-        [sys.executable, "-m", "tdac_agent.cli", "synth", "--out", str(out)],
+        [sys.executable, "-m", "tdac_agent", "synth", "--out", str(out)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, "TMPDIR": str(no_traces)},

@@ -254,7 +254,7 @@ def test_a_full_disk_is_one_clear_line(tmp_path, good):
     """Exit 3 before anything is asked; with room again the run goes on."""
     place = tmp_path / "small-disk"
     place.mkdir()
-    synth = f"{sys.executable} -m tdac_agent.cli synth --task {good} --out {place}/run"
+    synth = f"{sys.executable} -m tdac_agent synth --task {good} --out {place}/run"
     script = f"mount -t tmpfs -o size=4m none {place} && {synth}"
     done = subprocess.run(
         ["unshare", "-rm", "sh", "-c", script],

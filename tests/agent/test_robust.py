@@ -475,7 +475,7 @@ def test_an_interrupt_leaves_nothing(good, no_traces):
     words = ["verify", str(good), "--profile", "policy", "--robust", "5000"]
     words += ["--out", str(kept)]
     process = subprocess.Popen(
-        [sys.executable, "-m", "tdac_agent.cli", *words],
+        [sys.executable, "-m", "tdac_agent", *words],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "TMPDIR": str(no_traces)},

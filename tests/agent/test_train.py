@@ -163,7 +163,7 @@ def test_points_after_the_checkpoint_are_learnt_again(tmp_path, small, config):
 
 
 def start(*words):
-    run = [sys.executable, "-m", "tdac_agent.cli", "train", *map(str, words)]
+    run = [sys.executable, "-m", "tdac_agent", "train", *map(str, words)]
     return subprocess.Popen(
         run, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )

@@ -339,7 +339,7 @@ def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     assert any("used 2 s of CPU time" in error for error in errors), errors
 
 
-COMMAND = ["-m", "tdac_agent.cli", "verify"]
+COMMAND = ["-m", "tdac_agent", "verify"]
 SCRIPT = """
 import sys
 from pathlib import Path

@@ -73,6 +73,9 @@ class Handle:
     id: int
     type_name: str
 
+    def __repr__(self) -> str:
+        return f"<{self.type_name}>"
+
 
 @dataclass(frozen=True, slots=True)
 class RemoteError:

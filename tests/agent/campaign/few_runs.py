@@ -41,7 +41,7 @@ class Small:
         """The command, in a process of its own."""
         words = [f"{name}.yaml", "--out", out, *map(str, flags)]
         return subprocess.Popen(
-            [sys.executable, "-m", "tdac_agent.cli", "campaign", *words],
+            [sys.executable, "-m", "tdac_agent", "campaign", *words],
             cwd=self.folder,
             env=os.environ | {"COLUMNS": "200"},
             stdout=subprocess.PIPE,

@@ -104,7 +104,7 @@ def test_a_fault_that_stays_ends_the_run(
 def start(words, **variables):
     """`tdac` in a process of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "tdac_agent.cli", *map(str, words)],
+        [sys.executable, "-m", "tdac_agent", *map(str, words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, **variables},

@@ -1,0 +1,18 @@
+"""Entry point of the `tdac` script, and of `python -m tdac_agent`."""
+
+import sys
+
+
+def main() -> None:
+    """The command line; Ctrl-C while that is still being loaded is a line as well."""
+    try:
+        from tdac_agent.cli import main as command_line
+
+        command_line()
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()
