@@ -116,6 +116,8 @@ def main() -> None:
     """Does what the command line says: every known error is one clear line."""
     # Its threads would keep a core busy, waiting for work that nothing here has.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # To look for some, pydantic reads what every installed package says of itself.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:

@@ -71,6 +71,7 @@ class WarmJudge:
             and not SECRET.search(name)
         }
         environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+        environment["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
         environment.setdefault("OPENBLAS_NUM_THREADS", "1")
         # A worker that is killed leaves the folders of its children here.
         self._folder = tempfile.TemporaryDirectory(
