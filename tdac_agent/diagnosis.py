@@ -24,7 +24,7 @@ MAX_MESSAGE = 300
 _AWAY, _AWAY_STEPS = 0.8, 8
 _OUT_OF_CPU = re.compile(r"CPU time")
 _CONTRACT = re.compile(
-    r"must return|reset\(\)|step\(\)|run_episode|module 'controller'"
+    r"must return|reset\(\)|step\(\)|run_episode returned|module 'controller'"
 )
 _FOLDERS = re.compile(r"(?<![\w.])(?:/[\w.+-]+)+/(?=[\w.+-])")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+|0x[0-9a-fA-F]{6,}")

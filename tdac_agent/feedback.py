@@ -39,6 +39,20 @@ class Group:
         """Whether nothing more may be told of it."""
         return any(_is_held_out(failure) for failure in self.members)
 
+    @property
+    def happened(self) -> list[str]:
+        """What happened in its episodes, the first ones, each bounded."""
+        return _first([f.diagnosis.text for f in self.members if f.diagnosis])
+
+    @property
+    def messages(self) -> list[str]:
+        """What its tests say that no diagnosis quotes, likewise."""
+        if self.held_out:
+            return []
+        texts = [f.diagnosis.text for f in self.members if f.diagnosis]
+        told = (f.message for f in self.members)
+        return _first([m for m in told if not any(m in text for text in texts)])
+
 
 def render_feedback(report: Report) -> str:
     """The failures by root cause: three in full, the others in a line each.
@@ -116,14 +130,8 @@ def _root(failure: Failure) -> str:
 
 def _tell(group: Group) -> str:
     """Failures with one cause: names, messages, and what happened."""
-    diagnoses = [f.diagnosis for f in group.members if f.diagnosis is not None]
-    happened = list(dict.fromkeys(diagnosis.text for diagnosis in diagnoses))
-    messages: list[str] = []
-    if not group.held_out:
-        messages = list(dict.fromkeys(f.message for f in group.members))
-        messages = [m for m in messages if not any(m in text for text in happened)]
-    lines = [_names(list(group.members)), *_first(messages)]
-    lines += [f"What happened: {line}" for line in _first(happened)]
+    lines = [_names(list(group.members)), *group.messages]
+    lines += [f"What happened: {line}" for line in group.happened]
     return "\n   ".join(lines)
 
 
@@ -141,7 +149,8 @@ def _lines(groups: list[Group], report: Report) -> list[str]:
 
 
 def _first(texts: list[str]) -> list[str]:
-    """The first of some texts, each bounded, and how many more there are."""
+    """The first of the texts that differ, each bounded, and how many more there are."""
+    texts = list(dict.fromkeys(texts))
     more = len(texts) - MAX_MESSAGES
     return [cut(text) for text in texts[:MAX_MESSAGES]] + (
         [f"… and {more} more like these"] if more > 0 else []

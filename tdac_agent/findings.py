@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from tdac_agent.diagnosis import diagnose
 from tdac_agent.jobs import Findings
-from tdac_agent.judge import Judge, Key, rollout_key
+from tdac_agent.judge import NOMINAL, Judge, Key, rollout_key
 from tdac_agent.report import Episode
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Rollout
@@ -24,11 +25,12 @@ def driven(judge: Judge) -> list[Rollout]:
 def findings_of(judge: Judge, expected: list[str]) -> Findings:
     """The findings of a judge that has settled, of tests that had to run."""
     task = judge.task
+    rollouts = judge.rollouts
     diagnoses = {
         rollout_key(*key): diagnose(
-            _named(key, rollout), task.nominal
+            _named(key, rollouts), task.nominal
         ).model_dump_json()
-        for key, rollout in judge.rollouts.items()
+        for key, rollout in rollouts.items()
         if rollout.outcome != "not run"
         and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))
     }
@@ -42,9 +44,16 @@ def findings_of(judge: Judge, expected: list[str]) -> Findings:
     )
 
 
-def _named(key: Key, rollout: Rollout) -> Rollout:
-    """The episode under the name of what drove it: two begin at the nominal start."""
-    return rollout if key[2] == "policy" else replace(rollout, name="run_episode")
+def _named(key: Key, rollouts: Mapping[Key, Rollout]) -> Rollout:
+    """The episode under the name of what drove it: two begin at the nominal start.
+
+    An error that `policy` meets as well, as where an import fails, is told once.
+    """
+    rollout, nominal = rollouts[key], rollouts.get(NOMINAL)
+    of_both = nominal is not None and rollout.error == nominal.error is not None
+    if key[2] == "policy" or of_both:
+        return rollout
+    return replace(rollout, name="run_episode")
 
 
 def _episode(rollout: Rollout, task: Task) -> Episode:

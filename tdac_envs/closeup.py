@@ -149,7 +149,10 @@ def _close_up(chart: Chart, poses: Points, event: Event, radius: float) -> Image
 def _column(event: Event, close: Image | None) -> Image:
     """Caption, close-up and legend, one below the other."""
     lines = [line for fact in event.facts for line in textwrap.wrap(fact, _CHARACTERS)]
-    legend = [(GREY, True, "shortest path on the grid"), (TRAIL, False, "driven, light to dark")]
+    legend = [
+        (GREY, True, "shortest path on the grid"),
+        (TRAIL, False, "driven, light to dark"),
+    ]
     if event.way is not None:
         legend.append((GREEN, True, "shortest path from the end"))
     if event.contact is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -10,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.commands.sentences import tell
+from tdac_agent.feedback import group_failures
 from tdac_agent.report import Failure, Report, is_of_paper_alone
 from tdac_agent.trajectory import nominal_first
 from tdac_agent.units import UNITS
@@ -31,21 +33,16 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
         console.print(f"[yellow]warning: {escape(warning)}[/]")
     for node in about.left_out:
         console.print(f"[yellow]left out of the world: {escape(node)}[/]")
-    shown: set[str] = set()
-    failures: dict[str, list[Failure]] = {}
-    for failure in report.failures:
-        failures.setdefault(failure.message, []).append(failure)
-    for message, group in failures.items():
-        console.print(f"[red]failed[/] [bold]{escape(_told(group))}[/]")
-        text = _whole(message, group)
-        shown.add(text)
-        tell(console, text, indent=2)
-    for failure in report.failures:
-        diagnosis = failure.diagnosis
-        if diagnosis is not None and diagnosis.text not in shown:
-            shown.add(diagnosis.text)
-            console.print(f"[cyan]diagnosis[/] {escape(diagnosis.cause)}")
-            tell(console, diagnosis.text, indent=2)
+    groups, not_run = group_failures(report)
+    for group in groups:
+        _show_failed(console, group.members)
+        for message in group.messages:
+            tell(console, message, indent=2)
+        for text in group.happened:
+            tell(console, f"what happened: {text}", indent=2)
+    if not_run:
+        _show_failed(console, not_run)
+        tell(console, not_run[0].message, indent=2)
     console.print(episode_table(report))
     if out is not None:
         _show_files(out, console)
@@ -57,25 +54,21 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
     )
     if not verdict.passed and _only_drives(report):
         console.print(
-            "it drives, but has not all functions that the profile paper asks for: "
+            "it drives, but does not do all that the profile paper asks for: "
             "--profile policy asks for policy(obs) alone"
         )
 
 
-def _whole(message: str, group: list[Failure]) -> str:
-    """A message, or the diagnosis that quotes it, so that it is told once."""
-    for failure in group:
-        if failure.diagnosis is not None and message in failure.diagnosis.text:
-            return failure.diagnosis.text
-    return message
-
-
-def _told(group: list[Failure]) -> str:
+def _show_failed(console: Console, failures: Sequence[Failure]) -> None:
     """Names of tests that fail for one reason; of many, the first ones."""
-    tests = [failure.test for failure in group]
-    if len(tests) <= MOST_NAMES:
-        return ", ".join(tests)
-    return f"{', '.join(tests[:SOME_NAMES])} and {len(tests) - SOME_NAMES} more tests"
+    names = [failure.test for failure in failures]
+    if len(names) > MOST_NAMES:
+        more = len(names) - SOME_NAMES
+        names = [
+            *names[: SOME_NAMES - 1],
+            f"{names[SOME_NAMES - 1]} and {more} more tests",
+        ]
+    console.print(f"[red]failed[/] [bold]{escape(', '.join(names))}[/]")
 
 
 def _only_drives(report: Report) -> bool:

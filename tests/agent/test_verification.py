@@ -1,6 +1,7 @@
 """Verdicts: what passes, what fails, and that nothing else does either."""
 
 import glob
+import io
 import json
 import os
 import re
@@ -12,8 +13,10 @@ import time
 
 import numpy as np
 import pytest
+from rich.console import Console
 from small import write_small_task
 
+from tdac_agent.commands.report_view import show_report
 from tdac_agent.episode import as_wheels, wrong_action
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.report import Report, is_of_paper_alone
@@ -61,6 +64,31 @@ def test_doing_nothing_fails(small_task, warm):
     assert report.tests["test_end_to_end.py::test_no_collisions"] == "passed"
     causes = {f.diagnosis.cause for f in report.failures if f.diagnosis}
     assert causes == {"no motion"}
+
+
+def shown(report):
+    """What the terminal gets of a report."""
+    console = Console(file=io.StringIO(), width=120)
+    show_report(report, console)
+    return console.file.getvalue()
+
+
+def test_a_failure_of_run_episode_has_that_name(small_task, good_source, warm):
+    """What drives it is said: the policy's own episode begins at the same start."""
+    raising = "\n\ndef run_episode(env, max_steps):\n    raise KeyError('speeds')\n"
+    report = verify(good_source + raising, small_task, judge=warm)
+    found = [failure.diagnosis for failure in report.failures]
+    assert [diagnosis.episode for diagnosis in found] == ["run_episode"] * 2
+    assert shown(report).count("KeyError") == 1
+    assert "what happened: run_episode: error: " in shown(report)
+
+
+def test_a_cause_is_told_once(small_task, warm):
+    """A controller that cannot be imported fails most tests for one reason."""
+    report = verify("raise KeyError('speeds')\n", small_task, judge=warm)
+    assert len(report.failures) > 20
+    assert shown(report).count("KeyError") == 1
+    assert "what happened: nominal: error: " in shown(report)
 
 
 def test_evidence_is_kept(small_task, good_source, tmp_path, warm):
