@@ -9,6 +9,7 @@ from typing import Any
 from tdac_agent.arrival import near_goal, why_no_arrival
 from tdac_agent.course import goal_bearing, heading_error, turned_away
 from tdac_agent.motion import forward, saturated
+from tdac_agent.plain import plain
 from tdac_agent.report import Cause, Diagnosis
 from tdac_agent.setting import Nominal
 from tdac_agent.stall import PROGRESS, percent
@@ -19,15 +20,13 @@ from tdac_agent.units import Units
 from tdac_envs.task2d import Pose
 
 LAST_POSES = 4
-MAX_MESSAGE = 300
 # Share of turns away from the path, and their number, from which it is no accident.
 _AWAY, _AWAY_STEPS = 0.8, 8
+_RETURNED = "run_episode returned"
 _OUT_OF_CPU = re.compile(r"CPU time")
 _CONTRACT = re.compile(
-    r"must return|reset\(\)|step\(\)|run_episode returned|module 'controller'"
+    rf"must return|reset\(\)|step\(\)|{_RETURNED}|module 'controller'"
 )
-_FOLDERS = re.compile(r"(?<![\w.])(?:/[\w.+-]+)+/(?=[\w.+-])")
-_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+|0x[0-9a-fA-F]{6,}")
 
 
 def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
@@ -61,21 +60,17 @@ def _on_screen(rollout: Rollout, around: Surroundings) -> Diagnosis:
 
 
 def _error(rollout: Rollout, units: Units) -> Diagnosis:
-    message, steps = _plain(rollout.error or ""), rollout.trajectory.steps
+    message, steps = f"{plain(rollout.error or '')}.", rollout.trajectory.steps
     cause: Cause = "error"
     if rollout.timed_out or _OUT_OF_CPU.search(message):
         cause = "time-out"
     elif _CONTRACT.search(message):
         cause = "contract"
     when = f"after {steps} steps" if steps else "before its first step"
-    text = f"{cause}: the controller failed {when}: {message}"
+    # A loop of its own that has returned says by itself how far it came.
+    failed = "" if _RETURNED in message else f"the controller failed {when}: "
+    text = f"{cause}: {failed}{message}"
     return _diagnosis(rollout, units, cause, text, steps)
-
-
-def _plain(message: str) -> str:
-    """An error message as one bounded line without folders and addresses."""
-    line = " ".join(_ADDRESS.sub("", _FOLDERS.sub("", message)).split()).rstrip(".")
-    return f"{line if len(line) <= MAX_MESSAGE else line[:MAX_MESSAGE] + ' …'}."
 
 
 def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
@@ -94,8 +89,8 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
         f"{speed * around.full_speed:.0f} {units.length}/s, the {side} of the body "
         f"touched the {touch.thing} at "
         f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
-        f"{around.seen(touch, trajectory)} A wheel was at its limit in "
-        f"{percent(share)} of the steps. {_passed_goal(rollout, units)}{course}"
+        f"{around.seen(touch, trajectory)} {_limits(share)}"
+        f"{_passed_goal(rollout, units)}{course}"
     )
     return _diagnosis(
         rollout,
@@ -110,6 +105,11 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
         heading_error=error,
         saturated=round(share, 3),
     )
+
+
+def _limits(share: float) -> str:
+    told = f"A wheel was at its limit in {percent(share)} of the steps. "
+    return told if share else ""
 
 
 def _passed_goal(rollout: Rollout, units: Units) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from tdac_agent.plain import plain
 from tdac_agent.report import GROUPS, Diagnosis, Failure, Report
 
 MAX_GROUPS = 3
@@ -49,9 +50,9 @@ class Group:
         """What its tests say that no diagnosis quotes, likewise."""
         if self.held_out:
             return []
-        texts = [f.diagnosis.text for f in self.members if f.diagnosis]
+        quoted = "\n".join(f.diagnosis.text for f in self.members if f.diagnosis)
         told = (f.message for f in self.members)
-        return _first([m for m in told if not any(m in text for text in texts)])
+        return _first([m for m in told if plain(m) not in quoted])
 
 
 def render_feedback(report: Report) -> str:

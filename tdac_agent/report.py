@@ -166,15 +166,6 @@ def id_of(nodeid: str) -> str:
     return nodeid.removeprefix(f"{SHIPPED}/")
 
 
-def is_of_paper_alone(test: str) -> bool:
-    """Whether the profile `policy` has no such test."""
-    name = test.rpartition("::")[2]
-    of_paper = {"test_constants", "test_entry_points", "test_main"}
-    run_episode = name.startswith("test_run_episode_")
-    shipped = group_of(test) != "user"
-    return shipped and (group_of(test) == "unit" or name in of_paper or run_episode)
-
-
 def group_of(test: str) -> Group:
     """Which part of a suite a test belongs to."""
     files: dict[str, Group] = {

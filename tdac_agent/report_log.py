@@ -34,6 +34,7 @@ Text = Annotated[str, BeforeValidator(_without_surrogates)]
 
 class _Crash(BaseModel):
     message: Text
+    lineno: int | None = None
 
 
 class _Details(BaseModel):
@@ -203,7 +204,7 @@ def _message(record: _Collected) -> str:
     """Why a test failed, without the assertion's source; printable and bounded."""
     details = record.longrepr
     if isinstance(details, _Details):
-        text = details.reprcrash.message if details.reprcrash else ""
+        text = _of_crash(details.reprcrash) if details.reprcrash else ""
     elif isinstance(details, tuple):
         text = details[-1]  # of a skip: file, line, reason
     else:
@@ -216,6 +217,13 @@ def _message(record: _Collected) -> str:
         text = tail
     shown = "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)
     return shown if len(shown) <= MAX_MESSAGE else f"{shown[:MAX_MESSAGE]} …"
+
+
+def _of_crash(crash: _Crash) -> str:
+    """What an error says; of a bare assertion, where it stands."""
+    if crash.message != "AssertionError" or crash.lineno is None:
+        return crash.message
+    return f"line {crash.lineno}: an assertion without a message"
 
 
 def _collect_error(name: str, record: _Collected) -> str:

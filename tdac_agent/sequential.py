@@ -71,8 +71,8 @@ class SequentialTest:
         if self.limit < self.fewest_to_accept:
             raise TaskError(
                 f"to accept at {self.accept_at:g} with a margin of {self.margin:g} "
-                f"takes at least {self.fewest_to_accept} episodes, better some times "
-                f"that; got {self.limit}"
+                f"takes at least {self.fewest_to_accept} episodes, and seldom so few; "
+                f"got {self.limit}"
             )
 
     @property

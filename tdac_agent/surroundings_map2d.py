@@ -50,14 +50,16 @@ class MapSurroundings:
         half = self.task.robot.field_of_view_deg / 2.0
         off = abs(math.degrees(touch.bearing))
         if off > half:
+            digits = 1 if off < half + 1.0 else 0
             return (
-                f"No ray looks there: {off:.0f}° off the heading, the fan has "
+                f"No ray looks there: {off:.{digits}f}° off the heading, the fan has "
                 f"±{half:g}°."
             )
-        before = max(trajectory.steps - 10, 0)
-        shortest = float(trajectory.ranges[before].min())
+        earlier = min(trajectory.steps, 10)
+        shortest = float(trajectory.ranges[trajectory.steps - earlier].min())
         return (
-            f"In step {before} the shortest ray read {shortest:.1f} px from the centre."
+            f"{earlier} steps earlier the shortest ray read {shortest:.1f} px from the "
+            "centre."
         )
 
     def path_from(self, pose: Pose) -> Path:

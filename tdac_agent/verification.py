@@ -192,8 +192,10 @@ def load_trajectories(folder: Path) -> dict[str, Trajectory]:
 
 
 def _suite_folder(path: Path) -> Path:
-    if not path.is_dir() or not list(path.glob("test_*.py")):
-        raise ControllerFileError(f"no suite {str(path)!r}: expected test_*.py files")
+    if not path.is_dir():
+        raise ControllerFileError(f"no suite {str(path)!r}: no such folder")
+    if not list(path.glob("test_*.py")):
+        raise ControllerFileError(f"no suite in {str(path)!r}: it has no test_*.py")
     return path.resolve()
 
 

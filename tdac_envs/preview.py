@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +43,10 @@ def draw_preview(
         path: Shape (n, 2), the shortest path for the body; may be empty.
     """
     lines = _lines(params)
-    canvas = Canvas(cells, strip=12 + _ROW * (1 + len(lines)))
+    floor = (_shade(source, ~cells, _FREE_TINT), "free")
+    solid = (_shade(source, cells, _WALL_TINT), "obstacle")
+    legend = [row for row in ([floor, solid], _places(params)) if row]
+    canvas = Canvas(cells, strip=12 + _ROW * (len(legend) + len(lines)))
     _lay_source(canvas, source, cells)
     _draw_task(canvas, params, path)
     map_rows = canvas.strip_top
@@ -49,9 +54,12 @@ def draw_preview(
     canvas.image = _framed(canvas.image)
     _rulers(canvas, cells.shape, origin, map_rows)
     baseline = _TOP + map_rows + 24
-    _legend(canvas, baseline, params, len(path) > 0)
-    for index, line in enumerate(lines):
-        canvas.text(_LEFT, baseline + _ROW * (index + 1), line, GREY)
+    for entries in legend:
+        _draw_entries(canvas, baseline, entries)
+        baseline += _ROW
+    for line in lines:
+        canvas.text(_LEFT, baseline, line, GREY)
+        baseline += _ROW
     return canvas.image
 
 
@@ -63,7 +71,7 @@ def _lay_source(canvas: Canvas, source: ColourImage, cells: BoolGrid) -> None:
     picture = cv2.resize(source, size, interpolation=way).astype(np.float32)
     wall = cv2.resize(cells.astype(np.float32), size, interpolation=way)[..., None]
     tint = wall * np.array(_WALL_TINT) + (1 - wall) * np.array(_FREE_TINT)
-    mixed = np.rint(0.55 * picture + 0.45 * tint).astype(np.uint8)
+    mixed = _mixed(picture, tint)
     left = int(np.ceil(canvas.to_frame((-0.5, -0.5))[0][0]))
     canvas.image[: size[1], left : left + size[0]] = mixed
 
@@ -131,21 +139,36 @@ def _tick_step(scale: float) -> int:
     return 5000
 
 
-def _legend(canvas: Canvas, baseline: int, params: MapParams, has_path: bool) -> None:
-    entries: list[tuple[Colour, str]] = [
-        (_FREE_TINT, "free"),
-        (_WALL_TINT, "obstacle"),
-    ]
+def _mixed(picture: NDArray[Any], tint: NDArray[Any]) -> Picture:
+    return np.asarray(np.rint(0.55 * picture + 0.45 * tint), np.uint8)
+
+
+def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
+    """What some pixels look like on average once they are tinted."""
+    colour = np.array(cv2.mean(source, chosen.astype(np.uint8))[:3])
+    red, green, blue = _mixed(colour, np.array(tint)).tolist()
+    return red, green, blue
+
+
+def _places(params: MapParams) -> list[tuple[Colour, str]]:
+    """Start, goal and path, where there are some."""
+    entries: list[tuple[Colour, str]] = []
     if params.start is not None:
         entries.append((TRAIL, f"start {_text(params.start)}"))
     if params.goal is not None:
         entries.append((GREEN, f"goal {_text(params.goal)}"))
-    if has_path and params.score_terms is not None:
-        length = params.score_terms.path_length
-        entries.append((TRAIL, f"path {length:.0f} px"))
+    if params.score_terms is not None and params.score_terms.path_length:
+        entries.append((TRAIL, f"path {params.score_terms.path_length:.0f} px"))
+    return entries
+
+
+def _draw_entries(
+    canvas: Canvas, baseline: int, entries: list[tuple[Colour, str]]
+) -> None:
     x = _LEFT
     for colour, label in entries:
-        canvas.image[baseline - 10 : baseline + 1, x : x + 14] = colour
+        top = 6 if label.startswith("path") else 10
+        canvas.image[baseline - top : baseline + 1 - (10 - top), x : x + 14] = colour
         x = canvas.text(x + 20, baseline, label, INK) + 14
 
 

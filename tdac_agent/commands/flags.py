@@ -74,6 +74,8 @@ class TaskFlags:
         self._refuse("only a --world has nodes to ignore", ("ignore",))
         source = self.map_image or default
         own = source not in bundled_maps()
+        if own and not Path(source).exists():
+            raise TaskError(f"no map {source!r}: no such file")
         if own and (self.start is None or self.goal is None):
             raise TaskError(
                 f"give --start X Y and --goal X Y for {source!r} "

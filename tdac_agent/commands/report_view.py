@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -12,7 +13,7 @@ from rich.text import Text
 
 from tdac_agent.commands.sentences import tell
 from tdac_agent.feedback import group_failures
-from tdac_agent.report import Failure, Report, is_of_paper_alone
+from tdac_agent.report import Failure, Report
 from tdac_agent.trajectory import nominal_first
 from tdac_agent.units import UNITS
 
@@ -52,30 +53,33 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
         f"passed in {report.seconds:.1f} s  (task {escape(about.task)}, profile "
         f"{about.profile}, sandbox {about.sandbox})"
     )
-    if not verdict.passed and _only_drives(report):
+    if _lacks_names(report):
         console.print(
-            "it drives, but does not do all that the profile paper asks for: "
+            "the profile paper asks for all these functions and constants; "
             "--profile policy asks for policy(obs) alone"
         )
 
 
 def _show_failed(console: Console, failures: Sequence[Failure]) -> None:
-    """Names of tests that fail for one reason; of many, the first ones."""
+    """Names of tests that fail for one reason, their file once; of many, the first."""
     names = [failure.test for failure in failures]
     if len(names) > MOST_NAMES:
-        more = len(names) - SOME_NAMES
-        names = [
-            *names[: SOME_NAMES - 1],
-            f"{names[SOME_NAMES - 1]} and {more} more tests",
-        ]
-    console.print(f"[red]failed[/] [bold]{escape(', '.join(names))}[/]")
+        names = names[:SOME_NAMES]
+    more = len(failures) - len(names)
+    files: dict[str, list[str]] = {}
+    for name in names:
+        file, _, test = name.partition("::")
+        files.setdefault(file, []).append(test)
+    told = "; ".join(f"{file}::{', '.join(tests)}" for file, tests in files.items())
+    told += f" and {more} more tests" if more else ""
+    console.print(f"[red]failed[/] [bold]{escape(told)}[/]")
 
 
-def _only_drives(report: Report) -> bool:
-    """Whether tests of the profile `paper` alone stand in the way."""
-    reached = all(episode.outcome == "reached" for episode in report.episodes)
-    asked = all(is_of_paper_alone(failure.test) for failure in report.failures)
-    return bool(report.episodes) and reached and asked
+def _lacks_names(report: Report) -> bool:
+    """Whether what the profile `paper` asks for by name is not there."""
+    failed = {failure.test.rpartition("::")[2] for failure in report.failures}
+    parses = "test_source_parses" not in failed
+    return parses and bool(failed & {"test_constants", "test_entry_points"})
 
 
 def _show_files(out: Path, console: Console) -> None:
@@ -90,12 +94,15 @@ def episode_table(report: Report) -> Table:
     table = Table(
         title=f"Episodes as the environment recorded them ({units.length})",
         title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
     )
-    table.add_column("start")
-    table.add_column("outcome")
-    for name in ("steps", "contacts", "path left", "straight left"):
-        table.add_column(name, justify="right")
-    table.add_column("ms a call", justify="right")
+    table.add_column("start", no_wrap=True)
+    table.add_column("outcome", no_wrap=True)
+    figures = ("steps", "contacts", "path\nleft", "straight\nleft", "ms a\ncall")
+    for name in figures:
+        table.add_column(name, justify="right", no_wrap=True)
     for episode in (e for e in report.episodes if e.outcome != "not run"):
         colour = "green" if episode.outcome == "reached" else "red"
         table.add_row(
@@ -105,7 +112,7 @@ def episode_table(report: Report) -> Table:
             str(episode.collisions),
             _of(units.scale, episode.d_min, episode.d0),
             _of(units.scale, episode.d_min_euclidean, episode.d0_euclidean),
-            f"{episode.call_ms_mean:.2f}",
+            f"{episode.call_ms_mean:.2f}" if episode.call_ms_p99 else "–",
         )
     return table
 

@@ -125,7 +125,7 @@ def _error_rates(result: SequentialResult) -> str:
     return (
         f"  a controller of {_percent(low.rate)} is accepted with probability "
         f"{_percent(low.accepted)}\n"
-        f"  a controller of {_percent(high.rate)} is rejected with "
+        f"  a controller of {_percent(high.rate)} is rejected with probability "
         f"{_percent(high.rejected)}, undecided with {_percent(high.undecided)}"
     )
 

@@ -147,6 +147,8 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
         return file, flags.load() if flags.given() else load_task(path)
     if not path.is_file():
         raise ControllerFileError(f"no controller {controller!r}: no such file")
+    if path.suffix != ".py":
+        raise ControllerFileError(f"{controller!r} is no controller: expected a .py")
     if not flags.given() and (path.parent / "task.yaml").is_file():
         return path, load_task(path.parent)
     return path, flags.load()

@@ -6,7 +6,8 @@ import re
 import pytest
 from planted import PLANTS, fail, wrong_facts
 
-from tdac_agent.diagnosis import MAX_MESSAGE, diagnose
+from tdac_agent.diagnosis import diagnose
+from tdac_agent.plain import MAX_MESSAGE
 from tdac_agent.trajectory import Trajectory
 from tdac_agent.verification import verify
 
@@ -98,7 +99,7 @@ CONTROLLERS = {
         + "    return 0.3, 0.3\n",
         "error",
         7,
-        "ValueError at policy (line 8): no way <object object> in plan.txt.",
+        "ValueError at policy (line 8): no way <object object> in …/plan.txt.",
     ),
     "exception with a long text": (
         COUNTS + "    raise ValueError('x' * 5000)\n",

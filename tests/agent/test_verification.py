@@ -19,7 +19,7 @@ from small import write_small_task
 from tdac_agent.commands.report_view import show_report
 from tdac_agent.episode import as_wheels, wrong_action
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.report import Report, is_of_paper_alone
+from tdac_agent.report import Report
 from tdac_agent.sandbox import Limits
 from tdac_agent.verification import load_trajectories, read_source, verify
 
@@ -43,17 +43,6 @@ def test_a_good_controller_passes(small_task, good_source, profile, tests, no_tr
     assert [episode.name for episode in report.episodes] == names
     assert [episode.held_out for episode in report.episodes] == [False] * 3 + [True] * 3
     assert report.provenance.profile == profile
-
-
-def test_which_tests_are_of_paper_alone(small_task, good_source, warm):
-    """Those that the profile `policy` lacks, and none of a user's own."""
-    both = [
-        set(verify(good_source, small_task, profile=profile, judge=warm).tests)
-        for profile in ("paper", "policy")
-    ]
-    alone = both[0] - both[1]
-    assert {test for test in both[0] if is_of_paper_alone(test)} == alone
-    assert not is_of_paper_alone("own/test_unit.py::test_main")
 
 
 def test_doing_nothing_fails(small_task, warm):
@@ -357,7 +346,7 @@ def test_files_that_cannot_be_read(what):
 
 def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     """What all processes of a controller use together is bounded."""
-    burn = "\nfor _ in range(25_000_000):\n    pass\n"
+    burn = "\nimport time\n\nwhile time.process_time() < 0.8:\n    pass\n"
     source = good_source + burn
     limits = Limits(cpu_seconds=2)
     report = verify(source, small_task, profile="policy", limits=limits)
