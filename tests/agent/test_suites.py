@@ -133,9 +133,11 @@ def test_a_conftest_cannot_take_tests_away(check):
 
 
 def test_no_suite_in_the_folder(small_task, good_source, tmp_path):
-    """A folder without test files is the user's error."""
-    with pytest.raises(ControllerFileError, match=r"expected test_\*\.py files"):
+    """A folder that is missing, or has no test files, is the user's error."""
+    with pytest.raises(ControllerFileError, match=r"it has no test_\*\.py"):
         verify(good_source, small_task, suite=tmp_path)
+    with pytest.raises(ControllerFileError, match="no such folder"):
+        verify(good_source, small_task, suite=tmp_path / "none")
 
 
 def test_markers_choose_the_tests(check):
