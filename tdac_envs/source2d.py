@@ -82,7 +82,7 @@ def prepare(
         return _settled(_from_folder(path), given)
     if path.suffix == ".npy":
         return _settled(_from_npy(path), given)
-    _check_exists(path)
+    check_exists(path)
     return _from_image(path, given)
 
 
@@ -177,7 +177,7 @@ def metres_to_pixels(
     Raises:
         MapError: The map cannot be read, or has no resolution.
     """
-    _check_exists(Path(source))
+    check_exists(Path(source))
     if Path(source).is_dir():
         _check_is_map_folder(Path(source))
         grid = _from_folder(Path(source)).grid
@@ -278,7 +278,12 @@ def _check_is_map_folder(folder: Path) -> None:
         )
 
 
-def _check_exists(path: Path) -> None:
+def check_exists(path: Path) -> None:
+    """Refuses a map that is not there, with the bundled one that may be meant.
+
+    Raises:
+        MapError: There is no such file or folder.
+    """
     if path.exists():
         return
     known = ""

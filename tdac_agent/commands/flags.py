@@ -16,6 +16,7 @@ from tdac_envs.grid import OccupancyGrid
 from tdac_envs.image import load_image
 from tdac_envs.maps import bundled_map, bundled_maps
 from tdac_envs.metric import resolution_of, to_pixels
+from tdac_envs.source2d import check_exists
 
 Point = tuple[float, float]
 SAID_BY_A_TASK = (
@@ -62,6 +63,7 @@ class TaskFlags:
 
         Raises:
             TaskError: They contradict each other, or the task cannot be used.
+            MapError: There is no such map.
         """
         heading = None if self.heading is None else (self.heading,)
         check_finite(start=self.start, goal=self.goal, heading=heading)
@@ -74,8 +76,8 @@ class TaskFlags:
         self._refuse("only a --world has nodes to ignore", ("ignore",))
         source = self.map_image or default
         own = source not in bundled_maps()
-        if own and not Path(source).exists():
-            raise TaskError(f"no map {source!r}: no such file")
+        if own:
+            check_exists(Path(source))
         if own and (self.start is None or self.goal is None):
             raise TaskError(
                 f"give --start X Y and --goal X Y for {source!r} "

@@ -52,8 +52,8 @@ def run(
     """
     console = Console(stderr=as_json, emoji=False)
     with console.status("preparing the tasks …"):
-        check_extra()
         plan, folder = _asked_for(given, steps, out, resume)
+        check_extra()
     console.print(_heading(plan, folder), soft_wrap=True, highlight=False)
     columns = (
         TextColumn("{task.completed:,.0f} steps"),
