@@ -11,10 +11,12 @@ are all that it costs.
 
 from __future__ import annotations
 
+import contextlib
 import math
-import statistics
+import multiprocessing
 from collections.abc import Callable, Mapping
 from itertools import cycle, islice
+from multiprocessing.connection import Connection
 from typing import Any
 
 import gymnasium as gym
@@ -22,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tdac_envs  # noqa: F401 - registers the env
-from benchmarks.timing import Bench, Effort, compared, in_turn
+from benchmarks.timing import Bench, Effort, compared, in_turn, quartiles
 
 Actions = list[Any]
 Env = gym.Env[Any, Any]
@@ -137,14 +139,20 @@ def raced(
     return compared(title, times, FLOOR, REFERENCE, notes=notes)
 
 
+ALONE, TOGETHER, APART = "1 thread", "2 threads", "2 processes"
+
+
 def scaled(title: str, bursts: dict[str, Burst], rounds: int) -> Bench:
-    """The same of cases on one thread and on two, with what two are worth."""
+    """The same of cases on one thread and on more, with what these are worth."""
     times = in_turn({**yardsticks(), **bursts}, rounds)
     notes = {}
-    for two in (name for name in times if name.endswith("2 threads")):
-        one = two.replace("2 threads", "1 thread")
-        gains = [a / b for a, b in zip(times[one], times[two], strict=True)]
-        notes[two] = f"{statistics.median(gains):.2f} × one thread"
+    for name, own in times.items():
+        case, _, how = name.rpartition(", ")
+        if how in (TOGETHER, APART):
+            one = times[f"{case}, {ALONE}"]
+            gains = [a / b for a, b in zip(one, own, strict=True)]
+            low, gain, high = quartiles(gains)
+            notes[name] = f"{gain:.2f} × one thread ({low:.2f} to {high:.2f})"
     return compared(title, times, FLOOR, REFERENCE, notes=notes)
 
 
@@ -162,6 +170,39 @@ def batch_burst(envs: Any) -> Burst:
     return burst
 
 
+def batch_envs(count: int, threads: int) -> Any:
+    """A batch on the maze, reset."""
+    envs = gym.make_vec(NAME, count, "vector_entry_point", threads=threads)
+    envs.reset(seed=0)
+    return envs
+
+
+def burst_apart(count: int, processes: int = 2) -> Burst:
+    """The same in processes that share nothing: as much as the cores are worth."""
+    context = multiprocessing.get_context("spawn")
+    ends = []
+    for _ in range(processes):
+        ours, theirs = context.Pipe()
+        context.Process(target=_step_apart, args=(count, theirs), daemon=True).start()
+        theirs.close()
+        ends.append(ours)
+
+    def burst() -> int:
+        for end in ends:
+            end.send(None)
+        return sum(end.recv() for end in ends)
+
+    return burst
+
+
+def _step_apart(count: int, end: Connection) -> None:
+    burst = batch_burst(batch_envs(count, threads=1))
+    with contextlib.suppress(EOFError):
+        while True:
+            end.recv()
+            end.send(burst())
+
+
 def single(rounds: int) -> Bench:
     """A single environment through `gym.make`."""
     bursts = {
@@ -175,11 +216,9 @@ def batches(rounds: int) -> Bench:
     """Batches, on one thread and on more."""
     bursts = {}
     for count in (64, 1024, 4096):
-        for threads in (1, 2):
-            envs = gym.make_vec(NAME, count, "vector_entry_point", threads=threads)
-            envs.reset(seed=0)
-            name = f"{count} robots, {threads} thread{'s' * (threads > 1)}"
-            bursts[name] = batch_burst(envs)
+        bursts[f"{count} robots, {ALONE}"] = batch_burst(batch_envs(count, 1))
+        bursts[f"{count} robots, {TOGETHER}"] = batch_burst(batch_envs(count, 2))
+        bursts[f"{count} robots, {APART}"] = burst_apart(count)
     return scaled("Batches of robots on the maze", bursts, rounds)
 
 

@@ -112,8 +112,8 @@ def compared(
     """A bench of these times, with the ratios to two of its cases."""
     rows = []
     for case, own in times.items():
-        low, speed, high = _quartiles(_ratios(times[reference], own))
-        _, per_floor, _ = _quartiles(_ratios(own, times[floor]))
+        low, speed, high = quartiles(_ratios(times[reference], own))
+        _, per_floor, _ = quartiles(_ratios(own, times[floor]))
         rows.append(
             Row(
                 case,
@@ -138,7 +138,7 @@ def _ratios(over: Sequence[float], under: Sequence[float]) -> list[float]:
     return [a / b for a, b in zip(over, under, strict=True)]
 
 
-def _quartiles(ratios: Sequence[float]) -> tuple[float, float, float]:
+def quartiles(ratios: Sequence[float]) -> tuple[float, float, float]:
     if len(ratios) == 1:
         return ratios[0], ratios[0], ratios[0]
     low, middle, high = statistics.quantiles(ratios, method="inclusive")
