@@ -18,10 +18,12 @@ from tdac_envs.batching import (
     Array,
     Flags,
     autoreset_mode_of,
+    columns_of,
     infos_of,
     joint_space,
     mask_of,
     seeds_of,
+    told,
 )
 from tdac_envs.compiled import Kernel
 from tdac_envs.rows import Index, Rows
@@ -112,13 +114,10 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         for i, one in enumerate(seeds_of(seed, self.num_envs)):
             if one is not None and mask[i]:
                 self._randoms[i], self._seeds[i] = seeding.np_random(one)
-        chosen = np.flatnonzero(mask)
-        self._place(chosen, rest)
-        self._rows.call(chosen, mask)
-        self._over[mask] = False
+        self._begin(mask, rest)
         observations = {key: seen.copy() for key, seen in self._seen().items()}
-        self._complete(observations, chosen.tolist())
-        return observations, infos_of(np.where(mask, self.robots.outcome.T, 0.0), mask)
+        self._complete(observations, np.flatnonzero(mask).tolist())
+        return observations, self._infos(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Result:
         """Applies wheel speeds, shape (num_envs, 2), for one step.
@@ -127,28 +126,25 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             ValueError: The actions are not two finite numbers a robot.
             ResetNeeded: The mode is `DISABLED` and an episode has ended.
         """
-        wanted = self._wanted(actions)
-        resting = np.flatnonzero(self._over)
-        if resting.size and self.autoreset_mode is AutoresetMode.DISABLED:
+        self._rows.wake()
+        self._command(actions)
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
+            resting = np.flatnonzero(self._over)
             raise gym.error.ResetNeeded(
                 f"expected reset(options={{'reset_mask': ...}}) of the robots whose "
                 f"episodes have ended: {resting[:10].tolist()}"
             )
-        self._commands[:] = wanted
-        self._slip()
-        self._place(resting, {})
-        *seen, told = self._rows.call_all(self._over)
-        observations = dict(zip(self._seen(), seen, strict=True))
-        outcome = told.T
-        rewards = outcome[stepping.REWARD].copy()
-        terminated = outcome[stepping.TERMINATED] == 1.0
-        truncated = outcome[stepping.TRUNCATED] == 1.0
-        self._over = terminated | truncated
+        if self._slippery:
+            self._slip()
+        if self._drawn:
+            self._draw(np.flatnonzero(self._over), {})
+        *seen, flags, wholes, measures = self._rows.call_all()
+        observations = dict(zip(self._keys, seen, strict=True))
+        rewards, terminated, truncated, infos = told(flags, wholes, measures)
+        np.logical_or(terminated, truncated, out=self._over)
         self._complete(observations, range(self.num_envs))
-        infos: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
-            infos = self._restart(observations, outcome)
-        infos |= infos_of(outcome, np.ones(self.num_envs, np.bool_))
+            infos |= self._restart(observations, infos)
         return observations, rewards, terminated, truncated, infos
 
     def close_extras(self, **_: Any) -> None:
@@ -190,28 +186,29 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._each = [self.robots.row(i) for i in range(self.num_envs)]
         several = zip(self.setups, self.tasks, self._each, strict=True)
         arguments = [setup.arguments(task, robot) for setup, task, robot in several]
+        state, outcome, seen = self.robots.state, self.robots.outcome, self._seen()
+        self._keys = tuple(seen)
+        commands = (self._commands, state[:, stepping.LEFT : stepping.RIGHT + 1])
+        starts = (self._starts[:, :3], state[:, : stepping.HEADING + 1])
+        ways = (self._starts[:, 3:], outcome[:, stepping.REMAINING][:, None])
         self._rows = Rows(
             self._kernels,
             arguments,
             self.threads,
-            inputs=[
-                (
-                    self._commands,
-                    self.robots.state[:, stepping.LEFT : stepping.RIGHT + 1],
-                )
-            ],
-            outputs=(*self._seen().values(), self.robots.outcome),
+            kinds=self._over,
+            inputs=[(commands,), (starts, ways)],
+            outputs=tuple(seen.values()),
+            columns=columns_of(outcome),
         )
 
-    def _place(self, robots: Index, options: dict[str, Any]) -> None:
-        """Puts robots where their next episodes begin; the kernel `begin` does more."""
-        if not robots.size:
-            return
+    def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
+        """Begins the episodes of the robots in a mask, and of no others."""
+        chosen = np.flatnonzero(mask)
         if options or self._drawn:
-            self._draw(robots, options)
-        starts = self._starts[robots]
-        self.robots.state[robots, : stepping.HEADING + 1] = starts[:, :3]
-        self.robots.outcome[robots, stepping.REMAINING] = starts[:, 3]
+            self._draw(chosen, options)
+        self._over[chosen] = True
+        self._rows.call(chosen)
+        self._over[chosen] = False
 
     def _draw(self, robots: Index, options: dict[str, Any]) -> None:
         """Gives robots the tasks that their next episodes are about."""
@@ -248,41 +245,47 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
                 state = self.robots.state[i]
                 state[stepping.SLIP_LEFT : stepping.SLIP_RIGHT + 1] = slip
 
-    def _restart(self, observations: Observations, outcome: Array) -> dict[str, Any]:
+    def _restart(
+        self, observations: Observations, infos: dict[str, Any]
+    ) -> dict[str, Any]:
         """Begins anew what has ended; returns what it ended with.
 
         Overwrites what the robots observe and what their infos say.
         """
-        over = np.flatnonzero(self._over)
+        ended = self._over.copy()
+        over = np.flatnonzero(ended)
         final = np.full(self.num_envs, None, object)
         for i in over.tolist():
             final[i] = {key: value[i].copy() for key, value in observations.items()}
-        ended = self._over.copy()
-        infos = {
-            "final_obs": final,
-            "_final_obs": ended,
-            "final_info": infos_of(np.where(ended, outcome, 0.0), ended),
-            "_final_info": ended.copy(),
-        }
+        last = self._infos(ended)
         self.last_poses = self.pose()
-        self._place(over, {})
-        self._rows.call(over, ended)
+        self._begin(ended, {})
         for key, seen in self._seen().items():
             observations[key][over] = seen[over]
-        told = slice(stepping.REACHED, None)
-        outcome[told, over] = self.robots.outcome[over, told].T
+        for key, values in self._infos(ended).items():
+            infos[key][over] = values[over]
         self._complete(observations, over.tolist())
-        self._over = np.zeros(self.num_envs, np.bool_)
-        return infos
+        return {
+            "final_obs": final,
+            "_final_obs": ended,
+            "final_info": last,
+            "_final_info": ended.copy(),
+        }
 
-    def _wanted(self, actions: Any) -> Array:
+    def _infos(self, mask: Flags) -> dict[str, Any]:
+        return infos_of(np.where(mask, self.robots.outcome.T, 0.0), mask)
+
+    def _command(self, actions: Any) -> None:
+        """Keeps wheel speeds for the kernel, which limits them."""
         try:
-            wanted = np.asarray(actions, np.float64)
+            wanted = np.asarray(actions)
+            if wanted.shape == self._commands.shape:
+                self._commands[:] = wanted
+                if np.isfinite(self._commands).all():
+                    return
         except (TypeError, ValueError):
-            wanted = np.empty(0)
-        if wanted.shape != (self.num_envs, 2) or not np.isfinite(wanted).all():
-            raise ValueError(
-                f"expected actions of two finite numbers in [-1, 1] for each of "
-                f"{self.num_envs} robots, got {actions!r}"
-            )
-        return wanted
+            pass
+        raise ValueError(
+            f"expected actions of two finite numbers in [-1, 1] for each of "
+            f"{self.num_envs} robots, got {actions!r}"
+        )

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.row_loop import N_PIECE
+from tdac_envs.row_loop import N_PIECE, TO_FLAG, TO_WHOLE
 
 Arrays = Sequence[NDArray[Any]]
+Columns = Mapping[np.dtype[Any], Arrays]
 Words = NDArray[np.int64]
 
 # Where the ends of a copy are in its words, and the bytes of a row.
 _TO, _FROM, _LENGTH = 0, 2, 4
 _ALIGNED = 64
+_BECOMES = {np.dtype(np.int64): TO_WHOLE, np.dtype(np.bool_): TO_FLAG}
 
 
 class Outputs:
@@ -23,32 +26,43 @@ class Outputs:
 
     Args:
         arrays: Each has a row for each row, which lies in one piece.
+        columns: Arrays with a float64 for each row, by what the numbers become:
+            float64, int64, or bool, which is whether they are not 0.
 
     Attributes:
-        pieces: The copies, for the loop.
+        pieces: The copies, for the loop; where to is told from the new arrays' begin.
     """
 
-    def __init__(self, arrays: Arrays) -> None:
-        self._kept = arrays
-        self.pieces = _pieces(arrays, _FROM)
-        self.pieces[:, _TO + 1] = self.pieces[:, _LENGTH]
-        ends = np.cumsum(
-            [-(-a.nbytes // _ALIGNED) * _ALIGNED for a in arrays], dtype=int
-        )
-        self._size = int(ends[-1]) if len(arrays) else 0
-        self._begins = np.append(0, ends)[: len(arrays)]
-        self._kinds = [
-            (array.shape, array.dtype, begin)
-            for array, begin in zip(arrays, self._begins.tolist(), strict=True)
-        ]
+    def __init__(self, arrays: Arrays, columns: Columns) -> None:
+        self._kept = arrays, columns
+        kinds = [(array.shape, array.dtype) for array in arrays]
+        copied = [_pieces(arrays, _FROM)]
+        copied[0][:, _TO + 1] = copied[0][:, _LENGTH]
+        for dtype, several in columns.items():
+            pieces = _pieces(several, _FROM)
+            pieces[:, _TO + 1] = dtype.itemsize
+            pieces[:, _LENGTH] = _BECOMES.get(dtype, dtype.itemsize)
+            copied.append(pieces)
+            kinds.append(((len(several), len(several[0])), dtype))
+        self.pieces = np.concatenate(copied)
+        sizes = [math.prod(shape) * dtype.itemsize for shape, dtype in kinds]
+        ends = np.cumsum([-(-size // _ALIGNED) * _ALIGNED for size in sizes], dtype=int)
+        begins = np.append(0, ends).tolist()
+        self._size = begins.pop()
+        self._kinds = [(*k, begin) for k, begin in zip(kinds, begins, strict=True)]
+        to = begins[: len(arrays)]
+        for (count, length), dtype, begin in self._kinds[len(arrays) :]:
+            step = length * dtype.itemsize
+            to += range(begin, begin + count * step, step)
+        self.pieces[:, _TO] = to
 
-    def renewed(self) -> list[NDArray[Any]]:
-        """New arrays, not filled in, to which rows are copied from now on."""
+    def renewed(self) -> tuple[list[NDArray[Any]], int]:
+        """New arrays, not filled in, and where the memory of all of them begins."""
         block = np.empty(self._size, np.uint8)
-        self.pieces[:, _TO] = self._begins + address(block)
-        return [
+        found = [
             np.ndarray(shape, kind, block, begin) for shape, kind, begin in self._kinds
         ]
+        return found, address(block)
 
 
 def copies(pairs: Sequence[tuple[NDArray[Any], NDArray[Any]]]) -> Words:

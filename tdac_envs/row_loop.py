@@ -7,12 +7,17 @@ Numbers are words of 64 bits. The `door` says who may work:
 | `OPEN` | number of the call that is being made; 0 when none is |
 | `INSIDE` | helpers that are at work |
 | `FAILED` | not 0 where a helper's call failed |
-| `TAKEN + APART * k` | the next place in the order that thread k has not taken |
+| `OVER` | not 0 when the helpers are to end |
+| `TAKEN + OWN * k` | the next place in the order that thread k has not taken |
+| `AWAKE + OWN * k` | not 0 while helper k is awake, or has been woken |
 
 Words that one thread writes and others read lie `APART` words from each other, so that
 they share no line of the cache. The `plan` says what is done; see the constants. A
 thread first takes the places of its own part of the order, so that rows stay in the
 cache of one core from call to call, and then what the others have left.
+
+A helper sleeps until something is written to its pipe. It may be woken some time before
+a call; it then looks for it so many times, and sleeps again.
 """
 
 from __future__ import annotations
@@ -20,26 +25,35 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from tdac_envs.machine_code import kept, link, optimised
 
-# Words of the door.
+# Words of the door; thread 0 is the caller's.
 APART = 16
-OPEN, INSIDE, FAILED, TAKEN = (APART * k for k in range(4))
-# Words of the plan: places taken at a time; rows in their order; number of each row's
-# kernel; the kernels; words that are the row's own, how many, and those of each row;
-# pieces copied before and after a row's call, and how many; threads; end of each part.
-SHARE, ORDER, KINDS, ENTRIES, COLUMNS, WIDTH, VALUES = range(7)
-GIVEN, N_GIVEN, RETURNED, N_RETURNED = range(7, 11)
-THREADS, ENDS, N_PLAN = range(11, 14)
-# Words of a piece: address and bytes from row to row, to and from; bytes of a row.
+OPEN, INSIDE, FAILED, OVER, TAKEN, AWAKE = (APART * k for k in range(6))
+OWN = 2 * APART
+# Words of the plan that stay: places taken at a time; number of each row's kernel; the
+# kernels; words that are the row's own, how many, and those of each row; the words of
+# a row as they are in the first, and their bytes; for each kernel the pieces copied
+# before its calls and how many; pieces copied after them; ends of the helpers' pipes.
+SHARE, KINDS, ENTRIES, COLUMNS, WIDTH, VALUES, BASE, BYTES = range(8)
+GIVEN, RETURNED, BELLS = range(8, 11)
+# Words of a call: rows in their order, how many; threads; pieces copied after a row's
+# call; where what they are copied to begins.
+ORDER, COUNT, THREADS, N_RETURNED, BLOCK, N_PLAN = range(11, 17)
+# Words of a piece: address and bytes from row to row, to and from; bytes of a row, or
+# what a number of 64 bits becomes.
 N_PIECE = 5
-
-Loop = Callable[[int, int, int, int, int], int]
+TO_WHOLE, TO_FLAG = -1, -2
+# How often a helper that was woken looks for its call.
+LOOKS = 1000
 
 _CODE = f"""
 declare i32 @sched_yield()
 declare ptr @memcpy(ptr, ptr, i64)
+declare i64 @read(i32, ptr, i64)
+declare i64 @write(i32, ptr, i64)
 
 define internal i64 @word(ptr %words, i64 %which) {{
   %at = getelementptr i64, ptr %words, i64 %which
@@ -62,19 +76,38 @@ define internal ptr @at_row(ptr %piece, i64 %which, i64 %row) {{
   ret ptr %at
 }}
 
-define internal void @copy(ptr %pieces, i64 %count, i64 %row) {{
+define internal void @copy(ptr %pieces, i64 %count, i64 %row, i64 %block) {{
 start:
   br label %next
 next:
-  %number = phi i64 [0, %start], [%after, %each]
+  %number = phi i64 [0, %start], [%after, %done]
   %more = icmp slt i64 %number, %count
   br i1 %more, label %each, label %end
 each:
   %piece = getelementptr [{N_PIECE} x i64], ptr %pieces, i64 %number
-  %to = call ptr @at_row(ptr %piece, i64 0, i64 %row)
+  %place = call ptr @at_row(ptr %piece, i64 0, i64 %row)
+  %to = getelementptr i8, ptr %place, i64 %block
   %from = call ptr @at_row(ptr %piece, i64 2, i64 %row)
   %length = call i64 @word(ptr %piece, i64 4)
+  switch i64 %length, label %bytes [
+    i64 {TO_WHOLE}, label %whole
+    i64 {TO_FLAG}, label %flag
+  ]
+bytes:
   call ptr @memcpy(ptr %to, ptr %from, i64 %length)
+  br label %done
+whole:
+  %number_from = load double, ptr %from
+  %as_whole = fptosi double %number_from to i64
+  store i64 %as_whole, ptr %to
+  br label %done
+flag:
+  %flag_from = load double, ptr %from
+  %is_set = fcmp une double %flag_from, 0.0
+  %as_byte = zext i1 %is_set to i8
+  store i8 %as_byte, ptr %to
+  br label %done
+done:
   %after = add i64 %number, 1
   br label %next
 end:
@@ -108,19 +141,22 @@ define internal i32 @make(ptr %plan, ptr %slots, i64 %place) {{
   %order = call ptr @address(ptr %plan, i64 {ORDER})
   %row = call i64 @word(ptr %order, i64 %place)
   call void @fill(ptr %plan, ptr %slots, i64 %row)
-  %given = call ptr @address(ptr %plan, i64 {GIVEN})
-  %n_given = call i64 @word(ptr %plan, i64 {N_GIVEN})
-  call void @copy(ptr %given, i64 %n_given, i64 %row)
   %kinds = call ptr @address(ptr %plan, i64 {KINDS})
   %kind_at = getelementptr i8, ptr %kinds, i64 %row
   %kind = load i8, ptr %kind_at
   %which = zext i8 %kind to i64
+  %all_given = call ptr @address(ptr %plan, i64 {GIVEN})
+  %own_given = getelementptr [2 x i64], ptr %all_given, i64 %which
+  %given = call ptr @address(ptr %own_given, i64 0)
+  %n_given = call i64 @word(ptr %own_given, i64 1)
+  call void @copy(ptr %given, i64 %n_given, i64 %row, i64 0)
   %entries = call ptr @address(ptr %plan, i64 {ENTRIES})
   %entry = call ptr @address(ptr %entries, i64 %which)
   %status = call i32 %entry(ptr %slots)
   %returned = call ptr @address(ptr %plan, i64 {RETURNED})
   %n_returned = call i64 @word(ptr %plan, i64 {N_RETURNED})
-  call void @copy(ptr %returned, i64 %n_returned, i64 %row)
+  %block = call i64 @word(ptr %plan, i64 {BLOCK})
+  call void @copy(ptr %returned, i64 %n_returned, i64 %row, i64 %block)
   ret i32 %status
 }}
 
@@ -141,13 +177,19 @@ end_:
   ret i32 %failed
 }}
 
+define internal i64 @begin(i64 %whose, i64 %count, i64 %threads) {{
+  %several = mul i64 %whose, %count
+  %first = udiv i64 %several, %threads
+  ret i64 %first
+}}
+
 define internal i32 @part(ptr %door, ptr %plan, ptr %slots, i64 %whose) {{
 start:
-  %far = mul i64 %whose, {APART}
-  %which = add i64 %far, {TAKEN}
-  %taken = getelementptr i64, ptr %door, i64 %which
-  %ends = call ptr @address(ptr %plan, i64 {ENDS})
-  %last = call i64 @word(ptr %ends, i64 %whose)
+  %taken = call ptr @own(ptr %door, i64 {TAKEN}, i64 %whose)
+  %threads = call i64 @word(ptr %plan, i64 {THREADS})
+  %count = call i64 @word(ptr %plan, i64 {COUNT})
+  %past = add i64 %whose, 1
+  %last = call i64 @begin(i64 %past, i64 %count, i64 %threads)
   %size = call i64 @word(ptr %plan, i64 {SHARE})
   br label %next
 next:
@@ -168,6 +210,9 @@ end:
 
 define internal i32 @work(ptr %door, ptr %plan, ptr %slots, i64 %me) {{
 start:
+  %base = call ptr @address(ptr %plan, i64 {BASE})
+  %bytes = call i64 @word(ptr %plan, i64 {BYTES})
+  call ptr @memcpy(ptr %slots, ptr %base, i64 %bytes)
   %threads = call i64 @word(ptr %plan, i64 {THREADS})
   br label %next
 next:
@@ -184,6 +229,38 @@ each:
   br label %next
 end:
   ret i32 %failed
+}}
+
+define internal ptr @own(ptr %door, i64 %which, i64 %whose) {{
+  %far = mul i64 %whose, {OWN}
+  %sum = add i64 %far, %which
+  %at = getelementptr i64, ptr %door, i64 %sum
+  ret ptr %at
+}}
+
+define void @tdac_wake(ptr %door, ptr %plan, i64 %threads) {{
+start:
+  %bells = call ptr @address(ptr %plan, i64 {BELLS})
+  br label %next
+next:
+  %whose = phi i64 [1, %start], [%after, %done]
+  %more = icmp slt i64 %whose, %threads
+  br i1 %more, label %each, label %end
+each:
+  %awake_at = call ptr @own(ptr %door, i64 {AWAKE}, i64 %whose)
+  %awake = atomicrmw xchg ptr %awake_at, i64 1 seq_cst
+  %asleep = icmp eq i64 %awake, 0
+  br i1 %asleep, label %ring, label %done
+ring:
+  %bell = call i64 @word(ptr %bells, i64 %whose)
+  %end_of_pipe = trunc i64 %bell to i32
+  %written = call i64 @write(i32 %end_of_pipe, ptr %door, i64 1)
+  br label %done
+done:
+  %after = add i64 %whose, 1
+  br label %next
+end:
+  ret void
 }}
 
 define internal i32 @help(
@@ -205,17 +282,82 @@ leave:
   ret i32 0
 }}
 
-define i32 @tdac_rows(
-    ptr %door, ptr %plan, ptr %slots, i64 %me, i64 %call
-) {{
-  %leads = icmp eq i64 %me, 0
-  br i1 %leads, label %lead, label %helps
-helps:
-  %none = call i32 @help(
-    ptr %door, ptr %plan, ptr %slots, i64 %me, i64 %call
+define void @tdac_help(ptr %door, ptr %plan, ptr %slots, i64 %me, i32 %pipe) {{
+start:
+  %heard = alloca [64 x i8]
+  %awake = call ptr @own(ptr %door, i64 {AWAKE}, i64 %me)
+  %over = getelementptr i64, ptr %door, i64 {OVER}
+  br label %rest
+rest:
+  %last = phi i64 [0, %start], [%last_seen, %tired], [%now, %helped]
+  store atomic i64 0, ptr %awake seq_cst, align 8
+  %missed = load atomic i64, ptr %door seq_cst, align 8
+  %missed_none = icmp eq i64 %missed, 0
+  %missed_old = icmp eq i64 %missed, %last
+  %missed_no = or i1 %missed_none, %missed_old
+  br i1 %missed_no, label %sleep, label %woken
+sleep:
+  %read = call i64 @read(i32 %pipe, ptr %heard, i64 64)
+  br label %woken
+woken:
+  %ended = load atomic i64, ptr %over seq_cst, align 8
+  %goes_on = icmp eq i64 %ended, 0
+  br i1 %goes_on, label %look, label %end
+look:
+  %looks = phi i64 [0, %woken], [%more_looks, %wait]
+  %last_seen = phi i64 [%last, %woken], [%last_seen, %wait]
+  %now = load atomic i64, ptr %door seq_cst, align 8
+  %none = icmp eq i64 %now, 0
+  %old = icmp eq i64 %now, %last_seen
+  %no = or i1 %none, %old
+  br i1 %no, label %wait, label %helped
+wait:
+  %more_looks = add i64 %looks, 1
+  %ignored = call i32 @sched_yield()
+  %patient = icmp slt i64 %more_looks, {LOOKS}
+  br i1 %patient, label %look, label %tired
+tired:
+  br label %rest
+helped:
+  %status = call i32 @help(
+    ptr %door, ptr %plan, ptr %slots, i64 %me, i64 %now
   )
-  ret i32 %none
-lead:
+  br label %rest
+end:
+  ret void
+}}
+
+define internal void @keep(ptr %plan, i64 %which, i64 %value) {{
+  %at = getelementptr i64, ptr %plan, i64 %which
+  store i64 %value, ptr %at
+  ret void
+}}
+
+define i32 @tdac_rows(
+    ptr %door, ptr %plan, ptr %slots, i64 %call,
+    i64 %order, i64 %count, i64 %threads, i64 %returned, i64 %block
+) {{
+start:
+  call void @keep(ptr %plan, i64 {ORDER}, i64 %order)
+  call void @keep(ptr %plan, i64 {COUNT}, i64 %count)
+  call void @keep(ptr %plan, i64 {THREADS}, i64 %threads)
+  call void @keep(ptr %plan, i64 {N_RETURNED}, i64 %returned)
+  call void @keep(ptr %plan, i64 {BLOCK}, i64 %block)
+  call void @keep(ptr %door, i64 {FAILED}, i64 0)
+  br label %next
+next:
+  %whose = phi i64 [0, %start], [%after, %each]
+  %more = icmp slt i64 %whose, %threads
+  br i1 %more, label %each, label %open
+each:
+  %first = call i64 @begin(i64 %whose, i64 %count, i64 %threads)
+  %taken = call ptr @own(ptr %door, i64 {TAKEN}, i64 %whose)
+  store i64 %first, ptr %taken
+  %after = add i64 %whose, 1
+  br label %next
+open:
+  store atomic i64 %call, ptr %door seq_cst, align 8
+  call void @tdac_wake(ptr %door, ptr %plan, i64 %threads)
   %own = call i32 @work(ptr %door, ptr %plan, ptr %slots, i64 0)
   store atomic i64 0, ptr %door seq_cst, align 8
   %inside = getelementptr i64, ptr %door, i64 {INSIDE}
@@ -237,19 +379,37 @@ end:
 """
 
 
-@functools.cache
-def row_loop() -> Loop:
-    """The loop: of the addresses of door, plan and slots, of who works, of the call.
+class RowLoop(NamedTuple):
+    """Its entries, which take addresses of door and plan.
 
-    Thread 0 makes the call and returns when all rows have been called, not 0 where one
-    of them failed. The others help where this call is still being made.
+    Attributes:
+        make: Makes a call: of the caller's slots, the call's number, which is not 0 and
+            not that of the call before, and the plan's words of a call. Returns when
+            all rows have been called, not 0 where one of them failed.
+        help: Helps until it is over: of a helper's slots and number, and of its pipe.
+        wake: Wakes the helpers among so many threads.
+        code: Holds the machine code.
     """
+
+    make: Callable[..., int]
+    help: Callable[[int, int, int, int, int], None]
+    wake: Callable[[int, int, int], None]
+    code: Any
+
+
+@functools.cache
+def row_loop() -> RowLoop:
+    """The loop, from disk or compiled."""
     objects = kept("row_loop", [_CODE], lambda: [optimised(_CODE)])
-    engine, address = link(objects, "tdac_rows")
-    word = ctypes.c_int64
-    pointer = ctypes.c_void_p
-    kinds = (pointer, pointer, pointer, word, word)
-    loop = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(address)
-    # The engine holds the code.
-    loop.engine = engine  # type: ignore[attr-defined]
-    return loop
+    (engine, data), _ = link(objects, "tdac_rows")
+    word, pointer = ctypes.c_int64, ctypes.c_void_p
+    make = ctypes.CFUNCTYPE(ctypes.c_int32, *[pointer] * 3, *[word] * 6)
+    help_ = ctypes.CFUNCTYPE(None, *[pointer] * 3, word, ctypes.c_int32)
+    wake = ctypes.CFUNCTYPE(None, pointer, pointer, word)
+    at = engine.get_function_address
+    return RowLoop(
+        make(at("tdac_rows")),
+        help_(at("tdac_help")),
+        wake(at("tdac_wake")),
+        (engine, data),
+    )

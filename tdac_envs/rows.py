@@ -6,6 +6,7 @@ import ctypes
 import os
 import weakref
 from collections.abc import Iterable, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,12 @@ from numpy.typing import NDArray
 
 from tdac_envs import row_loop
 from tdac_envs.compiled import Kernel
-from tdac_envs.row_copies import Arrays, Outputs, address, copies
+from tdac_envs.row_copies import Arrays, Columns, Outputs, address, copies
 from tdac_envs.team import Team
 
 Index = NDArray[np.int64]
 Kinds = NDArray[np.uint8] | NDArray[np.bool_]
+Pairs = Sequence[tuple[NDArray[Any], NDArray[Any]]]
 
 # Rows that a thread takes at a time: little waiting at the end, few that share a line
 # of the cache with another thread's.
@@ -37,9 +39,13 @@ class Rows:
         arguments: Of each row; all of the same types. No two rows may write to the
             same memory.
         threads: How many work at a time; by default as many as there are cores.
-        inputs: Pairs of arrays with a row for each row, in one piece; before a row's
-            call, that of the first is copied to that of the second.
+        kinds: Number of the kernel of each row, which may change from call to call; by
+            default the first. One byte each.
+        inputs: For each kernel, pairs of arrays with a row for each row, in one piece;
+            before a row's call, that of the first is copied to that of the second.
         outputs: Such arrays, of which `call_all` returns copies.
+        columns: Arrays with a float64 for each row, of which `call_all` returns copies,
+            as what they are listed by.
     """
 
     def __init__(
@@ -48,26 +54,34 @@ class Rows:
         arguments: Iterable[tuple[Any, ...]],
         threads: int | None = None,
         *,
-        inputs: Sequence[tuple[NDArray[Any], NDArray[Any]]] = (),
+        kinds: Kinds | None = None,
+        inputs: Sequence[Pairs] = (),
         outputs: Arrays = (),
+        columns: Columns = MappingProxyType({}),
     ) -> None:
         self._kernels = kernels
         packed = [kernels[0].pack(each) for each in arguments]
         self._slots = np.array([slots for slots, _ in packed], np.int64)
         self._kept = [kept for _, kept in packed]
         self._all = np.arange(len(packed))
-        self._firsts = np.zeros(len(packed), np.uint8)
+        self._every = address(self._all)
+        self._kinds = np.zeros(len(packed), np.uint8) if kinds is None else kinds
         self._threads = threads or len(os.sched_getaffinity(0))
-        self._kept.append([inputs])
-        self._given, self._outputs = copies(inputs), Outputs(outputs)
         calls: list[Any] = [kernel.load() for kernel in kernels]
         entries = [ctypes.cast(call, ctypes.c_void_p).value for call in calls]
         self._entries = np.array(entries, np.int64)
-        self._plan = np.zeros(row_loop.THREADS, np.int64)
+        self._inputs = inputs
+        given = [copies(pairs) for pairs in inputs or [()] * len(kernels)]
+        table = np.array([(address(pieces), len(pieces)) for pieces in given], np.int64)
+        self._given = given, table
+        self._outputs = Outputs(outputs, columns)
+        self._plan = np.zeros(row_loop.N_PLAN, np.int64)
         self._plan[row_loop.SHARE] = _SHARE
-        self._plan[row_loop.ENTRIES] = self._entries.ctypes.data
-        self._plan[row_loop.GIVEN] = address(self._given)
-        self._plan[row_loop.N_GIVEN] = len(inputs)
+        self._plan[row_loop.KINDS] = address(self._kinds)
+        self._plan[row_loop.ENTRIES] = address(self._entries)
+        self._plan[row_loop.BASE] = address(self._slots)
+        self._plan[row_loop.BYTES] = self._slots[:1].nbytes
+        self._plan[row_loop.GIVEN] = address(table)
         self._plan[row_loop.RETURNED] = address(self._outputs.pieces)
         self._differ()
         self._team: Team | None = None
@@ -90,48 +104,52 @@ class Rows:
         differs = (self._slots != self._slots[:1]).any(axis=0)
         self._columns = np.flatnonzero(differs)
         self._values = np.ascontiguousarray(self._slots[:, self._columns])
-        self._plan[row_loop.COLUMNS] = self._columns.ctypes.data
+        self._plan[row_loop.COLUMNS] = address(self._columns)
         self._plan[row_loop.WIDTH] = len(self._columns)
-        self._plan[row_loop.VALUES] = self._values.ctypes.data
+        self._plan[row_loop.VALUES] = address(self._values)
 
-    def call(self, rows: Index, kinds: Kinds | None = None) -> None:
+    def wake(self) -> None:
+        """Wakes the threads that help, where a call of all rows is about to be made.
+
+        What is done until then, they need not be waited for.
+        """
+        if self._team is not None and self._threads > 1:
+            self._team.wake(self._threads_for(len(self._all)))
+
+    def call(self, rows: Index) -> None:
         """Makes the calls of some rows, in any order.
 
         Args:
             rows: Their numbers.
-            kinds: Number of the kernel of each row, also of those that are not called;
-                by default the first.
 
         Raises:
             ArithmeticError: One of them failed.
         """
-        self._make(np.ascontiguousarray(rows, np.int64), kinds, 0)
+        order = np.ascontiguousarray(rows, np.int64)
+        self._make(address(order), len(order))
 
-    def call_all(self, kinds: Kinds | None = None) -> list[NDArray[Any]]:
-        """Makes the calls of all rows; returns what is then in the outputs.
+    def call_all(self) -> list[NDArray[Any]]:
+        """Makes the calls of all rows.
 
-        Args:
-            kinds: Number of the kernel of each row; by default the first.
+        Returns:
+            Copies of the outputs, then one array of shape (columns, rows) for each kind
+            of column.
 
         Raises:
             ArithmeticError: One of them failed.
         """
-        found = self._outputs.renewed()
-        self._make(self._all, kinds, len(found))
+        found, block = self._outputs.renewed()
+        self._make(self._every, len(self._all), len(self._outputs.pieces), block)
         return found
 
-    def _make(self, order: Index, kinds: Kinds | None, returned: int) -> None:
-        which = self._firsts
-        if kinds is not None:
-            which = np.ascontiguousarray(kinds, np.uint8)
-        self._plan[row_loop.N_RETURNED] = returned
-        self._plan[row_loop.ORDER] = address(order)
-        self._plan[row_loop.KINDS] = address(which)
-        count = len(order)
-        threads = max(min(self._threads, -(-count // _LEAST)), 1)
-        if self._at_work().make(self._plan, self._slots[0], count, threads):
+    def _make(self, order: int, count: int, returned: int = 0, block: int = 0) -> None:
+        threads = self._threads_for(count)
+        if self._at_work().make(order, count, threads, returned, block):
             names = " or ".join(kernel.name for kernel in self._kernels)
             raise ArithmeticError(f"{names} failed")
+
+    def _threads_for(self, count: int) -> int:
+        return max(min(self._threads, -(-count // _LEAST)), 1)
 
     def close(self) -> None:
         """Ends the threads."""
@@ -142,6 +160,6 @@ class Rows:
     def _at_work(self) -> Team:
         # Threads do not outlive a fork.
         if self._team is None or self._team.process != os.getpid():
-            self._team = Team(self._threads, self._slots.shape[1])
+            self._team = Team(self._threads, self._plan)
             weakref.finalize(self, self._team.end)
         return self._team

@@ -2,9 +2,11 @@
 
 import copy
 import gc
+import os
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -93,10 +95,11 @@ def test_each_row_has_the_kernel_of_its_kind(threads):
     """Rows that are not called stay as they are."""
     values, numbers = np.ones((400, 2)), np.arange(400)[:, None]
     arguments = zip(values, numbers, strict=True)
-    rows = Rows((_scaled, _raised), arguments, threads)
-    kinds = (np.arange(400) % 3 == 0).astype(np.uint8)
+    kinds = np.zeros(400, np.uint8)
+    rows = Rows((_scaled, _raised), arguments, threads, kinds=kinds)
+    kinds[:] = np.arange(400) % 3 == 0
     called = np.flatnonzero(np.arange(400) % 5)
-    rows.call(called, kinds)
+    rows.call(called)
     rows.close()
     expected = np.where(kinds[:, None], 1.0 + numbers, 1.0 * numbers)
     expected[::5] = 1.0
@@ -114,7 +117,7 @@ def test_what_goes_in_and_comes_out_is_copied(threads):
         (_scaled,),
         arguments,
         threads,
-        inputs=[(given, inner)],
+        inputs=[[(given, inner)]],
         outputs=(inner, names, memory),
     )
     found, same, whole = rows.call_all()
@@ -131,6 +134,73 @@ def test_what_goes_in_and_comes_out_is_copied(threads):
     rows.close()
     np.testing.assert_array_equal(again, factors * np.ones((1, 2)))
     np.testing.assert_array_equal(found, kept)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_columns_are_copied_as_what_they_are_listed_by(threads):
+    """Numbers of any stride: as they are, whole, or whether they are not 0."""
+    memory = np.random.default_rng(0).integers(-2, 3, (300, 4)) * 1.0
+    memory[0] = np.nan, np.inf, -np.inf, 0.5
+    counts, before = memory[1:, 2], memory.copy()
+    arguments = [(row, np.array([3])) for row in memory]
+    columns = {
+        np.dtype(bool): [memory[:, 0], np.broadcast_to(1.0, 300), memory[:, 3]],
+        np.dtype(float): [memory[:, 1]],
+    }
+    rows = Rows((_scaled,), arguments, threads, outputs=[memory], columns=columns)
+    whole, flags, measures = rows.call_all()
+    np.testing.assert_array_equal(whole, 3 * before)
+    expected = [before[:, 0] != 0, np.ones(300, bool), before[:, 3] != 0]
+    np.testing.assert_array_equal(flags, expected)
+    np.testing.assert_array_equal(measures, [3 * before[:, 1]])
+    assert (flags.dtype, measures.dtype) == (bool, float)
+    rows = Rows(
+        (_scaled,), arguments[1:], threads, columns={np.dtype(np.int64): [counts]}
+    )
+    (wholes,) = rows.call_all()
+    np.testing.assert_array_equal(wholes, [9 * before[1:, 2]])
+    assert wholes.dtype == np.int64
+
+
+def test_inputs_are_those_of_the_row_s_kernel():
+    """A row whose kernel takes none keeps what it has."""
+    values, kinds = np.zeros((200, 2)), np.zeros(200, np.uint8)
+    given = np.arange(400.0).reshape(200, 2)
+    arguments = [(row, np.array([0])) for row in values]
+    rows = Rows(
+        (_raised, _raised), arguments, 2, kinds=kinds, inputs=[(), [(given, values)]]
+    )
+    kinds[5:] = 1
+    rows.call_all()
+    rows.close()
+    np.testing.assert_array_equal(values[:5], 0.0)
+    np.testing.assert_array_equal(values[5:], given[5:])
+
+
+def test_threads_that_were_woken_in_vain_help_in_the_next_call():
+    """Whether they look for it still, or sleep again."""
+    counts = np.zeros((500, 1))
+    rows = Rows((_raised,), [(each, np.array([1])) for each in counts], 3)
+    rows.wake()
+    for pause in (0.0, 0.0, 0.02, 0.0, 0.02):
+        rows.call_all()
+        rows.wake()
+        rows.wake()
+        time.sleep(pause)
+    rows.close()
+    assert (counts == 5).all()
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no /proc/self/fd")
+def test_pipes_end_with_the_threads():
+    """Environments that come and go use nothing up."""
+    arguments = [(np.ones(1), np.array([1])) for _ in range(500)]
+    rows = Rows((_scaled,), arguments, 3)
+    before = len(os.listdir("/proc/self/fd"))
+    rows.call_all()
+    assert len(os.listdir("/proc/self/fd")) == before + 4
+    rows.close()
+    assert len(os.listdir("/proc/self/fd")) == before
 
 
 def test_each_call_is_whole_when_it_returns():
