@@ -233,7 +233,7 @@ def _show(rows: list[Row], task: str, machines: list[Machine]) -> None:
     table = Table(title=f"Verification on {task}, s ({load})", title_justify="left")
     for name in ("controller", "from", "verdict"):
         table.add_column(name)
-    there = "where limits are of"
+    there = "at the limits' speed"
     for name in ("wall", "range", "controller's CPU", "our share", there, "limit"):
         table.add_column(name, justify="right")
     for row in rows:
@@ -258,7 +258,7 @@ def _show(rows: list[Row], task: str, machines: list[Machine]) -> None:
             f"import numpy {duration(machine.start)} a start"
         )
     console.print(
-        f"where the limits are of: {duration(OF_LIMITS.step)} and "
+        f"speed of the limits: {duration(OF_LIMITS.step)} and "
         f"{duration(OF_LIMITS.start)}; this machine is taken to be "
         f"{slower:.1f} times slower"
     )
