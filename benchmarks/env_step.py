@@ -3,7 +3,8 @@
     python -m benchmarks env_step
 
 A step of a single environment through `gym.make` in several situations, of a robot of
-a batch on one thread and on two; then how the time grows with the area of the map and
+a batch on one thread, on two, and in two processes that share nothing, which is what
+two cores are worth at that moment; then how the time grows with the area of the map and
 with the number of rays, and what the map's arrays take for each pixel. All take turns
 in short bursts. Floor: an environment that does nothing, so that Gymnasium's wrappers
 are all that it costs.

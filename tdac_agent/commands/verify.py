@@ -42,7 +42,7 @@ def run(
     check_tier(tier)
     robust.check()
     if out is not None:
-        _make_folder(out)
+        _check_folder(out)
     file, task = _prepared(controller, flags)
     gc.freeze()
     gc.enable()
@@ -129,10 +129,14 @@ def _replay(
     return words if tier == "auto" else [*words, "--tier", tier]
 
 
-def _make_folder(out: Path) -> None:
-    """Makes the folder before the work is done, or says why it cannot be."""
+def _check_folder(out: Path) -> None:
+    """Says why the folder cannot be written to, before the work is done."""
+    folder = out / "trajectories"
+    missing = [each for each in (folder, out) if not each.exists()]
     try:
-        (out / "trajectories").mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        for each in missing:
+            each.rmdir()
     except OSError as error:
         raise ControllerFileError(f"cannot write to {out}: {error.strerror}") from error
 

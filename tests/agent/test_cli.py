@@ -362,6 +362,19 @@ def test_a_junit_file_that_cannot_be_written(tdac, good):
     assert err.splitlines()[-1].startswith("error: cannot write")
 
 
+def test_a_verification_that_ends_early_leaves_no_folder(tdac, good, tmp_path):
+    """Where it cannot write is told before anything is run."""
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "test_mine.py").write_text("import nosuchmodule\n")
+    flags = ("--profile", "policy", "--suite", tmp_path / "broken")
+    code, _, _ = tdac("verify", good, *flags, "--out", tmp_path / "kept")
+    assert (code, (tmp_path / "kept").exists()) == (3, False)
+    bad = good / "controller.py" / "kept"
+    code, out, err = tdac("verify", good, "--profile", "policy", "--out", bad)
+    assert is_one_clear_line(code, out, err, Path.cwd())
+    assert err.startswith("error: cannot write to")
+
+
 def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
     """Neither yes nor no."""
     (tmp_path / "test_mine.py").write_text("import nosuchmodule\n")
