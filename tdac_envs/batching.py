@@ -65,7 +65,8 @@ def told(flags: Flags, wholes: NDArray[np.int64], measures: Array) -> Told:
     terminated, truncated, *known = flags
     rewards, *last = measures
     infos = dict(zip(_NAMES, (*known, *wholes, *last), strict=True))
-    return rewards, terminated, truncated, infos
+    # Who keeps them does not keep all the rest with them.
+    return rewards.copy(), terminated.copy(), truncated.copy(), infos
 
 
 def infos_of(outcome: Array, mask: Flags) -> dict[str, Any]:

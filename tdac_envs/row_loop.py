@@ -7,7 +7,6 @@ Numbers are words of 64 bits. The `door` says who may work:
 | `OPEN` | number of the call that is being made; 0 when none is |
 | `INSIDE` | helpers that are at work |
 | `FAILED` | not 0 where a helper's call failed |
-| `OVER` | not 0 when the helpers are to end |
 | `TAKEN + OWN * k` | the next place in the order that thread k has not taken |
 | `AWAKE + OWN * k` | not 0 while helper k is awake, or has been woken |
 
@@ -17,13 +16,15 @@ thread first takes the places of its own part of the order, so that rows stay in
 cache of one core from call to call, and then what the others have left.
 
 A helper sleeps until something is written to its pipe. It may be woken some time before
-a call; it then looks for it so many times, and sleeps again.
+a call; it then looks for it so many times, and sleeps again. It ends when `END` is the
+last that was written, or when nobody can write any more.
 """
 
 from __future__ import annotations
 
 import ctypes
 import functools
+import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -31,7 +32,7 @@ from tdac_envs.machine_code import kept, link, optimised
 
 # Words of the door; thread 0 is the caller's.
 APART = 16
-OPEN, INSIDE, FAILED, OVER, TAKEN, AWAKE = (APART * k for k in range(6))
+OPEN, INSIDE, FAILED, TAKEN, AWAKE = (APART * k for k in range(5))
 OWN = 2 * APART
 # Words of the plan that stay: places taken at a time; number of each row's kernel; the
 # kernels; words that are the row's own, how many, and those of each row; the words of
@@ -46,10 +47,13 @@ ORDER, COUNT, THREADS, N_RETURNED, BLOCK, N_PLAN = range(11, 17)
 # what a number of 64 bits becomes.
 N_PIECE = 5
 TO_WHOLE, TO_FLAG = -1, -2
-# How often a helper that was woken looks for its call.
+# How often a helper that was woken looks for its call, or tries to read from a pipe.
 LOOKS = 1000
+END = b"!"
 
 _CODE = f"""
+@ring = internal constant i8 0
+
 declare i32 @sched_yield()
 declare ptr @memcpy(ptr, ptr, i64)
 declare i64 @read(i32, ptr, i64)
@@ -254,7 +258,7 @@ each:
 ring:
   %bell = call i64 @word(ptr %bells, i64 %whose)
   %end_of_pipe = trunc i64 %bell to i32
-  %written = call i64 @write(i32 %end_of_pipe, ptr %door, i64 1)
+  %written = call i64 @write(i32 %end_of_pipe, ptr @ring, i64 1)
   br label %done
 done:
   %after = add i64 %whose, 1
@@ -286,7 +290,6 @@ define void @tdac_help(ptr %door, ptr %plan, ptr %slots, i64 %me, i32 %pipe) {{
 start:
   %heard = alloca [64 x i8]
   %awake = call ptr @own(ptr %door, i64 {AWAKE}, i64 %me)
-  %over = getelementptr i64, ptr %door, i64 {OVER}
   br label %rest
 rest:
   %last = phi i64 [0, %start], [%last_seen, %tired], [%now, %helped]
@@ -295,17 +298,28 @@ rest:
   %missed_none = icmp eq i64 %missed, 0
   %missed_old = icmp eq i64 %missed, %last
   %missed_no = or i1 %missed_none, %missed_old
-  br i1 %missed_no, label %sleep, label %woken
+  br i1 %missed_no, label %sleep, label %look
 sleep:
-  %read = call i64 @read(i32 %pipe, ptr %heard, i64 64)
-  br label %woken
+  %failures = phi i64 [0, %rest], [%more_failures, %interrupted]
+  %count = call i64 @read(i32 %pipe, ptr %heard, i64 64)
+  %closed = icmp eq i64 %count, 0
+  br i1 %closed, label %end, label %open
+open:
+  %failed = icmp slt i64 %count, 0
+  br i1 %failed, label %interrupted, label %woken
+interrupted:
+  %more_failures = add i64 %failures, 1
+  %for_good = icmp sgt i64 %more_failures, {LOOKS}
+  br i1 %for_good, label %end, label %sleep
 woken:
-  %ended = load atomic i64, ptr %over seq_cst, align 8
-  %goes_on = icmp eq i64 %ended, 0
-  br i1 %goes_on, label %look, label %end
+  %at = sub i64 %count, 1
+  %last_at = getelementptr i8, ptr %heard, i64 %at
+  %last_heard = load i8, ptr %last_at
+  %ended = icmp eq i8 %last_heard, {ord(END)}
+  br i1 %ended, label %end, label %look
 look:
-  %looks = phi i64 [0, %woken], [%more_looks, %wait]
-  %last_seen = phi i64 [%last, %woken], [%last_seen, %wait]
+  %looks = phi i64 [0, %rest], [0, %woken], [%more_looks, %wait]
+  %last_seen = phi i64 [%last, %rest], [%last, %woken], [%last_seen, %wait]
   %now = load atomic i64, ptr %door seq_cst, align 8
   %none = icmp eq i64 %now, 0
   %old = icmp eq i64 %now, %last_seen
@@ -397,9 +411,18 @@ class RowLoop(NamedTuple):
     code: Any
 
 
-@functools.cache
+_LOCK = threading.Lock()
+
+
 def row_loop() -> RowLoop:
     """The loop, from disk or compiled."""
+    # Two engines would do, but none may be dropped while its code is used.
+    with _LOCK:
+        return _row_loop()
+
+
+@functools.cache
+def _row_loop() -> RowLoop:
     objects = kept("row_loop", [_CODE], lambda: [optimised(_CODE)])
     (engine, data), _ = link(objects, "tdac_rows")
     word, pointer = ctypes.c_int64, ctypes.c_void_p

@@ -83,7 +83,9 @@ class Rows:
         self._plan[row_loop.BYTES] = self._slots[:1].nbytes
         self._plan[row_loop.GIVEN] = address(table)
         self._plan[row_loop.RETURNED] = address(self._outputs.pieces)
-        self._differ()
+        # The words in which the calls differ, and what they are in each; None where
+        # these are to be found before the next call.
+        self._differing: tuple[Index, Index] | None = None
         self._team: Team | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -91,30 +93,35 @@ class Rows:
 
     def put(self, row: int, *args: Any) -> None:
         """Replaces the arguments of one row."""
-        slots, self._kept[row] = self._kernels[0].pack(args)
+        slots, kept = self._kernels[0].pack(args)
+        # An interrupt must leave no address of memory that is gone.
+        self._kept[row] = [self._kept[row], kept]
+        differing, self._differing = self._differing, None
         changed = np.flatnonzero(slots != self._slots[row])
         self._slots[row] = slots
-        if np.isin(changed, self._columns).all():
-            self._values[row] = slots[self._columns]
-        else:
-            self._differ()
+        if differing is not None and np.isin(changed, differing[0]).all():
+            columns, values = differing
+            values[row] = slots[columns]
+            self._differing = differing
+        self._kept[row] = kept
 
     def _differ(self) -> None:
         """Finds the words in which the calls differ: only these are read for each."""
         differs = (self._slots != self._slots[:1]).any(axis=0)
-        self._columns = np.flatnonzero(differs)
-        self._values = np.ascontiguousarray(self._slots[:, self._columns])
-        self._plan[row_loop.COLUMNS] = address(self._columns)
-        self._plan[row_loop.WIDTH] = len(self._columns)
-        self._plan[row_loop.VALUES] = address(self._values)
+        columns = np.flatnonzero(differs)
+        values = np.ascontiguousarray(self._slots[:, columns])
+        own = slice(row_loop.COLUMNS, row_loop.VALUES + 1)
+        self._plan[own] = address(columns), len(columns), address(values)
+        self._differing = columns, values
 
     def wake(self) -> None:
         """Wakes the threads that help, where a call of all rows is about to be made.
 
         What is done until then, they need not be waited for.
         """
-        if self._team is not None and self._threads > 1:
-            self._team.wake(self._threads_for(len(self._all)))
+        team = self._team
+        if team is not None and self._threads > 1 and team.process == os.getpid():
+            team.wake(self._threads_for(len(self._all)))
 
     def call(self, rows: Index) -> None:
         """Makes the calls of some rows, in any order.
@@ -143,6 +150,8 @@ class Rows:
         return found
 
     def _make(self, order: int, count: int, returned: int = 0, block: int = 0) -> None:
+        if self._differing is None:
+            self._differ()
         threads = self._threads_for(count)
         if self._at_work().make(order, count, threads, returned, block):
             names = " or ".join(kernel.name for kernel in self._kernels)
@@ -152,14 +161,15 @@ class Rows:
         return max(min(self._threads, -(-count // _LEAST)), 1)
 
     def close(self) -> None:
-        """Ends the threads."""
-        if self._team is not None:
-            self._team.end()
-            self._team = None
+        """Has the threads end, without waiting for them."""
+        team, self._team = self._team, None
+        if team is not None:
+            team.end()
 
     def _at_work(self) -> Team:
         # Threads do not outlive a fork.
         if self._team is None or self._team.process != os.getpid():
-            self._team = Team(self._threads, self._plan)
-            weakref.finalize(self, self._team.end)
+            team = Team(self._threads, self._plan)
+            weakref.finalize(self, team.end)
+            self._team = team
         return self._team

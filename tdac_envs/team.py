@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.row_loop import APART, BELLS, BYTES, OVER, OWN, TAKEN, row_loop
+from tdac_envs.row_loop import APART, BELLS, BYTES, END, OWN, TAKEN, row_loop
 
 Words = NDArray[np.int64]
 
@@ -19,7 +20,8 @@ class Team:
 
     A helper takes no part in a call for which it wakes too late, and nobody waits for
     one that sleeps: the caller waits for the shares that others are at, no longer.
-    Helpers know nothing of Python, and wait for none of its locks.
+    Helpers know nothing of Python, and wait for none of its locks. Where one cannot be
+    started, the others work without it.
 
     Args:
         threads: How many there may be, the caller's among them.
@@ -36,13 +38,15 @@ class Team:
         # Each thread writes to its own, and shares no line of the cache.
         width = int(plan[BYTES]) // self._door.itemsize
         self._slots = np.zeros((threads, width + APART), np.int64)
+        # Where to write for whom, for the loop; of those that have not ended.
         self._bells = np.full(threads, -1, np.int64)
-        self._pipes: list[tuple[int, int]] = []
+        self._ringable: list[int] = []
         self._helpers: list[threading.Thread] = []
+        self._most = threads
         self._call = 0
         plan[BELLS] = self._bells.ctypes.data
         shared = self._door.ctypes.data, plan.ctypes.data
-        loop = row_loop()
+        self._loop = loop = row_loop()
         self._make = partial(loop.make, *shared, self._slots.ctypes.data)
         self._help = partial(loop.help, *shared)
         self._wake = partial(loop.wake, *shared)
@@ -62,37 +66,53 @@ class Team:
             threads: How many work.
             returned: Pieces that are copied after a row's call.
             block: Address where what they are copied to begins.
-
-        Raises:
-            OSError: A helper cannot be started.
         """
+        threads = min(threads, self._most)
         while len(self._helpers) + 1 < threads:
-            self._start(len(self._helpers) + 1)
+            try:
+                self._start(len(self._helpers) + 1)
+            except (OSError, RuntimeError) as error:
+                threads = self._most = len(self._helpers) + 1
+                told = f"{threads} thread{'s' * (threads > 1)} instead of more"
+                warnings.warn(f"{told}: {error}", RuntimeWarning, stacklevel=5)
         self._call += 1
         return self._make(self._call, order, count, threads, returned, block)
 
     def end(self) -> None:
-        """Ends the helpers."""
-        self._door[OVER] = 1
-        # Threads do not outlive a fork.
-        if self.process == os.getpid():
-            for _, bell in self._pipes:
-                os.write(bell, b"!")
-            for helper in self._helpers:
-                helper.join()
-        for pipe in self._pipes:
-            for end in pipe:
-                os.close(end)
-        self._pipes.clear()
+        """Has the helpers end.
+
+        It does not wait for them: garbage may be collected, and this be called, where
+        they would wait for this thread in turn.
+        """
+        self._bells[:] = -1
+        # Those of a process that was forked are another's.
+        while self._ringable and self.process == os.getpid():
+            bell = self._ringable.pop()
+            os.write(bell, END)
+            os.close(bell)
 
     def _start(self, number: int) -> None:
         heard, bell = os.pipe()
-        self._pipes.append((heard, bell))
-        self._bells[number] = bell
-        arguments = self._slots[number].ctypes.data, number, heard
-        name = f"tdac-rows-{number}"
+        # It holds the team, whose memory it uses.
         helper = threading.Thread(
-            target=self._help, args=arguments, name=name, daemon=True
+            target=self._serve,
+            args=(number, heard),
+            name=f"tdac-rows-{number}",
+            daemon=True,
         )
-        helper.start()
+        self._ringable.append(bell)
+        self._bells[number] = bell
         self._helpers.append(helper)
+        try:
+            helper.start()
+        except RuntimeError:
+            self._helpers.pop()
+            for end in (self._ringable.pop(), heard):
+                os.close(end)
+            raise
+
+    def _serve(self, number: int, heard: int) -> None:
+        try:
+            self._help(self._slots[number].ctypes.data, number, heard)
+        finally:
+            os.close(heard)

@@ -120,11 +120,11 @@ class WrappedVectorEnv(VectorWrapper):
             self._last(observations, infos)
         return self._begun(observations), rewards, terminated, truncated, infos
 
-    def close_extras(self, **_: Any) -> None:
+    def close(self, **kwargs: Any) -> None:
         """Ends the threads."""
         if self._routes is not None:
             self._routes.close()
-        self.batch.close()
+        super().close(**kwargs)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_routes": None, "_stages": None}

@@ -33,6 +33,21 @@ def _inverted(value):
     value[0] = 100 // value[0]
 
 
+def _started(call) -> list[threading.Thread]:
+    """The threads that a call starts."""
+    before = threading.enumerate()
+    call()
+    return [each for each in threading.enumerate() if each not in before]
+
+
+def _comes_true(check) -> bool:
+    """Whether it does within a while."""
+    end = time.monotonic() + 20.0
+    while not (true := check()) and time.monotonic() < end:
+        time.sleep(0.01)
+    return true
+
+
 @pytest.mark.parametrize("count", [1, 63, 64, 65, 1000])
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_each_row_is_called_once(count, threads):
@@ -77,11 +92,11 @@ def test_threads_end_with_the_rows():
     """Closing leaves none behind; the next call starts them again."""
     arguments = [(np.ones(1), np.array([1])) for _ in range(500)]
     rows = Rows((_scaled,), arguments, 3)
-    before = threading.active_count()
     for _ in range(2):
-        rows.call_all()
+        helpers = _started(rows.call_all)
         rows.close()
-        assert threading.active_count() == before
+        assert len(helpers) == 2
+        assert _comes_true(lambda all_=helpers: not any(h.is_alive() for h in all_))
 
 
 def test_addresses_are_not_copied():
@@ -196,11 +211,102 @@ def test_pipes_end_with_the_threads():
     """Environments that come and go use nothing up."""
     arguments = [(np.ones(1), np.array([1])) for _ in range(500)]
     rows = Rows((_scaled,), arguments, 3)
-    before = len(os.listdir("/proc/self/fd"))
+    before = set(os.listdir("/proc/self/fd"))
     rows.call_all()
-    assert len(os.listdir("/proc/self/fd")) == before + 4
+    pipes = {*os.listdir("/proc/self/fd")} - before
+    assert len(pipes) == 4
     rows.close()
-    assert len(os.listdir("/proc/self/fd")) == before
+    rows.wake()
+    assert _comes_true(lambda: not pipes & {*os.listdir("/proc/self/fd")})
+
+
+def test_without_a_descriptor_for_a_helper_the_others_do_it():
+    """It is told once, and what has begun goes on."""
+    script = (
+        "import os, resource, warnings\n"
+        "from test_rows import Rows, _raised, np\n"
+        "value = np.ones((500, 1))\n"
+        "rows = Rows((_raised,), [(v, np.array([1])) for v in value], 4)\n"
+        "rows.call(np.arange(3))\n"
+        "free = max(map(int, os.listdir('/proc/self/fd'))) + 1\n"
+        "resource.setrlimit(resource.RLIMIT_NOFILE, (free, free))\n"
+        "with warnings.catch_warnings(record=True) as told:\n"
+        "    warnings.simplefilter('always')\n"
+        "    for _ in range(3):\n"
+        "        rows.call_all()\n"
+        "assert (value[3:] == 4).all()\n"
+        "print(*(str(each.message) for each in told), sep='\\n')\n"
+    )
+    told = _script(script)
+    assert told.startswith("1 thread instead of more: ")
+    assert told.count("\n") == 1
+
+
+def test_first_calls_in_two_threads_at_once():
+    """The machine code of neither is dropped."""
+    script = (
+        "import threading\n"
+        "from test_rows import Rows, _raised, np\n"
+        "values = np.ones((2, 500, 1))\n"
+        "def go(value):\n"
+        "    rows = Rows((_raised,), [(v, np.array([1])) for v in value], 2)\n"
+        "    for _ in range(200):\n"
+        "        rows.call_all()\n"
+        "both = [threading.Thread(target=go, args=(v,)) for v in values]\n"
+        "for each in both: each.start()\n"
+        "for each in both: each.join()\n"
+        "assert (values == 201).all()\n"
+    )
+    _script(script)
+
+
+def test_an_interrupt_at_any_place_leaves_whole_rows():
+    """Also where a row's arguments are being replaced by such of another shape."""
+    values = [np.zeros(3) for _ in range(200)]
+    rows = Rows((_raised,), [(v, np.array([1])) for v in values], 2)
+    rows.call_all()
+    for place in range(1, 400):
+        row = place % 200
+        values[row] = np.zeros(1 + place % 4)
+        _interrupted(lambda k=row: rows.put(k, values[k], np.array([1])), place % 40)
+        rows.put(row, values[row], np.array([1]))
+        before = [value.copy() for value in values]
+        rows.call_all()
+        for old, new in zip(before, values, strict=True):
+            np.testing.assert_array_equal(new, old + 1)
+    rows.close()
+
+
+def _interrupted(call, place: int) -> None:
+    """Makes a call that is interrupted before the so many-th line in this package."""
+    left = place
+
+    def trace(frame, event, _):
+        nonlocal left
+        if "tdac_envs" not in frame.f_code.co_filename:
+            return None
+        if event == "line":
+            left -= 1
+            if left == 0:
+                raise KeyboardInterrupt
+        return trace
+
+    sys.settrace(trace)
+    try:
+        call()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        sys.settrace(None)
+
+
+def _script(text: str) -> str:
+    """What a script prints that runs in a process of its own."""
+    command = [sys.executable, "-W", "ignore", "-c", text]
+    here = Path(__file__).parent
+    return subprocess.run(
+        command, check=True, timeout=120, cwd=here, stdout=subprocess.PIPE, text=True
+    ).stdout
 
 
 def test_each_call_is_whole_when_it_returns():
@@ -219,12 +325,11 @@ def test_each_call_is_whole_when_it_returns():
 def test_threads_end_with_an_object_that_is_forgotten():
     """It need not be closed."""
     rows = Rows((_scaled,), [(np.ones(1), np.array([1])) for _ in range(500)], 3)
-    before = threading.active_count()
-    rows.call_all()
-    assert threading.active_count() == before + 2
+    helpers = _started(rows.call_all)
+    assert len(helpers) == 2
     del rows
     gc.collect()
-    assert threading.active_count() == before
+    assert _comes_true(lambda: not any(helper.is_alive() for helper in helpers))
 
 
 def test_a_forked_process_has_threads_of_its_own():
@@ -241,5 +346,4 @@ def test_a_forked_process_has_threads_of_its_own():
         "if child:\n"
         "    assert os.waitpid(child, 0)[1] == 0\n"
     )
-    command = [sys.executable, "-W", "ignore", "-c", script]
-    subprocess.run(command, check=True, timeout=120, cwd=Path(__file__).parent)
+    _script(script)
