@@ -28,7 +28,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from benchmarks.timing import Bench, Effort, show
+from benchmarks.timing import Bench, Effort, Row, duration, show, whole_from_one
 
 NAMES = ("env_step", "epuck_step", "peers", "preprocessing", "planning", "start_up")
 PROFILED = 25
@@ -54,7 +54,11 @@ def main() -> int:
     if options.json:
         every = {name: [asdict(b) for b in benches] for name, benches in found.items()}
         print(json.dumps({"machine": _machine(), **every}, indent=1))
-    return int(any(_too_long(b) for benches in found.values() for b in benches))
+    late = [row for benches in found.values() for b in benches for row in _late(b)]
+    for row in late:
+        told = f"{duration(row.fastest)}, limit {duration(row.limit or 0.0)}"
+        print(f"too slow: {row.case}: {told}", file=sys.stderr)
+    return 1 if late else 0
 
 
 def _bench(name: str, options: argparse.Namespace) -> Callable[[], Sequence[Bench]]:
@@ -89,8 +93,9 @@ def _place(call: Any) -> str:
     return escape(f"{file}:{call.lineno} {call.name}" if call.lineno else call.name)
 
 
-def _too_long(bench: Bench) -> bool:
-    return any(row.limit is not None and row.fastest > row.limit for row in bench.rows)
+def _late(bench: Bench) -> list[Row]:
+    """The rows that take longer than they should even at best."""
+    return [row for row in bench.rows if row.limit and row.fastest > row.limit]
 
 
 def _machine() -> str:
@@ -101,12 +106,6 @@ def _machine() -> str:
     )
 
 
-def _rounds(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text}")
-    return int(text)
-
-
 def _options() -> argparse.Namespace:
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=about)
@@ -114,7 +113,9 @@ def _options() -> argparse.Namespace:
         "names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}"
     )
     parser.add_argument("--maps", type=Path, help="folder of MovingAI maps and .scen")
-    parser.add_argument("--rounds", type=_rounds, help="turns that the cases take")
+    parser.add_argument(
+        "--rounds", type=whole_from_one, help="turns that the cases take"
+    )
     parser.add_argument("--quick", action="store_true", help="toy sizes, one round")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--profile", action="store_true", help="print profiles")

@@ -122,6 +122,5 @@ def posts(count: int) -> World:
 
 def benches(effort: Effort) -> list[Bench]:
     """One bench a table."""
-    tables = (single, batches, more_things)
     rounds = effort.rounds_of(ROUNDS)
-    return [table(rounds) for table in tables[: 1 if effort.quick else None]]
+    return [table(rounds) for table in (single, batches, more_things)]

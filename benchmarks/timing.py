@@ -6,6 +6,7 @@ disturbs all of it alike: ratios hold where seconds do not.
 
 from __future__ import annotations
 
+import argparse
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -188,3 +189,10 @@ def _verdict(row: Row) -> str:
         return ""
     colour = "green" if row.fastest <= row.limit else "red"
     return f"[{colour}]{duration(row.limit)}[/]"
+
+
+def whole_from_one(text: str) -> int:
+    """A number of an option; a type of argparse."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text}")
+    return int(text)

@@ -39,7 +39,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.timing import WIDTH, duration, in_turn
+from benchmarks.timing import WIDTH, duration, in_turn, whole_from_one
 from tdac_agent import load_task, synthesize, verify
 from tdac_agent.privileged import (
     DO_NOTHING,
@@ -49,6 +49,7 @@ from tdac_agent.privileged import (
 )
 from tdac_agent.task import Task, lay_out
 from tdac_agent.warm import WarmJudge
+from tdac_envs import TdacError
 
 READY_SECONDS = 2.0
 CART_POLE_STEPS = 10_000
@@ -88,7 +89,10 @@ def main() -> int:
     """Returns the exit code: 1 where a share or a wall time exceeds its limit."""
     options = _options()
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    task = load_task(options.task)
+    try:
+        task = load_task(options.task)
+    except TdacError as error:
+        sys.exit(f"benchmarks.verify: {error}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         controllers = _controllers(task, folder)
@@ -108,7 +112,11 @@ def main() -> int:
     else:
         _show(rows, options.task, machines)
     slower = _slower(machines)
-    return 1 if any(_too_slow(row, slower) for row in rows) else 0
+    late = [row for row in rows if _too_slow(row, slower)]
+    for row in late:
+        told = f"wall {row.wall:.2f} s, our share {row.share:.2f} s"
+        print(f"too slow: {row.controller}, {row.way}: {told}", file=sys.stderr)
+    return 1 if late else 0
 
 
 def _controllers(task: Task, folder: Path) -> dict[str, str]:
@@ -268,7 +276,7 @@ def _options() -> argparse.Namespace:
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="benchmarks.verify", description=about)
     parser.add_argument("--task", default="maze", help="bundled name or task.yaml")
-    parser.add_argument("--runs", type=int, default=5, help="of each kind")
+    parser.add_argument("--runs", type=whole_from_one, default=5, help="of each kind")
     parser.add_argument("--json", action="store_true", help="print JSON")
     return parser.parse_args()
 

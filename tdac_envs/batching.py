@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -16,6 +16,7 @@ from tdac_envs.row_copies import Columns
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Env = TypeVar("Env")
 Told = tuple[Array, Flags, Flags, dict[str, Any]]
 
 _INFOS: dict[str, tuple[int, type]] = {
@@ -97,6 +98,52 @@ def autoreset_mode_of(given: str | AutoresetMode) -> AutoresetMode:
         ) from None
 
 
+def several(
+    make: Callable[..., Env], each: Any, options: dict[str, Any], count: int
+) -> list[Env]:
+    """The environments of a batch, one for each entry of `each`.
+
+    Args:
+        make: Makes one.
+        each: Arguments that differ, as the caller of `make_vec` gave them.
+        options: Arguments that they share.
+        count: Of robots.
+
+    Raises:
+        TaskError: `each` is no list of such arguments, has more than there are robots,
+            or an environment cannot be made: says which.
+    """
+    if not isinstance(each, Sequence) or not all(isinstance(e, Mapping) for e in each):
+        raise TaskError(
+            f"expected each to be a list of dicts of arguments, as [{{'delay': 1}}], "
+            f"got {each!r}"
+        )
+    if len(each) > count:
+        raise TaskError(f"each has {len(each)} entries for {count} robots")
+    envs = []
+    for number, more in enumerate(each or [{}]):
+        try:
+            envs.append(make(**{**options, **more}))
+        except TaskError as error:
+            if not more:
+                raise
+            raise TaskError(f"each[{number}]: {error}") from error
+    return envs
+
+
+def no_pictures(render_mode: object) -> None:
+    """Refuses a mode of pictures.
+
+    Raises:
+        TaskError: There is one.
+    """
+    if render_mode is not None:
+        raise TaskError(
+            f"a batch draws nothing; expected render_mode None, or "
+            f"vectorization_mode='sync', got {render_mode!r}"
+        )
+
+
 def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
     """The observation space that holds those of all environments.
 
@@ -107,7 +154,8 @@ def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
     first = envs[0]
     shapes = [[array.shape for array in env.robot] for env in envs]
     if any(each != shapes[0] for each in shapes):
-        raise TaskError("expected the same n_rays and delay of all robots of a batch")
+        rays = "n_rays and " if "ranges" in first.observation_space.spaces else ""
+        raise TaskError(f"expected the same {rays}delay of all robots of a batch")
     keys = first.observation_space.keys()
     if any(env.observation_space.keys() != keys for env in envs):
         raise TaskError("expected the same sensors of all robots of a batch")
@@ -128,9 +176,14 @@ def seeds_of(seed: Any, count: int) -> Sequence[int | None]:
     """
     if seed is None or isinstance(seed, int | np.integer):
         return [None if seed is None else int(seed) + i for i in range(count)]
-    if len(seed) != count:
-        raise ValueError(f"expected {count} seeds, one a robot, got {len(seed)}")
-    return list(seed)
+    try:
+        seeds = list(seed)
+    except TypeError:
+        told = f"expected a whole number as seed, or {count} of them, got {seed!r}"
+        raise ValueError(told) from None
+    if len(seeds) != count:
+        raise ValueError(f"expected {count} seeds, one a robot, got {len(seeds)}")
+    return seeds
 
 
 def mask_of(given: Any, count: int) -> Flags:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import reprlib
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -62,7 +63,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         autoreset_mode: str | AutoresetMode,
         threads: int | None,
     ) -> None:
-        self.num_envs = whole_number("num_envs", num_envs, 1)
+        self.num_envs = num_envs
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         self.threads = None if threads is None else whole_number("threads", threads, 1)
         first = envs[0]
@@ -87,6 +88,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         # Whether a robot's next task may be another one than its last.
         self._drawn = any(self._vary)
         self._over = np.zeros(num_envs, np.bool_)
+        self._never_begun = np.ones(num_envs, np.bool_)
+        self._begun = False
         self._commands = np.zeros((num_envs, 2))
         self.goals = np.array([task.goal for task in self.tasks], np.float32)
         self._starts = np.array([(*task.start, task.shortest) for task in self.tasks])
@@ -105,16 +108,20 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             options: As of one environment, and `reset_mask`.
 
         Raises:
-            ValueError: There are more or fewer seeds than robots, or the mask is not
-                one of robots.
+            ValueError: There are more or fewer seeds than robots, the mask is not one
+                of robots, or the options are no dict.
             TaskError: The options are not feasible.
         """
+        if not isinstance(options, Mapping | None):
+            raise ValueError(f"expected options to be a dict, got {options!r}")
         rest = dict(options or {})
         mask = mask_of(rest.pop("reset_mask", None), self.num_envs)
         for i, one in enumerate(seeds_of(seed, self.num_envs)):
             if one is not None and mask[i]:
                 self._randoms[i], self._seeds[i] = seeding.np_random(one)
         self._begin(mask, rest)
+        self._never_begun[mask] = False
+        self._begun = not self._never_begun.any()
         observations = {key: seen.copy() for key, seen in self._seen().items()}
         self._complete(observations, np.flatnonzero(mask).tolist())
         return observations, self._infos(mask)
@@ -124,8 +131,11 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
         Raises:
             ValueError: The actions are not two finite numbers a robot.
-            ResetNeeded: The mode is `DISABLED` and an episode has ended.
+            ResetNeeded: Not all robots have been reset yet; or the mode is `DISABLED`
+                and an episode has ended.
         """
+        if not self._begun:
+            raise gym.error.ResetNeeded("expected reset() of all robots before step()")
         self._rows.wake()
         self._command(actions)
         if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
@@ -287,5 +297,15 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             pass
         raise ValueError(
             f"expected actions of two finite numbers in [-1, 1] for each of "
-            f"{self.num_envs} robots, got {actions!r}"
+            f"{self.num_envs} robots, got {self._wrong(actions)}"
         )
+
+    def _wrong(self, actions: Any) -> str:
+        """What is wrong with actions, in few words."""
+        shape = np.shape(actions) if isinstance(actions, np.ndarray) else None
+        if shape is not None and shape != self._commands.shape:
+            return f"an array of shape {shape}"
+        if shape is None or actions.dtype.kind not in "fiu":
+            return reprlib.repr(actions)
+        robot = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
+        return f"{actions[robot].tolist()} for robot {robot}"

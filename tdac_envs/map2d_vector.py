@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from tdac_envs.arguments import one_of
+from tdac_envs.arguments import whole_number
+from tdac_envs.batching import no_pictures, several
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
 from tdac_envs.kernels import begin, drive
 from tdac_envs.map2d import Map2DEnv, noisy
@@ -44,9 +45,10 @@ class Map2DVectorEnv(DrivenVectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        one_of("render_mode", render_mode, (None,))
+        no_pictures(render_mode)
+        num_envs = whole_number("num_envs", num_envs, 1)
         super().__init__(
-            [Map2DEnv(**{**options, **more}) for more in each or ({},)],
+            several(Map2DEnv, each, options, num_envs),
             num_envs,
             begin,
             drive,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from tdac_envs.astar import Guide
 from tdac_envs.grid import BoolGrid, FloatGrid, body_free, clearance
@@ -110,7 +111,7 @@ def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
     clear = clearance(cells)
     free = body_free(clear, trip.radius + inflation)
     start, goal, radius = trip.start, trip.goal, trip.radius
-    for name, (x, y) in (("start", start), ("goal", goal)):
+    for name, (x, y), other in (("start", start, goal), ("goal", goal, start)):
         if free[y, x]:
             continue
         what = (
@@ -118,7 +119,8 @@ def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
             if cells[y, x]
             else f"is {clear[y, x]:.1f} px from an obstacle, too near"
         )
-        return f"{name} ({x}, {y}) {what}; {_nearest_text(free, x, y, radius)}"
+        near = _nearest_text(_joined(free, other), x, y, radius)
+        return f"{name} ({x}, {y}) {what}; {near}"
     widest = widest_radius(clear, start, goal)
     advice = (
         "no robot gets through: a wall closes the way"
@@ -129,6 +131,14 @@ def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
         f"start {start} and goal {goal} are not connected for a robot of "
         f"{radius:g} px radius; {advice}"
     )
+
+
+def _joined(free: BoolGrid, point: Point) -> BoolGrid:
+    """The pixels that are joined with a point; all where it is not free itself."""
+    labels = _labels(free)
+    label = labels[point[::-1]]
+    joined: BoolGrid = labels == label
+    return joined if label else free
 
 
 def _nearest_text(free: BoolGrid, x: int, y: int, radius: float) -> str:
@@ -152,9 +162,15 @@ def connected(free: BoolGrid, start: Point, goal: Point) -> bool:
 
     A diagonal step needs both pixels beside it, so 4-connectivity decides.
     """
-    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    labels = _labels(free)
     at_start, at_goal = labels[start[::-1]], labels[goal[::-1]]
     return bool(at_start == at_goal and at_start > 0)
+
+
+def _labels(free: BoolGrid) -> NDArray[np.int32]:
+    """Of each free pixel the piece that it is in, from 1; 0 of the others."""
+    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    return labels.astype(np.int32, copy=False)
 
 
 def widest_radius(clear: FloatGrid, start: Point, goal: Point) -> float:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from tdac_envs.arguments import one_of
+from tdac_envs.arguments import whole_number
+from tdac_envs.batching import no_pictures, several
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import begin, drive
@@ -51,8 +52,9 @@ class EPuckVectorEnv(DrivenVectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        one_of("render_mode", render_mode, (None,))
-        envs = [EPuckEnv(**{**options, **more}) for more in each or ({},)]
+        no_pictures(render_mode)
+        num_envs = whole_number("num_envs", num_envs, 1)
+        envs = several(EPuckEnv, each, options, num_envs)
         if any(env.setup.pushes for env in envs):
             raise TaskError(
                 "a batch cannot push things; expected on_collision='terminate', a "

@@ -61,12 +61,14 @@ def widest(clear, start, goal):
 
 def failure(cells, clear, free, start, goal, radius):
     """Which check fails, or None."""
-    for name, (x, y) in (("start", start), ("goal", goal)):
+    for name, (x, y), other in (("start", start, goal), ("goal", goal, start)):
         if free[y, x]:
             continue
         what = f"is {clear[y, x]:.1f} px from an obstacle, too near"
         what = "lies in an obstacle" if cells[y, x] else what
-        near = nearest_free(free, x, y)
+        pieces = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+        joined = pieces == pieces[other[::-1]] if free[other[::-1]] else free
+        near = nearest_free(joined, x, y)
         robot = f"a robot of {radius:g} px radius"
         text = f"the nearest free pixel for {robot} is {near}"
         text = f"{robot} fits nowhere on this map" if near is None else text

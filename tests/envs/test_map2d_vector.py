@@ -206,6 +206,30 @@ def test_actions_of_another_kind_are_refused_and_change_nothing(given):
     np.testing.assert_array_equal(batch.pose(), before)
 
 
+def test_wrong_actions_of_many_are_told_in_few_words():
+    """With the robot that they are for."""
+    batch = Map2DVectorEnv(200)
+    batch.reset(seed=0)
+    actions = np.ones((200, 2), np.float32)
+    actions[17, 1] = np.nan
+    with pytest.raises(ValueError, match=r"got \[1.0, nan\] for robot 17$"):
+        batch.step(actions)
+    with pytest.raises(ValueError, match=r"got an array of shape \(2, 200\)$"):
+        batch.step(actions.T)
+
+
+def test_no_robot_is_stepped_before_its_first_reset():
+    """As in a single environment."""
+    batch, still = Map2DVectorEnv(3), np.zeros((3, 2), np.float32)
+    with pytest.raises(ResetNeeded, match=r"reset\(\) of all robots before step"):
+        batch.step(still)
+    batch.reset(options={"reset_mask": np.array([True, False, True])})
+    with pytest.raises(ResetNeeded, match=r"reset\(\) of all robots before step"):
+        batch.step(still)
+    batch.reset(options={"reset_mask": np.array([False, True, False])})
+    batch.step(still)
+
+
 def test_without_autoreset_an_ended_episode_is_not_stepped():
     """The message says which robots are to be reset, and how."""
     batch = Map2DVectorEnv(3, autoreset_mode=AutoresetMode.DISABLED, horizon=1)
@@ -222,7 +246,11 @@ def test_without_autoreset_an_ended_episode_is_not_stepped():
         ({"num_envs": 0}, "num_envs to be a whole number from 1"),
         ({"autoreset_mode": "Never"}, "autoreset_mode to be one of 'NextStep'"),
         ({"threads": 0}, "threads to be a whole number from 1"),
-        ({"render_mode": "rgb_array"}, "render_mode to be one of None"),
+        ({"render_mode": "rgb_array"}, "expected render_mode None"),
+        ({"each": {"map": "maze"}}, "expected each to be a list of dicts"),
+        ({"each": ["maze"]}, "expected each to be a list of dicts"),
+        ({"each": [{}, {}, {}]}, "each has 3 entries for 2 robots"),
+        ({"each": [{}, {"start": (0, 0)}]}, r"each\[1\]: .*start \(0, 0\)"),
         ({"each": [{"n_rays": 3}, {"n_rays": 4}]}, "the same n_rays and delay"),
         ({"map": "mase"}, "did you mean 'maze'"),
     ],
@@ -236,6 +264,8 @@ def test_wrong_arguments_are_named(options, message):
     ("arguments", "message"),
     [
         ({"seed": [1, 2]}, "expected 3 seeds"),
+        ({"seed": 1.5}, "expected a whole number as seed, or 3 of them"),
+        ({"options": "start"}, "expected options to be a dict"),
         ({"options": {"reset_mask": np.zeros(3, bool)}}, "reset_mask"),
         ({"options": {"reset_mask": [True]}}, "to be 3 bools"),
     ],

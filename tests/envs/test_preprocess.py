@@ -230,6 +230,14 @@ def test_the_advised_pixel_and_radius_hold() -> None:
         preprocess(image, (70, 70), (230, 70), widest + 0.6)
 
 
+def test_the_advised_pixel_is_joined_with_the_other_end() -> None:
+    """A nearer one, from which no way leads there, would be of no use."""
+    cells = np.zeros((80, 160), np.bool_)
+    cells[:, 30:34] = True
+    with pytest.raises(TaskError, match=r"radius is \(3[6-9], 40\)"):
+        preprocess(cells, (30, 40), (140, 40), 3.0)
+
+
 def test_snap_moves_the_ends_and_says_so() -> None:
     grid, params = preprocess(rooms(), (150, 50), GOAL, 12.0, snap=True)
     assert params.start != (150, 50)
