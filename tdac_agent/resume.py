@@ -86,6 +86,11 @@ def asked_for(folder: Path) -> dict[str, Any]:
         TaskError: Its task cannot be read.
     """
     run = load_run(folder)
+    if not (folder / "task.yaml").is_file():
+        raise RunError(
+            f"the run in {folder} ended before it had begun: give its command again, "
+            f"with --out {folder}"
+        )
     given, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
     return {
         "task": _task(folder),

@@ -14,7 +14,7 @@ from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.commands.progress import Progress
 from tdac_agent.commands.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault
-from tdac_agent.records import RUN_FILE, Run, load_run
+from tdac_agent.records import Run, load_run
 from tdac_agent.resume import asked_for, run_there
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
@@ -99,7 +99,7 @@ def _show(run: Run, console: Console, *, before: Run | None) -> int:
 
 def _so_far(folder: Path) -> str:
     """What there is of a run that did not come to its end."""
-    if not (folder / RUN_FILE).is_file():
+    if not (folder / "task.yaml").is_file():
         return "nothing was begun"
     return f"the run so far is in {folder}; go on: tdac synth --resume {folder}"
 

@@ -250,6 +250,16 @@ def test_resume_takes_no_other_flags(tdac, halted):
     assert "is not a run folder" in err
 
 
+def test_a_run_that_ended_before_it_had_begun_is_begun_again(tdac, halted, tmp_path):
+    """Its task is not there yet; the message says what to do."""
+    folder = tmp_path / "early"
+    folder.mkdir()
+    (folder / "run.json").write_bytes((halted / "run.json").read_bytes())
+    code, _, err = tdac("synth", "--resume", folder)
+    assert code == 2
+    assert f"give its command again, with --out {folder}" in err
+
+
 def test_a_full_disk_is_one_clear_line(tmp_path, good):
     """Exit 3 before anything is asked; with room again the run goes on."""
     place = tmp_path / "small-disk"
