@@ -179,8 +179,9 @@ def seeds_of(seed: Any, count: int) -> Sequence[int | None]:
     try:
         seeds = list(seed)
     except TypeError:
-        told = f"expected a whole number as seed, or {count} of them, got {seed!r}"
-        raise ValueError(told) from None
+        raise ValueError(
+            f"expected a whole number as seed, or {count} of them, got {seed!r}"
+        ) from None
     if len(seeds) != count:
         raise ValueError(f"expected {count} seeds, one a robot, got {len(seeds)}")
     return seeds

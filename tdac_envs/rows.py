@@ -162,9 +162,9 @@ class Rows:
 
     def close(self) -> None:
         """Has the threads end, without waiting for them."""
-        team, self._team = self._team, None
-        if team is not None:
-            team.end()
+        if self._team is not None:
+            self._team.end()
+            self._team = None
 
     def _at_work(self) -> Team:
         # Threads do not outlive a fork.

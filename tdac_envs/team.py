@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import _thread
 import os
-import threading
 import warnings
 from functools import partial
 
@@ -41,7 +41,7 @@ class Team:
         # Where to write for whom, for the loop; of those that have not ended.
         self._bells = np.full(threads, -1, np.int64)
         self._ringable: list[int] = []
-        self._helpers: list[threading.Thread] = []
+        self._helpers = 0
         self._most = threads
         self._call = 0
         plan[BELLS] = self._bells.ctypes.data
@@ -53,7 +53,7 @@ class Team:
 
     def wake(self, threads: int) -> None:
         """Wakes the helpers that are there for a call that will come soon."""
-        self._wake(min(threads, len(self._helpers) + 1))
+        self._wake(min(threads, self._helpers + 1))
 
     def make(
         self, order: int, count: int, threads: int, returned: int, block: int
@@ -68,11 +68,11 @@ class Team:
             block: Address where what they are copied to begins.
         """
         threads = min(threads, self._most)
-        while len(self._helpers) + 1 < threads:
+        while self._helpers + 1 < threads:
             try:
-                self._start(len(self._helpers) + 1)
+                self._start(self._helpers + 1)
             except (OSError, RuntimeError) as error:
-                threads = self._most = len(self._helpers) + 1
+                threads = self._most = self._helpers + 1
                 told = f"{threads} thread{'s' * (threads > 1)} instead of more"
                 warnings.warn(f"{told}: {error}", RuntimeWarning, stacklevel=5)
         self._call += 1
@@ -93,20 +93,16 @@ class Team:
 
     def _start(self, number: int) -> None:
         heard, bell = os.pipe()
-        # It holds the team, whose memory it uses.
-        helper = threading.Thread(
-            target=self._serve,
-            args=(number, heard),
-            name=f"tdac-rows-{number}",
-            daemon=True,
-        )
-        self._ringable.append(bell)
         self._bells[number] = bell
-        self._helpers.append(helper)
+        self._ringable.append(bell)
+        self._helpers = number
         try:
-            helper.start()
+            # Unlike those of `threading`, it has started or not, interrupted or not.
+            # It holds the team, whose memory it uses.
+            _thread.start_new_thread(self._serve, (number, heard))
         except RuntimeError:
-            self._helpers.pop()
+            self._helpers = number - 1
+            self._bells[number] = -1
             for end in (self._ringable.pop(), heard):
                 os.close(end)
             raise
