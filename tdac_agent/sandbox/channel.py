@@ -18,8 +18,9 @@ KEPT_OUTPUT = 4000
 # Most answers come sooner; after this, waiting for a CPU is looked at.
 SOON_SECONDS = 0.25
 MOST_WAITED_SECONDS = 300.0
-# Of the time that a child did not stand in line; so much on a CPU is all of it.
-BUSY_SHARE = 0.9
+# Of the time that a child did not stand in line; so much on a CPU is all of it, as far
+# as the host of a virtual machine lets it have one.
+BUSY_SHARE = 0.75
 
 
 class ChannelClosedError(Exception):
