@@ -10,8 +10,9 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Callable
 from copy import copy
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -58,6 +59,7 @@ PARTS = (
     webots_flags.app,
     doctor_flags.app,
 )
+FOR_HELP = frozenset(["-h", "--help"])
 
 
 @app.callback(invoke_without_command=True)
@@ -76,13 +78,38 @@ def _root(
 def command_line(words: list[str]) -> typer.Typer:
     """The commands, or the part of them that has the first word alone.
 
-    Typer reads the flags of all that it is given, and takes its time.
+    Typer reads the flags of all that it is given, and takes its time. The list of all
+    commands shows none.
     """
     line, first = copy(app), set(words[:1])
     line.registered_groups = []
     for part in [part for part in PARTS if first & _names(part)] or PARTS:
-        line.add_typer(part)
+        line.add_typer(part if first - FOR_HELP else _without_flags(part))
     return line
+
+
+def _without_flags(part: typer.Typer) -> typer.Typer:
+    """The same commands and groups, to be listed only."""
+    listed = copy(part)
+    listed.registered_commands = [copy(info) for info in part.registered_commands]
+    for info in listed.registered_commands:
+        info.callback = _nothing_like(info.callback)
+    listed.registered_groups = [copy(info) for info in part.registered_groups]
+    for group in listed.registered_groups:
+        assert group.typer_instance is not None
+        group.typer_instance = _without_flags(group.typer_instance)
+    return listed
+
+
+def _nothing_like(command: Callable[..., Any] | None) -> Callable[[], None]:
+    """Has its name and its help."""
+
+    def nothing() -> None:
+        pass
+
+    nothing.__name__ = getattr(command, "__name__", "")
+    nothing.__doc__ = command.__doc__
+    return nothing
 
 
 def _names(part: typer.Typer) -> set[str | None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -36,6 +36,7 @@ class OccupancyGrid:
     cells: BoolGrid
     resolution: float | None = None
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    _hash: str | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         cells = np.array(self.cells, dtype=np.bool_, order="C")
@@ -78,8 +79,12 @@ class OccupancyGrid:
 
     def sha256(self) -> str:
         """Hash of the shape and the cells."""
-        head = f"{self.width}x{self.height}:".encode()
-        return hashlib.sha256(head + np.packbits(self.cells).tobytes()).hexdigest()
+        if self._hash is None:
+            head = f"{self.width}x{self.height}:".encode()
+            found = hashlib.sha256(head + np.packbits(self.cells).tobytes()).hexdigest()
+            object.__setattr__(self, "_hash", found)
+            return found
+        return self._hash
 
 
 def clearance(cells: BoolGrid) -> FloatGrid:

@@ -51,7 +51,9 @@ class MapParams(BaseModel):
 
     schema_version: Literal[1] = 1
     source: str = Field(description="File name of the map image.")
-    source_sha256: str = Field(description="SHA-256 of the map image's bytes.")
+    source_sha256: str = Field(
+        description="SHA-256 of the map image's bytes; of a grid, `grid.sha256()`."
+    )
     width: int = Field(gt=0, description="px")
     height: int = Field(gt=0, description="px")
     start: tuple[float, float] | None = None

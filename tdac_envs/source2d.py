@@ -251,7 +251,7 @@ def _from_cells(cells: NDArray[Any], name: str) -> Prepared:
     grid = OccupancyGrid(cells)
     params = MapParams(
         source=name,
-        source_sha256=hashlib.sha256(grid.cells.tobytes()).hexdigest(),
+        source_sha256=grid.sha256(),
         width=grid.width,
         height=grid.height,
         polarity="given",
