@@ -140,6 +140,7 @@ def _ratios(over: Sequence[float], under: Sequence[float]) -> list[float]:
 
 
 def quartiles(ratios: Sequence[float]) -> tuple[float, float, float]:
+    """First quartile, median and third quartile; of a single one, that one."""
     if len(ratios) == 1:
         return ratios[0], ratios[0], ratios[0]
     low, middle, high = statistics.quantiles(ratios, method="inclusive")

@@ -13,7 +13,7 @@ from tdac_agent.learned import read_metadata
 from tdac_agent.provenance import sha256_of
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
-from tdac_agent.task_file import read_task_file
+from tdac_agent.task_file import TASK_FILE, read_task_file
 from tdac_agent.verification import read_source
 from tdac_envs.errors import TaskError, hint
 from tdac_envs.wrappers import WRAPPERS
@@ -101,7 +101,7 @@ def _controller(word: str, file: Path) -> Entrant:
 
 
 def _env_of(run_folder: Path) -> str | None:
-    file = run_folder / "task.yaml"
+    file = run_folder / TASK_FILE
     try:
         return read_task_file(file, file).env
     except TaskError:

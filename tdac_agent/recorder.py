@@ -32,6 +32,7 @@ from tdac_agent.report import Report
 from tdac_agent.retry import Missed
 from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, portable_task_file, write_workdir
+from tdac_agent.task_file import TASK_FILE
 
 OWN_SUITE = "suite"
 Event = Callable[[dict[str, Any]], None]
@@ -72,9 +73,7 @@ class Recorder:
         folder = self.run.folder
         self.save()
         write_workdir(folder, task)
-        write_atomic(
-            folder / "task.yaml", portable_task_file(task, own_suite=OWN_SUITE)
-        )
+        write_atomic(folder / TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE))
         if task.suite is not None:
             ignored = shutil.ignore_patterns("__pycache__")
             own = folder / OWN_SUITE

@@ -12,6 +12,7 @@ from tdac_agent.locks import LOCK_FILE
 from tdac_agent.prompt import VARIANTS
 from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
 from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import TASK_FILE
 
 # What decides the questions of a run and what becomes of the answers, in plain words;
 # two runs that differ in none of it are one run.
@@ -86,7 +87,7 @@ def asked_for(folder: Path) -> dict[str, Any]:
         TaskError: Its task cannot be read.
     """
     run = load_run(folder)
-    if not (folder / "task.yaml").is_file():
+    if not (folder / TASK_FILE).is_file():
         raise RunError(
             f"the run in {folder} ended before it had begun: give its command again, "
             f"with --out {folder}"

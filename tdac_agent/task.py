@@ -16,6 +16,7 @@ from tdac_agent.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.task_file import (
     EPUCK,
     OWN_KEYS,
+    TASK_FILE,
     TaskFile,
     bundled_task,
     read_task_file,
@@ -100,9 +101,9 @@ def load_task(source: str | Path | TaskFile, *, base: Path | None = None) -> Tas
     if bundled is not None:
         return _resolve(str(source), bundled, Path())
     path = Path(source)
-    path = path / "task.yaml" if path.is_dir() else path
+    path = path / TASK_FILE if path.is_dir() else path
     spec, base = read_task_file(path, source), base or path.parent
-    name = path.parent.resolve().name if path.name == "task.yaml" else path.stem
+    name = path.parent.resolve().name if path.name == TASK_FILE else path.stem
     return _resolve(name, spec, base)
 
 
@@ -137,7 +138,7 @@ def write_workdir(folder: Path, task: Task) -> None:
 def lay_out(task: Task, folder: Path) -> Path:
     """Writes a task for the judge, with all that a controller may read; its folder."""
     write_workdir(folder, task)
-    (folder / "task.yaml").write_text(portable_task_file(task), encoding="utf-8")
+    (folder / TASK_FILE).write_text(portable_task_file(task), encoding="utf-8")
     return folder
 
 

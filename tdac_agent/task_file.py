@@ -12,6 +12,9 @@ from tdac_envs.errors import TaskError, first_problem, hint
 from tdac_envs.maps import bundled_maps
 from tdac_envs.worlds import bundled_worlds
 
+TASK_FILE = "task.yaml"
+"""Its name in the folder of a task or a run."""
+
 Profile = Literal["policy", "paper"]
 EnvName = Literal["TDAC-Map2D-v0", "TDAC-EPuck-v0"]
 MAP2D: EnvName = "TDAC-Map2D-v0"

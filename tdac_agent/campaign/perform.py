@@ -21,6 +21,7 @@ from tdac_agent.records import JOURNAL, RUN_FILE, Run
 from tdac_agent.retry import RetryPolicy
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task, load_task
+from tdac_agent.task_file import TASK_FILE
 from tdac_agent.warm import WarmJudge
 from tdac_envs.errors import TdacError
 
@@ -28,7 +29,7 @@ PATIENCE = RetryPolicy(seconds=4 * 3600.0)
 """Nobody waits for a single answer of a campaign."""
 RUNS = "runs"
 """Folder of the runs, in that of a campaign."""
-KEPT = frozenset({RUN_FILE, JOURNAL, "task.yaml", "controller.py", "report.json"})
+KEPT = frozenset({RUN_FILE, JOURNAL, TASK_FILE, "controller.py", "report.json"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from tdac_agent.records import Run, load_run
 from tdac_agent.resume import asked_for, run_there
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
+from tdac_agent.task_file import TASK_FILE
 from tdac_agent.verification import read_source
 
 _EXIT = {"verified": 0, "budget": 4}
@@ -99,7 +100,7 @@ def _show(run: Run, console: Console, *, before: Run | None) -> int:
 
 def _so_far(folder: Path) -> str:
     """What there is of a run that did not come to its end."""
-    if not (folder / "task.yaml").is_file():
+    if not (folder / TASK_FILE).is_file():
         return "nothing was begun"
     return f"the run so far is in {folder}; go on: tdac synth --resume {folder}"
 

@@ -17,7 +17,7 @@ from tdac_agent.files import write_atomic
 from tdac_agent.nursery import Nursery
 from tdac_agent.report import Report
 from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import Profile
+from tdac_agent.task_file import TASK_FILE, Profile
 from tdac_agent.warm import WarmJudge
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
         raise ControllerFileError(f"no controller {controller!r}: no such file")
     if path.suffix != ".py":
         raise ControllerFileError(f"{controller!r} is no controller: expected a .py")
-    if not flags.given() and (path.parent / "task.yaml").is_file():
+    if not flags.given() and (path.parent / TASK_FILE).is_file():
         return path, load_task(path.parent)
     return path, flags.load()
 

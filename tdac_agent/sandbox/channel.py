@@ -18,9 +18,9 @@ KEPT_OUTPUT = 4000
 # Most answers come sooner; after this, waiting for a CPU is looked at.
 SOON_SECONDS = 0.25
 MOST_WAITED_SECONDS = 300.0
-# Of the time that a child did not stand in line; so much on a CPU is all of it, as far
-# as the host of a virtual machine lets it have one.
-BUSY_SHARE = 0.75
+# Of the time that a child did not stand in line; so much on a CPU is all of it. Where
+# the host of a virtual machine takes more, a time-out is the machine's doing.
+BUSY_SHARE = 0.9
 
 
 class ChannelClosedError(Exception):
