@@ -26,7 +26,7 @@ _BUCKETS = 8
 """A power of two above `2 sqrt(2) _PER_PIXEL`, the most that one step adds."""
 _PIXELS_PER_ENTRY = 4
 """Of the map, for each entry of a bucket at first."""
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 """More than the rounding of a sum of steps; other lengths differ by above 1e-5 px."""
 _LEVEL, _DONE, _COUNTS = 0, 1, 2
 
@@ -124,7 +124,7 @@ def _search(
     end, room = ends[0, 1] * width + ends[0, 0], buckets.shape[1]
     level, done, empty, fullest = state[_LEVEL], state[_DONE], 0, room
     while empty < _BUCKETS:
-        if level > _PER_PIXEL * (field[end] + _ROUNDING):
+        if level > _PER_PIXEL * (field[end] + ROUNDING):
             return True
         bucket = level & (_BUCKETS - 1)
         empty = empty + 1 if state[_COUNTS + bucket] == 0 else 0
@@ -142,7 +142,7 @@ def _search(
             x = cell - y * width
             length = field[cell]
             so_far = length + _rest(known, most, ends, cell, x, y)
-            if _PER_PIXEL * (so_far + _ROUNDING) < level:
+            if _PER_PIXEL * (so_far + ROUNDING) < level:
                 continue
             for k in range(8):
                 i, j = _DX[k], _DY[k]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from operator import add
 from typing import Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from tdac_envs.grid import clearance
 from tdac_envs.params import ScoreTerms
 from tdac_envs.readings import plain_reading, readings
 from tdac_envs.scene import Reading, Scene
-from tdac_envs.score import explain, guide_of, score, terms_of
+from tdac_envs.score import Ground, Trip, explain, guide_of, score, terms_of
 
 Preset = Literal["default", "paper"]
 
@@ -109,56 +110,74 @@ def _paper_grid(scene: Scene) -> list[Candidate]:
     )
     with ThreadPoolExecutor(THREADS) as pool:
         families = list(pool.map(partial(_family, scene), bases))
-        # Readings of which cleanup has made the same share their array.
-        jobs = {id(r.cells): (r, guide) for family, guide in families for r in family}
-        found = pool.map(lambda job: _terms(scene, *job), jobs.values())
-        terms = dict(zip(jobs, found, strict=True))
-    readings_ = [reading for family, _ in families for reading in family]
-    return [c for r in readings_ for c in _candidates(scene, r, terms[id(r.cells)])]
+        return [c for family in families for c in _judged(scene, family, pool)]
 
 
-def _family(scene: Scene, base: Reading) -> tuple[list[Reading], Guide | None]:
-    """The reading at each strength of cleanup, and a guide for paths on all."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Family:
+    """Readings of one polarity, and a guide for paths on all; None without any path."""
+
+    readings: list[Reading]
+    guide: Guide | None
+
+
+def _family(scene: Scene, base: Reading) -> _Family:
+    """The reading at each strength of cleanup."""
     cleaned = cleanings(base.cells, PAPER_CLEANUPS)
     family = [
         replace(base, cells=cells, cleanup=strength)
         for cells, strength in zip(cleaned, PAPER_CLEANUPS, strict=True)
     ]
     if scene.trip is None:
-        return family, None
+        return _Family(family, None)
     clear = clearance(np.logical_and.reduce(cleaned))
-    return family, guide_of(clear, scene.trip)
+    return _Family(family, guide_of(clear, scene.trip))
 
 
-def _terms(
-    scene: Scene, reading: Reading, guide: Guide | None
-) -> list[ScoreTerms | None]:
-    """Terms of the score with each margin, up to the first that is infeasible."""
-    if scene.trip is None or guide is None:
-        return [None]
-    clear = clearance(reading.cells)
-    return list(terms_of(reading.cells, clear, scene.trip, INFLATIONS, guide))
+def _judged(scene: Scene, family: _Family, pool: ThreadPoolExecutor) -> list[Candidate]:
+    """The readings with each margin, up to the first that is infeasible."""
+    trip, guide = scene.trip, family.guide
+    if trip is None:
+        return [Candidate(reading) for reading in family.readings]
+    if guide is None:
+        return [_candidate(reading, trip) for reading in family.readings]
+    # Readings of which cleanup has made the same share their array.
+    grids = {id(reading.cells): reading.cells for reading in family.readings}
+    grounds = list(pool.map(Ground.of, grids.values()))
+    halves = pool.map(
+        lambda margins: terms_of(grounds, trip, margins, guide),
+        (INFLATIONS[:2], INFLATIONS[2:]),
+    )
+    terms = dict(zip(grids, map(add, *halves), strict=True))
+    return [
+        candidate
+        for reading in family.readings
+        for candidate in _candidates(reading, trip, terms[id(reading.cells)])
+    ]
 
 
 def _with_margins(scene: Scene, reading: Reading) -> list[Candidate]:
-    """The reading with each margin; only the first where that is infeasible."""
-    terms: Iterable[ScoreTerms | None] = [None]
-    if scene.trip is not None:
-        clear = clearance(reading.cells)
-        guide = guide_of(clear, scene.trip)
-        if guide is not None:
-            terms = terms_of(reading.cells, clear, scene.trip, INFLATIONS, guide)
-    return _candidates(scene, reading, terms)
+    """The reading with each margin, up to the first that is infeasible."""
+    if scene.trip is None:
+        return [Candidate(reading)]
+    ground = Ground.of(reading.cells)
+    guide = guide_of(ground.clear, scene.trip)
+    if guide is None:
+        return [_candidate(reading, scene.trip)]
+    (terms,) = terms_of([ground], scene.trip, INFLATIONS, guide)
+    return _candidates(reading, scene.trip, terms)
 
 
 def _candidates(
-    scene: Scene, reading: Reading, terms: Iterable[ScoreTerms | None]
+    reading: Reading, trip: Trip, terms: Sequence[ScoreTerms | None]
 ) -> list[Candidate]:
-    if scene.trip is None:
-        return [Candidate(reading)]
-    candidates = []
-    for inflation, each in zip(INFLATIONS, terms, strict=False):
-        why = cache(partial(explain, reading.cells, scene.trip, inflation))
-        reason = why if each is None else None
-        candidates.append(Candidate(reading, inflation, reason, each))
-    return candidates
+    first = next((at for at, each in enumerate(terms) if each is None), len(terms))
+    judged = zip(INFLATIONS, terms[: first + 1], strict=False)
+    return [_candidate(reading, trip, inflation, each) for inflation, each in judged]
+
+
+def _candidate(
+    reading: Reading, trip: Trip, inflation: int = 0, terms: ScoreTerms | None = None
+) -> Candidate:
+    why = cache(partial(explain, reading.cells, trip, inflation))
+    return Candidate(reading, inflation, why if terms is None else None, terms)

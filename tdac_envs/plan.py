@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.astar import Guide, lengths_between
+from tdac_envs.astar import ROUNDING, Guide, Lengths, lengths_between
 from tdac_envs.compiled import kernel
 from tdac_envs.grid import BoolGrid
 
@@ -15,6 +17,7 @@ Field = NDArray[np.float64]
 _DX = np.array([1, -1, 0, 0, 1, 1, -1, -1])
 _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _SQRT2 = 2.0**0.5
+_SOLID, _OPEN, _TRIED = 0, 1, 2
 
 
 @kernel("b1[:,:] i8 i8 f8[:,:] b1[:] i8[:,:] -> b1")
@@ -119,7 +122,7 @@ def _descend(
             if k >= 4 and not (free[y, nx] and free[ny, x]):
                 continue
             through = field[ny, nx] + (1.0 if k < 4 else _SQRT2)
-            if through < best - 1e-9:
+            if through < best - ROUNDING:
                 best, best_x, best_y = through, nx, ny
         x, y = best_x, best_y
 
@@ -160,6 +163,98 @@ def plan_path(
     lengths = lengths_between(free, start, goal, guide)
     framed = np.pad(free, 1)
     return descend(framed, lengths, (start[0] + 1, start[1] + 1)) - 1
+
+
+def plan_paths(
+    spaces: Sequence[BoolGrid],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    guide: Guide,
+) -> list[Path]:
+    """The same as `plan_path` in each of several spaces, which have much in common.
+
+    One search in all of them together mostly does: where the shortest path of a space
+    is no longer than that, it is found among the ones of all.
+
+    Args:
+        spaces: Shape (height, width), bool, each; best with more space towards the end.
+        start: Pixel (x, y).
+        goal: Pixel (x, y).
+        guide: From `guide_between`, for pixels that hold all of the spaces.
+    """
+    paths: list[Path] = [np.empty((0, 2))] * len(spaces)
+    lengths: Lengths | None = None
+    for number in reversed(range(len(spaces))):
+        path = _among(spaces[number], lengths, start)
+        if len(path) == 0:
+            together = np.logical_or.reduce(spaces[: number + 1])
+            if not (_is_free(together, start) and _is_free(together, goal)):
+                break
+            lengths = lengths_between(together, start, goal, guide)
+            if np.isinf(lengths[start[1] + 1, start[0] + 1]):
+                break
+            path = _among(spaces[number], lengths, start)
+        if len(path) == 0:
+            path = plan_path(spaces[number], start, goal, guide)
+        paths[number] = path
+    return paths
+
+
+def _among(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> Path:
+    """The path of `plan_path` in a part of a space, if it is as short as there.
+
+    Args:
+        free: The part, shape (height, width).
+        lengths: From `lengths_between`, of the space; None where there is none.
+        start: Pixel (x, y).
+
+    Returns:
+        Shape (n, 2); empty where it is longer, or where there is none.
+    """
+    if lengths is None or not _is_free(free, start):
+        return np.empty((0, 2))
+    most = int(lengths[start[1] + 1, start[0] + 1]) + 2
+    pixels, turns = np.empty((most, 2), np.int64), np.zeros(most, np.int64)
+    open_ = np.pad(free, 1).view(np.uint8)
+    count = _walk(open_, lengths, start[0] + 1, start[1] + 1, pixels, turns)
+    return pixels[:count].astype(np.float64) - 1
+
+
+@kernel("u1[:,:] f8[:,:] i8 i8 i8[:,:] i8[:] -> i8")
+def _walk(
+    open_: NDArray[np.uint8],
+    lengths: Lengths,
+    start_x: int,
+    start_y: int,
+    path: NDArray[np.int64],
+    turns: NDArray[np.int64],
+) -> int:
+    """Writes the first of the shortest ways down the lengths; returns how many pixels.
+
+    All ways to a pixel are equally long, so it need not be tried again after one of
+    them has led nowhere. Returns 0 where all do.
+    """
+    path[0, 0], path[0, 1] = start_x, start_y
+    count = 1
+    while count > 0:
+        x, y, k = path[count - 1, 0], path[count - 1, 1], turns[count - 1]
+        length = lengths[y, x]
+        if length == 0.0:
+            return count
+        if k == 8:
+            open_[y, x] = _TRIED
+            count -= 1
+            continue
+        turns[count - 1] = k + 1
+        i, j = x + _DX[k], y + _DY[k]
+        through = lengths[j, i] + (1.0 if k < 4 else _SQRT2)
+        if open_[j, i] != _OPEN or abs(through - length) > ROUNDING:
+            continue
+        if k >= 4 and (open_[y, i] == _SOLID or open_[j, x] == _SOLID):
+            continue
+        path[count, 0], path[count, 1], turns[count] = i, j, 0
+        count += 1
+    return 0
 
 
 def guide_between(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tdac_envs.astar import Guide
 from tdac_envs.grid import BoolGrid, FloatGrid, body_free, clearance
 from tdac_envs.params import ScoreTerms
-from tdac_envs.plan import Path, guide_between, path_length, plan_path
+from tdac_envs.plan import Path, guide_between, path_length, plan_paths
 
 Point = tuple[int, int]
 
@@ -45,36 +45,66 @@ class Trip:
     radius: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """A grid with what its score needs of it.
+
+    Attributes:
+        clear: `clearance` of its cells.
+        sharpness: Of its cells.
+    """
+
+    clear: FloatGrid
+    sharpness: float
+
+    @classmethod
+    def of(cls, cells: BoolGrid) -> Ground:
+        """That of cells, shape (height, width), bool, True = occupied."""
+        return cls(clearance(cells), sharpness(cells))
+
+
 def terms_of(
-    cells: BoolGrid, clear: FloatGrid, trip: Trip, margins: Sequence[int], guide: Guide
-) -> Iterator[ScoreTerms | None]:
+    grounds: Sequence[Ground], trip: Trip, margins: Sequence[int], guide: Guide
+) -> list[list[ScoreTerms | None]]:
     """Terms of the score with each margin that the planner keeps around the body.
 
     Args:
-        cells: Shape (height, width), bool, True = occupied.
-        clear: `clearance(cells)`.
+        grounds: Of the same size, best with fewer obstacles towards the end.
         trip: Start, goal and body.
         margins: In rising order, px.
-        guide: From `guide_of`, for these cells or for fewer.
+        guide: From `guide_of`, for a grid without obstacles that a ground has not.
 
-    Yields:
-        None, and then nothing more, where the body does not get to the goal.
+    Returns:
+        For each ground a list as long as `margins`; None where the body does not get
+        to the goal.
     """
-    edges = sharpness(cells)
-    path: Path = np.empty((0, 2))
+    paths: list[Path] = [np.empty((0, 2))] * len(grounds)
+    found: list[list[ScoreTerms | None]] = [[] for _ in grounds]
     for margin in margins:
-        free = body_free(clear, trip.radius + margin)
-        if not _leads_over(path, free):
-            path = plan_path(free, trip.start, trip.goal, guide)
-        if len(path) == 0:
-            yield None
-            return
-        columns, rows = path.astype(np.intp).T
-        yield ScoreTerms(
-            min_clearance=float(clear[rows, columns].min()),
-            path_length=path_length(path),
-            sharpness=edges,
-        )
+        spaces = {
+            number: body_free(ground.clear, trip.radius + margin)
+            for number, ground in enumerate(grounds)
+            # A body that is too wide for a way does not get wider to the goal.
+            if margin == margins[0] or len(paths[number])
+        }
+        spaces = {n: s for n, s in spaces.items() if not _leads_over(paths[n], s)}
+        planned = plan_paths(list(spaces.values()), trip.start, trip.goal, guide)
+        for number, path in zip(spaces, planned, strict=True):
+            paths[number] = path
+        for terms, ground, path in zip(found, grounds, paths, strict=True):
+            terms.append(_terms(ground, path))
+    return found
+
+
+def _terms(ground: Ground, path: Path) -> ScoreTerms | None:
+    if len(path) == 0:
+        return None
+    columns, rows = path.astype(np.intp).T
+    return ScoreTerms(
+        min_clearance=float(ground.clear[rows, columns].min()),
+        path_length=path_length(path),
+        sharpness=ground.sharpness,
+    )
 
 
 def guide_of(clear: FloatGrid, trip: Trip) -> Guide | None:
