@@ -20,6 +20,14 @@ Lengths = NDArray[np.float64]
 _DX = np.array([1, -1, 0, 0, 1, 1, -1, -1])
 _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _SQRT2 = 2.0**0.5
+_BITS, _WAY = 4, 15
+"""Of an entry in a bucket, the direction in which its pixel was reached."""
+_ALL_WAYS = 8
+"""Stands for no direction: nothing led here."""
+_ONWARD = np.array([1 << k for k in range(4)] + [0x15, 0x29, 0x46, 0x8A] + [0xFF])
+"""Bits of the directions in which to go on, by that from which a pixel was reached."""
+_ASIDE = np.array([[0x14, 0x28], [0x44, 0x88], [0x11, 0x42], [0x21, 0x82]])
+"""Further ones after a straight step, for a wall on either side of where it began."""
 _PER_PIXEL = 2
 """Buckets for each px of a way's length: within half a px few ways cross."""
 _BUCKETS = 8
@@ -61,23 +69,33 @@ def lengths_between(
         path may go.
     """
     height, width = free.shape
-    field: Lengths = np.full((height + 2, width + 2), -1.0)
-    np.copyto(field[1:-1, 1:-1], np.inf, where=free)
+    field: Lengths = np.empty((height + 2, width + 2))
+    _clear(free, field)
     field[goal[1] + 1, goal[0] + 1] = 0.0
     known = np.empty(0) if guide is None else guide.lengths.ravel()
     most = 0.0 if guide is None else guide.length
     # Memory that is never written costs nothing.
-    buckets = np.empty((_BUCKETS, free.size // _PIXELS_PER_ENTRY + 64), np.int32)
+    buckets = np.empty((_BUCKETS, free.size // _PIXELS_PER_ENTRY + 64), np.int64)
     straight = _octile.function(goal[0] - start[0], goal[1] - start[1])
     state = np.zeros(_COUNTS + _BUCKETS, np.int64)
     state[_LEVEL] = int(_PER_PIXEL * max(most, straight))
     first = int(state[_LEVEL]) % _BUCKETS
-    buckets[first, 0] = (goal[1] + 1) * (width + 2) + goal[0] + 1
+    cell = (goal[1] + 1) * (width + 2) + goal[0] + 1
+    buckets[first, 0] = cell << _BITS | _ALL_WAYS
     state[_COUNTS + first] = 1
     ends = np.array([[start[0], start[1]], [goal[0], goal[1]]]) + 1
     while not _search(field.ravel(), width + 2, ends, known, most, buckets, state):
         buckets = np.pad(buckets, ((0, 0), (0, 3 * buckets.shape[1])))
     return field
+
+
+@kernel("b1[:,:] f8[:,:] ->")
+def _clear(free: BoolGrid, field: Lengths) -> None:
+    """No length is known yet; there is a border that no path crosses."""
+    field[0], field[-1], field[:, 0], field[:, -1] = -1.0, -1.0, -1.0, -1.0
+    for y in range(free.shape[0]):
+        for x in range(free.shape[1]):
+            field[y + 1, x + 1] = np.inf if free[y, x] else -1.0
 
 
 @kernel()
@@ -103,14 +121,34 @@ def _rest(
     return float(max(min(known[cell], beyond), straight))
 
 
-@kernel("f8[:] i8 i8[:,:] f8[:] f8 i4[:,:] i8[:] -> b1")
+@kernel()
+def _ways(field: Lengths, width: int, cell: int, way: int) -> int:
+    """Bits of the directions in which to go on from a pixel that was found by a step.
+
+    Where several ways to a pixel are equally long, it is enough to find the one that is
+    diagonal first; the others lead over pixels that are found so as well. Source:
+    Harabor and Grastien, Online Graph Pruning for Pathfinding on Grid Maps, AAAI 2011,
+    here for steps that cut no corner.
+    """
+    ways = _ONWARD[way]
+    if way < 4:
+        came = cell - _DY[way] * width - _DX[way]
+        side = width if way < 2 else 1
+        if field[came + side] < 0.0:
+            ways |= _ASIDE[way, 0]
+        if field[came - side] < 0.0:
+            ways |= _ASIDE[way, 1]
+    return int(ways)
+
+
+@kernel("f8[:] i8 i8[:,:] f8[:] f8 i8[:,:] i8[:] -> b1")
 def _search(
     field: Lengths,
     width: int,
     ends: NDArray[np.int64],
     known: Lengths,
     most: float,
-    buckets: NDArray[np.int32],
+    buckets: NDArray[np.int64],
     state: NDArray[np.int64],
 ) -> bool:
     """Works the buckets off up to the length of the shortest path, or until all are.
@@ -136,15 +174,15 @@ def _search(
                 if fullest + 8 > room:
                     state[_LEVEL], state[_DONE] = level, done
                     return False
-            cell = int(buckets[bucket, done])
+            cell, way = buckets[bucket, done] >> _BITS, buckets[bucket, done] & _WAY
             done += 1
             y = cell // width
             x = cell - y * width
             length = field[cell]
-            so_far = length + _rest(known, most, ends, cell, x, y)
-            if _PER_PIXEL * (so_far + ROUNDING) < level:
-                continue
+            ways = _ways(field, width, cell, way)
             for k in range(8):
+                if ways >> k & 1 == 0:
+                    continue
                 i, j = _DX[k], _DY[k]
                 to = cell + j * width + i
                 through = length + (1.0 if k < 4 else _SQRT2)
@@ -157,7 +195,7 @@ def _search(
                 # Rounding must not reach back into a bucket that is done.
                 into = max(int(_PER_PIXEL * whole), level) & (_BUCKETS - 1)
                 count = state[_COUNTS + into]
-                buckets[into, count] = to
+                buckets[into, count] = to << _BITS | k
                 state[_COUNTS + into] = count + 1
                 fullest = max(fullest, count + 1)
         state[_COUNTS + bucket] = 0

@@ -17,6 +17,7 @@ from tdac_envs.plan import (
     guide_between,
     path_length,
     plan_path,
+    plan_paths,
 )
 
 MOVINGAI = Path(__file__).parents[3] / "shared/data/maps/movingai"
@@ -115,6 +116,25 @@ def test_a_guide_changes_nothing(seed, density):
             assert len(plan_path(part, (2, 3), (50, 35))) == 0
         else:
             assert_same_path(part, (2, 3), (50, 35), guide)
+
+
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.1, 0.3]))
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_paths_of_many_spaces_are_those_of_each(seed, density):
+    """Whether one lies within the other, has longer ways, or none."""
+    start, goal = (2, 3), (50, 35)
+    whole = random_free(seed, density, (40, 55))
+    holes = [random_free(seed + n, 0.04 * n, whole.shape) for n in range(4)]
+    spaces = [whole & hole for hole in holes] + [whole & holes[1] & holes[2]]
+    for space in spaces:
+        space[3, 2] = space[35, 50] = True
+    together = np.logical_or.reduce(spaces)
+    guide = guide_between(together, start, goal)
+    if guide is None:
+        return
+    for space, path in zip(spaces, plan_paths(spaces, start, goal, guide), strict=True):
+        wanted = descend(space, distance_field(space, goal), start)
+        np.testing.assert_array_equal(path, wanted)
 
 
 def test_buckets_grow_where_many_paths_are_equally_long(monkeypatch):
