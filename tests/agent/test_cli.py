@@ -73,6 +73,20 @@ def test_a_command_reads_no_flags_of_another():
         assert len(command_line(words).registered_groups) == len(PARTS)
 
 
+def test_the_list_of_commands_is_made_without_their_flags():
+    """Names and helps are those of the commands themselves, in groups as well."""
+
+    def listed(group):
+        if not hasattr(group, "commands"):
+            return group.help
+        return {name: listed(command) for name, command in group.commands.items()}
+
+    bare, whole = (typer.main.get_command(command_line([w])) for w in ("-h", "verfy"))
+    assert listed(bare) == listed(whole)
+    assert list(bare.commands) == list(whole.commands)
+    assert [p.name for p in bare.commands["verify"].params] == []
+
+
 def test_a_task_is_named_by_the_same_flags_everywhere():
     """All commands on one task have them in one order; `synth` two more, for models."""
     told_to_models = ["robot_image", "instructions"]
