@@ -61,7 +61,7 @@ class MapImage:
                 "expected at least 2 x 2"
             )
         flat = self.colour.reshape(-1, 3)
-        if self.occupied is None and bool((flat == flat[0]).all()):
+        if self.occupied is None and np.array_equal(flat[1:], flat[:-1]):
             raise MapError(
                 f"{self.name}: every pixel has the same colour "
                 f"{tuple(int(c) for c in flat[0])}, so there are no walls to see; "
