@@ -60,6 +60,7 @@ def preprocess(
     if best.reason is not None:
         raise TaskError(f"{source.name}: {best.reason()}")
     grid = OccupancyGrid(best.reading.cells, source.resolution, source.origin)
+    notes += _changed(best.reading, preset)
     return grid, _params(scene, best, heading, notes)
 
 
@@ -111,10 +112,13 @@ def _snapped(
     return moved
 
 
-def _ignored(reading: Reading) -> list[str]:
-    """What of the picture's obstacles the reading takes for free space."""
+def _changed(reading: Reading, preset: Preset) -> list[str]:
+    """In what the reading goes beyond the picture."""
     if not (reading.opening or reading.cleanup):
         return []
+    if preset == "paper":
+        what = f"pieces and holes under {reading.cleanup} px removed, gaps closed"
+        return [f"cleaned with strength {reading.cleanup}: {what}; look at the preview"]
     what = f"specks up to {reading.cleanup} px"
     if reading.opening:
         what = f"lines under {reading.opening} px and {what}"
@@ -145,5 +149,5 @@ def _params(
         score_terms=best.terms,
         resolution=image.resolution,
         origin=image.origin,
-        notes=(*notes, *_ignored(reading)),
+        notes=tuple(notes),
     )

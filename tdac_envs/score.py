@@ -150,7 +150,7 @@ def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
             else f"is {clear[y, x]:.1f} px from an obstacle, too near"
         )
         near = _nearest_text(_joined(free, other), x, y, radius)
-        return f"{name} ({x}, {y}) {what}; {near}"
+        return f"{name} ({x}, {y}) {what}; {near}{_narrower(clear, trip)}"
     widest = widest_radius(clear, start, goal)
     advice = (
         "no robot gets through: a wall closes the way"
@@ -169,6 +169,14 @@ def _joined(free: BoolGrid, point: Point) -> BoolGrid:
     label = labels[point[::-1]]
     joined: BoolGrid = labels == label
     return joined if label else free
+
+
+def _narrower(clear: FloatGrid, trip: Trip) -> str:
+    """What would do without another start or goal; empty where nothing would."""
+    widest = widest_radius(clear, trip.start, trip.goal)
+    if widest < 0.5:
+        return ""
+    return f"; from this start to this goal a radius of {widest:.1f} px gets through"
 
 
 def _nearest_text(free: BoolGrid, x: int, y: int, radius: float) -> str:

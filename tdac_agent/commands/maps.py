@@ -39,16 +39,19 @@ def run(
     if (start is None) != (goal is None):
         raise TaskError("give both --start X Y and --goal X Y, or neither")
     check_finite(start=start, goal=goal)
-    path = Path(image)
+    path, heading = Path(image), 0.0
     if image in bundled_maps():
         bundled = bundled_map(image)
+        heading = bundled.heading
         path, start, goal = bundled.image, start or bundled.start, goal or bundled.goal
         robot_radius = robot_radius or bundled.robot_radius
     if metres:
         start, goal, robot_radius = in_pixels(path, start, goal, robot_radius)
     radius = RobotParams().radius if robot_radius is None else robot_radius
     source = load_image(path)
-    grid, params = preprocess(source, start, goal, radius, preset=preset, snap=snap)
+    grid, params = preprocess(
+        source, start, goal, radius, preset=preset, snap=snap, heading=heading
+    )
     ends = (_pixel(params.start), _pixel(params.goal))
     ranked = rank_candidates(source, *ends, radius, preset=preset)
     folder = out if out is not None else Path(f"{path.stem}-map")

@@ -19,6 +19,7 @@ from small import SHORT, small_cells, write_small_task
 
 from tdac_agent.cli import PARTS, command_line
 from tdac_agent.commands.options import task_flags
+from tdac_envs.maps import bundled_map
 
 COMMANDS = [
     "map", "world", "synth", "verify", "play", "evaluate", "train", "check-suite",
@@ -457,6 +458,15 @@ def test_map_prints_json(tdac, image):
     record = json.loads(out)
     assert record["params"]["start"] == [30, 30]
     assert all(Path(file).is_file() for file in record["files"])
+
+
+def test_a_bundled_map_brings_its_own_heading(tdac):
+    """As the environment of its name has it."""
+    code, out, _ = tdac("map", "maze", "--json")
+    assert code == 0
+    heading = bundled_map("maze").heading
+    assert heading != 0.0
+    assert json.loads(out)["params"]["heading"] == heading
 
 
 def test_map_without_places(tdac, image):

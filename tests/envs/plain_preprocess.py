@@ -72,7 +72,9 @@ def failure(cells, clear, free, start, goal, radius):
         robot = f"a robot of {radius:g} px radius"
         text = f"the nearest free pixel for {robot} is {near}"
         text = f"{robot} fits nowhere on this map" if near is None else text
-        return f"{name} ({x}, {y}) {what}; {text}"
+        room = widest(clear, start, goal)
+        way = f"from this start to this goal a radius of {room:.1f} px gets through"
+        return f"{name} ({x}, {y}) {what}; {text}{f'; {way}' if room >= 0.5 else ''}"
     if connected(free, start, goal):
         return None
     room = widest(clear, start, goal)

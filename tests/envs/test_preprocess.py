@@ -480,6 +480,19 @@ def test_cleanup_is_its_definition(strength: int) -> None:
     assert got == wanted
 
 
+@pytest.mark.parametrize(
+    ("preset", "words"),
+    [("paper", "pieces and holes under 16 px removed"), ("default", "specks up to 4")],
+)
+def test_a_note_says_what_was_changed(preset: str, words: str) -> None:
+    """The paper's grid fills and closes as well; it does not only remove."""
+    grid, params = preprocess(noisy(0, 120), (10, 10), (100, 100), 1.0, preset=preset)
+    (note,) = params.notes
+    assert words in note
+    added = grid.cells & (noisy(0, 120)[..., 0] > 128)
+    assert added.any() == (preset == "paper")
+
+
 @pytest.mark.parametrize("with_task", [True, False])
 def test_write_map_round_trip(with_task: bool, tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "map.png"), rooms())
