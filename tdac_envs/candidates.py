@@ -171,9 +171,12 @@ def _with_margins(scene: Scene, reading: Reading) -> list[Candidate]:
 def _candidates(
     reading: Reading, trip: Trip, terms: Sequence[ScoreTerms | None]
 ) -> list[Candidate]:
-    first = next((at for at, each in enumerate(terms) if each is None), len(terms))
-    judged = zip(INFLATIONS, terms[: first + 1], strict=False)
-    return [_candidate(reading, trip, inflation, each) for inflation, each in judged]
+    candidates = []
+    for inflation, each in zip(INFLATIONS, terms, strict=True):
+        candidates.append(_candidate(reading, trip, inflation, each))
+        if each is None:
+            break
+    return candidates
 
 
 def _candidate(

@@ -160,9 +160,7 @@ def plan_path(
     """
     if not (_is_free(free, start) and _is_free(free, goal)):
         return np.empty((0, 2))
-    lengths = lengths_between(free, start, goal, guide)
-    framed = np.pad(free, 1)
-    return descend(framed, lengths, (start[0] + 1, start[1] + 1)) - 1
+    return _among(free, lengths_between(free, start, goal, guide), start)
 
 
 def plan_paths(
@@ -204,7 +202,7 @@ def _among(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> P
     """The path of `plan_path` in a part of a space, if it is as short as there.
 
     Args:
-        free: The part, shape (height, width).
+        free: The part, or all of the space, shape (height, width).
         lengths: From `lengths_between`, of the space; None where there is none.
         start: Pixel (x, y).
 
@@ -213,7 +211,10 @@ def _among(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> P
     """
     if lengths is None or not _is_free(free, start):
         return np.empty((0, 2))
-    most = int(lengths[start[1] + 1, start[0] + 1]) + 2
+    length = lengths[start[1] + 1, start[0] + 1]
+    if np.isinf(length):
+        return np.empty((0, 2))
+    most = int(length) + 2
     pixels, turns = np.empty((most, 2), np.int64), np.zeros(most, np.int64)
     open_ = np.pad(free, 1).view(np.uint8)
     count = _walk(open_, lengths, start[0] + 1, start[1] + 1, pixels, turns)

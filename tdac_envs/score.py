@@ -84,7 +84,7 @@ def terms_of(
         spaces = {
             number: body_free(ground.clear, trip.radius + margin)
             for number, ground in enumerate(grounds)
-            # A body that is too wide for a way does not get wider to the goal.
+            # Where a narrower body does not get to the goal, this one does not.
             if margin == margins[0] or len(paths[number])
         }
         spaces = {n: s for n, s in spaces.items() if not _leads_over(paths[n], s)}
