@@ -47,6 +47,28 @@ def preprocess(
         MapError: The image cannot be used.
         TaskError: No reading of it makes the task feasible; says why.
     """
+    grid, params, _ = examine(
+        image, start, goal, robot_radius, preset=preset, snap=snap, heading=heading
+    )
+    return grid, params
+
+
+def examine(
+    image: Source,
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+    robot_radius: float,
+    *,
+    preset: Preset,
+    snap: bool,
+    heading: float,
+) -> tuple[OccupancyGrid, MapParams, list[Candidate]]:
+    """The same as `preprocess`, and every candidate that was looked at; see `ranked`.
+
+    Raises:
+        MapError: As `preprocess` does.
+        TaskError: As `preprocess` does.
+    """
     source = as_image(image)
     notes: list[str] = []
     ends: list[Point | None] = []
@@ -56,12 +78,13 @@ def preprocess(
             pixel = _snapped(source, name, pixel, robot_radius, notes)
         ends.append(pixel)
     scene = Scene.of(source, ends[0], ends[1], robot_radius)
-    best = ranked(scene, preset)[0]
+    candidates = ranked(scene, preset)
+    best = candidates[0]
     if best.reason is not None:
         raise TaskError(f"{source.name}: {best.reason()}")
     grid = OccupancyGrid(best.reading.cells, source.resolution, source.origin)
     notes += _changed(best.reading, preset)
-    return grid, _params(scene, best, heading, notes)
+    return grid, _params(scene, best, heading, notes), candidates
 
 
 def rank_candidates(

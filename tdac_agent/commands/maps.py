@@ -18,7 +18,7 @@ from tdac_envs.image import load_image
 from tdac_envs.map_folder import write_map
 from tdac_envs.maps import bundled_map, bundled_maps
 from tdac_envs.params import MapParams, RobotParams
-from tdac_envs.preprocessing import preprocess, rank_candidates
+from tdac_envs.preprocessing import examine
 
 SHOWN = 8
 Point = tuple[float, float]
@@ -49,11 +49,9 @@ def run(
         start, goal, robot_radius = in_pixels(path, start, goal, robot_radius)
     radius = RobotParams().radius if robot_radius is None else robot_radius
     source = load_image(path)
-    grid, params = preprocess(
+    grid, params, ranked = examine(
         source, start, goal, radius, preset=preset, snap=snap, heading=heading
     )
-    ends = (_pixel(params.start), _pixel(params.goal))
-    ranked = rank_candidates(source, *ends, radius, preset=preset)
     folder = out if out is not None else Path(f"{path.stem}-map")
     files = write_map(folder, grid, params, source)
     if as_json:
@@ -71,10 +69,6 @@ def run(
     else:
         console.print(_table(ranked))
     _print_choice(console, params, folder)
-
-
-def _pixel(point: Point | None) -> tuple[int, int] | None:
-    return None if point is None else (round(point[0]), round(point[1]))
 
 
 def _row(candidate: Candidate) -> dict[str, object]:
