@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.compiled import constant
 from tdac_envs.contact import wrap_angle
 from tdac_envs.grid import BoolGrid, body_free
 from tdac_envs.plan import Path, descend, distance_field
@@ -68,7 +69,7 @@ def steer(
         axle: Distance of the wheels.
     """
     dx, dy = point[0] - pose[0], point[1] - pose[1]
-    error = float(wrap_angle(math.atan2(dy, dx) - pose[2]))
+    error = float(wrap_angle(float(math.atan2(dy, dx) - pose[2])))
     if abs(error) > _ALIGNED:
         wheel = min(max(error * axle / (2.0 * step), -1.0), 1.0)
         return wheel, -wheel
@@ -138,7 +139,8 @@ def taut(path: Path, is_free: Callable[[Point, Point], bool]) -> list[Point]:
 def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
     """Whether the body, grown by `safe` px, gets straight from one point to another."""
     clear = task.terrain.padded_clear
-    return gets_straight(clear, *begin, *end, task.robot.radius + safe)
+    numbers = (*begin, *end, task.robot.radius + safe)
+    return gets_straight(constant(clear), *map(float, numbers))
 
 
 def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:

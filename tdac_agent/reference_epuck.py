@@ -54,10 +54,8 @@ def _free(task: EPuckTask, begin: Point, end: Point) -> bool:
     """Whether the body, and a little more, gets straight from one point to another."""
     solid = task.ground.solid
     heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
-    touch = first_touch(
-        solid.points, solid.first, solid.extent, *begin, heading,
-        math.dist(begin, end), 0.0, BODY_RADIUS + _SAFE,
-    )  # fmt: skip
+    pose, length = (float(begin[0]), float(begin[1]), heading), math.dist(begin, end)
+    touch = first_touch(*solid.arrays(), *pose, length, 0.0, BODY_RADIUS + _SAFE)
     return touch > 1.0
 
 

@@ -108,10 +108,8 @@ class WorldSurroundings:
         """Whether the body gets straight from one place to another."""
         (x, y), (to_x, to_y) = METRES.place_of(*begin), METRES.place_of(*end)
         solid, heading = self.task.ground.solid, math.atan2(to_y - y, to_x - x)
-        touch = first_touch(
-            solid.points, solid.first, solid.extent, x, y, heading,
-            math.hypot(to_x - x, to_y - y), 0.0, BODY_RADIUS,
-        )  # fmt: skip
+        length = math.hypot(to_x - x, to_y - y)
+        touch = first_touch(*solid.arrays(), x, y, heading, length, 0.0, BODY_RADIUS)
         return touch > 1.0
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
@@ -156,9 +154,7 @@ def _nearest(task: EPuckTask, x: float, y: float) -> _Near:
         parts = at_body_height(thing.solid, ground.floor)
         prisms = Prisms.of(map(Owned, parts))
         for part in range(len(parts)):
-            gap, *away = part_gap(
-                prisms.points, prisms.first, prisms.extent, part, x, y
-            )
+            gap, *away = part_gap(*prisms.arrays(), part, x, y)
             outline = prisms.outline(part) if len(parts) == 1 else none
             way = (float(away[0]), float(away[1]))
             found.append(_Near(_name(thing), float(gap), way, outline))

@@ -133,7 +133,7 @@ def prisms_of(parts: Iterable[Part]) -> Prisms:
 
 def gap_to(prisms: Prisms, x: float, y: float) -> float:
     """Distance from a point to the nearest part, m; negative within one."""
-    return float(nearest_gap(prisms.points, prisms.first, prisms.extent, x, y))
+    return float(nearest_gap(*prisms.arrays(), float(x), float(y)))
 
 
 def occupied_at(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import constant, kernel, subkernel
 from tdac_envs.grid import BoolGrid
 
 Point = tuple[int, int]
@@ -70,13 +70,13 @@ def lengths_between(
     """
     height, width = free.shape
     field: Lengths = np.empty((height + 2, width + 2))
-    _clear(free, field)
+    _clear(constant(free), field)
     field[goal[1] + 1, goal[0] + 1] = 0.0
     known = np.empty(0) if guide is None else guide.lengths.ravel()
     most = 0.0 if guide is None else guide.length
     # Memory that is never written costs nothing.
     buckets = np.empty((_BUCKETS, free.size // _PIXELS_PER_ENTRY + 64), np.int64)
-    straight = _octile.function(goal[0] - start[0], goal[1] - start[1])
+    straight = _octile(goal[0] - start[0], goal[1] - start[1])
     state = np.zeros(_COUNTS + _BUCKETS, np.int64)
     state[_LEVEL] = int(_PER_PIXEL * max(most, straight))
     first = int(state[_LEVEL]) % _BUCKETS
@@ -89,7 +89,7 @@ def lengths_between(
     return field
 
 
-@kernel("b1[:,:] f8[:,:] ->")
+@kernel
 def _clear(free: BoolGrid, field: Lengths) -> None:
     """No length is known yet; there is a border that no path crosses."""
     field[0], field[-1], field[:, 0], field[:, -1] = -1.0, -1.0, -1.0, -1.0
@@ -98,14 +98,14 @@ def _clear(free: BoolGrid, field: Lengths) -> None:
             field[y + 1, x + 1] = np.inf if free[y, x] else -1.0
 
 
-@kernel()
+@kernel
 def _octile(dx: int, dy: int) -> float:
     """Length of the shortest path over (dx, dy) where nothing is in the way."""
     dx, dy = abs(dx), abs(dy)
     return max(dx, dy) + (_SQRT2 - 1.0) * min(dx, dy)
 
 
-@kernel()
+@subkernel
 def _rest(
     known: Lengths, most: float, ends: NDArray[np.int64], cell: int, x: int, y: int
 ) -> float:
@@ -121,7 +121,7 @@ def _rest(
     return float(max(min(known[cell], beyond), straight))
 
 
-@kernel()
+@subkernel
 def _ways(field: Lengths, width: int, cell: int, way: int) -> int:
     """Bits of the directions in which to go on from a pixel that was found by a step.
 
@@ -141,7 +141,7 @@ def _ways(field: Lengths, width: int, cell: int, way: int) -> int:
     return int(ways)
 
 
-@kernel("f8[:] i8 i8[:,:] f8[:] f8 i8[:,:] i8[:] -> b1")
+@kernel
 def _search(
     field: Lengths,
     width: int,

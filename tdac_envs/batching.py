@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from tdac_envs import stepping
 from tdac_envs.errors import TaskError
-from tdac_envs.row_copies import Columns
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Env = TypeVar("Env")
-Told = tuple[Array, Flags, Flags, dict[str, Any]]
 
 _INFOS: dict[str, tuple[int, type]] = {
     "is_success": (stepping.REACHED, np.bool_),
@@ -28,58 +26,29 @@ _INFOS: dict[str, tuple[int, type]] = {
     "path_distance": (stepping.REMAINING, np.float64),
     "clearance": (stepping.ROOM, np.float64),
 }
-_FLAGS, _WHOLES, _MEASURES = (
-    [key for key, (_, of) in _INFOS.items() if of is kind]
-    for kind in (np.bool_, np.int64, np.float64)
-)
-_MARKS = [f"_{key}" for key in _INFOS]
-_NAMES = (*_FLAGS, *_MARKS, *_WHOLES, *_MEASURES)
 
 
-def columns_of(outcome: Array) -> Columns:
-    """What a step tells of all robots: what `told` is given, before it is copied.
+def ends_of(outcome: Array) -> tuple[Array, Flags, Flags]:
+    """Rewards of a step, and whose episodes it terminated and truncated.
 
     Args:
         outcome: Shape (num_envs, entries).
     """
-    of = {key: outcome[:, entry] for key, (entry, _) in _INFOS.items()}
     ends = outcome[:, stepping.TERMINATED], outcome[:, stepping.TRUNCATED]
-    true = np.broadcast_to(1.0, len(outcome))
-    return {
-        np.dtype(np.bool_): [*ends, *(of[key] for key in _FLAGS), *[true] * len(of)],
-        np.dtype(np.int64): [of[key] for key in _WHOLES],
-        np.dtype(np.float64): [
-            outcome[:, stepping.REWARD],
-            *(of[key] for key in _MEASURES),
-        ],
-    }
-
-
-def told(flags: Flags, wholes: NDArray[np.int64], measures: Array) -> Told:
-    """Rewards, ends and infos of a step of all robots.
-
-    Args:
-        flags: Of `columns_of`, shape (columns, num_envs).
-        wholes: The same.
-        measures: The same.
-    """
-    terminated, truncated, *known = flags
-    rewards, *last = measures
-    infos = dict(zip(_NAMES, (*known, *wholes, *last), strict=True))
-    # Who keeps them does not keep all the rest with them.
-    return rewards.copy(), terminated.copy(), truncated.copy(), infos
+    terminated, truncated = (end != 0.0 for end in ends)
+    return outcome[:, stepping.REWARD].copy(), terminated, truncated
 
 
 def infos_of(outcome: Array, mask: Flags) -> dict[str, Any]:
     """The infos of the robots in the mask, each key with its own.
 
     Args:
-        outcome: Shape (entries, num_envs), 0 out of the mask.
+        outcome: Shape (num_envs, entries), 0 out of the mask.
         mask: Shape (num_envs,).
     """
     infos: dict[str, Any] = {}
     for key, (entry, kind) in _INFOS.items():
-        infos[key], infos[f"_{key}"] = outcome[entry].astype(kind), mask.copy()
+        infos[key], infos[f"_{key}"] = outcome[:, entry].astype(kind), mask.copy()
     return infos
 
 

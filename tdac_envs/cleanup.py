@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.grid import BoolGrid
 
 Labels = NDArray[np.int32]
@@ -56,7 +56,7 @@ def _labels(mask: BoolGrid, connectivity: int) -> Labels:
     return np.asarray(found[1], np.int32)
 
 
-@kernel("i4[:,:] i4[:,:] i8 i8[:] ->")
+@kernel
 def _measure(pieces: Labels, holes: Labels, first_hole: int, size: Counts) -> None:
     """Counts the pixels of each piece and of each hole."""
     for y in range(pieces.shape[0]):
@@ -67,7 +67,7 @@ def _measure(pieces: Labels, holes: Labels, first_hole: int, size: Counts) -> No
                 size[first_hole + holes[y, x]] += 1
 
 
-@kernel()
+@subkernel
 def _root(parent: Counts, node: int) -> int:
     while parent[node] != node:
         parent[node] = parent[parent[node]]
@@ -75,7 +75,7 @@ def _root(parent: Counts, node: int) -> int:
     return node
 
 
-@kernel("i4[:,:] i4[:,:] i8 i8 i8[:] i8[:] i8[:] ->")
+@kernel
 def _free_small(
     pieces: Labels,
     holes: Labels,
@@ -105,7 +105,7 @@ def _free_small(
                     joined[other] += joined[one]
 
 
-@kernel("i8 i8 i8[:] i8[:] i8[:] b1[:] ->")
+@kernel
 def _decide(
     first_hole: int,
     strength: int,
@@ -120,7 +120,7 @@ def _decide(
         occupied[node] = stays or joined[_root(parent, node)] < strength
 
 
-@kernel("i4[:,:] i4[:,:] i8 b1[:] b1[:,:] ->")
+@kernel
 def _fill(
     pieces: Labels, holes: Labels, first_hole: int, occupied: BoolGrid, cells: BoolGrid
 ) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.grid import FloatGrid
 
 # A disc that starts in touch is stopped when it gets this much deeper, px: driving
@@ -22,14 +22,14 @@ _ROUNDING = 1e-3
 _TWO_PI = 2.0 * math.pi
 
 
-@kernel()
+@kernel
 def wrap_angle(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
     return math.pi if wrapped <= -math.pi else wrapped
 
 
-@kernel()
+@subkernel
 def move(
     x: float, y: float, heading: float, forward: float, turn: float
 ) -> tuple[float, float, float]:
@@ -48,7 +48,7 @@ def move(
     )
 
 
-@kernel("f4[:,:] f8 f8 f8 f8 f8 f8 -> f8")
+@kernel
 def first_contact(
     clear: FloatGrid,
     x: float,
@@ -79,7 +79,7 @@ def first_contact(
     return contact_before(clear, x, y, heading, forward, turn, radius, end_x, end_y)
 
 
-@kernel()
+@subkernel
 def contact_before(
     clear: FloatGrid,
     x: float,
@@ -107,7 +107,7 @@ def contact_before(
     return best / length if best < length else 2.0
 
 
-@kernel()
+@subkernel
 def _scan(
     clear: FloatGrid,
     x: float,
@@ -156,14 +156,14 @@ def _scan(
     return best, nearest
 
 
-@kernel()
+@subkernel
 def _square_distance2(x: float, y: float, i: int, j: int) -> float:
     dx = max(abs(x - i) - 0.5, 0.0)
     dy = max(abs(y - j) - 0.5, 0.0)
     return dx * dx + dy * dy
 
 
-@kernel()
+@subkernel
 def has_room(clear: FloatGrid, x: float, y: float, radius: float) -> bool:
     """Whether a point is at least `radius` px from all occupied squares."""
     for j in range(math.ceil(y - radius - 0.5), math.floor(y + radius + 0.5) + 1):
@@ -175,7 +175,7 @@ def has_room(clear: FloatGrid, x: float, y: float, radius: float) -> bool:
     return True
 
 
-@kernel()
+@subkernel
 def _room(clear: FloatGrid, x: float, y: float) -> float:
     """Lower bound of the distance from a point to the nearest occupied square."""
     i, j = math.floor(x + 0.5), math.floor(y + 0.5)
@@ -186,7 +186,7 @@ def _room(clear: FloatGrid, x: float, y: float) -> float:
     return float(clear[j + 1, i + 1]) - off - _ROUNDING
 
 
-@kernel()
+@subkernel
 def _is_edge(clear: FloatGrid, i: int, j: int) -> bool:
     """Whether a free pixel is beside (i, j) of the padded map.
 
@@ -201,7 +201,7 @@ def _is_edge(clear: FloatGrid, i: int, j: int) -> bool:
     )
 
 
-@kernel()
+@subkernel
 def free_way(rest: float, approach: float, curvature: float) -> float:
     """Way that is surely free: to the root of `rest + approach h - curvature h^2 / 2`.
 
@@ -218,7 +218,7 @@ def free_way(rest: float, approach: float, curvature: float) -> float:
     return math.inf
 
 
-@kernel()
+@subkernel
 def _travel(
     x: float,
     y: float,

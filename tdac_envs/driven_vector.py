@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -14,20 +14,19 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from tdac_envs import stepping
+from tdac_envs.addresses import Addresses
 from tdac_envs.arguments import whole_number
 from tdac_envs.batching import (
     Array,
     Flags,
     autoreset_mode_of,
-    columns_of,
+    ends_of,
     infos_of,
     joint_space,
     mask_of,
     seeds_of,
-    told,
 )
-from tdac_envs.compiled import Kernel
-from tdac_envs.rows import Index, Rows
+from tdac_envs.slices import Rows, Slices
 
 Observations = dict[str, NDArray[np.float32]]
 Result = tuple[Observations, Array, Flags, Flags, dict[str, Any]]
@@ -43,22 +42,21 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         envs: Environments of one kind, whose robots have memory of one shape. Each
             has a `robot` and a `setup`, as `Map2DEnv` has.
         num_envs: Number of robots.
-        begin: Kernel that begins an episode.
-        drive: Kernel that makes a step.
         autoreset_mode: When an episode that has ended begins anew.
         threads: How many work at a time; by default as many as there are cores.
 
     Attributes:
+        step_rows: The compiled loop of such robots; see `tdac_envs.kernels.step_rows`.
         last_poses: True poses in which the episodes ended that the last step began
             anew, with `SAME_STEP`; shape (num_envs, 3), of the others as they are.
     """
+
+    step_rows: Callable[..., None]
 
     def __init__(
         self,
         envs: Sequence[Any],
         num_envs: int,
-        begin: Kernel[Any, Any],
-        drive: Kernel[Any, Any],
         *,
         autoreset_mode: str | AutoresetMode,
         threads: int | None,
@@ -80,7 +78,9 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         for constants, setup in zip(self.robots.constants, self.setups, strict=True):
             constants[:] = setup.constants()
         self.last_poses = self.pose()
-        self._kernels = drive, begin
+        self._slices = Slices(self.threads)
+        self._all = np.arange(num_envs)
+        self._everyone = np.ones(num_envs, np.bool_)
         self._slippery = [i for i, s in enumerate(self.setups) if s.wheel_slip]
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
@@ -93,7 +93,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._commands = np.zeros((num_envs, 2))
         self.goals = np.array([task.goal for task in self.tasks], np.float32)
         self._starts = np.array([(*task.start, task.shortest) for task in self.tasks])
-        self._bind()
+        self._addresses = Addresses(map(self._arrays, range(num_envs)))
 
     def reset(
         self,
@@ -136,7 +136,6 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         """
         if not self._begun:
             raise gym.error.ResetNeeded("expected reset() of all robots before step()")
-        self._rows.wake()
         self._command(actions)
         if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
             resting = np.flatnonzero(self._over)
@@ -148,9 +147,10 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             self._slip()
         if self._drawn:
             self._draw(np.flatnonzero(self._over), {})
-        *seen, flags, wholes, measures = self._rows.call_all()
-        observations = dict(zip(self._keys, seen, strict=True))
-        rewards, terminated, truncated, infos = told(flags, wholes, measures)
+        self._act(self._all)
+        observations = {key: seen.copy() for key, seen in self._seen().items()}
+        rewards, terminated, truncated = ends_of(self.robots.outcome)
+        infos = infos_of(self.robots.outcome, self._everyone)
         np.logical_or(terminated, truncated, out=self._over)
         self._complete(observations, range(self.num_envs))
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
@@ -159,7 +159,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     def close_extras(self, **_: Any) -> None:
         """Ends the threads."""
-        self._rows.close()
+        self._slices.close()
 
     def pose(self) -> Array:
         """The true poses, shape (num_envs, 3)."""
@@ -177,11 +177,12 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return tuple(self._seeds)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_rows": None, "_each": None}
+        return {**self.__dict__, "_slices": None, "_addresses": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._bind()
+        self._slices = Slices(self.threads)
+        self._addresses = Addresses(map(self._arrays, range(self.num_envs)))
 
     def _seen(self) -> Observations:
         """What the kernels let the robots observe, in their own arrays."""
@@ -191,25 +192,18 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         """Adds what no kernel does; noise is drawn anew for these robots."""
         raise NotImplementedError
 
-    def _bind(self) -> None:
-        """Makes the kernels' calls on the robots' own arrays."""
-        self._each = [self.robots.row(i) for i in range(self.num_envs)]
-        several = zip(self.setups, self.tasks, self._each, strict=True)
-        arguments = [setup.arguments(task, robot) for setup, task, robot in several]
-        state, outcome, seen = self.robots.state, self.robots.outcome, self._seen()
-        self._keys = tuple(seen)
-        commands = (self._commands, state[:, stepping.LEFT : stepping.RIGHT + 1])
-        starts = (self._starts[:, :3], state[:, : stepping.HEADING + 1])
-        ways = (self._starts[:, 3:], outcome[:, stepping.REMAINING][:, None])
-        self._rows = Rows(
-            self._kernels,
-            arguments,
-            self.threads,
-            kinds=self._over,
-            inputs=[(commands,), (starts, ways)],
-            outputs=tuple(seen.values()),
-            columns=columns_of(outcome),
-        )
+    def _act(self, rows: Rows) -> None:
+        """Makes the step of some robots, or begins their episodes."""
+        words = self._addresses.words
+
+        def act(some: Rows) -> None:
+            self.step_rows(some, self._over, self._commands, self._starts, words)
+
+        self._slices.run(act, rows)
+
+    def _arrays(self, i: int) -> tuple[NDArray[Any], ...]:
+        """What the kernels take of a robot and its world."""
+        return *self.setups[i].world(self.tasks[i]), *self.robots.row(i)
 
     def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
         """Begins the episodes of the robots in a mask, and of no others."""
@@ -217,10 +211,10 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         if options or self._drawn:
             self._draw(chosen, options)
         self._over[chosen] = True
-        self._rows.call(chosen)
+        self._act(chosen)
         self._over[chosen] = False
 
-    def _draw(self, robots: Index, options: dict[str, Any]) -> None:
+    def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
         """Gives robots the tasks that their next episodes are about."""
         drawn = [
             (i, self.setups[i].draw(options, self._random(i)))
@@ -233,12 +227,12 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
     def _give(self, i: int, task: Any) -> None:
         """Gives a robot another task."""
         self._drawn = True
-        robot, before = self._each[i], self.tasks[i]
+        before = self.tasks[i]
         self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
         self.goals[i] = task.goal
         if task.field is not before.field:
-            self._rows.put(i, *self.setups[i].arguments(task, robot))
-        robot.place(task)
+            self._addresses.put(i, self._arrays(i))
+        self.robots.row(i).place(task)
 
     def _random(self, i: int) -> np.random.Generator:
         random = self._randoms[i]
@@ -283,7 +277,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         }
 
     def _infos(self, mask: Flags) -> dict[str, Any]:
-        return infos_of(np.where(mask, self.robots.outcome.T, 0.0), mask)
+        return infos_of(np.where(mask[:, None], self.robots.outcome, 0.0), mask)
 
     def _command(self, actions: Any) -> None:
         """Keeps wheel speeds for the kernel, which limits them."""

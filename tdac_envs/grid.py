@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import constant, kernel, subkernel
 from tdac_envs.errors import MapError
 
 BoolGrid = NDArray[np.bool_]
@@ -101,13 +101,12 @@ def clearance(cells: BoolGrid) -> FloatGrid:
     height, width = cells.shape
     clear = np.empty((height, width), np.float32)
     rows = np.empty((height, width), np.int32)
-    _clearance(
-        cells, rows, np.empty(width + 2, np.int64), np.empty((2, width + 3)), clear
-    )
+    site, scratch = np.empty(width + 2, np.int64), np.empty((2, width + 3))
+    _clearance(constant(cells), rows, site, scratch, clear)
     return clear
 
 
-@kernel("b1[:,:] i4[:,:] i8[:] f8[:,:] f4[:,:] ->")
+@kernel
 def _clearance(
     cells: BoolGrid,
     up: NDArray[np.int32],
@@ -152,7 +151,7 @@ def _clearance(
             before = after
 
 
-@kernel()
+@subkernel
 def _rows_to_obstacle(cells: BoolGrid, rows: NDArray[np.int32]) -> None:
     """Rows from each pixel to the nearest occupied one of its column."""
     height, width = cells.shape

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.addresses import Addresses, Words, plane
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.grid import BoolGrid, body_free
 from tdac_envs.plan import distance_field
@@ -74,7 +75,10 @@ class Route:
         points = np.asarray(places, np.float64)[:, :2]
         cells = np.ascontiguousarray((points - (left, low)) / spacing)
         found = np.empty_like(cells)
-        look_ahead(self.roomy, self.shortest, cells, self.reach / spacing, found)
+        count, reach = len(cells), self.reach / spacing
+        own = Addresses([(self.roomy, self.shortest)])
+        words = np.broadcast_to(own.words, (count, *own.words.shape[1:])).copy()
+        look_ahead(np.arange(count), words, cells, np.full(count, reach), found)
         at = found * spacing + (left, low)
         return np.where(np.isfinite(found), at, self.goal)
 
@@ -159,7 +163,7 @@ def _near(field: Lengths, at: Any, far: float) -> float:
     return float((part + hops).min(initial=math.inf))
 
 
-@kernel()
+@subkernel
 def _entry(shortest: Lengths, column: float, row: float) -> tuple[int, int, float]:
     """The nearest grid point with a route, -1 for none, and its distance."""
     height, width = shortest.shape
@@ -174,7 +178,7 @@ def _entry(shortest: Lengths, column: float, row: float) -> tuple[int, int, floa
     return x, y, best
 
 
-@kernel()
+@subkernel
 def _next(field: Lengths, x: int, y: int) -> tuple[int, int, float]:
     """The next grid point down a field, and the length of the step; 0 at its end."""
     height, width = field.shape
@@ -190,32 +194,57 @@ def _next(field: Lengths, x: int, y: int) -> tuple[int, int, float]:
     return to_x, to_y, step
 
 
-@kernel("f4[:,:] f4[:,:] f8[:,:] f8 f8[:,:] ->")
-def look_ahead(
+@subkernel
+def _look_ahead(
     roomy: Lengths,
     shortest: Lengths,
-    places: NDArray[np.float64],
+    place: NDArray[np.float64],
     reach: float,
     found: NDArray[np.float64],
 ) -> None:
-    """Finds the next way-point from each place; all lengths in spacings.
+    """Finds the next way-point from a place; all lengths in spacings.
 
     Args:
         roomy: See `Route`.
         shortest: See `Route`.
-        places: Shape (n, 2), columns and rows, fractions too.
+        place: Shape (2,), column and row, fractions too.
         reach: How far to go.
+        found: Shape (2,), overwritten with a grid point; inf for the goal itself.
+    """
+    found[0] = found[1] = math.inf
+    x, y, gone = _entry(shortest, place[0], place[1])
+    step = 1.0
+    while gone < reach and step > 0.0:
+        if roomy[y, x] < math.inf:
+            x, y, step = _next(roomy, x, y)
+        else:
+            x, y, step = _next(shortest, x, y)
+        gone += step
+    if gone < math.inf and step > 0.0:
+        found[0], found[1] = x, y
+
+
+@kernel
+def look_ahead(
+    rows: Words,
+    words: Words,
+    places: NDArray[np.float64],
+    reaches: NDArray[np.float64],
+    found: NDArray[np.float64],
+) -> None:
+    """Finds the next way-points of many robots, each on a route of its own.
+
+    Args:
+        rows: Numbers of the robots, shape (k,).
+        words: Shape (n, 2, 4): where `roomy` and `shortest` of a robot's route are, in
+            a `tdac_envs.addresses.Addresses`.
+        places: Shape (n, 2), columns and rows, fractions too.
+        reaches: Shape (n,): how far to go, in spacings.
         found: Shape (n, 2), overwritten with grid points; inf for the goal itself.
     """
-    for k in range(places.shape[0]):
-        found[k, 0] = found[k, 1] = math.inf
-        x, y, gone = _entry(shortest, places[k, 0], places[k, 1])
-        step = 1.0
-        while gone < reach and step > 0.0:
-            if roomy[y, x] < math.inf:
-                x, y, step = _next(roomy, x, y)
-            else:
-                x, y, step = _next(shortest, x, y)
-            gone += step
-        if gone < math.inf and step > 0.0:
-            found[k, 0], found[k, 1] = x, y
+    for row in rows:
+        roomy, shortest = (
+            plane(words[row, 0], np.float32),
+            plane(words[row, 1], np.float32),
+        )
+        _look_ahead(roomy, shortest, places[row], reaches[row], found[row])

@@ -7,14 +7,16 @@ arrays of one robot are described in `tdac_envs.robot2d.Robot`.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.addresses import Words, block, line, plane
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.contact import contact_before, move, wrap_angle
 from tdac_envs.grid import FloatGrid
-from tdac_envs.rays import LeapGrid, cast_rays, sees
+from tdac_envs.rays import LeapGrid, cast_rays, in_sight
 from tdac_envs.stepping import (
     AXLE,
     DT,
@@ -36,6 +38,7 @@ from tdac_envs.stepping import (
     X,
     Y,
     apply_command,
+    give_command,
     settle,
     within,
 )
@@ -44,9 +47,11 @@ from tdac_envs.stepping import clear as forget
 # A body that was stopped by an obstacle goes back by this much of its way, px, so
 # that the next step starts outside it.
 CONTACT_GAP = 1e-6
+# Places of some arrays among those of `begin`.
+STATE, OUTCOME = 5, 10
 
 
-@kernel("f4[:,:] f8[:] f8 f8 f8 f8 f8 -> b1")
+@subkernel
 def advance(
     clear: FloatGrid,
     state: Array,
@@ -86,8 +91,8 @@ def advance(
     return bool(touch <= 1.0)
 
 
-@kernel("u1[:,:,:] f4[:,:] f8 f8 f8 -> f8")
-def path_distance(
+@subkernel
+def _path_distance(
     leaps: LeapGrid,
     field: FloatGrid,
     x: float,
@@ -116,14 +121,24 @@ def path_distance(
                 off_x, off_y = x - i, y - j
                 through = field[j, i] + math.sqrt(off_x * off_x + off_y * off_y)
                 # The four pixels around a point are never behind a wall.
-                if through < best and (ring == 0 or sees(leaps, x, y, i, j)):
+                if through < best and (
+                    ring == 0 or in_sight(leaps, x, y, float(i), float(j))
+                ):
                     best = through
         if best < math.inf:
             return best
     return previous
 
 
-@kernel()
+@kernel
+def path_distance(
+    leaps: LeapGrid, field: FloatGrid, x: float, y: float, previous: float
+) -> float:
+    """`_path_distance` for calls from Python."""
+    return _path_distance(leaps, field, x, y, previous)
+
+
+@subkernel
 def _observe(
     leaps: LeapGrid,
     clear: FloatGrid,
@@ -142,19 +157,14 @@ def _observe(
     goal_x, goal_y = constants[GOAL_X], constants[GOAL_Y]
     gap = math.hypot(goal_x - x, goal_y - y)
     near = gap <= constants[TOLERANCE]
-    outcome[REACHED] = near and sees(leaps, x, y, goal_x, goal_y)
+    outcome[REACHED] = near and in_sight(leaps, x, y, goal_x, goal_y)
     outcome[GAP] = gap
-    outcome[REMAINING] = path_distance(leaps, field, x, y, outcome[REMAINING])
+    outcome[REMAINING] = _path_distance(leaps, field, x, y, outcome[REMAINING])
     outcome[ROOM] = clear[math.floor(y + 1.5), math.floor(x + 1.5)]
 
 
-_ARRAYS = (
-    "u1[:,:,:] f4[:,:] f4[:,:] f8[:,:] f8[:] f8[:] f8[:,:] f4[:] f4[:] f4[:] f8[:] ->"
-)
-
-
-@kernel(_ARRAYS)
-def begin(
+@subkernel
+def _begin(
     leaps: LeapGrid,
     clear: FloatGrid,
     field: FloatGrid,
@@ -167,7 +177,7 @@ def begin(
     ranges: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Begins an episode where `state` says; arguments as of `drive`.
+    """Begins an episode where `state` says; arguments as of `_drive`.
 
     `outcome[REMAINING]` is given: the length of the shortest path from there.
     """
@@ -179,8 +189,8 @@ def begin(
     outcome[REACHED], outcome[REMAINING] = 0.0, remaining
 
 
-@kernel(_ARRAYS)
-def drive(
+@subkernel
+def _drive(
     leaps: LeapGrid,
     clear: FloatGrid,
     field: FloatGrid,
@@ -223,3 +233,65 @@ def drive(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
     settle(constants, state, outcome, before)
+
+
+@subkernel
+def _arrays_at(words: Words) -> Any:
+    """The arrays of a robot: of the world `leaps`, `clear`, `field`, `directions`, then
+    those of `Robot`, each as `_drive` says.
+    """
+    return (
+        block(words[0], np.uint8),
+        plane(words[1], np.float32),
+        plane(words[2], np.float32),
+        plane(words[3], np.float64),
+        line(words[4], np.float64),
+        line(words[STATE], np.float64),
+        plane(words[6], np.float64),
+        line(words[7], np.float32),
+        line(words[8], np.float32),
+        line(words[9], np.float32),
+        line(words[OUTCOME], np.float64),
+    )
+
+
+@kernel
+def begin(words: Words) -> None:
+    """Begins an episode where the robot's `state` says, from `outcome[REMAINING]`.
+
+    Args:
+        words: Shape (11, 4), of a `tdac_envs.addresses.Addresses`; see `Setup.world`.
+    """
+    _begin(*_arrays_at(words))
+
+
+@kernel
+def drive(words: Words) -> None:
+    """One step of a robot; `words` as for `begin`."""
+    _drive(*_arrays_at(words))
+
+
+@kernel
+def step_rows(
+    rows: Words,
+    over: NDArray[np.bool_],
+    commands: Array,
+    starts: Array,
+    words: Words,
+) -> None:
+    """One step of many robots, or the begin of an episode where one is over.
+
+    Args:
+        rows: Numbers of the robots, shape (k,).
+        over: Shape (n,): whether a robot's episode begins.
+        commands: Shape (n, 2): wanted speeds of the wheels.
+        starts: Shape (n, 4): pose in which an episode begins, and the way from there.
+        words: Shape (n, 11, 4); see `begin`.
+    """
+    for row in rows:
+        own = _arrays_at(words[row])
+        give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
+        if over[row]:
+            _begin(*own)
+        else:
+            _drive(*own)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from tdac_envs.addresses import Addresses
 from tdac_envs.arguments import not_negative, one_of
 from tdac_envs.driven import DrivenEnv, Observation
 from tdac_envs.kernels import begin, drive
@@ -217,7 +219,7 @@ class Map2DEnv(DrivenEnv):
     def __getstate__(self) -> dict[str, Any]:
         return {
             **self.__dict__,
-            **dict.fromkeys(("_call_begin", "_call_drive", "_copies")),
+            **dict.fromkeys(("_addresses", "_call_begin", "_call_drive", "_copies")),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -226,9 +228,10 @@ class Map2DEnv(DrivenEnv):
 
     def _bind(self) -> None:
         """Makes the kernels' calls on this environment's own arrays."""
-        arguments = self.setup.arguments(self.task, self.robot)
-        self._call_begin: Callable[[], None] = begin.bind(*arguments)
-        self._call_drive = drive.bind(*arguments)
+        self._addresses = Addresses([(*self.setup.world(self.task), *self.robot)])
+        (words,) = self._addresses.words
+        self._call_begin: Callable[[], None] = partial(begin, words)
+        self._call_drive = partial(drive, words)
         robot = self.robot
         seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
         self._copies = [array.copy for array in seen]

@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode
 from tdac_envs.arguments import whole_number
 from tdac_envs.batching import no_pictures, several
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
-from tdac_envs.kernels import begin, drive
+from tdac_envs.kernels import step_rows
 from tdac_envs.map2d import Map2DEnv, noisy
 
 
@@ -35,6 +35,8 @@ class Map2DVectorEnv(DrivenVectorEnv):
         **options: Arguments of `Map2DEnv`, for all robots.
     """
 
+    step_rows = staticmethod(step_rows)
+
     def __init__(
         self,
         num_envs: int = 1,
@@ -50,8 +52,6 @@ class Map2DVectorEnv(DrivenVectorEnv):
         super().__init__(
             several(Map2DEnv, each, options, num_envs),
             num_envs,
-            begin,
-            drive,
             autoreset_mode=autoreset_mode,
             threads=threads,
         )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.astar import ROUNDING, Guide, Lengths, lengths_between
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import constant, kernel
 from tdac_envs.grid import BoolGrid
 
 Path = NDArray[np.float64]
@@ -20,7 +20,7 @@ _SQRT2 = 2.0**0.5
 _SOLID, _OPEN, _TRIED = 0, 1, 2
 
 
-@kernel("b1[:,:] i8 i8 f8[:,:] b1[:] i8[:,:] -> b1")
+@kernel
 def _spread(
     free: BoolGrid,
     goal_x: int,
@@ -85,11 +85,11 @@ def distance_field(free: BoolGrid, goal: tuple[int, int]) -> Field:
     """
     if not _is_free(free, goal):
         return np.full(free.shape, np.inf)
-    room = 4 * sum(free.shape) + 1024
+    room, open_ = 4 * sum(free.shape) + 1024, constant(free)
     while True:
         field: Field = np.full(free.shape, np.inf)
         settled, buckets = np.zeros(free.size, np.bool_), np.empty((3, room), np.int64)
-        if _spread(free, goal[0], goal[1], field, settled, buckets):
+        if _spread(open_, *goal, field, settled, buckets):
             return field
         room *= 4
 
@@ -100,7 +100,7 @@ def _is_free(free: BoolGrid, pixel: tuple[int, int]) -> bool:
     return inside and bool(free[pixel[::-1]])
 
 
-@kernel("b1[:,:] f8[:,:] i8 i8 i8[:,:] -> i8")
+@kernel
 def _descend(
     free: BoolGrid, field: Field, start_x: int, start_y: int, path: NDArray[np.int64]
 ) -> int:
@@ -139,7 +139,8 @@ def descend(free: BoolGrid, field: Field, start: tuple[int, int]) -> Path:
     if not inside or not np.isfinite(field[start[1], start[0]]):
         return np.empty((0, 2))
     pixels = np.empty((int(field[start[1], start[0]]) + 2, 2), np.int64)
-    count = _descend(free, field, start[0], start[1], pixels)
+    known = constant(field, np.float64)
+    count = _descend(constant(free), known, *start, pixels)
     return pixels[:count].astype(np.float64)
 
 
@@ -221,7 +222,7 @@ def _among(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> P
     return pixels[:count].astype(np.float64) - 1
 
 
-@kernel("u1[:,:] f8[:,:] i8 i8 i8[:,:] i8[:] -> i8")
+@kernel
 def _walk(
     open_: NDArray[np.uint8],
     lengths: Lengths,

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import constant, kernel, subkernel
 from tdac_envs.grid import BoolGrid
 
 LeapGrid = NDArray[np.uint8]
@@ -36,11 +36,11 @@ def leaps_of(cells: BoolGrid) -> LeapGrid:
     """
     height, width = cells.shape
     leaps = np.zeros((4, height + 2, width + 2), np.uint8)
-    _fill_leaps(cells, leaps)
+    _fill_leaps(constant(cells), leaps)
     return leaps
 
 
-@kernel("b1[:,:] u1[:,:,:] ->")
+@kernel
 def _fill_leaps(cells: BoolGrid, leaps: LeapGrid) -> None:
     """The square of a pixel is one more than the least of its three neighbours'."""
     height, width = cells.shape
@@ -58,7 +58,7 @@ def _fill_leaps(cells: BoolGrid, leaps: LeapGrid) -> None:
                     out[j, i] = min(least, _LONGEST - 1) + 1
 
 
-@kernel()
+@subkernel
 def _cast(
     leaps: LeapGrid, u: float, v: float, dx: float, dy: float, range_max: float
 ) -> float:
@@ -89,7 +89,7 @@ def _cast(
             return range_max
 
 
-@kernel("u1[:,:,:] f8 f8 f8 f8 -> f8")
+@subkernel
 def cast_ray(
     leaps: LeapGrid, x: float, y: float, angle: float, range_max: float
 ) -> float:
@@ -105,7 +105,7 @@ def cast_ray(
     return _cast_from(leaps, x, y, math.cos(angle), math.sin(angle), range_max)
 
 
-@kernel()
+@subkernel
 def _cast_from(
     leaps: LeapGrid, x: float, y: float, dx: float, dy: float, range_max: float
 ) -> float:
@@ -114,7 +114,7 @@ def _cast_from(
     return _cast(leaps, u, v, dx, dy, range_max) if _is_on(leaps, u, v) else 0.0
 
 
-@kernel()
+@subkernel
 def _is_on(leaps: LeapGrid, u: float, v: float) -> bool:
     """Whether a point of the padded map is one."""
     return bool(0.0 <= u < leaps.shape[2] and 0.0 <= v < leaps.shape[1])
@@ -137,7 +137,7 @@ def fan(field_of_view: float, n_rays: int) -> NDArray[np.float64]:
     return np.array([[math.cos(v) for v in offsets], [math.sin(v) for v in offsets]])
 
 
-@kernel("u1[:,:,:] f8[:,:] f8 f8 f8 f8 f4[:] ->")
+@subkernel
 def cast_rays(
     leaps: LeapGrid,
     directions: NDArray[np.float64],
@@ -169,8 +169,8 @@ def cast_rays(
         out[k] = _cast(leaps, u, v, dx, dy, range_max)
 
 
-@kernel("u1[:,:,:] f8 f8 f8 f8 -> b1")
-def sees(leaps: LeapGrid, x: float, y: float, to_x: float, to_y: float) -> bool:
+@subkernel
+def in_sight(leaps: LeapGrid, x: float, y: float, to_x: float, to_y: float) -> bool:
     """Whether the segment between two points crosses no occupied square."""
     off_x, off_y = to_x - x, to_y - y
     distance = math.sqrt(off_x * off_x + off_y * off_y)
@@ -178,3 +178,9 @@ def sees(leaps: LeapGrid, x: float, y: float, to_x: float, to_y: float) -> bool:
         return True
     dx, dy = off_x / distance, off_y / distance
     return bool(_cast_from(leaps, x, y, dx, dy, distance) >= distance)
+
+
+@kernel
+def sees(leaps: LeapGrid, x: float, y: float, to_x: float, to_y: float) -> bool:
+    """`in_sight` for calls from Python."""
+    return bool(in_sight(leaps, x, y, to_x, to_y))

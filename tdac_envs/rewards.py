@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from tdac_envs.arguments import not_negative, one_of
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import subkernel
 
 
 class RewardWeights(NamedTuple):
@@ -39,7 +39,7 @@ def weights_of(given: Mapping[str, float] | None) -> RewardWeights:
     return RewardWeights(**weights)
 
 
-@kernel()
+@subkernel
 def step_reward(
     weights: RewardWeights, progress: float, reached: bool, collided: bool
 ) -> float:

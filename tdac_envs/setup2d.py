@@ -14,7 +14,7 @@ from tdac_envs.errors import TaskError
 from tdac_envs.params import RobotParams
 from tdac_envs.rays import fan
 from tdac_envs.rewards import RewardWeights
-from tdac_envs.robot2d import Robot, constants_of
+from tdac_envs.robot2d import constants_of
 from tdac_envs.task2d import (
     Map2DTask,
     default_horizon,
@@ -68,16 +68,10 @@ class Setup:
             stops=self.on_collision == "terminate",
         )
 
-    def arguments(self, task: Map2DTask, robot: Robot) -> tuple[Any, ...]:
-        """What the kernels `begin` and `drive` take."""
+    def world(self, task: Map2DTask) -> tuple[NDArray[Any], ...]:
+        """What the kernels `begin` and `drive` take beside the robot's memory."""
         terrain = task.terrain
-        return (
-            terrain.leaps,
-            terrain.padded_clear,
-            task.field,
-            self.directions,
-            *robot,
-        )
+        return terrain.leaps, terrain.padded_clear, task.field, self.directions
 
     def draw(self, options: dict[str, Any], random: np.random.Generator) -> Map2DTask:
         """The task of an episode.

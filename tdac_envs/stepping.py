@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import subkernel
 from tdac_envs.rewards import RewardWeights, step_reward
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ GAP, REMAINING, ROOM = range(7, 10)
 N_OUTCOME = 10
 
 
-@kernel()
+@subkernel
 def clear(
     state: Array, queue: Array, wheel_speeds: NDArray[np.float32], outcome: Array
 ) -> None:
@@ -42,13 +42,33 @@ def clear(
     outcome[:REMAINING] = 0.0
 
 
-@kernel()
+@subkernel
+def give_command(
+    begins: bool, command: Array, start: Array, state: Array, outcome: Array
+) -> None:
+    """Prepares a robot of a batch for its next call of `begin` or `drive`.
+
+    Args:
+        begins: Whether its episode begins.
+        command: Shape (2,): wanted speeds of the wheels.
+        start: Shape (4,): pose in which an episode begins, and the way from there.
+        state: Overwritten.
+        outcome: Overwritten.
+    """
+    if begins:
+        state[X], state[Y], state[HEADING] = start[0], start[1], start[2]
+        outcome[REMAINING] = start[3]
+    else:
+        state[LEFT], state[RIGHT] = command[0], command[1]
+
+
+@subkernel
 def within(value: float) -> float:
     """The value, limited to [-1, 1]."""
     return min(max(value, -1.0), 1.0)
 
 
-@kernel()
+@subkernel
 def apply_command(
     constants: Array,
     state: Array,
@@ -71,7 +91,7 @@ def apply_command(
     wheel_speeds[1] = right + lag * (wheel_speeds[1] - right)
 
 
-@kernel()
+@subkernel
 def settle(constants: Array, state: Array, outcome: Array, before: float) -> None:
     """Reward and end of a step, from what was touched and reached.
 

@@ -12,7 +12,7 @@ from tdac_envs.grid import FloatGrid
 _SHORTEST_PIECE = 4.0
 
 
-@kernel("f4[:,:] f8 f8 f8 f8 f8 -> b1")
+@kernel
 def gets_straight(
     clear: FloatGrid, x: float, y: float, to_x: float, to_y: float, radius: float
 ) -> bool:

@@ -269,11 +269,8 @@ def _may_start(task: Map2DTask, pose: Pose) -> bool:
         terrain.padded_clear,
         terrain.leaps,
         task.field,
-        pose.x,
-        pose.y,
-        task.robot.radius,
-        *task.goal,
-        task.goal_tolerance,
+        *map(float, (pose.x, pose.y, task.robot.radius)),
+        *map(float, (*task.goal, task.goal_tolerance)),
     )
 
 

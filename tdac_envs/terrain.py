@@ -24,7 +24,7 @@ from tdac_envs.grid import (
 )
 from tdac_envs.kernels import path_distance
 from tdac_envs.plan import distance_field
-from tdac_envs.rays import LeapGrid, leaps_of, sees
+from tdac_envs.rays import LeapGrid, in_sight, leaps_of, sees
 
 Point = tuple[float, float]
 
@@ -69,7 +69,7 @@ def at_goal(
     """Whether (x, y) is within the tolerance and no wall stands in between."""
     if math.hypot(goal[0] - x, goal[1] - y) > tolerance:
         return False
-    return bool(sees(terrain.leaps, x, y, *goal))
+    return bool(sees(terrain.leaps, *map(float, (x, y, *goal))))
 
 
 def _near(x: float, y: float, shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
@@ -118,7 +118,7 @@ def _may_hop(
         math.atan2(end[1] - begin[1], end[0] - begin[0]),
         math.dist(begin, end),
         0.0,
-        radius,
+        float(radius),
     )
     return bool(touch > 1.0)
 
@@ -156,7 +156,7 @@ def _nearest_place(terrain: Terrain, x: float, y: float, radius: float) -> str:
     return f"the nearest free pixel is ({columns[nearest]}, {rows[nearest]})"
 
 
-@kernel("f4[:,:] u1[:,:,:] f4[:,:] f8 f8 f8 f8 f8 f8 -> b1")
+@kernel
 def may_start(
     clear: FloatGrid,
     leaps: LeapGrid,
@@ -185,7 +185,7 @@ def may_start(
     if not has_room(clear, x, y, body):
         return False
     near = math.hypot(goal_x - x, goal_y - y) <= tolerance
-    if near and sees(leaps, x, y, goal_x, goal_y):
+    if near and in_sight(leaps, x, y, goal_x, goal_y):
         return False
     height, width = field.shape
     column, row = math.floor(x + 0.5), math.floor(y + 0.5)
@@ -244,7 +244,7 @@ _shared_field = lru_cache(maxsize=4)(field_to)
 
 def way(terrain: Terrain, field: NDArray[np.float32], x: float, y: float) -> float:
     """Length of the shortest path from any point by a field of `field_to`, px."""
-    return float(path_distance(terrain.leaps, field, x, y, math.inf))
+    return float(path_distance(terrain.leaps, field, float(x), float(y), math.inf))
 
 
 def widest_connected_radius(clear: FloatGrid, start: Point, goal: Point) -> float:

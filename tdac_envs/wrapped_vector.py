@@ -11,10 +11,11 @@ from gymnasium.vector import VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from tdac_envs.addresses import Addresses
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
 from tdac_envs.errors import TaskError
 from tdac_envs.guidance import Route, look_ahead, route_to_goal
-from tdac_envs.rows import Rows
+from tdac_envs.slices import Rows, Slices
 from tdac_envs.wrappers import Frame, check_wrappers, guided_space
 
 Array = NDArray[np.float64]
@@ -39,10 +40,11 @@ class Routes:
         # Robots of one setup mostly have one task in the beginning.
         known = {id(task): task for task in self._tasks}
         routes = {key: route_to_goal(task) for key, task in known.items()}
-        arguments = [
-            self._arguments(i, routes[id(task)]) for i, task in enumerate(self._tasks)
-        ]
-        self._rows = Rows((look_ahead,), arguments, batch.threads)
+        own = [routes[id(task)] for task in self._tasks]
+        self._addresses = Addresses((route.roomy, route.shortest) for route in own)
+        for i, route in enumerate(own):
+            self._place(i, route)
+        self._slices = Slices(batch.threads)
 
     def refresh(self) -> None:
         """Has the routes lead to the goals of the episodes that have begun."""
@@ -51,26 +53,32 @@ class Routes:
             return
         for i, task in enumerate(tasks):
             if task is not self._tasks[i]:
-                self._rows.put(i, *self._arguments(i, route_to_goal(task)))
+                route = route_to_goal(task)
+                self._addresses.put(i, (route.roomy, route.shortest))
+                self._place(i, route)
         self._tasks = list(tasks)
 
     def ahead(self, poses: Array) -> Array:
         """The next way-point of each robot, shape (n, 2), as of `Route.ahead`."""
         np.divide(poses[:, :2] - self._corners, self._spacings, out=self._cells)
-        self._rows.call_all()
+        words = self._addresses.words
+        reaches = (self.reach / self._spacings)[:, 0]
+
+        def look(some: Rows) -> None:
+            look_ahead(some, words, self._cells, reaches, self._found)
+
+        self._slices.run(look, np.arange(len(self._tasks)))
         at = self._found * self._spacings + self._corners
         return np.where(np.isfinite(self._found), at, self._goals)
 
     def close(self) -> None:
         """Ends the threads."""
-        self._rows.close()
+        self._slices.close()
 
-    def _arguments(self, i: int, route: Route) -> tuple[Any, ...]:
+    def _place(self, i: int, route: Route) -> None:
+        """Keeps where a robot's route lies."""
         *self._corners[i], self._spacings[i] = route.frame
         self._goals[i], self.reach[i] = route.goal, route.reach
-        own = slice(i, i + 1)
-        steps = route.reach / route.frame[2]
-        return route.roomy, route.shortest, self._cells[own], steps, self._found[own]
 
 
 class WrappedVectorEnv(VectorWrapper):

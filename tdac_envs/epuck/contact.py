@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.contact import free_way, move, wrap_angle
-from tdac_envs.epuck.gaps import part_gap
+from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, Array, Index
 
 # As in `tdac_envs.contact`, but in metres: a disc in touch may get this much deeper
@@ -27,7 +27,7 @@ CONTACT_GAP = 1e-9
 X, Y, HEADING = range(3)
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f8 f8 f8 f8 f8 f8 -> f8")
+@kernel
 def first_touch(
     points: Array,
     first: Index,
@@ -64,7 +64,7 @@ def first_touch(
     )  # fmt: skip
 
 
-@kernel()
+@subkernel
 def touch_of(
     points: Array,
     first: Index,
@@ -96,7 +96,7 @@ def touch_of(
     return best / length if best < length else 2.0
 
 
-@kernel()
+@subkernel
 def _scan(
     points: Array,
     first: Index,
@@ -124,7 +124,7 @@ def _scan(
         off_x, off_y = extent[k, MID_X] - x, extent[k, MID_Y] - y
         off = math.sqrt(off_x * off_x + off_y * off_y)
         if off - extent[k, REACH] - radius < best:
-            gap = part_gap(points, first, extent, k, x, y)[0] - radius
+            gap = gap_of(points, first, extent, k, x, y)[0] - radius
             nearest = min(nearest, gap)
             if gap < best:
                 best = _travel(
@@ -134,7 +134,7 @@ def _scan(
     return best, nearest
 
 
-@kernel()
+@subkernel
 def _travel(
     points: Array,
     first: Index,
@@ -161,7 +161,7 @@ def _travel(
     curvature = abs(turn) / length
     way, at_x, at_y, at_heading = 0.0, x, y, heading
     while True:
-        gap, away_x, away_y = part_gap(points, first, extent, part, at_x, at_y)
+        gap, away_x, away_y = gap_of(points, first, extent, part, at_x, at_y)
         rest = gap - radius - floor
         along = away_x * math.cos(at_heading) + away_y * math.sin(at_heading)
         approach = math.copysign(1.0, forward) * along
@@ -178,7 +178,7 @@ def _travel(
         at_x, at_y, at_heading = move(x, y, heading, share * forward, share * turn)
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] i8[:] i8 i8 f8[:] f8 f8 f8 -> b1")
+@subkernel
 def advance(
     points: Array,
     first: Index,

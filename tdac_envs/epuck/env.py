@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.addresses import Addresses
 from tdac_envs.arguments import not_negative, one_of
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.driven import DrivenEnv, Observation
@@ -252,7 +254,9 @@ class EPuckEnv(DrivenEnv):
         return np.column_stack([centres, np.zeros(len(centres))])
 
     def __getstate__(self) -> dict[str, Any]:
-        calls = dict.fromkeys(("_call_begin", "_call_drive", "_call_alone"))
+        calls = dict.fromkeys(
+            ("_addresses", "_call_begin", "_call_drive", "_call_alone")
+        )
         return {**self.__dict__, **calls, "_scene": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -261,14 +265,13 @@ class EPuckEnv(DrivenEnv):
 
     def _bind(self) -> None:
         """Makes the kernels' calls on this environment's own arrays."""
-        arguments = self._arguments()
-        self._call_begin: Callable[[], None] = kernels.begin.bind(*arguments)
-        self._call_drive = kernels.drive.bind(*arguments)
+        world = self.setup.world(self.task, self._solid, self._seen)
+        self._addresses = Addresses([(*world, *self.robot)])
+        (words,) = self._addresses.words
+        self._call_begin: Callable[[], None] = partial(kernels.begin, words)
+        self._call_drive = partial(kernels.drive, words)
         if self._pushes:
             self._call_alone, self._call_drive = self._call_drive, self._push
-
-    def _arguments(self) -> tuple[Any, ...]:
-        return self.setup.arguments(self.task, self.robot, self._solid, self._seen)
 
     def _push(self) -> None:
         """Takes the step, with physics if something that can be pushed is near."""
@@ -280,15 +283,16 @@ class EPuckEnv(DrivenEnv):
             self._speed[:] = 0.0
             self._call_alone()
             return
-        constants, state, queue, _, speeds, *_, outcome = robot
-        kernels.turn_wheels(constants, state, queue, speeds, outcome)
+        (words,) = self._addresses.words
+        state, outcome = robot.state, robot.outcome
+        kernels.turn_wheels(words)
         forward, turn = outcome[kernels.FORWARD :].tolist()
         outcome[TOUCHED] = push(
             self._solid, ground.solid, ground.centres, ground.masses,
             state, self._speed, self._things, Drive(forward, turn, task.dt),
         )  # fmt: skip
         self._carry()
-        kernels.finish(*self._arguments())
+        kernels.finish(words)
 
     def _carry(self) -> None:
         """Puts what is solid and what is seen where the things are."""

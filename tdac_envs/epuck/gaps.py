@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, ROUND, Array, Index
 
 
-@kernel()
-def part_gap(
+@subkernel
+def gap_of(
     points: Array, first: Index, extent: Array, part: int, x: float, y: float
 ) -> tuple[float, float, float]:
     """Signed distance from a point to a part, and the unit vector that leads away."""
@@ -44,11 +44,19 @@ def part_gap(
     return distance, near_x / distance, near_y / distance
 
 
-@kernel()
+@kernel
+def part_gap(
+    points: Array, first: Index, extent: Array, part: int, x: float, y: float
+) -> tuple[float, float, float]:
+    """`gap_of` for calls from Python."""
+    return gap_of(points, first, extent, part, x, y)
+
+
+@subkernel
 def _depth(
     points: Array, begin: int, end: int, x: float, y: float
 ) -> tuple[float, float, float]:
-    """As `part_gap`, of a point that is not outside a polygon."""
+    """As `gap_of`, of a point that is not outside a polygon."""
     outside, out_x, out_y = -math.inf, 1.0, 0.0
     for i in range(begin, end):
         j = i + 1 if i + 1 < end else begin
@@ -61,7 +69,7 @@ def _depth(
     return min(outside, 0.0), out_x, out_y
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f8 f8 -> f8")
+@kernel
 def nearest_gap(
     points: Array, first: Index, extent: Array, x: float, y: float
 ) -> float:
@@ -69,7 +77,7 @@ def nearest_gap(
     return nearest_of(points, first, extent, first[:0], 0, extent.shape[0], x, y)
 
 
-@kernel()
+@subkernel
 def nearest_of(
     points: Array,
     first: Index,
@@ -87,11 +95,11 @@ def nearest_of(
         off_x, off_y = extent[k, MID_X] - x, extent[k, MID_Y] - y
         near = best + extent[k, REACH]
         if near > 0.0 and off_x * off_x + off_y * off_y < near * near:
-            best = min(best, part_gap(points, first, extent, k, x, y)[0])
+            best = min(best, gap_of(points, first, extent, k, x, y)[0])
     return best
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f8 f8 f8 f8[:,:] ->")
+@kernel
 def clear_grid(
     points: Array,
     first: Index,
@@ -133,5 +141,5 @@ def clear_grid(
                 min(math.ceil((x1 + reach - left) / spacing) + 1, width),
             ):
                 x, y = left + u * spacing, low + v * spacing
-                gap = part_gap(points, first, extent, k, x, y)[0]
+                gap = gap_of(points, first, extent, k, x, y)[0]
                 clear[v, u] = min(clear[v, u], gap)

@@ -81,8 +81,7 @@ class Ground:
 
     def gap(self, x: float, y: float) -> float:
         """Distance from a point to what is solid, m; negative within it."""
-        solid = self.solid
-        return nearest_gap(solid.points, solid.first, solid.extent, x, y)
+        return nearest_gap(*self.solid.arrays(), float(x), float(y))
 
     def at(self, column: int, row: int) -> Point:
         """A grid point's place."""
@@ -171,5 +170,5 @@ def _clearances(solid: Prisms, bounds: Bounds) -> tuple[float, NDArray[np.float6
     spacing = max(SPACING, math.sqrt(width * height / MOST_POINTS))
     shape = (math.floor(height / spacing) + 1, math.floor(width / spacing) + 1)
     clear = np.full(shape, _WIDEST)
-    clear_grid(solid.points, solid.first, solid.extent, left, low, spacing, clear)
+    clear_grid(*solid.arrays(), left, low, spacing, clear)
     return spacing, clear

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.epuck.prisms import (
     FACTOR,
     HIGH,
@@ -70,7 +70,7 @@ GROUND_HEIGHT, GROUND_RANGE = 0.003, 0.016
 GROUND_TABLE = np.array([(0.0, 1000.0, 0.002), (0.016, 300.0, 0.004)])
 
 
-@kernel()
+@subkernel
 def _interpolated(table: Array, distance: float, column: int) -> float:
     """Linear between the rows of a table, the end values beyond it."""
     last = table.shape[0] - 1
@@ -84,7 +84,7 @@ def _interpolated(table: Array, distance: float, column: int) -> float:
     return float(table[last, column])
 
 
-@kernel("f8 -> f8")
+@subkernel
 def response(distance: float) -> float:
     """What a sensor reads, without noise, of a thing of reflectance 1.
 
@@ -94,13 +94,13 @@ def response(distance: float) -> float:
     return _interpolated(TABLE, distance, 1)
 
 
-@kernel("f8 -> f8")
+@subkernel
 def spread(distance: float) -> float:
     """Relative standard deviation of a reading; `distance` as for `response`."""
     return _interpolated(TABLE, distance, 2)
 
 
-@kernel()
+@subkernel
 def crossing(
     points: Array,
     first: Index,
@@ -149,8 +149,8 @@ def crossing(
     return near
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f8 f8 f8 f8 -> b1")
-def sees(
+@subkernel
+def in_sight(
     points: Array,
     first: Index,
     extent: Array,
@@ -167,6 +167,20 @@ def sees(
     return True
 
 
+@kernel
+def sees(
+    points: Array,
+    first: Index,
+    extent: Array,
+    x: float,
+    y: float,
+    to_x: float,
+    to_y: float,
+) -> bool:
+    """`in_sight` for calls from Python."""
+    return bool(in_sight(points, first, extent, x, y, to_x, to_y))
+
+
 def at_ray_height(extent: Array, floor: float) -> NDArray[np.bool_]:
     """Which parts are neither too low nor too high for all rays, shape (n,)."""
     bottom = floor + HEIGHT
@@ -175,7 +189,7 @@ def at_ray_height(extent: Array, floor: float) -> NDArray[np.bool_]:
     )
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] i8[:] i8 i8 f8 f8[:] f4[:] f8[:,:] ->")
+@subkernel
 def sense(
     points: Array,
     first: Index,
@@ -240,7 +254,7 @@ def sense(
             hits[i, 2] = _interpolated(TABLE, distance, 2)
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f8 f8[:] f4[:] f8[:] ->")
+@kernel
 def sense_ground(
     points: Array,
     first: Index,

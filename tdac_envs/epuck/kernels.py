@@ -6,15 +6,17 @@ The arrays of one robot are described in `tdac_envs.epuck.robot.Robot`.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.addresses import Words, line, plane
+from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.contact import move, wrap_angle
 from tdac_envs.epuck.contact import advance
 from tdac_envs.epuck.gaps import nearest_of
-from tdac_envs.epuck.infrared import sees, sense
+from tdac_envs.epuck.infrared import in_sight, sense
 from tdac_envs.epuck.nearby import listed_at
 from tdac_envs.epuck.prisms import Array, Index
 from tdac_envs.stepping import (
@@ -37,6 +39,7 @@ from tdac_envs.stepping import (
     Y,
     apply_command,
     clear,
+    give_command,
     settle,
     within,
 )
@@ -53,9 +56,11 @@ LEFT_TURNED, RIGHT_TURNED = range(8, 10)
 N_STATE = 10
 FORWARD, TURN = range(10, 12)
 N_OUTCOME = 12
+# Places of some arrays among those of `begin`.
+CONSTANTS, STATE, QUEUE, WHEEL_SPEEDS, OUTCOME = 11, 12, 13, 15, 19
 
 
-@kernel()
+@subkernel
 def way_left(
     field: NDArray[np.float32], constants: Array, x: float, y: float, previous: float
 ) -> float:
@@ -81,7 +86,7 @@ def way_left(
     return previous
 
 
-@kernel()
+@subkernel
 def _observe(
     points: Array,
     first: Index,
@@ -102,7 +107,7 @@ def _observe(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Fills in what follows from where the robot is; arguments as for `drive`."""
+    """Fills in what follows from where the robot is; arguments as for `_drive`."""
     x, y, goal_x, goal_y = state[X], state[Y], constants[GOAL_X], constants[GOAL_Y]
     left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
     pose[0], pose[1], pose[2] = x, y, state[HEADING]
@@ -119,19 +124,13 @@ def _observe(
     begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
     room = nearest_of(points, first, extent, listed, begin, end, x, y)
     outcome[REACHED] = gap <= constants[TOLERANCE] and (
-        gap < room or sees(points, first, extent, x, y, goal_x, goal_y)
+        gap < room or in_sight(points, first, extent, x, y, goal_x, goal_y)
     )
     outcome[GAP], outcome[ROOM] = gap, room
 
 
-_ARRAYS = (
-    "f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] f8[:,:] i8[:] f8[:,:] i8[:,:] i8[:] f4[:,:] "
-    "f8[:] f8[:] f8[:,:] f4[:] f4[:] f4[:] f4[:] f8[:,:] f8[:] ->"
-)
-
-
-@kernel(_ARRAYS)
-def begin(
+@subkernel
+def _begin(
     points: Array,
     first: Index,
     extent: Array,
@@ -153,7 +152,7 @@ def begin(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Begins an episode where `state` says; arguments as for `drive`.
+    """Begins an episode where `state` says; arguments as for `_drive`.
 
     `outcome[REMAINING]` is given: the length of the shortest path from there.
     """
@@ -168,8 +167,8 @@ def begin(
     outcome[REACHED], outcome[REMAINING] = 0.0, remaining
 
 
-@kernel("f8[:] f8[:] f8[:,:] f4[:] f8[:] ->")
-def turn_wheels(
+@subkernel
+def _turn_wheels(
     constants: Array,
     state: Array,
     queue: Array,
@@ -178,7 +177,7 @@ def turn_wheels(
 ) -> None:
     """Sets the wheels' speeds and angles, and in `outcome` the arc that they wish.
 
-    Arguments as for `drive`.
+    Arguments as for `_drive`.
     """
     apply_command(constants, state, queue, wheel_speeds, outcome)
     swept = constants[MAX_SPEED] * constants[DT]
@@ -191,8 +190,8 @@ def turn_wheels(
     outcome[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]
 
 
-@kernel(_ARRAYS)
-def finish(
+@subkernel
+def _finish(
     points: Array,
     first: Index,
     extent: Array,
@@ -214,9 +213,9 @@ def finish(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Ends a step after `turn_wheels`, when the robot is where it gets to.
+    """Ends a step after `_turn_wheels`, when the robot is where it gets to.
 
-    Arguments as for `drive`; `outcome[TOUCHED]` is given.
+    Arguments as for `_drive`; `outcome[TOUCHED]` is given.
     """
     before = outcome[REMAINING]
     _observe(
@@ -227,8 +226,8 @@ def finish(
     settle(constants, state, outcome, before)
 
 
-@kernel(_ARRAYS)
-def drive(
+@subkernel
+def _drive(
     points: Array,
     first: Index,
     extent: Array,
@@ -274,7 +273,7 @@ def drive(
         hits: Overwritten.
         outcome: Overwritten; what it says of the place where the step begins is used.
     """
-    turn_wheels(constants, state, queue, wheel_speeds, outcome)
+    _turn_wheels(constants, state, queue, wheel_speeds, outcome)
     forward, turn, x, y = outcome[FORWARD], outcome[TURN], state[X], state[Y]
     if outcome[ROOM] - constants[RADIUS] > abs(forward):
         # Nothing is within reach.
@@ -288,8 +287,98 @@ def drive(
             points, first, extent, listed, begin, end,
             state, forward, turn, constants[RADIUS],
         )  # fmt: skip
-    finish(
+    _finish(
         points, first, extent, cells, listed,
         seen_points, seen_first, seen_extent, seen_cells, seen_listed, field,
         constants, state, queue, pose, wheel_speeds, turned, readings, hits, outcome,
     )  # fmt: skip
+
+
+@subkernel
+def _arrays_at(words: Words) -> Any:
+    """The arrays of a robot, as `_drive` takes them."""
+    return (
+        plane(words[0], np.float64),
+        line(words[1], np.int64),
+        plane(words[2], np.float64),
+        plane(words[3], np.int64),
+        line(words[4], np.int64),
+        plane(words[5], np.float64),
+        line(words[6], np.int64),
+        plane(words[7], np.float64),
+        plane(words[8], np.int64),
+        line(words[9], np.int64),
+        plane(words[10], np.float32),
+        line(words[CONSTANTS], np.float64),
+        line(words[STATE], np.float64),
+        plane(words[QUEUE], np.float64),
+        line(words[14], np.float32),
+        line(words[WHEEL_SPEEDS], np.float32),
+        line(words[16], np.float32),
+        line(words[17], np.float32),
+        plane(words[18], np.float64),
+        line(words[OUTCOME], np.float64),
+    )
+
+
+@kernel
+def begin(words: Words) -> None:
+    """Begins an episode where the robot's `state` says, from `outcome[REMAINING]`.
+
+    Args:
+        words: Shape (20, 4), of a `tdac_envs.addresses.Addresses`: of the world as
+            `Setup.world` has it, and of the robot.
+    """
+    _begin(*_arrays_at(words))
+
+
+@kernel
+def drive(words: Words) -> None:
+    """One step in which nothing is pushed; `words` as for `begin`."""
+    _drive(*_arrays_at(words))
+
+
+@kernel
+def turn_wheels(words: Words) -> None:
+    """The begin of a step in which things may be pushed; `words` as for `begin`."""
+    _turn_wheels(
+        line(words[CONSTANTS], np.float64),
+        line(words[STATE], np.float64),
+        plane(words[QUEUE], np.float64),
+        line(words[WHEEL_SPEEDS], np.float32),
+        line(words[OUTCOME], np.float64),
+    )
+
+
+@kernel
+def finish(words: Words) -> None:
+    """The end of such a step, when `outcome[TOUCHED]` is known."""
+    _finish(*_arrays_at(words))
+
+
+@kernel
+def step_rows(
+    rows: Words,
+    over: NDArray[np.bool_],
+    commands: Array,
+    starts: Array,
+    words: Words,
+) -> None:
+    """One step of many robots, or the begin of an episode where one is over.
+
+    Args:
+        rows: Numbers of the robots, shape (k,).
+        over: Shape (n,): whether a robot's episode begins.
+        commands: Shape (n, 2): wanted speeds of the wheels.
+        starts: Shape (n, 4): pose in which an episode begins, and the way from there.
+        words: Shape (n, 20, 4); see `begin`.
+    """
+    for row in rows:
+        own = _arrays_at(words[row])
+        give_command(
+            over[row], commands[row], starts[row], own[STATE], own[OUTCOME]
+        )  # fmt: skip
+        if over[row]:
+            _begin(*own)
+        else:
+            _drive(*own)

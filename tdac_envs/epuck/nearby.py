@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
-from tdac_envs.epuck.gaps import part_gap
+from tdac_envs.compiled import kernel, subkernel
+from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import FARTHEST, at_ray_height
 from tdac_envs.epuck.prisms import FIXED, Array, Index, Prisms
@@ -95,8 +95,7 @@ def _gaps(
     """Distance from the middle of each cell to each part, shape (rows, columns, n)."""
     gaps = np.empty((*shape, len(prisms.extent)))
     left, low, _, _ = ground.bounds
-    points, first, extent = prisms.points, prisms.first, prisms.extent
-    cell_gaps(points, first, extent, left, low, width, gaps)
+    cell_gaps(*prisms.arrays(), left, low, width, gaps)
     return gaps
 
 
@@ -110,7 +109,7 @@ def _listed(counts: NDArray[np.bool_]) -> Nearby:
     return Nearby(cells, np.append(np.arange(n), np.nonzero(counts)[2]))
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f8 f8 f8 f8[:,:,:] ->")
+@kernel
 def cell_gaps(
     points: Array,
     first: Index,
@@ -126,10 +125,10 @@ def cell_gaps(
         for column in range(columns):
             x, y = left + (column + 0.5) * width, low + (row + 0.5) * width
             for k in range(count):
-                gaps[row, column, k] = part_gap(points, first, extent, k, x, y)[0]
+                gaps[row, column, k] = gap_of(points, first, extent, k, x, y)[0]
 
 
-@kernel()
+@subkernel
 def listed_at(
     cells: Index, count: int, left: float, low: float, width: float, x: float, y: float
 ) -> tuple[int, int]:

@@ -73,9 +73,7 @@ def ground_readings(seen: Prisms, floor: float, robot: Robot) -> tuple[Observed,
         robot: Its memory.
     """
     readings, spreads = np.zeros(3, np.float32), np.zeros(3)
-    sense_ground(
-        seen.points, seen.first, seen.extent, floor, robot.state, readings, spreads
-    )
+    sense_ground(*seen.arrays(), floor, robot.state, readings, spreads)
     return readings, spreads
 
 

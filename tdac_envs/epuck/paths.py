@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.bodies import BODY_RADIUS
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import constant, kernel
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.infrared import sees
@@ -23,9 +23,7 @@ def at_goal(ground: Ground, goal: Point, tolerance: float, x: float, y: float) -
     gap, solid = math.hypot(goal[0] - x, goal[1] - y), ground.solid
     if gap > tolerance:
         return False
-    return gap < ground.gap(x, y) or sees(
-        solid.points, solid.first, solid.extent, x, y, *goal
-    )
+    return gap < ground.gap(x, y) or sees(*solid.arrays(), *map(float, (x, y, *goal)))
 
 
 def check_stands(ground: Ground, name: str, x: float, y: float) -> None:
@@ -76,17 +74,15 @@ def entry(
     """
     solid, (left, low, _, _) = ground.solid, ground.bounds
     u, v = (at[0] - left) / ground.spacing, (at[1] - low) / ground.spacing
-    cell = _entry_cell(
-        solid.points, solid.first, solid.extent, field,
-        *at, u, v, left, low, ground.spacing, BODY_RADIUS,
-    )  # fmt: skip
+    numbers = (*at, u, v, left, low, ground.spacing, BODY_RADIUS)
+    cell = _entry_cell(*solid.arrays(), constant(field), *map(float, numbers))
     if cell < 0:
         return None
     row, column = divmod(cell, field.shape[1])
     return column, row
 
 
-@kernel("f8[:,:] i8[:] f8[:,:] f4[:,:] f8 f8 f8 f8 f8 f8 f8 f8 -> i8")
+@kernel
 def _entry_cell(
     points: NDArray[np.float64],
     first: NDArray[np.int64],

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.compiled import constant
 from tdac_envs.footprint import Disc
 from tdac_envs.world import Part
 
@@ -77,6 +78,10 @@ class Prisms:
             np.array(extent).reshape(-1, 7),
             np.array(owners, np.int64),
         )
+
+    def arrays(self) -> tuple[Array, Index, Array]:
+        """Points, first and extent as kernels take them."""
+        return constant(self.points), constant(self.first), constant(self.extent)
 
     def copy(self) -> Prisms:
         """The same with places of its own, which may be changed."""

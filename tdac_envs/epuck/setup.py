@@ -15,7 +15,6 @@ from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH
 from tdac_envs.epuck.nearby import Surroundings
 from tdac_envs.epuck.prisms import Prisms
-from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.task import (
     EPuckTask,
     default_horizon,
@@ -85,18 +84,16 @@ class Setup:
             np.float64,
         )
 
-    def arguments(
+    def world(
         self,
         task: EPuckTask,
-        robot: Robot,
         solid: Prisms | None = None,
         seen: Prisms | None = None,
-    ) -> tuple[Any, ...]:
-        """What the kernels `begin`, `drive` and `finish` take.
+    ) -> tuple[NDArray[Any], ...]:
+        """What `begin`, `drive` and `finish` take beside the robot's memory.
 
         Args:
             task: Of the episode.
-            robot: Its memory.
             solid: What is solid, where that can be pushed; else the ground's own.
             seen: What is visible, likewise.
         """
@@ -106,7 +103,7 @@ class Setup:
         return (
             solid.points, solid.first, solid.extent, near.cells, near.listed,
             seen.points, seen.first, seen.extent, sighted.cells, sighted.listed,
-            task.field, *robot,
+            task.field,
         )  # fmt: skip
 
     def draw(self, options: dict[str, Any], random: np.random.Generator) -> EPuckTask:

@@ -12,7 +12,7 @@ from tdac_envs.arguments import whole_number
 from tdac_envs.batching import no_pictures, several
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
 from tdac_envs.epuck.env import EPuckEnv
-from tdac_envs.epuck.kernels import begin, drive
+from tdac_envs.epuck.kernels import step_rows
 from tdac_envs.epuck.observed import Observed, ground_readings, noisy, north, position
 from tdac_envs.errors import TaskError
 
@@ -42,6 +42,8 @@ class EPuckVectorEnv(DrivenVectorEnv):
         TaskError: A robot would push things.
     """
 
+    step_rows = staticmethod(step_rows)
+
     def __init__(
         self,
         num_envs: int = 1,
@@ -63,8 +65,6 @@ class EPuckVectorEnv(DrivenVectorEnv):
         super().__init__(
             envs,
             num_envs,
-            begin,
-            drive,
             autoreset_mode=autoreset_mode,
             threads=threads,
         )

@@ -1,154 +1,261 @@
-"""Kernels: compiled once, kept on disk, and the same as the Python they are made of."""
+"""Kernels: compiled once, kept where nobody else writes, and equal to their Python."""
 
+import ast
 import math
 import os
-import pickle
+import shutil
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tdac_envs import contact, grid, kernels, machine_code, plan, rays
-from tdac_envs.compiled import Kernel, kernel
+import tdac_envs
+from tdac_envs import contact, grid, kernels, plan, rays
+from tdac_envs.compiled import cache_folder, constant
 from tdac_envs.contact import first_contact
 from tdac_envs.grid import clearance
 from tdac_envs.rays import cast_ray, leaps_of
 
-HALF = 0.5
+PACKAGE = Path(tdac_envs.__file__).parent
+STEP = (
+    "import gymnasium as gym, tdac_envs\n"
+    "env = gym.make('TDAC-Map2D-v0')\n"
+    "env.reset(seed=0)\n"
+    "print(env.step(env.action_space.high)[0]['pose'].tolist())\n"
+)
+COMPILING = "tdac: compiling for this machine, kept for the next time: "
 
 
-@kernel()
-def _inner(x: float) -> float:
-    return HALF * x
-
-
-@kernel("f8[:,:] f8 i8 f4[:] -> f8")
-def _sum(values, factor, count, out):
-    total = 0.0
-    for j in range(values.shape[0]):
-        for i in range(values.shape[1]):
-            total += values[j, i]
-    for k in range(min(count, out.shape[0])):
-        out[k] = k
-    return _inner(total) * factor
-
-
-@kernel("i8 i8 -> i8")
-def _divide(a, b):
-    return a // b
-
-
-@kernel("i8 -> i8")
-def _raised(a):
-    return a + 5
-
-
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    """An empty cache, and kernels that are not loaded yet."""
-    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path)
-    return tmp_path
-
-
-def fresh(of):
-    return Kernel(of.function, of.signature)
-
-
-def test_arguments_and_results(cache):
-    """Numbers and arrays come as they are given; what is written is seen outside."""
-    values, out = np.arange(6.0).reshape(2, 3), np.full(3, -1, np.float32)
-    assert fresh(_sum)(values, 2.0, 2, out) == 15.0
-    assert out.tolist() == [0.0, 1.0, -1.0]
-
-
-def test_arrays_of_another_kind_are_converted(cache):
-    """Other types and layouts are copied; another number of dimensions is refused."""
-    add = fresh(_sum)
-    out = np.zeros(1, np.float32)
-    assert add(np.ones((4, 6), np.int32)[::2, ::3], 1.0, 0, out) == 2.0
-    with pytest.raises(TypeError, match="2 dimensions, got 1"):
-        add(np.ones(3), 1.0, 0, out)
-    with pytest.raises(TypeError, match="expected 4 arguments, got 1"):
-        add(np.ones(3))
-
-
-def test_a_bound_call_reads_the_arrays_anew(cache):
-    """What is in the arrays at the time of a call counts."""
-    values, out = np.ones((1, 1)), np.zeros(2, np.float32)
-    call = fresh(_sum).bind(values, 1.0, 2, out)
-    call()
-    assert out.tolist() == [0.0, 1.0]
-    out[:] = 7
-    call()
-    assert out.tolist() == [0.0, 1.0]
-
-
-def test_a_failing_kernel_raises(cache):
-    """What would raise in Python does not crash the process."""
-    divide = fresh(_divide)
-    assert divide(7, 2) == 3
-    with pytest.raises(ArithmeticError, match="_divide failed"):
-        divide(1, 0)
-
-
-def test_machine_code_is_kept(cache, monkeypatch):
-    """The second time it is read from disk, unless the file is torn."""
-    assert fresh(_divide)(9, 3) == 3
-    (file,) = cache.iterdir()
-    whole = file.read_bytes()
-    monkeypatch.setattr(Kernel, "_compile", lambda _: pytest.fail("compiled again"))
-    assert fresh(_divide)(9, 3) == 3
-    monkeypatch.undo()
-    monkeypatch.setattr(machine_code, "cache_folder", lambda: cache)
-    file.write_bytes(whole[: len(whole) // 2])
-    assert fresh(_divide)(9, 3) == 3
-    assert len(file.read_bytes()) == len(whole)
-
-
-@pytest.mark.parametrize("terminal", [True, False])
-def test_compiling_is_told_on_a_terminal(cache, monkeypatch, terminal):
-    """Once: it takes seconds, and nobody asked for it."""
-    machine_code._tell.cache_clear()
-    reading, writing = os.openpty() if terminal else os.pipe()
-    with open(writing, "w") as stderr, open(reading, "rb", buffering=0) as seen:
-        monkeypatch.setattr("sys.stderr", stderr)
-        assert fresh(_divide)(9, 3) == fresh(_raised)(3) - 5 == 3
-        stderr.write("the end\n")
-        stderr.flush()
-        assert seen.read(1000).count(b"compiling") == terminal
-
-
-def test_a_changed_constant_is_other_code(monkeypatch):
-    """The key depends on what inner kernels and constants say."""
-    before = _sum._about()
-    monkeypatch.setitem(globals(), "HALF", 0.25)
-    assert _sum._about() != before
-
-
-def test_a_cache_that_cannot_be_written_is_done_without(monkeypatch, tmp_path):
-    """A full or read-only disk is no reason to stop."""
-    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path / "missing")
-    assert fresh(_divide)(9, 2) == 4
-
-
-def test_kernels_are_pickled_by_name():
-    """A worker process finds its own."""
-    assert pickle.loads(pickle.dumps(first_contact)) is first_contact
-
-
-def test_an_environment_needs_no_compiler_twice():
-    """With its code on disk, a process makes and steps an environment without numba."""
-    script = (
-        "import sys, gymnasium as gym, tdac_envs\n"
-        "env = gym.make('TDAC-Map2D-v0')\n"
-        "env.reset(seed=0); env.step(env.action_space.sample())\n"
-        "print('numba' in sys.modules)\n"
+def run(script, **variables):
+    """A script in a process of its own: what it prints, and what it says beside."""
+    environment = {**os.environ, **{k: str(v) for k, v in variables.items()}}
+    command = [sys.executable, "-P", "-c", script]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env=environment, check=True
     )
-    for _ in range(2):
-        run = [sys.executable, "-c", script]
-        done = subprocess.run(run, check=True, capture_output=True, text=True)
-    assert done.stdout.split() == ["False"]
+    return done.stdout.strip(), done.stderr.strip()
+
+
+@pytest.fixture(scope="module")
+def copied_package():
+    """The folder of a copy of the package with an empty cache, which all may read."""
+    folder = Path(tempfile.mkdtemp())
+    folder.chmod(0o755)
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(PACKAGE, folder / "tdac_envs", ignore=ignored)
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="module")
+def cold_start(copied_package):
+    """What the first process prints that uses the copy, and what it says beside."""
+    return run(STEP, PYTHONPATH=copied_package)
+
+
+def test_a_cold_start_says_what_it_does_and_a_warm_one_nothing(
+    cold_start, copied_package
+):
+    """Also where standard error is no terminal: compiling takes many seconds."""
+    pose, said = cold_start
+    assert said.startswith(COMPILING + "kernel 1 of at most ")
+    assert run(STEP, PYTHONPATH=copied_package) == (pose, "")
+
+
+def test_an_edited_callee_in_another_module_takes_effect(copied_package):
+    """numba looks at the file of the kernel that is called, and at no other."""
+    script = (
+        "import numpy as np\n"
+        "from tdac_envs.compiled import constant\n"
+        "from tdac_envs.straight import gets_straight\n"
+        "clear = constant(np.full((9, 40), 9.0), np.float32)\n"
+        "print(gets_straight(clear, 4.0, 4.0, 30.0, 4.0, 2.0))\n"
+    )
+    file = copied_package / "tdac_envs" / "contact.py"
+    text = file.read_text()
+    assert "    return contact_before(" in text
+    assert run(script, PYTHONPATH=copied_package)[0] == "True"
+    file.write_text(
+        text.replace("return contact_before(", "return 0.0 * contact_before(")
+    )
+    edited, said = run(script, PYTHONPATH=copied_package)
+    file.write_text(text)
+    assert edited == "False"
+    assert said.startswith(COMPILING)
+    assert run(script, PYTHONPATH=copied_package) == ("True", "")
+
+
+def test_constants_of_kernels_stand_where_changes_are_noticed():
+    """A file that is not looked at may have no number that is compiled in."""
+    texts = {file: file.read_text() for file in PACKAGE.rglob("*.py")}
+    known = {file for file, text in texts.items() if "compiled import" in text}
+    for file in known:
+        for node in ast.walk(ast.parse(texts[file])):
+            module = getattr(node, "module", None) or ""
+            if isinstance(node, ast.ImportFrom) and module.startswith("tdac_envs."):
+                source = PACKAGE.joinpath(*module.split(".")[1:]).with_suffix(".py")
+                names = {each.name for each in node.names if each.name.isupper()}
+                own = _names_in_kernels(texts[file]) & names
+                assert not own or source in known, (file, own)
+
+
+def _names_in_kernels(text):
+    """The names that kernels and subkernels of a file use."""
+    functions = [
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef)
+        and any("kernel" in ast.unparse(each) for each in node.decorator_list)
+    ]
+    inner = (node for function in functions for node in ast.walk(function))
+    return {node.id for node in inner if isinstance(node, ast.Name)}
+
+
+def folder_with(**variables):
+    """The cache folder of a process with these variables, and what it says of it."""
+    script = "from tdac_envs.compiled import cache_folder; print(cache_folder())"
+    return run(script, **variables)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [{"NUMBA_OPT": "0"}, {"NUMBA_CPU_NAME": "generic"}, {"NUMBA_DEBUGINFO": 1}],
+)
+def test_settings_of_numba_have_a_folder_of_their_own(setting):
+    """Code made without optimisation is not loaded where it is made with it."""
+    usual, _ = folder_with()
+    assert folder_with(**setting)[0] != usual
+    assert folder_with() == (usual, "")
+
+
+def test_functions_of_others_keep_their_place(tmp_path):
+    """A user's own cache folder is left as it is."""
+    script = "import numba, tdac_envs.kernels\nprint(numba.config.CACHE_DIR)\n"
+    assert run(script, NUMBA_CACHE_DIR=tmp_path)[0] == str(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_compiling_the_same_comes_out():
+    """`NUMBA_DISABLE_JIT=1` runs the same kernels as plain Python, for debugging."""
+    script = (
+        "import gymnasium as gym, numpy as np, tdac_envs\n"
+        "cells = np.zeros((40, 60), bool); cells[18:22, 20:] = True\n"
+        "options = dict(map=cells, start=(10, 8), goal=(50, 33), robot_radius=4)\n"
+        "envs = gym.make_vec('TDAC-Map2D-v0', 2, 'vector_entry_point', **options)\n"
+        "env = gym.make('TDAC-Map2D-v0', **options)\n"
+        "seen = [envs.reset(seed=3)[0], env.reset(seed=3)[0]]\n"
+        "for k in range(9):\n"
+        "    seen += [envs.step(np.full((2, 2), 0.5 + 0.1 * k, np.float32))[0]]\n"
+        "    seen += [env.step(np.array([1.0, 0.2 * k], np.float32))[0]]\n"
+        "print([v.ravel().tolist() for each in seen for v in each.values()])\n"
+    )
+    compiled, plain = run(script)[0], run(script, NUMBA_DISABLE_JIT=1)[0]
+    for one, other in zip(eval(compiled), eval(plain), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
+
+
+def test_no_kernel_is_compiled_for_two_sets_of_types():
+    """numba's cache mixes them up where two processes write at once; and it is slow."""
+    script = (
+        "import gymnasium as gym, numpy as np, sys, tdac_envs\n"
+        "from tdac_envs.wrapped_vector import WrappedVectorEnv\n"
+        "for name in ('TDAC-Map2D-v0', 'TDAC-EPuck-v0'):\n"
+        "    for variation in ('nominal', 'random'):\n"
+        "        env = gym.make(name, variation=variation, on_collision='block')\n"
+        "        env.reset(seed=0)\n"
+        "        env.step(env.action_space.sample())\n"
+        "    task = env.unwrapped.nominal\n"
+        "    env.reset(options={'start': task.start[:2], 'goal': list(task.goal)})\n"
+        "    if 'Map' in name:\n"
+        "        env.reset(options={'start': [*map(round, task.start[:2])]})\n"
+        "    envs = gym.make_vec(name, 2, 'vector_entry_point', variation='jitter')\n"
+        "    envs = WrappedVectorEnv(envs, ('goal-relative', 'guidance', 'flatten'))\n"
+        "    envs.reset(seed=0); envs.step(envs.action_space.sample())\n"
+        "cells = np.zeros((90, 120), np.uint8); cells[40:50, 30:] = 1\n"
+        "options = dict(start=(20, 20), goal=(100, 75), robot_radius=5)\n"
+        "env = gym.make('TDAC-Map2D-v0', map=cells > 0, **options)\n"
+        "env.reset(seed=1); env.step(env.action_space.sample())\n"
+        "from tdac_envs.compiled import KERNELS\n"
+        "print(len(KERNELS))\n"
+        "print([k.__name__ for k in KERNELS if len(k.signatures) > 1])\n"
+    )
+    count, several = run(script)[0].split("\n")
+    assert int(count) > 20
+    assert several == "[]"
+
+
+@pytest.mark.parametrize("make", ["link", "loose", "loose file", "loose above"])
+def test_a_folder_that_others_may_write_to_is_not_believed(make, tmp_path):
+    """What lies there is run, so nobody else may have put it there."""
+    from tdac_envs.private import is_private
+
+    folder = tmp_path / "above" / "cache"
+    (folder / "inner").mkdir(parents=True)
+    (folder / "inner" / "file").write_bytes(b"")
+    for each in (tmp_path / "above", folder, folder / "inner"):
+        each.chmod(0o755)
+    assert is_private(folder)
+    if make == "link":
+        (folder / "inner" / "link").symlink_to("/dev/null")
+    elif make == "loose":
+        (folder / "inner").chmod(0o777)
+    elif make == "loose file":
+        (folder / "inner" / "file").chmod(0o666)
+    else:
+        (tmp_path / "above").chmod(0o777)
+    assert not is_private(folder)
+
+
+as_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can be another user")
+
+
+@as_root
+@pytest.mark.parametrize("what", ["folder", "file"])
+def test_another_user_s_code_is_not_believed(what, tmp_path):
+    """Not even where nobody but that user can write to it."""
+    from tdac_envs.private import is_private
+
+    folder = tmp_path / "cache"
+    folder.mkdir(mode=0o755)
+    (folder / "file").write_bytes(b"")
+    assert is_private(folder)
+    os.chown(folder if what == "folder" else folder / "file", 12345, 12345)
+    assert not is_private(folder)
+
+
+@as_root
+@pytest.mark.parametrize("home", ["own", "none"])
+def test_an_unprivileged_user_reads_a_warm_package(home, cold_start, copied_package):
+    """In a private copy, made once; without a place for it, a line says so."""
+    own = copied_package / home
+    own.mkdir()
+    os.chown(own, 12345, 12345)
+    # Other packages are imported before, since they need not be readable for others.
+    again = STEP if home == "own" else "import tdac_envs.kernels"
+    script = (
+        f"{STEP}"
+        "import os, sys, gymnasium as gym\n"
+        "for name in [n for n in sys.modules if n.startswith('tdac_envs')]:\n"
+        "    del sys.modules[name]\n"
+        "for name in ('TDAC-Map2D-v0', 'TDAC-EPuck-v0'):\n"
+        "    del gym.registry[name]\n"
+        "os.setgroups([]); os.setgid(12345); os.setuid(12345)\n"
+        f"{again}\n"
+    )
+    variables = {"PYTHONPATH": copied_package, "XDG_CACHE_HOME": ""}
+    variables["HOME"] = own if home == "own" else "/nonexistent"
+    poses, said = run(script, **variables)
+    assert set(poses.split("\n")) == {cold_start[0]}
+    if home == "own":
+        (copy,) = own.glob(".cache/tdac/tdac-*")
+        assert (copy.stat().st_uid, copy.stat().st_mode & 0o777) == (12345, 0o700)
+        assert said == ""
+    else:
+        assert said.startswith("tdac: compiled code cannot be kept in ")
+        assert said.count("\n") == 0
 
 
 def test_an_import_compiles_nothing():
@@ -157,9 +264,12 @@ def test_an_import_compiles_nothing():
         "import sys, tdac_envs\n"
         "print(sorted({'numba', 'llvmlite', 'cv2', 'scipy'} & set(sys.modules)))\n"
     )
-    run = [sys.executable, "-c", script]
-    done = subprocess.run(run, check=True, capture_output=True, text=True)
-    assert done.stdout.split() == ["[]"]
+    assert run(script) == ("[]", "")
+
+
+def test_the_folder_is_this_machine_s_own():
+    """Machine code of another processor would end the process."""
+    assert cache_folder() is None or cache_folder().name.startswith("tdac-")
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -172,25 +282,25 @@ def test_compiled_and_plain_agree(seed):
     clear = clearance(cells)
     plain = np.empty_like(clear)
     rows, site = np.empty(cells.shape, np.int32), np.empty(33, np.int64)
-    grid._clearance.function(cells, rows, site, np.empty((2, 34)), plain)
+    grid._clearance.py_func(cells, rows, site, np.empty((2, 34)), plain)
     np.testing.assert_array_equal(clear, plain)
     field = plan.distance_field(free, (12, 12))
     settled, buckets = np.zeros(cells.size, np.bool_), np.empty((3, 9000), np.int64)
     own = np.full(cells.shape, np.inf)
-    plan._spread.function(free, 12, 12, own, settled, buckets)
+    plan._spread.py_func(free, 12, 12, own, settled, buckets)
     np.testing.assert_array_equal(field, own)
-    leaps, padded = leaps_of(cells), np.pad(clear, 1)
+    leaps, padded = constant(leaps_of(cells)), constant(np.pad(clear, 1))
     plain = np.zeros_like(leaps)
-    rays._fill_leaps.function(cells, plain)
+    rays._fill_leaps.py_func(cells, plain)
     np.testing.assert_array_equal(leaps, plain)
     for _ in range(20):
         x, y = random.uniform(10.5, 12.5, 2)
         angle, turn = random.uniform(-math.pi, math.pi, 2)
         ray = (leaps, x, y, angle, 40.0)
-        assert cast_ray(*ray) == pytest.approx(rays.cast_ray.function(*ray), abs=1e-12)
+        assert cast_ray(*ray) == pytest.approx(rays.cast_ray.py_func(*ray), abs=1e-12)
         step = (padded, x, y, angle, random.uniform(-9, 9), turn, 1.0)
-        exact = contact.first_contact.function(*step)
+        exact = contact.first_contact.py_func(*step)
         assert first_contact(*step) == pytest.approx(exact, abs=1e-9)
-        way = (leaps, field.astype(np.float32), x, y, 5.0)
-        exact = kernels.path_distance.function(*way)
+        way = (leaps, constant(field, np.float32), x, y, 5.0)
+        exact = kernels._path_distance.py_func(*way)
         assert kernels.path_distance(*way) == pytest.approx(exact, rel=1e-5)

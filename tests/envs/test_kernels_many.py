@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from tdac_envs.compiled import _jitted
+from tdac_envs.compiled import constant
 from tdac_envs.contact import first_contact, move
 from tdac_envs.grid import clearance
 from tdac_envs.rays import cast_ray, leaps_of
@@ -14,8 +14,6 @@ from tdac_envs.rays import cast_ray, leaps_of
 MAPS = 20
 EACH = 50_000
 RANGE = 220.0
-
-casting, touching, moving = map(_jitted, (cast_ray, first_contact, move))
 
 
 def some_map(seed):
@@ -80,7 +78,7 @@ def worst_ray(leaps, centres, points, angles, range_max):
     for k in range(len(angles)):
         x, y = points[k]
         expected = slab(centres, x, y, angles[k], range_max)
-        measured = casting(leaps, x, y, angles[k], range_max)
+        measured = cast_ray(leaps, x, y, angles[k], range_max)
         worst = max(worst, abs(expected - measured))
         hits += expected < range_max
     return worst, hits
@@ -95,11 +93,11 @@ def wrong_contacts(clear, rim, points, angles, arcs, radius):
         forward, turn = arcs[k]
         if gap_to(rim, x, y) <= radius + 1e-6:
             continue
-        touch = touching(clear, x, y, angles[k], forward, turn, radius)
+        touch = first_contact(clear, x, y, angles[k], forward, turn, radius)
         least, free = math.inf, math.inf
         for part in range(33):
             share = part / 32
-            px, py, _ = moving(x, y, angles[k], share * forward, share * turn)
+            px, py, _ = move(x, y, angles[k], share * forward, share * turn)
             gap = gap_to(rim, px, py) - radius
             least = min(least, gap)
             if share < touch - 1e-9:
@@ -112,7 +110,7 @@ def wrong_contacts(clear, rim, points, angles, arcs, radius):
             wrong += 1
         if touch <= 1.0:
             touches += 1
-            px, py, _ = moving(x, y, angles[k], touch * forward, touch * turn)
+            px, py, _ = move(x, y, angles[k], touch * forward, touch * turn)
             wrong += abs(gap_to(rim, px, py) - radius) > 1e-6
         else:
             passes += 1
@@ -134,7 +132,9 @@ def test_rays_are_those_of_brute_force(seed):
     cells, random = some_map(seed)
     points = free_points(cells, random, EACH)
     angles = random.uniform(-math.pi, math.pi, EACH)
-    worst, hits = worst_ray(leaps_of(cells), squares(cells), points, angles, RANGE)
+    worst, hits = worst_ray(
+        constant(leaps_of(cells)), squares(cells), points, angles, RANGE
+    )
     assert hits > EACH // 2
     assert worst < 1e-6
 
@@ -144,7 +144,10 @@ def test_rays_are_those_of_brute_force(seed):
 def test_contacts_are_those_of_the_disc_itself(seed):
     """50,000 steps on each of 20 maps touch when the disc does, and only then."""
     cells, random = some_map(seed)
-    clear, radius = np.pad(clearance(cells), 1), float(random.uniform(0.3, 3.0))
+    clear, radius = (
+        constant(np.pad(clearance(cells), 1)),
+        float(random.uniform(0.3, 3.0)),
+    )
     rim = np.pad(cells, 12, constant_values=True)
     points = free_points(cells, random, EACH)
     angles = random.uniform(-math.pi, math.pi, EACH)
