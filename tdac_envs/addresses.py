@@ -90,5 +90,6 @@ def plane(words: Words, dtype: type[Any]) -> NDArray[Any]:
 @subkernel
 def block(words: Words, dtype: type[Any]) -> NDArray[Any]:
     """The array of three dimensions with these words."""
-    array: NDArray[Any] = carray(_pointer(int(words[0])), (words[1], words[2], words[3]), dtype)
+    shape = words[1], words[2], words[3]
+    array: NDArray[Any] = carray(_pointer(int(words[0])), shape, dtype)
     return array

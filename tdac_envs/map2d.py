@@ -219,7 +219,7 @@ class Map2DEnv(DrivenEnv):
     def __getstate__(self) -> dict[str, Any]:
         return {
             **self.__dict__,
-            **dict.fromkeys(("_addresses", "_call_begin", "_call_drive", "_copies")),
+            **dict.fromkeys(("addresses", "_call_begin", "_call_drive", "_copies")),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -228,8 +228,8 @@ class Map2DEnv(DrivenEnv):
 
     def _bind(self) -> None:
         """Makes the kernels' calls on this environment's own arrays."""
-        self._addresses = Addresses([(*self.setup.world(self.task), *self.robot)])
-        (words,) = self._addresses.words
+        self.addresses = Addresses([(*self.setup.world(self.task), *self.robot)])
+        (words,) = self.addresses.words
         self._call_begin: Callable[[], None] = partial(begin, words)
         self._call_drive = partial(drive, words)
         robot = self.robot

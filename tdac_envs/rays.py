@@ -37,7 +37,7 @@ def leaps_of(cells: BoolGrid) -> LeapGrid:
     height, width = cells.shape
     leaps = np.zeros((4, height + 2, width + 2), np.uint8)
     _fill_leaps(constant(cells), leaps)
-    return leaps
+    return constant(leaps)
 
 
 @kernel

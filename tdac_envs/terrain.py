@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel
+from tdac_envs.compiled import constant, kernel
 from tdac_envs.contact import first_contact, has_room
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import (
@@ -57,9 +57,8 @@ class Terrain:
 # A map is often loaded by several envs, or again and again in one process.
 @lru_cache(maxsize=4)
 def _terrain(grid: OccupancyGrid) -> Terrain:
-    padded_clear = np.pad(clearance(grid.cells), 1)
+    padded_clear = constant(np.pad(clearance(grid.cells), 1))
     leaps = leaps_of(grid.cells)
-    padded_clear.flags.writeable = leaps.flags.writeable = False
     return Terrain(grid, padded_clear[1:-1, 1:-1], padded_clear, leaps)
 
 
@@ -234,9 +233,7 @@ def field_to(
         Shape (height, width), float32, px, read-only; inf where there is no path.
     """
     free = body_free(terrain.clear, radius)
-    field = distance_field(free, goal).astype(np.float32)
-    field.flags.writeable = False
-    return field
+    return constant(distance_field(free, goal), np.float32)
 
 
 _shared_field = lru_cache(maxsize=4)(field_to)

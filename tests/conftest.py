@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import random
 import signal
+import sys
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -31,6 +33,16 @@ def real_data() -> Path:
     if not REAL_DATA.is_dir():
         pytest.skip(f"{REAL_DATA.name} is not beside this checkout")
     return REAL_DATA
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_set_of_types() -> Iterator[None]:
+    """No kernel is compiled for two: numba's cache mixes them up between processes."""
+    yield
+    compiled = sys.modules.get("tdac_envs.compiled")
+    kernels = compiled.KERNELS if compiled else []
+    several = [each for each in kernels if len(each.signatures) > 1]
+    assert not several, [(each.py_func, each.signatures) for each in several]
 
 
 def pytest_collection_modifyitems(

@@ -1,4 +1,4 @@
-"""The command `tdac doctor`."""
+"""The commands `tdac doctor` and `tdac warm`."""
 
 from __future__ import annotations
 
@@ -15,3 +15,15 @@ def doctor(as_json: Json = False) -> None:
     from tdac_agent.commands import doctor as command
 
     raise typer.Exit(command.run(as_json))
+
+
+@app.command(epilog="Example: `tdac warm`")
+def warm() -> None:
+    """Compile everything now, so that no command has to wait for it later.
+
+    Run by an administrator on an installed package, this is done for all users of the
+    machine.
+    """
+    from tdac_agent.commands import warm as command
+
+    raise typer.Exit(command.run())

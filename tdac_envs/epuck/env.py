@@ -255,7 +255,7 @@ class EPuckEnv(DrivenEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         calls = dict.fromkeys(
-            ("_addresses", "_call_begin", "_call_drive", "_call_alone")
+            ("addresses", "_call_begin", "_call_drive", "_call_alone")
         )
         return {**self.__dict__, **calls, "_scene": None}
 
@@ -266,8 +266,8 @@ class EPuckEnv(DrivenEnv):
     def _bind(self) -> None:
         """Makes the kernels' calls on this environment's own arrays."""
         world = self.setup.world(self.task, self._solid, self._seen)
-        self._addresses = Addresses([(*world, *self.robot)])
-        (words,) = self._addresses.words
+        self.addresses = Addresses([(*world, *self.robot)])
+        (words,) = self.addresses.words
         self._call_begin: Callable[[], None] = partial(kernels.begin, words)
         self._call_drive = partial(kernels.drive, words)
         if self._pushes:
@@ -283,7 +283,7 @@ class EPuckEnv(DrivenEnv):
             self._speed[:] = 0.0
             self._call_alone()
             return
-        (words,) = self._addresses.words
+        (words,) = self.addresses.words
         state, outcome = robot.state, robot.outcome
         kernels.turn_wheels(words)
         forward, turn = outcome[kernels.FORWARD :].tolist()

@@ -38,8 +38,7 @@ def scattered(rng, count=12):
 
 
 def arrays(shapes):
-    prisms = Prisms.of(Owned(Part(shape, 0.0, 0.1)) for shape in shapes)
-    return prisms.points, prisms.first, prisms.extent
+    return Prisms.of(Owned(Part(shape, 0.0, 0.1)) for shape in shapes).arrays()
 
 
 def space_of(shapes):
@@ -89,7 +88,7 @@ def test_the_first_contact_is_the_first_and_a_contact(seed):
         share = first_touch(*prisms, x, y, heading, forward, turn, RADIUS)
         end = min(share, 1.0)
         for part in np.linspace(0.0, end, 100):
-            at = move.function(x, y, heading, part * forward, part * turn)
+            at = move.py_func(x, y, heading, part * forward, part * turn)
             assert oracle_gap(space, at[0], at[1]) >= RADIUS - 1e-8
         if share <= 1.0:
             assert oracle_gap(space, at[0], at[1]) == pytest.approx(RADIUS, abs=1e-8)
@@ -97,7 +96,7 @@ def test_the_first_contact_is_the_first_and_a_contact(seed):
 
 def test_a_disc_that_was_stopped_may_leave_but_not_go_on():
     """Driving on moves it by nothing, driving off by all of the way."""
-    prisms = *arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)]), [], 0, 1
+    prisms = *arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)]), np.empty(0, np.int64), 0, 1
     state = np.zeros(3)
     assert advance(*prisms, state, 0.3, 0.0, RADIUS)
     stopped = state[0]

@@ -18,6 +18,7 @@ from tdac_envs.epuck.prisms import FIXED
 from tdac_envs.worlds import world_file
 
 STEP = 0.006
+NONE = np.empty(0, np.int64)
 every_world = pytest.mark.parametrize("name", bundled_worlds())
 
 
@@ -42,10 +43,6 @@ def poses(ground, count):
     )
 
 
-def arrays(prisms):
-    return prisms.points, prisms.first, prisms.extent
-
-
 @every_world
 def test_they_change_nothing(name, place):
     """Readings, distances and contacts are those with all parts, to the last bit."""
@@ -57,19 +54,19 @@ def test_they_change_nothing(name, place):
         cell = (*ground.bounds[:2], around.width, x, y)
         begin, end = listed_at(around.seen.cells, len(seen.extent), *cell)
         state = np.array([x, y, heading])
-        for k, which in enumerate(((around.seen.listed, begin, end), ([], 0, None))):
+        for k, which in enumerate(((around.seen.listed, begin, end), (NONE, 0, None))):
             listed, first, last = which
             last = len(seen.extent) if last is None else last
-            sense(*arrays(seen), listed, first, last, ground.floor, state,
+            sense(*seen.arrays(), listed, first, last, ground.floor, state,
                   readings[k], hits[k])  # fmt: skip
         np.testing.assert_array_equal(hits[0], hits[1])
         np.testing.assert_array_equal(readings[0], readings[1])
         begin, end = listed_at(around.solid.cells, len(solid.extent), *cell)
-        near = (*arrays(solid), around.solid.listed, begin, end)
-        room = nearest_gap(*arrays(solid), x, y)
+        near = (*solid.arrays(), around.solid.listed, begin, end)
+        room = nearest_gap(*solid.arrays(), x, y)
         assert nearest_of(*near, x, y) == pytest.approx(room, abs=1e-12)
         arc = (x, y, heading, random.uniform(-STEP, STEP), random.uniform(-1, 1))
-        touch = first_touch(*arrays(solid), *arc, BODY_RADIUS)
+        touch = first_touch(*solid.arrays(), *arc, BODY_RADIUS)
         assert touch_of(*near, *arc, BODY_RADIUS) == pytest.approx(touch, abs=1e-9)
 
 
@@ -113,7 +110,7 @@ def test_a_path_begins_at_the_nearest_point_that_the_body_gets_to(name):
         for _, i, j in sorted(near):
             off = np.subtract(ground.at(i, j), at)
             way = (math.atan2(off[1], off[0]), math.hypot(*off), 0.0, BODY_RADIUS)
-            if first_touch(solid.points, solid.first, solid.extent, *at, *way) > 1:
+            if first_touch(*solid.arrays(), *at, *way) > 1:
                 expected = (i, j)
                 break
         assert entry(ground, open_field(free), tuple(at.tolist())) == expected

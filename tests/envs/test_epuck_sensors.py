@@ -162,7 +162,7 @@ def test_rays_are_those_of_a_physics_engine():
             state = rng.uniform(-0.6, 0.6, 3) * (1, 1, 5)
             if oracle_gap(space, *state[:2]) < 0.037:
                 continue
-            every = (prisms.points, prisms.first, prisms.extent, [], 0, len(shapes))
+            every = (*prisms.arrays(), np.empty(0, np.int64), 0, len(shapes))
             hits, found = np.zeros((8, 3)), np.zeros(8, np.float32)
             sense(*every, 0.0, state, found, hits)
             x, y, heading = state.tolist()

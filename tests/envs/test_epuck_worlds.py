@@ -41,7 +41,7 @@ class TestBundled:
         task = EPuckEnv(name).task
         solid = task.ground.solid
         line = (*task.start[:2], *task.goal)
-        assert not sees(solid.points, solid.first, solid.extent, *line)
+        assert not sees(*solid.arrays(), *line)
         assert task.shortest > 1.04 * math.dist(task.start[:2], task.goal)
 
     @every_world
