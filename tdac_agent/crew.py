@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
+from tdac_agent.counters import shared_counters
 from tdac_agent.errors import Fault
 
 SIZE = max(2, len(os.sched_getaffinity(0)))
@@ -104,7 +105,7 @@ class Cores:
         context = multiprocessing.get_context("fork")
         self._all = sorted(os.sched_getaffinity(0))
         self._lock = context.Lock()
-        self._taken = context.RawArray("b", len(self._all))
+        self._taken = shared_counters(len(self._all))
 
     @contextlib.contextmanager
     def one(self) -> Generator[None]:

@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import threading
 
+from tdac_agent.counters import shared_counters
 from tdac_agent.sandbox import (
     TIERS,
     Child,
@@ -42,8 +43,9 @@ class Nursery:
         # Without room, but perhaps with children, which another process may have.
         self._full: list[Zygote] = []
         self._ready: list[Child] = []
-        context = multiprocessing.get_context("fork")
-        self._taken = context.Value("i", 0)
+        # How many of those that were ready were taken.
+        self._taken = shared_counters(1)
+        self._taking = multiprocessing.get_context("fork").Lock()
         self._owner = os.getpid()
         if ahead:
             self._start_likely()
@@ -89,15 +91,15 @@ class Nursery:
             return None
         if tier not in ("auto", self._ready[0].tier):
             return None
-        with self._taken.get_lock():
-            number = self._taken.value
-            self._taken.value += 1
+        with self._taking:
+            number = self._taken[0]
+            self._taken[0] += 1
         return self._ready[number] if number < len(self._ready) else None
 
     def close(self) -> None:
         """Has no further children; ends the zygotes that have none."""
         if os.getpid() == self._owner:
-            for child in self._ready[self._taken.value :]:
+            for child in self._ready[self._taken[0] :]:
                 child.close()
         with self._lock:
             for zygote in self._zygotes + self._full:
@@ -149,8 +151,9 @@ class Nursery:
         for zygote in self._zygotes:
             if _suits(zygote, tier, limits):
                 return zygote
-        self._zygotes.append(start_zygote(tier, limits))
-        return self._zygotes[-1]
+        started = start_zygote(tier, limits)
+        self._zygotes.append(started)
+        return started
 
     def _drop(self, zygote: Zygote) -> None:
         self._zygotes.remove(zygote)

@@ -24,6 +24,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from tdac_agent.counters import shared_counters
 from tdac_agent.sandbox.bubblewrap import bubblewrap_command
 from tdac_agent.sandbox.channel import Channel
 from tdac_agent.sandbox.errors import SandboxError
@@ -44,6 +45,8 @@ OPTIONS = ("-s", "-S", "-P", "-B", "-u", "-X", "utf8")
 SLOTS = 16
 KEPT_OUTPUT = 4000
 REAP_SECONDS = 10.0
+# How many folders were given away, and how many children live.
+GIVEN, ALIVE = 0, 1
 
 Reaped = tuple[int, float, int]
 
@@ -95,8 +98,7 @@ class Zygote:
         slots = slots if separate and tier != "rlimits" else 1
         context = multiprocessing.get_context("fork")
         self._lock = context.Lock()
-        # How many folders were given away, and how many children live.
-        self._given, self._alive = context.RawValue("i", 0), context.RawValue("i", 0)
+        self._counts = shared_counters(2)
         self.parent = Path(tempfile.mkdtemp(prefix="tdac-child-")).resolve()
         self.site = self.parent / "site"
         # A file of the zygote's that no child may read.
@@ -114,7 +116,7 @@ class Zygote:
     @property
     def slots(self) -> int:
         """How many further children it can have."""
-        return len(self._folders) - int(self._given.value)
+        return len(self._folders) - self._counts[GIVEN]
 
     def fork(self, limits: Limits) -> Forked:
         """A new child that waits for its setup frame.
@@ -139,9 +141,9 @@ class Zygote:
                 raise SandboxError(f"{self.tier}: cannot fork a child: {text}")
             _tie(inner[3], pid)
             us.pop_all()
-            folder = self._folders[self._given.value]
-            self._given.value += 1
-            self._alive.value += 1
+            folder = self._folders[self._counts[GIVEN]]
+            self._counts[GIVEN] += 1
+            self._counts[ALIVE] += 1
         write, read, printed, lifeline = outer
         frame, most = limits.frame_bytes, limits.output_bytes
         channel = Channel(write, read, printed, frame, most, Line(pid))
@@ -155,8 +157,8 @@ class Zygote:
     def close(self) -> None:
         """Have no further children; end now or with the last one."""
         with self._lock:
-            self._given.value = len(self._folders)
-            if not self._alive.value:
+            self._counts[GIVEN] = len(self._folders)
+            if not self._counts[ALIVE]:
                 self._end()
 
     def kill(self) -> None:
@@ -174,8 +176,8 @@ class Zygote:
                 reaped = status, cpu, peak * (1 if sys.platform == "darwin" else 1024)
             except OSError:
                 reaped = lost
-            self._alive.value -= 1
-            if not self._alive.value and not self.slots:
+            self._counts[ALIVE] -= 1
+            if not self._counts[ALIVE] and not self.slots:
                 self._end()
         return reaped
 

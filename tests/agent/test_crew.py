@@ -123,3 +123,26 @@ def test_the_end(tmp_path):
     for pid in members:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+def test_members_write_to_nothing_that_is_not_theirs():
+    """While they are at work, what this process shares with others is as it was.
+
+    It has dropped what its members share among themselves, whose memory must not be
+    used again as long as they write there.
+    """
+    context = multiprocessing.get_context("fork")
+    begun, may_end = context.Barrier(3), context.Event()
+
+    def work():
+        begun.wait(60)
+        return may_end.wait(60)
+
+    with closing(Crew(work, no_end, 2)) as crew, ThreadPoolExecutor(2) as pool:
+        values = [context.RawValue("i", 0) for _ in range(8)]
+        at_work = [pool.submit(crew.do) for _ in range(2)]
+        begun.wait(60)
+        found = [value.value for value in values]
+        may_end.set()
+        assert [task.result() for task in at_work] == [True, True]
+    assert found == [0] * 8
