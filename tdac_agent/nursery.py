@@ -60,7 +60,7 @@ class Nursery:
         """
         child = self._ready_child(tier, limits) or self._new_child(tier, limits)
         with contextlib.suppress(OSError):  # it has ended, which its first call finds
-            os.sched_setaffinity(child.pid, os.sched_getaffinity(0))
+            os.sched_setaffinity(child.controller_pid, os.sched_getaffinity(0))
         return child
 
     def _new_child(self, tier: str, limits: Limits) -> Child:

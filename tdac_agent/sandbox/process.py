@@ -15,7 +15,6 @@ from tdac_agent.sandbox.ending import ChildUsage, Ending
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
 from tdac_agent.sandbox.inner.wire import Handle, Kind
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
-from tdac_agent.sandbox.waiting import Line
 from tdac_agent.sandbox.zygote import Forked
 
 
@@ -62,6 +61,8 @@ class Child:
         limits: What it may use.
         folder: Its private folder.
         pid: The leader of its process group.
+        controller_pid: The process that runs the controller: the leader, or under the
+            tier `namespaces` the one that it waits for.
 
     Args:
         tier: See above, as for the next one.
@@ -74,7 +75,8 @@ class Child:
         self.limits = limits
         self.folder = forked.folder
         self.pid = forked.pid
-        self._line = Line(self.pid)
+        self.controller_pid = forked.pid
+        self._line = forked.line
         end, root = Ending(forked), forked.folder.root
         self._talk = Conversation(forked.channel, self.pid, limits, root, end)
         weakref.finalize(self, end)
@@ -101,8 +103,9 @@ class Child:
     def set_up(self, setup: dict[str, Any]) -> dict[str, bool]:
         """Have the child confine itself; return what it found to hold."""
         seconds = self.limits.start_seconds
-        facts = self._talk.request(Kind.SETUP, setup, "start", seconds)
-        return dict(facts)
+        facts = dict(self._talk.request(Kind.SETUP, setup, "start", seconds))
+        self.controller_pid = self._line.pid = facts.pop("pid", self.pid)
+        return facts
 
     def furnish(self, workdir: Path | None, controller_source: str | bytes) -> None:
         """Copy a working folder and a controller into a child started without.

@@ -15,7 +15,7 @@ from pathlib import Path
 TICKS_SECONDS = 0.025
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Line:
     """A process's place among those that want a CPU; sleepers are not in line.
 

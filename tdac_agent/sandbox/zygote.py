@@ -59,6 +59,7 @@ class Forked:
         pid: Its process id here, and that of a process group of its own.
         folder: Its private folder.
         channel: The way to talk with it.
+        line: The line for a CPU in which its controller stands.
         lifeline: When this descriptor closes, the kernel kills the process group.
         reap: Waits for its end; exit code or minus the signal, CPU s, resident bytes.
     """
@@ -66,6 +67,7 @@ class Forked:
     pid: int
     folder: PrivateFolder
     channel: Channel
+    line: Line
     lifeline: int
     reap: Callable[[], Reaped]
 
@@ -145,9 +147,9 @@ class Zygote:
             self._counts[GIVEN] += 1
             self._counts[ALIVE] += 1
         write, read, printed, lifeline = outer
-        frame, most = limits.frame_bytes, limits.output_bytes
-        channel = Channel(write, read, printed, frame, most, Line(pid))
-        return Forked(pid, folder, channel, lifeline, lambda: self._reap(number))
+        frame, most, line = limits.frame_bytes, limits.output_bytes, Line(pid)
+        channel = Channel(write, read, printed, frame, most, line)
+        return Forked(pid, folder, channel, line, lifeline, lambda: self._reap(number))
 
     @property
     def ended(self) -> bool:

@@ -6,13 +6,16 @@ import contextlib
 import os
 import resource
 import signal
+from collections.abc import Callable
 from typing import Any
 
 from . import kernel, landlock, namespaces, seccomp
 
 
-def confine(setup: dict[str, Any]) -> dict[str, bool]:
-    """Apply `setup["steps"]` in order and return what was found to hold.
+def confine(setup: dict[str, Any]) -> dict[str, int]:
+    """Apply `setup["steps"]` in order; return what was found to hold, and `pid`.
+
+    That is the id of this process outside, where a step has given it another one.
 
     Args:
         setup: The judge's setup frame.
@@ -20,10 +23,12 @@ def confine(setup: dict[str, Any]) -> dict[str, bool]:
     Raises:
         OSError: A step is not possible here.
     """
+    found: dict[str, int] = {}
     for step in setup["steps"]:
-        _STEPS[step](setup)
+        found |= _STEPS[step](setup) or {}
     os.chdir(setup["work"])
     return {
+        **found,
         "hides_files": _files_hidden([*setup["witnesses"], *setup["foreign"]]),
         "hides_names": not any(map(os.path.lexists, setup["witnesses"])),
         "denies_network": not kernel.can_open_socket(),
@@ -108,7 +113,7 @@ def _can_fork() -> bool:
     return True
 
 
-_STEPS = {
+_STEPS: dict[str, Callable[[dict[str, Any]], dict[str, int] | None]] = {
     "namespaces": namespaces.enter,
     "end with parent": _end_with_parent,
     "rlimits": _limit_resources,

@@ -24,12 +24,17 @@ _UNSHARE = (
 )
 _NOSUID, _NODEV, _BIND, _RECURSIVE, _PRIVATE = 2, 4, 4096, 16384, 1 << 18
 _NOBODY = 65534
+_PID = struct.Struct("=i")
 
 
-def enter(setup: dict[str, Any]) -> None:
+def enter(setup: dict[str, Any]) -> dict[str, int]:
     """Move this process into new namespaces; return in the first process of them.
 
     The process that called waits outside and ends as the inner one does.
+
+    Returns:
+        The process id of the inner one as seen from outside, where /proc can tell the
+        judge how it fares.
 
     Raises:
         OSError: The kernel or the container does not allow it.
@@ -41,13 +46,19 @@ def enter(setup: dict[str, Any]) -> None:
     _write("/proc/self/gid_map", f"{_NOBODY} {gid} 1")
     kernel.mount("none", "/", "", _RECURSIVE | _PRIVATE)
     _build_root(setup)
+    outside, tell = os.pipe()
     pid = os.fork()
     if pid:
-        _stand_by(pid, setup["descriptors"])
+        os.write(tell, _PID.pack(pid))
+        _stand_by(pid, [*setup["descriptors"], outside, tell])
+    os.close(tell)
+    (seen_as,) = _PID.unpack(os.read(outside, _PID.size))
+    os.close(outside)
     kernel.prctl(kernel.PR_SET_PDEATHSIG, signal.SIGKILL)
     kernel.prctl(kernel.PR_SET_NO_NEW_PRIVS, 1)
     header = struct.pack("=Ii", 0x20080522, 0)
     kernel.syscall("capset", _buffer(header), _buffer(bytes(24)))
+    return {"pid": seen_as}
 
 
 def _write(path: str, text: str) -> None:
@@ -74,6 +85,7 @@ def _build_root(setup: dict[str, Any]) -> None:
         _show(path, scratch, _RECURSIVE)
     for path in (*setup["devices"], setup["root"], setup["site"]):
         _show(path, scratch, 0)
+    _hide_ways(setup, scratch)
     _make_read_only(scratch)
     options = f"mode=700,size={setup['scratch_bytes']}"
     kernel.mount("tmpfs", scratch + scratch, "tmpfs", _NOSUID | _NODEV, options)
@@ -91,6 +103,22 @@ def _show(path: str, root: str, recursive: int) -> None:
         os.makedirs(os.path.dirname(target), exist_ok=True)
         os.close(os.open(target, os.O_CREAT | os.O_RDONLY))
     kernel.mount(path, target, "", _BIND | recursive)
+
+
+def _hide_ways(setup: dict[str, Any], root: str) -> None:
+    """Keep the folders that lead to visible ones from being listed.
+
+    Their names tell where this machine has its files, and differ from run to run.
+    """
+    shown = (*setup["system"], *setup["packages"], setup["root"], setup["site"])
+    device = os.stat(root).st_dev
+    for way in {parent for path in shown for parent in _parents(path)}:
+        if os.stat(root + way).st_dev == device:
+            os.chmod(root + way, 0o111)
+
+
+def _parents(path: str) -> list[str]:
+    return [path[:end] for end, letter in enumerate(path) if letter == os.sep]
 
 
 def _make_read_only(root: str) -> None:

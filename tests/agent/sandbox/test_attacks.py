@@ -296,6 +296,17 @@ def test_folders_outside_are_hidden(launch, promising_tier, tmp_path):
         assert child.call("entries", (path,)) == []
 
 
+def test_folders_on_the_way_to_visible_ones_are_hidden(launch, promising_tier):
+    """Their names differ from run to run, and tell where this machine has its files.
+
+    A judge has its temporary folder below that of the machine, where a virtual
+    environment may be as well.
+    """
+    child = loaded(launch, promising_tier, LISTING)
+    for path in ("/", "/tmp", *map(str, child.folder.root.parents)):
+        assert child.call("entries", (path,)) == []
+
+
 WRITES = """
     import os
 

@@ -52,13 +52,13 @@ def crowd():
 
 
 @pytest.fixture
-def crowded(launch, crowd):
+def crowded(launch, crowd, tier):
     """Starts children on the crowded CPU."""
 
     def start(source):
-        child = launch(source, limits=LIMITS)
+        child = launch(source, tier=tier, limits=LIMITS)
         child.load()
-        os.sched_setaffinity(child.pid, {crowd})
+        os.sched_setaffinity(child.controller_pid, {crowd})
         return child
 
     return start

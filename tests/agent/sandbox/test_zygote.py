@@ -201,8 +201,8 @@ def test_a_child_stays_where_its_taker_is(tier):
     finally:
         os.sched_setaffinity(0, every)
     free = nursery.take(tier, Limits())
-    assert os.sched_getaffinity(bound.pid) == {min(every)}
-    assert os.sched_getaffinity(free.pid) == every
+    assert os.sched_getaffinity(bound.controller_pid) == {min(every)}
+    assert os.sched_getaffinity(free.controller_pid) == every
     for child in (bound, free):
         child.close()
     nursery.close()
