@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import threading
 import time
+from collections.abc import Generator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from functools import cached_property, partial
 from pathlib import Path
 
+from tdac_agent.blame import ours
 from tdac_agent.crew import SIZE, Crew
 from tdac_agent.errors import Fault
 from tdac_agent.nursery import Nursery
@@ -25,7 +27,6 @@ from tdac_agent.suite_episode import (
     Order,
     SuiteCrew,
     drive,
-    fresh_child,
     load_controller,
     not_driven,
     skipped,
@@ -36,6 +37,7 @@ from tdac_agent.turns import Turns
 from tdac_envs.task2d import Pose
 
 JITTERS = 5
+NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))
 # As many as a suite has: the nominal one, the jittered ones, those of `run_episode`.
 EPISODES = 1 + JITTERS + 3
 WALL_SECONDS = 600.0
@@ -122,7 +124,8 @@ class Judge:
         if self._unit is not None and self._unit.fault is not None:
             self._end_unit()
         if self._unit is None:
-            self._unit = Unit(self._loaded(), self._deadline)
+            with self._ours():
+                self._unit = Unit(self._loaded(), self._deadline, self._ours)
         return self._unit
 
     def call_may_pass(self) -> bool:
@@ -148,6 +151,10 @@ class Judge:
                 `truncated run_episode`, where the environment ends that loop after
                 `steps`, and has counted collisions before it.
         """
+        if name not in NAMES:
+            raise ValueError(
+                f"expected 'nominal' or 'jitter N', N = 1 to {JITTERS}, got {name!r}"
+            )
         key = (name, steps, drive)
         self._wanted.add(key)
         return self._submit(key).result()
@@ -172,9 +179,22 @@ class Judge:
         The short ones come last, so that all who drive have done at about one time.
         """
         whole, *short = OWN_LOOPS if own_loop else (NOMINAL,)
-        jittered = [(f"jitter {n}", None, "policy") for n in range(1, JITTERS + 1)]
+        jittered = [(name, None, "policy") for name in NAMES[1:]]
         for key in (NOMINAL, whole, *(jittered if jitters else ()), *short):
             self._submit(key)
+
+    @contextmanager
+    def _ours(self) -> Generator[None]:
+        """Remembers what goes wrong meanwhile and is not the controller's doing.
+
+        A test may catch the error, and no other test meets it again.
+        """
+        try:
+            with ours():
+                yield
+        except Fault as fault:
+            self.fault = self.fault or str(fault)
+            raise
 
     def settle(self) -> None:
         """Waits for the episodes under way; after this all costs are known."""
@@ -209,20 +229,18 @@ class Judge:
 
     def start_pose(self, name: str) -> Pose:
         """Start of a named episode."""
-        if name == "nominal":
-            return self.task.nominal.start
-        if name not in self._starts:
-            raise ValueError(
-                f"expected 'nominal' or 'jitter N', N = 1 to {JITTERS}, got {name!r}"
-            )
-        return self._starts[name]
+        return self.task.nominal.start if name == "nominal" else self._starts[name]
 
     @cached_property
     def _starts(self) -> dict[str, Pose]:
         starts = spread_starts(self.task.nominal, self._seed, JITTERS)
-        return {f"jitter {n}": pose for n, pose in enumerate(starts, 1)}
+        return dict(zip(NAMES[1:], starts, strict=True))
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
+        with self._ours():
+            return self._in_turn(name, steps, drive)
+
+    def _in_turn(self, name: str, steps: int | None, drive: str) -> Rollout:
         if name != "nominal" and not self._submit(NOMINAL).result().reached:
             reason = "not run, since the nominal episode failed"
             order = self._order(name, steps, drive)
@@ -257,9 +275,6 @@ class Judge:
             driven = self._crew.do(self._brief, order)
         except ControllerFault as fault:
             return not_driven(self.task, order, fault)
-        except Fault as fault:
-            self.fault = str(fault)
-            raise
         self.tier = driven.tier
         self._account(driven.cpu_seconds)
         if driven.import_fault is not None:
@@ -297,11 +312,7 @@ class Judge:
             ControllerFault: It cannot be imported; the same at each later request.
         """
         self._may_start()
-        try:
-            child = fresh_child(self._nursery, self._brief)
-        except Fault as fault:
-            self.fault = str(fault)
-            raise
+        child = self._nursery.take(self._brief.tier, self._limits)
         self.tier = child.tier
         try:
             load_controller(child, self._brief)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 from tdac_agent.sandbox import (
@@ -51,14 +52,21 @@ class Unit:
     Args:
         child: With the controller imported.
         deadline: When the last call must be over, by `time.monotonic`.
+        ours: Around each request; sees the errors that are not the controller's.
 
     Attributes:
         fault: Why the process is gone, None while it answers.
     """
 
-    def __init__(self, child: Child, deadline: float) -> None:
+    def __init__(
+        self,
+        child: Child,
+        deadline: float,
+        ours: Callable[[], AbstractContextManager[None]],
+    ) -> None:
         self._child = child
         self._deadline = deadline
+        self._ours = ours
         self.fault: ControllerFault | None = None
 
     def get(self, name: str) -> Any:
@@ -97,7 +105,9 @@ class Unit:
         try:
             if seconds <= 0:
                 raise ControllerTimeout("the verification", 0)
-            return self._wrap(request(seconds))
+            with self._ours():
+                answer = request(seconds)
+            return self._wrap(answer)
         except ControllerError:
             raise
         except ControllerFault as fault:

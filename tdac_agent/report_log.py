@@ -20,6 +20,9 @@ from tdac_agent.report import (
 )
 
 PHASES = frozenset({"setup", "call", "teardown"})
+INTERNAL_ERROR = 3
+"""pytest's exit status, and the mark of its lines about it."""
+BREAKDOWN = "INTERNALERROR>"
 NOT_RUN = "the test did not run to its end"
 TORN = "the report log is torn or unfinished, so that nothing in it counts as passed"
 
@@ -95,6 +98,12 @@ class _Log(NamedTuple):
         ended = isinstance(last, _Finished) and last.exitstatus in (0, int(failed))
         return ended and None not in self.records
 
+    @property
+    def broke_down(self) -> bool:
+        """Whether pytest ended by an error of a hook and not of a test."""
+        last = self.records[-1] if self.records else None
+        return isinstance(last, _Finished) and last.exitstatus == INTERNAL_ERROR
+
 
 def read_findings(results: Path, output: str) -> Findings:
     """The judge's findings.
@@ -121,17 +130,25 @@ def read_findings(results: Path, output: str) -> Findings:
 
 
 def read_outcomes(
-    path: Path, findings: Findings
+    path: Path, findings: Findings, output: str = ""
 ) -> tuple[dict[str, str], list[Failure]]:
     """Outcome of each expected test; what is missing from the log has failed.
 
     A test has passed if each phase of it is on record, each as passed, in a log that
     is whole.
 
+    Args:
+        path: The log.
+        findings: What the judge found.
+        output: What it printed.
+
     Raises:
-        Fault: The suite cannot be collected, or ran what was not expected.
+        Fault: The suite cannot be collected, ran what was not expected, or has a hook
+            that raised.
     """
     log = _read(path)
+    if log.broke_down:
+        raise Fault(f"the suite broke down: {_breakdown(output)}")
     phases: dict[str, set[str]] = {name: set() for name in findings.expected}
     tests: dict[str, str] = dict.fromkeys(findings.expected, "missing")
     failures: dict[str, Failure] = {}
@@ -231,6 +248,12 @@ def _collect_error(name: str, record: _Collected) -> str:
     text = _message(record)
     marked = [line[1:].strip() for line in text.splitlines() if line.startswith("E ")]
     return f"{name}: {marked[-1] if marked else text}"
+
+
+def _breakdown(output: str) -> str:
+    """The error of a hook: the last line that pytest marks so."""
+    marked = [line for line in output.splitlines() if line.startswith(BREAKDOWN)]
+    return marked[-1].removeprefix(BREAKDOWN).strip() if marked else _tail(output)
 
 
 def _tail(output: str) -> str:

@@ -6,16 +6,15 @@ import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from tdac_agent.blame import ours
 from tdac_agent.crew import Crew
 from tdac_agent.episode import Record, run_own_loop, run_policy
-from tdac_agent.errors import Fault
 from tdac_agent.nursery import Nursery
 from tdac_agent.sandbox import (
     Child,
     ControllerFault,
     ControllerTimeout,
     Limits,
-    SandboxError,
 )
 from tdac_agent.task import Task, load_task
 from tdac_agent.trajectory import Outcome, Rollout
@@ -95,17 +94,18 @@ def _task_of(workdir: Path) -> Task:
     return load_task(workdir)
 
 
+@ours()
 def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
     """Drives an episode in a fresh child.
 
     Raises:
-        Fault: The sandbox failed.
+        Fault: Sandbox or judge failed.
     """
     limit = order.steps if order.steps is not None else task.nominal.horizon
     record = Record(task.make_env(), order.start, limit)
     if order.drive == "truncated run_episode":
         record.truncates, record.collisions_before = True, 2
-    child = fresh_child(nursery, brief)
+    child = nursery.take(brief.tier, brief.limits)
     try:
         load_controller(child, brief)
     except ControllerFault as fault:
@@ -131,23 +131,12 @@ def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
     return Driven(rollout, cpu_seconds, child.tier)
 
 
-def fresh_child(nursery: Nursery, brief: Brief) -> Child:
-    """A child without files.
-
-    Raises:
-        Fault: The sandbox failed.
-    """
-    try:
-        return nursery.take(brief.tier, brief.limits)
-    except SandboxError as error:
-        raise Fault(f"the sandbox failed: {error}") from error
-
-
 def load_controller(child: Child, brief: Brief) -> None:
     """Gives a child its files, and has it import the controller.
 
     Raises:
         ControllerFault: It cannot be imported.
+        SandboxError: Its files cannot be copied.
     """
     child.furnish(brief.workdir, brief.source)
     child.load()

@@ -90,7 +90,7 @@ def verify(
             warm = judge or stack.enter_context(WarmJudge())
             output = _run_judge(job, folder, warm, meanwhile)
         findings = read_findings(job.out, output)
-        tests, failures = read_outcomes(job.out / "report.jsonl", findings)
+        tests, failures = read_outcomes(job.out / "report.jsonl", findings, output)
         report = Report(
             verdict=verdict_of(tests),
             provenance=_provenance(task, source, job, suites, findings),

@@ -313,3 +313,46 @@ def test_the_tasks_hash_covers_it(small_task, tmp_path, changes):
     )
     same = load_task(write_small_task(tmp_path, name="other"))
     assert same.sha256() == small_task.sha256()
+
+
+POOR = """
+import os
+import resource
+
+
+def test_it(controller):
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (3, limits[1]))
+    try:
+        controller.constant("N_RAYS")
+    {forgiving}
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+"""
+NO_FILES = """
+import shutil
+
+shutil.rmtree("work")
+
+
+def test_it(controller):
+    controller.constant("N_RAYS")
+"""
+BROKEN_HOOK = "def pytest_runtest_logreport():\n    raise KeyError('a hook')\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "conftest", "reason"),
+    [
+        (POOR.format(forgiving=""), None, "Too many open files"),
+        (POOR.format(forgiving="except OSError: pass"), None, "Too many open files"),
+        (NO_FILES, None, "cannot copy the working folder"),
+        ("def test_it(): ...\n", BROKEN_HOOK, "KeyError: 'a hook'"),
+    ],
+    ids=["no descriptors", "forgiven", "no files", "a hook"],
+)
+def test_what_goes_wrong_in_the_judge_is_no_verdict(check, text, conftest, reason):
+    """Whatever test it happens in, and whether or not that test forgives it."""
+    with pytest.raises(Fault, match=reason) as caught:
+        check(text, conftest)
+    assert "\n" not in str(caught.value)

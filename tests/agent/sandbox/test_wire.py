@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from tdac_agent.episode import as_wheels, wrong_action
 from tdac_agent.sandbox.inner import wire
 from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
@@ -284,3 +285,11 @@ def test_a_layout_leaves_other_values_alone():
         assert layout.decode(data[:index] + b"\xff" + data[index + 1 :]) is None
     for other in (None, {}, {"a": 1}, {1: value["pose"]}, {"a": np.zeros(0)}, [1]):
         assert Layout.of(other) is None
+
+
+@given(values | st.lists(hashable | scalars | arrays, min_size=2, max_size=2))
+def test_whatever_a_policy_answers_is_two_numbers_or_refused(value):
+    """No answer makes an error in the judge, where it would be taken for a fault."""
+    wheels = as_wheels(value)
+    assert wheels is None or (wheels.shape == (2,) and np.isfinite(wheels).all())
+    assert len(wrong_action(value)) < 200
