@@ -17,6 +17,7 @@ import select
 import signal
 import sys
 import tempfile
+import threading
 import traceback
 from functools import partial
 from math import inf
@@ -88,16 +89,24 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
 
 def _status_of(worker: int) -> int:
     """Of a worker that has ended; one whose caller has gone has no more to do."""
-    if sys.platform == "linux":
-        ended, watch = os.pidfd_open(worker), select.poll()
-        watch.register(ended, select.POLLIN)
-        watch.register(0, 0)  # tells when nobody can write any more
-        watch.poll()
-        watch.unregister(0)
-        # Without a job it ends by itself.
-        if not watch.poll(1000 * FAREWELL_SECONDS):
-            os.killpg(worker, signal.SIGKILL)
-        os.close(ended)
+    ended, tell = os.pipe()
+
+    def wait() -> None:
+        os.waitid(os.P_PID, worker, os.WEXITED | os.WNOWAIT)
+        os.close(tell)
+
+    # A process descriptor would do, but not every kernel and container gives one.
+    waiting, watch = threading.Thread(target=wait, daemon=True), select.poll()
+    waiting.start()
+    watch.register(ended, 0)
+    watch.register(0, 0)  # tells when nobody can write any more
+    watch.poll()
+    watch.unregister(0)
+    # Without a job it ends by itself.
+    if not watch.poll(1000 * FAREWELL_SECONDS):
+        os.killpg(worker, signal.SIGKILL)
+    waiting.join()  # the next fork should find a single thread
+    os.close(ended)
     return os.waitpid(worker, 0)[1]
 
 

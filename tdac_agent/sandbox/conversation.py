@@ -37,7 +37,7 @@ class Conversation:
 
     Args:
         channel: Carries the frames.
-        pid: The child's first process.
+        lifeline: Descriptor that tells when the child has ended.
         limits: What the child may use.
         root: The private folder, whose name is removed from messages.
         end: Kills the child and returns what it used.
@@ -46,13 +46,13 @@ class Conversation:
     def __init__(
         self,
         channel: Channel,
-        pid: int,
+        lifeline: int,
         limits: Limits,
         root: Path,
         end: Callable[[], ChildUsage],
     ) -> None:
         self._channel = channel
-        self._pid = pid
+        self._lifeline = lifeline
         self._limits = limits
         self._root = root
         self._end = end
@@ -133,7 +133,7 @@ class Conversation:
         if isinstance(error, OutputFloodError):
             text = f"printed more than {self._limits.output_bytes} bytes at {phase}"
             self.give_up(ControllerOutputFlood(text, phase))
-        if not has_ended(self._pid, EXIT_SECONDS):
+        if not has_ended(self._lifeline, EXIT_SECONDS):
             self.breach("closed it", phase)
         used, limit = self._end(), self._limits.cpu_seconds
         text = explain_end(used.status, phase, used.cpu_seconds, limit)

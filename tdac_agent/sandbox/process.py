@@ -78,7 +78,8 @@ class Child:
         self.controller_pid = forked.pid
         self._line = forked.line
         end, root = Ending(forked), forked.folder.root
-        self._talk = Conversation(forked.channel, self.pid, limits, root, end)
+        channel, lifeline = forked.channel, forked.lifeline
+        self._talk = Conversation(channel, lifeline, limits, root, end)
         weakref.finalize(self, end)
 
     def __enter__(self) -> Child:

@@ -30,7 +30,16 @@ def apply(lifeline: int) -> None:
     Raises:
         OSError: The kernel or the processor does not offer it.
     """
-    code = b"".join(struct.pack("<HBBI", *step) for step in program(lifeline))
+    install(program(lifeline))
+
+
+def install(steps: list[Instruction]) -> None:
+    """Have the kernel filter this process's calls, and those of its children.
+
+    Raises:
+        OSError: The kernel does not offer it.
+    """
+    code = b"".join(struct.pack("<HBBI", *step) for step in steps)
     buffer = ctypes.create_string_buffer(code, len(code))
     pointer = struct.pack("@HP", len(code) // 8, ctypes.addressof(buffer))
     kernel.prctl(kernel.PR_SET_NO_NEW_PRIVS, 1)
