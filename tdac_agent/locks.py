@@ -15,10 +15,18 @@ TRY_SECONDS = 0.1
 """Somebody who looks whether a lock is held, holds it for a moment."""
 
 
+def open_lock(file: Path) -> int:
+    """A descriptor of a file to be locked, which is made where it is missing.
+
+    A link in its place is an OSError: it would make a file wherever it points to.
+    """
+    return os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+
+
 @contextmanager
 def hold(file: Path) -> Generator[bool]:
     """Holds the lock of a file meanwhile; gives False where another process does."""
-    handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
+    handle = open_lock(file)
     try:
         yield any(_take(handle, attempt) for attempt in range(TRIES))
     finally:
@@ -38,7 +46,7 @@ def _take(handle: int, attempt: int) -> bool:
 @contextmanager
 def wait_for(file: Path) -> Generator[None]:
     """Holds the lock of a file meanwhile, and waits for it as long as it takes."""
-    handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
+    handle = open_lock(file)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)
         yield
@@ -49,7 +57,7 @@ def wait_for(file: Path) -> Generator[None]:
 def is_held(file: Path) -> bool:
     """Whether a process holds the lock of a file."""
     try:
-        handle = os.open(file, os.O_RDONLY)
+        handle = os.open(file, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError:
         return False
     try:

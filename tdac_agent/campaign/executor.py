@@ -39,9 +39,15 @@ class Ended:
 
 @dataclass(frozen=True, slots=True)
 class Died:
-    """The process of a run has died; the run goes on in another one."""
+    """The process of a run has died; the run goes on in another one.
+
+    Attributes:
+        planned: The run.
+        reason: Of the death.
+    """
 
     planned: PlannedRun
+    reason: str
 
 
 Update = Begun | Told | Ended | Died
@@ -66,11 +72,11 @@ class Bereaved:
         """The next run."""
         return self._waiting.pop() if self._waiting else self.then()
 
-    def died(self, planned: PlannedRun) -> Update:
+    def died(self, planned: PlannedRun, reason: str) -> Update:
         """What becomes of a run whose process has died."""
         self._deaths[planned.name] += 1
         if self._deaths[planned.name] < MOST_DEATHS:
             self._waiting.append(planned)
-            return Died(planned)
-        reason = f"its process died {MOST_DEATHS} times; see errors.log"
-        return Ended(planned, Outcome(planned.name, "error", reason))
+            return Died(planned, reason)
+        told = f"its process died {MOST_DEATHS} times, at last: {reason}"
+        return Ended(planned, Outcome(planned.name, "error", told))

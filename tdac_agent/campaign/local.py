@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
+from tdac_agent.campaign.cores import core_locks
 from tdac_agent.campaign.executor import Begun, Bereaved, Ended, Next, Told, Update
 from tdac_agent.campaign.perform import Outcome, Terms
 from tdac_agent.campaign.plan import PlannedRun
@@ -35,6 +36,7 @@ class _Worker:
     process: subprocess.Popen[bytes]
     planned: PlannedRun | None = None
     runs: int = 0
+    last_word: str = ""
     _torn: bytes = b""
 
     @property
@@ -56,6 +58,16 @@ class _Worker:
         raw = os.read(self.answers.fileno(), CHUNK)
         *lines, self._torn = (self._torn + raw).split(b"\n")
         return [json.loads(line) for line in lines] if raw else None
+
+    @property
+    def death(self) -> str:
+        """Why it has ended, in its own words where it had time for some."""
+        code = self.process.returncode
+        if self.last_word:
+            return self.last_word
+        if code < 0:
+            return f"killed by {signal.Signals(-code).name}"
+        return f"ended with exit code {code}; see {ERRORS}"
 
     def end(self) -> None:
         """Lets go of it; one that is idle ends by itself."""
@@ -132,7 +144,11 @@ def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
     Args:
         terms: What all runs share.
         next_run: Where they come from.
+
+    Raises:
+        Fault: Workers could not share the cores.
     """
+    core_locks()  # where there is no place for them, every worker would die
     runs = Bereaved(next_run)
     with (Path(terms.folder) / ERRORS).open("ab") as errors:
         pool = _Pool(terms, errors)
@@ -163,10 +179,13 @@ def _hear(pool: _Pool, worker: _Worker, runs: Bereaved) -> Iterator[Update]:
     if messages is None:
         pool.dismiss(worker)
         if planned is not None:
-            yield runs.died(planned)
+            yield runs.died(planned, worker.death)
         return
-    assert planned is not None
     for message in messages:
+        if "death" in message:
+            worker.last_word = message["death"]
+            continue
+        assert planned is not None
         if "outcome" in message:
             worker.planned = None
             yield Ended(planned, Outcome(**message["outcome"]))

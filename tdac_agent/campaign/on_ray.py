@@ -62,8 +62,8 @@ def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
 def _update(ray: Any, reference: Any, planned: PlannedRun, runs: Bereaved) -> Update:
     try:
         outcome: Outcome = ray.get(reference)
-    except ray.exceptions.WorkerCrashedError:
-        return runs.died(planned)
+    except ray.exceptions.WorkerCrashedError as error:
+        return runs.died(planned, " ".join(str(error).split())[:300])
     except ray.exceptions.RayError as error:
         reason = " ".join(str(error).split())[:300]
         return Ended(planned, Outcome(planned.name, "error", reason))
@@ -72,8 +72,11 @@ def _update(ray: Any, reference: Any, planned: PlannedRun, runs: Bereaved) -> Up
 
 def _in_task(planned: PlannedRun, terms: Terms) -> Outcome:
     """One run, in a process of Ray's."""
-    with own_core() as turn, WarmJudge(turn=turn) as judge:
-        return perform(planned, terms, judge)
+    try:
+        with own_core() as turn, WarmJudge(turn=turn) as judge:
+            return perform(planned, terms, judge)
+    except Fault as fault:
+        return Outcome(planned.name, "error", str(fault))
 
 
 def _start(workers: int) -> Any:

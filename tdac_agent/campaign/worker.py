@@ -3,8 +3,8 @@
     python -m tdac_agent.campaign.worker PARENT TERMS
 
 Reads a planned run per line, as JSON, and writes records of its journal and in the end
-its outcome. It has a judge for all of them, a core of its own, and one thread for
-whatever libraries compute with; it ends with the process that started it.
+its outcome, or what it died of. It has a judge for all of them, a core of its own, and
+one thread for whatever libraries compute with; it ends with the process that started it.
 """
 
 from __future__ import annotations
@@ -31,11 +31,16 @@ def main(parent: int, terms: Terms) -> None:
         return
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what others print is no answer
-    with own_core() as turn, WarmJudge(turn=turn) as judge:
-        for line in iter(sys.stdin.readline, ""):
-            planned = PlannedRun.from_json(line)
-            outcome = perform(planned, terms, judge, lambda r: _tell(answers, r))
-            _say(answers, {"outcome": outcome.to_json()})
+    try:
+        with own_core() as turn, WarmJudge(turn=turn) as judge:
+            for line in iter(sys.stdin.readline, ""):
+                planned = PlannedRun.from_json(line)
+                outcome = perform(planned, terms, judge, lambda r: _tell(answers, r))
+                _say(answers, {"outcome": outcome.to_json()})
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        _say(answers, {"death": f"{type(error).__name__}: {reason}"})
+        raise
 
 
 def _tell(answers: BinaryIO, record: dict[str, Any]) -> None:

@@ -65,8 +65,8 @@ class LiveView:
         """Tells what stays on the screen."""
         match update:
             case Died():
-                told = f"the process of {update.planned.name} died; it goes on"
-                tell(self._console, told, "yellow")
+                told = f"the process of {update.planned.name} died: {update.reason}"
+                tell(self._console, f"{told}; it goes on", "yellow")
             case Ended() if not self._console.is_terminal:
                 self._console.print(self._line(update.outcome), soft_wrap=True)
             case Ended() if not update.outcome.finished:

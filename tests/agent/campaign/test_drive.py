@@ -84,11 +84,12 @@ def test_a_run_whose_processes_die_is_given_up_at_last():
     runs = list(plan_of("builtin").all())
     bereaved = Bereaved(iter(runs[1:]).__next__)
     for _ in range(MOST_DEATHS - 1):
-        assert bereaved.died(runs[0]) == Died(runs[0])
+        assert bereaved.died(runs[0], "why") == Died(runs[0], "why")
         assert bereaved.next() == runs[0]
-    ended = bereaved.died(runs[0])
+    ended = bereaved.died(runs[0], "out of memory")
     assert isinstance(ended, Ended)
     assert ended.outcome.status == "error"
+    assert ended.outcome.reason.endswith("at last: out of memory")
     assert bereaved.next() == runs[1]
 
 
