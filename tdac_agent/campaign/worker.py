@@ -4,7 +4,7 @@
 
 Reads a planned run per line, as JSON, and writes records of its journal and in the end
 its outcome, or what it died of. It has a judge for all of them, a core of its own, and
-one thread for whatever libraries compute with; it ends with the process that started it.
+one thread for whatever libraries compute with; it ends with the one that started it.
 """
 
 from __future__ import annotations
