@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -84,7 +85,7 @@ def _encode(
             code = process.wait()
         if code != 0:
             messages.seek(0)
-            raise VideoError(f"ffmpeg failed: {messages.read().decode().strip()}")
+            raise _failure(code, messages.read())
 
 
 def _feed(
@@ -119,7 +120,13 @@ def _palettise(film: Path, target: Path) -> None:
     for options in passes:
         done = subprocess.run([*_ffmpeg(), *options], capture_output=True, check=False)
         if done.returncode != 0:
-            raise VideoError(f"ffmpeg failed: {done.stderr.decode().strip()}")
+            raise _failure(done.returncode, done.stderr)
+
+
+def _failure(code: int, messages: bytes) -> VideoError:
+    """What ffmpeg said, or how it ended without a word."""
+    end = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    return VideoError(f"ffmpeg failed: {messages.decode().strip() or end}")
 
 
 def _ffmpeg() -> list[str]:

@@ -1,4 +1,4 @@
-"""`tdac doctor`: what works on this machine."""
+"""`tdac doctor`: what works on this machine, by trying it."""
 
 from __future__ import annotations
 
@@ -14,21 +14,25 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.campaign.config import read_config
-from tdac_agent.commands.play import has_display
-from tdac_agent.lifecycle import model_warnings, retired
-from tdac_agent.providers.choice import OFFLINE
+from tdac_agent.commands.display import has_display
+from tdac_agent.commands.trials import attempt
 from tdac_agent.sandbox import available_tiers
 from tdac_agent.shipped import shipped, shipped_names
 from tdac_envs.extras import install_command
 
 EXTRAS = {
     "human": "pygame",
+    "video": "moviepy",
     "sb3": "stable_baselines3",
     "anthropic": "anthropic",
     "openai": "openai",
     "ray": "ray",
 }
+TRIALS = (
+    ("compiled step", "compiled_step", True),
+    ("verification", "verification", True),
+    ("video (.mp4, .gif)", "video", False),
+)
 KEYS = ("ANTHROPIC_API_KEY", "OPENAI_API_KEY")
 PACKAGES = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
 
@@ -52,7 +56,9 @@ class Check:
 
 def run(as_json: bool) -> int:
     """Tries everything and prints it; 3 where something needed does not work."""
-    checks = [*_sandbox(), _video(), _window(), *_extras(), *_keys(), *_models()]
+    checks = [*_sandbox(), *_trials(), _window(), *_extras(), *_keys()]
+    # These load what has been tried above, which would end this process, too.
+    checks += _models() if _usable(checks) else []
     if as_json:
         record = {
             "checks": [asdict(check) for check in checks],
@@ -61,7 +67,12 @@ def run(as_json: bool) -> int:
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
     else:
         _show(checks)
-    return 3 if any(c.needed and not c.works for c in checks) else 0
+    return 0 if _usable(checks) else 3
+
+
+def _usable(checks: list[Check]) -> bool:
+    """Whether everything works that is needed."""
+    return all(check.works for check in checks if check.needed)
 
 
 def _sandbox() -> list[Check]:
@@ -81,14 +92,14 @@ def _sandbox() -> list[Check]:
     return [*checks, Check("sandbox in use", best is not None, detail, needed=True)]
 
 
-def _video() -> Check:
-    import imageio_ffmpeg
-
-    try:
-        version = imageio_ffmpeg.get_ffmpeg_version()
-    except RuntimeError as error:
-        return Check("video (.mp4, .gif)", False, str(error))
-    return Check("video (.mp4, .gif)", True, f"ffmpeg {version}")
+def _trials() -> list[Check]:
+    """What a first hour needs, tried; films are no part of what is needed."""
+    checks = []
+    with Console(stderr=True, emoji=False).status("") as told:
+        for title, name, needed in TRIALS:
+            told.update(f"trying {title}; the first time it is compiled …")
+            checks.append(Check(title, *attempt(name), needed))
+    return checks
 
 
 def _window() -> Check:
@@ -120,6 +131,10 @@ def _keys() -> list[Check]:
 
 def _models() -> list[Check]:
     """Which models of the shipped campaigns are gone, or soon will be."""
+    from tdac_agent.campaign.config import read_config
+    from tdac_agent.lifecycle import model_warnings, retired
+    from tdac_agent.providers.choice import OFFLINE
+
     checks = []
     for name in shipped_names("*.yaml"):
         models = read_config(shipped(name)).models

@@ -11,7 +11,10 @@ app = typer.Typer()
 
 @app.command(epilog="Example: `tdac doctor`")
 def doctor(as_json: Json = False) -> None:
-    """Say what works on this machine: sandbox tiers, window, video, extras, keys."""
+    """Try what works on this machine: sandbox, compiled code, judge, video, extras.
+
+    Exits with 3 where something does not work that everything needs.
+    """
     from tdac_agent.commands import doctor as command
 
     raise typer.Exit(command.run(as_json))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import tempfile
 from pathlib import Path
 
+from tdac_agent.commands.display import has_display
 from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.robust_flags import DisturbanceFlags, refuse_without
 from tdac_agent.commands.verify import controller_and_task
@@ -99,13 +98,6 @@ def drive_disturbed(
             raise Fault(f"the sandbox failed: {error}") from error
         finally:
             nursery.close()
-
-
-def has_display() -> bool:
-    """Whether a window can be opened."""
-    if sys.platform in ("darwin", "win32"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _checked(episode: str | None) -> str:

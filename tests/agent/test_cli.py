@@ -492,12 +492,3 @@ def test_play_says_what_went_wrong(tdac, good):
     code, out, _ = tdac("play", good, "--video", "a.gif")
     assert code == 1
     assert "ModuleNotFoundError at import" in out
-
-
-def test_doctor(tdac):
-    """Exit 0 where controllers can be run; as JSON, too."""
-    code, out, _ = tdac("doctor", "--json")
-    assert code == 0
-    record = json.loads(out)
-    assert any(c["name"] == "sandbox in use" and c["works"] for c in record["checks"])
-    assert "numpy" in record["versions"]
