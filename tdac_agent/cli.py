@@ -7,6 +7,7 @@ Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastruc
 from __future__ import annotations
 
 import gc
+import logging
 import os
 import signal
 import sys
@@ -145,6 +146,8 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # To look for some, pydantic reads what every installed package says of itself.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # It says at length where it keeps its fonts if it cannot write to a home.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:

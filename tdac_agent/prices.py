@@ -75,9 +75,10 @@ def price_file() -> Path:
     named = os.environ.get("TDAC_PRICES")
     if named:
         return Path(named)
-    settings = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
-    own = settings / "tdac" / "prices.yaml"
-    return own if own.is_file() else SHIPPED
+    settings = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
+    own = Path(settings, "tdac", "prices.yaml")
+    # Without a home, as of a user id that the system does not know, it stays "~".
+    return own if own.is_absolute() and own.is_file() else SHIPPED
 
 
 def load_prices(path: Path | None = None) -> PriceList:
