@@ -60,3 +60,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'tdac_agent' has no attribute {name!r}")
     return getattr(import_module(f"tdac_agent.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """What there is, imported yet or not."""
+    return sorted({*globals(), *__all__})

@@ -62,6 +62,11 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(_HOME[name]), name)
 
 
+def __dir__() -> list[str]:
+    """What there is, imported yet or not."""
+    return sorted({*globals(), *__all__})
+
+
 # The horizon depends on the task, so the envs truncate themselves: no TimeLimit here.
 gym.register(
     "TDAC-Map2D-v0",

@@ -11,20 +11,32 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
 
-# How long an example takes says more of the machine's other work than of the code.
-settings.register_profile(
-    "calm", deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("calm")
 SAMPLE = 12
-REAL_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+ROOT = Path(__file__).resolve().parents[1]
+REAL_DATA = ROOT.parent / "shared" / "data"
+# Their tests import the benchmarks, which are never installed.
+sys.path.append(str(ROOT))
 
 
 def pytest_configure() -> None:
     """Interrupts reach what tests start, also where they are run in the background."""
+    _set_up_hypothesis()
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _set_up_hypothesis() -> None:
+    try:
+        from hypothesis import HealthCheck, settings
+    except ImportError as error:
+        command = f"{sys.executable} -m pip install -e '{ROOT}[test]'"
+        message = f"the tests need the extra `test`: {command}"
+        raise pytest.UsageError(message) from error
+    # How long an example takes says more of the machine's other work than of the code.
+    settings.register_profile(
+        "calm", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    )
+    settings.load_profile("calm")
 
 
 @pytest.fixture(scope="session")

@@ -1,15 +1,18 @@
 """Promises of every env that `import tdac_envs` registers."""
 
 import pickle
+import sys
 import warnings
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.error import DependencyNotInstalled
 from gymnasium.utils.env_checker import check_env
 
 import tdac_envs  # noqa: F401 - registers the envs
+from tdac_envs.extras import install_command
 
 IDS = sorted(name for name in gym.registry if name.startswith("TDAC-"))
 VARIANTS = [
@@ -80,6 +83,18 @@ def test_gymnasium_has_nothing_to_say(name, options):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env)
+
+
+@every_env
+def test_without_a_window_gymnasium_says_what_to_install(name, monkeypatch):
+    """It renders for humans, too; what needs no window can be checked without one."""
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    env = gym.make(name, disable_env_checker=True).unwrapped
+    with pytest.raises(DependencyNotInstalled) as missing:
+        check_env(env)
+    line = f'render_mode="human" needs pygame: {install_command("human")}'
+    assert str(missing.value) == line
+    check_env(env, skip_render_check=True)
 
 
 @variants

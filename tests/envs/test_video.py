@@ -3,8 +3,10 @@
 import re
 import subprocess
 
+import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.wrappers import RecordVideo
 from imageio_ffmpeg import get_ffmpeg_exe
 
 from tdac_envs.video import VideoError, write_video
@@ -110,3 +112,18 @@ def test_what_ffmpeg_says_is_passed_on(tmp_path):
     with pytest.raises(VideoError, match="ffmpeg failed: "):
         write_video(frames(), tmp_path / "film.mp4", fps=-1)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["TDAC-Map2D-v0", "TDAC-EPuck-v0"])
+def test_gymnasium_records_films(tmp_path, name):
+    """With the extra `video`, a whole episode; each frame has the robot elsewhere."""
+    env = gym.make(f"tdac_envs:{name}", render_mode="rgb_array", horizon=5)
+    with RecordVideo(env, str(tmp_path / "films")) as recorded:
+        recorded.reset(seed=0)
+        truncated = False
+        while not truncated:
+            truncated = recorded.step(np.ones(2, np.float32))[3]
+        shape = recorded.render().shape
+    film = decode(tmp_path / "films" / "rl-video-episode-0.mp4")[1]
+    assert film.shape == (6, *(side - side % 2 for side in shape[:2]), 3)
+    assert (film[0] != film[-1]).any()
