@@ -90,8 +90,8 @@ def test_the_script_reproduces_the_map(name, drawn):
     assert task == kept.image.with_suffix(".json").read_text()
     now, before = cv2.imread(str(drawn / f"{name}.png")), cv2.imread(str(kept.image))
     assert now.shape == before.shape
-    # Labels are set in OpenCV's own font, which may differ between its versions.
-    assert (cv2.absdiff(now, before) > 8).mean() < 0.005
+    # Labels are set in OpenCV's own font, which was another one before version 5.
+    assert (cv2.absdiff(now, before) > 8).mean() < 0.01
 
 
 @pytest.mark.slow

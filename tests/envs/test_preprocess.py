@@ -539,7 +539,7 @@ SAMPLE = [t for t in _real_tasks() if t["width"] * t["height"] <= 500_000][::4]
 
 
 @pytest.mark.skipif(not SAMPLE, reason="the real maps are not on this machine")
-@pytest.mark.parametrize("task", SAMPLE, ids=lambda t: t["name"])
+@pytest.mark.parametrize("task", SAMPLE, ids=[t["name"] for t in SAMPLE])
 def test_real_maps(task: dict) -> None:
     """Every fourth real map: polarity and feasibility as the index has them."""
     if task["polarity"] == "mixed" or task["max_robot_radius_px"] < 3:
