@@ -1,3 +1,15 @@
+# What each part promises, on two cores, installation aside:
+#   make test         Every feature works, on this machine as it is; at most 5 minutes.
+#                     Nothing in it needs a quiet machine.
+#   make slow         What needs patience or quiet: each controller of the zoo on every
+#                     sandbox tier, each bundled map, long sweeps of seeds, killed runs.
+#   make slow-sample  Twelve of these tests, as CI runs them.
+#   make test-all     Both, and lint: what must pass before a release.
+#   make portability  Other people's machines: no bubblewrap, each tier, lowest and newest
+#                     versions, other Pythons, another user, other processors, a busy
+#                     machine. A table says what could not be tried, and why. Some rows:
+#                     make portability ROWS="lowest wheel-user"
+#   make lint         Style and types.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -5,7 +17,7 @@ BIN := $(VENV)/bin
 # the files with short tests come last, and both processes end together.
 PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: synth test slow slow-sample bench lint clean
+.PHONY: synth test test-all slow slow-sample lint bench portability clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
@@ -13,11 +25,16 @@ synth: $(VENV)/.installed
 test: $(VENV)/.test-installed
 	$(BIN)/pytest $(PARALLEL) -m "not slow"
 
-slow-sample: $(VENV)/.test-installed
-	TDAC_SLOW_SAMPLE=1 $(BIN)/pytest $(PARALLEL) -m slow
+test-all: test slow lint
 
 slow: $(VENV)/.test-installed
 	$(BIN)/pytest $(PARALLEL) -m slow
+
+slow-sample: $(VENV)/.test-installed
+	TDAC_SLOW_SAMPLE=1 $(BIN)/pytest $(PARALLEL) -m slow
+
+portability:
+	$(PYTHON) tools/portability $(ROWS)
 
 bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[bench]"

@@ -1,6 +1,6 @@
 """Judges the whole zoo and prints a table; exit 1 where a verdict is not as expected.
 
-python tests/agent/zoo/run.py [NAME ...] [--kind KIND] [--tier TIER]
+python tests/agent/zoo/run.py [NAME ...] [--kind KIND] [--tier TIER] [--core]
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ def main(
     names: Annotated[list[str] | None, typer.Argument(help="All by default.")] = None,
     kind: Annotated[str | None, typer.Option(help="Only this kind of task.")] = None,
     tier: Annotated[str | None, typer.Option(help="Only on this one.")] = None,
+    core: Annotated[bool, typer.Option(help="Only what is judged on all.")] = False,
     workers: Annotated[int, typer.Option(help="Verifications at a time.")] = WORKERS,
 ) -> None:
     """Judges controllers of the zoo and compares with what their headers promise."""
@@ -43,6 +44,7 @@ def main(
     if kind not in (None, *KINDS):
         raise typer.BadParameter(f"expected one of {', '.join(KINDS)}, got {kind!r}")
     cases = chosen_cases(names or [], [kind] if kind else list(KINDS))
+    cases = [case for case in cases if case.every_tier or not core]
     jobs = [(case, t) for case in cases for t in tiers_of(case) if tier in (None, t)]
     # What waits for a limit comes first, so that it is not waited for at the end.
     jobs.sort(key=lambda job: "limits" not in job[0].header)

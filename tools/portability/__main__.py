@@ -1,0 +1,75 @@
+"""Tries what other people's machines are like, and prints a table of what came of it.
+
+python3 tools/portability [ROW ...] [--work DIR] [--command COMMAND]
+
+Without rows all of them. Exit 0 if every row that could run passed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+
+from outcome import FAILED, attempt, told
+from place import ROOT, Place
+from rows import ROWS, drawn
+
+DRAWN = "drawn"
+
+
+def main() -> int:
+    """Runs the rows that were named; 1 if one of them failed."""
+    options = _options()
+    names = _names(options.rows)
+    folder = options.work or Path(tempfile.mkdtemp(prefix="tdac-portability-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    place = Place(folder.resolve(), shlex.split(options.command))
+    outcomes = []
+    try:
+        for name in names:
+            row = ROWS[name]
+            print(f"\n== {name}: {row.what}", flush=True)
+            outcomes.append(attempt(name, row.what, partial(row.run, place)))
+    finally:
+        if options.work is None:
+            shutil.rmtree(folder, ignore_errors=True)
+        print(f"\n{told(outcomes)}", flush=True)
+    return 1 if any(outcome.result == FAILED for outcome in outcomes) else 0
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="tools/portability", description=__doc__)
+    parser.add_argument(
+        "rows", nargs="*", metavar="ROW", help=f"{', '.join(ROWS)}, {DRAWN}"
+    )
+    parser.add_argument("--work", type=Path, help="folder to work in, which is kept")
+    parser.add_argument("--command", default="make test", help="of temporary and busy")
+    return parser.parse_args()
+
+
+def _names(wanted: list[str]) -> list[str]:
+    """The rows to run, each of them known."""
+    names = [_drawn() if name == DRAWN else name for name in wanted or ROWS]
+    if unknown := [name for name in names if name not in ROWS]:
+        sys.exit(f"no row {unknown[0]!r}; there are {', '.join(ROWS)}")
+    return names
+
+
+def _drawn() -> str:
+    """The row that the hash of the last commit chooses."""
+    command = ["git", "rev-parse", "HEAD"]
+    commit = subprocess.check_output(command, cwd=ROOT, text=True).strip()
+    name = drawn(commit)
+    out = ", ".join(other for other in ROWS if not ROWS[other].drawn)
+    print(f"drawn by {commit[:12]}: {name} (not in the draw: {out})", flush=True)
+    return name
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""The folder that the rows work in, with a clone and its virtual environment."""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from commands import run
+from outcome import CannotRun
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Place:
+    """A working folder below the temporary folder; what a row needs is made once.
+
+    Attributes:
+        folder: The folder.
+        command: What `temporary` and `busy` run in the clone.
+    """
+
+    def __init__(self, folder: Path, command: list[str]) -> None:
+        # What runs as another user must get here.
+        folder.chmod(0o755)
+        self.folder = folder
+        self.command = command
+
+    @functools.cached_property
+    def tree(self) -> Path:
+        """A fresh clone of the last commit."""
+        tree = self.folder / "tree"
+        run(["git", "clone", "--quiet", ROOT, tree], cwd=self.folder)
+        if subprocess.run(
+            ["git", "status", "--porcelain"],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            check=True,
+        ).stdout:
+            print("changes that are not committed are not in the clone", flush=True)
+        shared = ROOT.parent / "shared"
+        if shared.is_dir():
+            # Where the tests look for maps and worlds of other people.
+            (self.folder / "shared").symlink_to(shared)
+        return tree
+
+    @functools.cached_property
+    def python(self) -> Path:
+        """The interpreter of the clone's own `.venv`, with the test extra."""
+        run(
+            ["make", f"PYTHON={sys.executable}", ".venv/.test-installed"], cwd=self.tree
+        )
+        return self.tree / ".venv/bin/python"
+
+    @functools.cached_property
+    def uv(self) -> Path:
+        """uv, in an environment of its own."""
+        home = self.folder / "uv"
+        run([sys.executable, "-m", "venv", home], cwd=self.folder)
+        run([home / "bin/pip", "install", "--quiet", "uv"], cwd=self.folder)
+        return home / "bin/uv"
+
+    def run_uv(self, *words: str | Path) -> str:
+        """Runs uv with the interpreters that are here."""
+        env = {**os.environ, "UV_PYTHON_DOWNLOADS": "never"}
+        if links := os.environ.get("PIP_FIND_LINKS"):
+            env.setdefault("UV_FIND_LINKS", links)
+        return run([self.uv, *words], cwd=self.folder, env=env)
+
+    def environment(self, name: str, python: str) -> Path:
+        """The interpreter of a new virtual environment with nothing in it."""
+        venv = self.folder / name
+        self.run_uv("venv", "--quiet", "--python", python, venv)
+        return venv / "bin/python"
+
+
+def interpreter(version: str) -> str:
+    """An interpreter of a version such as "3.12", of those on PATH and of pyenv's.
+
+    Raises:
+        CannotRun: There is none.
+    """
+    name = f"python{version}"
+    folders = [Path(folder) for folder in os.get_exec_path()]
+    folders += sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin"))
+    for path in (folder / name for folder in folders):
+        if path.exists() and _is(path, version):
+            return str(path)
+    raise CannotRun(f"there is no {name} on PATH nor among pyenv's versions")
+
+
+def _is(path: Path, version: str) -> bool:
+    """Whether it runs and is that version; a shim may do neither."""
+    code = "import sys; print('%d.%d' % sys.version_info[:2])"
+    told = subprocess.run(
+        [path, "-c", code], capture_output=True, text=True, check=False
+    )
+    return told.stdout.strip() == version

@@ -1,0 +1,58 @@
+"""All rows of the table, by name."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import emulated
+import packaged
+import suites
+import tiers
+import versions
+from place import Place
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One thing that must work on other people's machines.
+
+    Attributes:
+        run: Does it and returns what came of it.
+        what: It runs.
+        drawn: Whether CI may draw it: it takes minutes, and CI does not run it anyway.
+    """
+
+    run: Callable[[Place], str]
+    what: str
+    drawn: bool = True
+
+
+ROWS = {
+    "temporary": Row(
+        suites.temporary, "make test below the temporary folder, no bubblewrap", False
+    ),
+    "tiers": Row(tiers.tiers, "sandbox tests, zoo's core, verdicts on every tier"),
+    "verdicts": Row(tiers.verdicts, "a good and a bad controller on every tier", False),
+    "lowest": Row(versions.lowest, "tests with the lowest direct versions"),
+    "newest": Row(versions.newest, "tests with the newest versions"),
+    "python3.12": Row(versions.python312, "tests on CPython 3.12"),
+    "python3.13": Row(versions.python313, "tests on CPython 3.13"),
+    "wheel-user": Row(packaged.wheel_user, "wheel of root's, used by nobody", False),
+    "wheel-nohome": Row(packaged.wheel_nohome, "wheel, user id without name and HOME"),
+    "qemu-nehalem": Row(emulated.nehalem, "rollout on an emulated Nehalem"),
+    "qemu-haswell": Row(emulated.haswell, "rollout on an emulated Haswell"),
+    "qemu-aarch64": Row(emulated.aarch64, "rollout on an emulated aarch64"),
+    "nojit": Row(suites.nojit, "kernel tests with NUMBA_DISABLE_JIT=1"),
+    "busy": Row(suites.busy, "make test beside four busy loops", False),
+}
+
+
+def drawn(seed: str) -> str:
+    """The row that CI runs beside those that it always runs.
+
+    Args:
+        seed: The commit's hash: each row has its turn, and a run can be repeated.
+    """
+    return random.Random(seed).choice([name for name in ROWS if ROWS[name].drawn])

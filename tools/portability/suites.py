@@ -1,0 +1,50 @@
+"""Rows that run this project's own tests in a clone below the temporary folder."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from commands import counted, own_environment, run
+from place import Place
+from walls import hidden
+
+BUSY_LOOPS = 4
+# Of each kind of compiled function a few tests, for without compilation all are slow.
+KERNELS = "tests/envs/test_kernels.py"
+
+
+def temporary(place: Place) -> str:
+    """The command (`make test`) in the clone, without bubblewrap."""
+    command = [*place.command, f"PYTHON={sys.executable}"]
+    return counted(run(command, cwd=place.tree, env=hidden(place)))
+
+
+def busy(place: Place) -> str:
+    """The same while other programs want the processors, too."""
+    _ = place.python  # the installation is not what is tried
+    with busy_loops(BUSY_LOOPS):
+        return temporary(place)
+
+
+@contextmanager
+def busy_loops(number: int) -> Iterator[None]:
+    """Processes that compute all the time."""
+    command = [sys.executable, "-c", "while True: pass"]
+    loops = [subprocess.Popen(command) for _ in range(number)]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+            loop.wait()
+
+
+def nojit(place: Place) -> str:
+    """A handful of kernel tests without compilation."""
+    tests = [place.python, "-m", "pytest", "-q", "-m", "not slow", KERNELS]
+    return counted(
+        run(tests, cwd=place.tree, env=own_environment(NUMBA_DISABLE_JIT="1"))
+    )

@@ -1,0 +1,91 @@
+"""Rows that try each tier of the sandbox by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from commands import counted, run
+from outcome import CannotRun, RowFailed
+from place import Place
+from walls import hidden, shown
+
+Environment = Mapping[str, str]
+Check = Callable[[Place, Environment, list[str]], str]
+WORKING = """
+from tdac_agent.sandbox import available_tiers
+for status in available_tiers():
+    print("tier", status.tier.name, "works" if status.works else status.reason)
+"""
+STANDS_STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+NOT_VERIFIED = 1
+# What goes wrong in one call of a few shall be seen, too.
+TRIES = 3
+
+
+def verdicts(place: Place) -> str:
+    """One good and one bad controller on every tier, without and with bubblewrap."""
+    return _without_and_with(place, _verdicts)
+
+
+def tiers(place: Place) -> str:
+    """The tests of the sandbox, the zoo's core and the verdicts, likewise."""
+    return _without_and_with(place, _tests_and_verdicts)
+
+
+def _without_and_with(place: Place, check: Check) -> str:
+    """Runs a check for the tiers that work; says of each whether it was tried.
+
+    Raises:
+        CannotRun: bubblewrap cannot be had; what was run without it has passed.
+    """
+    env = hidden(place)
+    said = f"bubblewrap hidden: {check(place, env, _working(place, env))}"
+    try:
+        env = shown(place)
+    except CannotRun as reason:
+        return f"{said}; not with it: {reason}"
+    names = _working(place, env)
+    if "bubblewrap" not in names:
+        return f"{said}; it does not work here"
+    return f"{said}; shown: {check(place, env, names)}"
+
+
+def _working(place: Place, env: Environment) -> list[str]:
+    """Names of the tiers that work in an environment, best first."""
+    text = run([place.python, "-c", WORKING], cwd=place.tree, env=env)
+    lines = [line.split() for line in text.splitlines() if line.startswith("tier ")]
+    if not lines:
+        raise RowFailed("no tier was told")
+    return [words[1] for words in lines if words[2] == "works"]
+
+
+def _tests_and_verdicts(place: Place, env: Environment, names: list[str]) -> str:
+    python, tree = place.python, place.tree
+    tests = ["-m", "pytest", "-q", "-m", "not slow", "tests/agent/sandbox"]
+    said = counted(run([python, *tests], cwd=tree, env=env))
+    for name in names:
+        zoo = ["tests/agent/zoo/run.py", "--core", "--tier", name]
+        run([python, *zoo], cwd=tree, env=env)
+    return f"{said}, the zoo's core, {_verdicts(place, env, names)}"
+
+
+def _verdicts(place: Place, env: Environment, names: list[str]) -> str:
+    good, bad = _controllers(place, env)
+    verify = [place.python, "-m", "tdac_agent", "verify"]
+    for name in names:
+        for _ in range(TRIES):
+            run([*verify, good, "--tier", name], cwd=place.folder, env=env)
+        told = [*verify, bad, "--profile", "policy", "--tier", name]
+        run(told, cwd=place.folder, env=env, expect=NOT_VERIFIED)
+    return f"verdicts on {' '.join(names)}"
+
+
+def _controllers(place: Place, env: Environment) -> tuple[Path, Path]:
+    """A run folder that is verified, and a controller that does not move."""
+    good, bad = place.folder / "good", place.folder / "bad.py"
+    if not good.exists():
+        synth = [place.python, "-m", "tdac_agent", "synth", "--out", good]
+        run(synth, cwd=place.folder, env=env)
+    bad.write_text(STANDS_STILL)
+    return good, bad

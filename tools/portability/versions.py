@@ -1,0 +1,57 @@
+"""Rows that run the tests with other versions of what tdac needs, and of Python."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+
+from commands import counted, run
+from place import Place, interpreter
+
+# Comes with gigabytes for graphics cards where no smaller build is offered.
+HEAVY = ("torch", "stable-baselines3")
+
+
+def lowest(place: Place) -> str:
+    """The tests with the lowest direct versions."""
+    return _tests(place, "lowest", sys.executable, "--resolution", "lowest-direct")
+
+
+def newest(place: Place) -> str:
+    """The tests with the newest versions."""
+    return _tests(place, "newest", sys.executable, "--resolution", "highest")
+
+
+def python312(place: Place) -> str:
+    """The tests on Python 3.12."""
+    return _tests(place, "python3.12", interpreter("3.12"))
+
+
+def python313(place: Place) -> str:
+    """The tests on Python 3.13."""
+    return _tests(place, "python3.13", interpreter("3.13"))
+
+
+def _tests(place: Place, name: str, version: str, *options: str) -> str:
+    """Installs tdac with the test extra and runs the tests that are not slow."""
+    needed = test_extra(place)
+    heavy = [need for need in needed if need.startswith(HEAVY)]
+    light = [need for need in needed if need not in heavy]
+    python = place.environment(f"venv-{name}", version)
+    install = ("pip", "install", "--python", python)
+    left_out = ""
+    if "nvidia" in place.run_uv(*install, "--dry-run", *heavy):
+        left_out = f"; without {', '.join(HEAVY)}: here they come with some gigabytes"
+    else:
+        # What is installed stays, and so the lowest of these is not asked for.
+        place.run_uv(*install, *heavy)
+    place.run_uv(*install, *options, "--editable", place.tree, *light)
+    tests = ["-m", "pytest", "-q", "-n", "2", "--dist", "loadfile", "-m", "not slow"]
+    return counted(run([python, *tests], cwd=place.tree)) + left_out
+
+
+def test_extra(place: Place) -> list[str]:
+    """What the tests need beside tdac."""
+    project = tomllib.loads((place.tree / "pyproject.toml").read_text())["project"]
+    needed: list[str] = project["optional-dependencies"]["test"]
+    return needed
