@@ -10,6 +10,7 @@ import sys
 from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from outcome import RowFailed
 
@@ -42,7 +43,9 @@ def run(
     """
     command = [str(word) for word in words]
     print(f"$ {' '.join(command)}", flush=True)
-    identity = {} if user is None else {"user": user, "group": user, "extra_groups": []}
+    identity: dict[str, Any] = {}
+    if user is not None:
+        identity = {"user": user, "group": user, "extra_groups": []}
     kept: deque[str] = deque(maxlen=KEPT_LINES)
     with subprocess.Popen(
         command,

@@ -92,7 +92,7 @@ def _wheels(place: Place, version: str) -> Path:
 
 
 def _compared(
-    place: Place, name: str, command: list[str | Path], env: dict[str, str]
+    place: Place, name: str, command: list[object], env: dict[str, str]
 ) -> str:
     """Runs the rollout on this processor and on the other, and compares.
 

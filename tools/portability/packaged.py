@@ -79,7 +79,7 @@ def _public_interpreter() -> str:
 
 
 def _runs_for_all(path: Path) -> bool:
-    command = [path, "-c", RECENT]
+    command: list[str | Path] = [path, "-c", RECENT]
     try:
         done = subprocess.run(
             command,
