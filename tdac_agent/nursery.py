@@ -9,7 +9,7 @@ import threading
 
 from tdac_agent.counters import shared_counters
 from tdac_agent.sandbox import (
-    TIERS,
+    CONFINING,
     Child,
     Limits,
     NoRoomError,
@@ -18,6 +18,7 @@ from tdac_agent.sandbox import (
     Zygote,
     find_tier,
     fork_child,
+    nothing_confines,
     start_zygote,
 )
 
@@ -120,7 +121,7 @@ class Nursery:
     def _first_child(self, limits: Limits) -> Child:
         """One of the best tier that turns out to work."""
         reasons = []
-        for tier in TIERS:
+        for tier in CONFINING:
             try:
                 child = self._child(tier, limits)
             except SandboxError as error:
@@ -128,7 +129,7 @@ class Nursery:
                 continue
             self._best = tier
             return child
-        raise SandboxError("no sandbox tier works here: " + "; ".join(reasons))
+        raise nothing_confines(reasons)
 
     def _child(self, tier: Tier, limits: Limits) -> Child:
         zygote = self._zygote(tier, limits)
@@ -161,7 +162,7 @@ class Nursery:
 
     def _start_likely(self) -> None:
         """Starts a zygote of the first tier that lets one start."""
-        for tier in TIERS:
+        for tier in CONFINING:
             try:
                 self._zygotes.append(start_zygote(tier, Limits()))
             except SandboxError:

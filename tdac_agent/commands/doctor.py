@@ -83,12 +83,12 @@ def _sandbox() -> list[Check]:
         )
         for s in tiers
     ]
-    best = next((status.tier.name for status in tiers if status.works), None)
-    if best == "rlimits":
-        detail = "rlimits only: verdicts make no claim about files and network; on "
-        detail += "Debian and Ubuntu: apt install bubblewrap"
-        return [*checks, Check("sandbox in use", True, detail, needed=True)]
-    detail = best or "none works: controllers cannot be run here"
+    works = (s.tier.name for s in tiers if s.works and s.tier.promises)
+    best = next(works, None)
+    detail = best or (
+        "none: controllers run only with --tier rlimits, unconfined; "
+        "on Debian and Ubuntu: apt install bubblewrap"
+    )
     return [*checks, Check("sandbox in use", best is not None, detail, needed=True)]
 
 

@@ -21,15 +21,17 @@ from tdac_agent.sandbox.launch import (
     best_tier,
     find_tier,
     fork_child,
+    nothing_confines,
     start,
     start_zygote,
 )
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
 from tdac_agent.sandbox.process import Child, EpisodeEnv
-from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
+from tdac_agent.sandbox.tiers import CONFINING, TIERS, Tier, TierStatus
 from tdac_agent.sandbox.zygote import NoRoomError, Zygote
 
 __all__ = [
+    "CONFINING",
     "MAX_SOURCE_BYTES",
     "TIERS",
     "Child",
@@ -53,6 +55,7 @@ __all__ = [
     "best_tier",
     "find_tier",
     "fork_child",
+    "nothing_confines",
     "start",
     "start_zygote",
 ]

@@ -12,7 +12,7 @@ from tdac_agent.sandbox.exposure import entries_but_hidden, exposure
 from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
 from tdac_agent.sandbox.process import Child
-from tdac_agent.sandbox.tiers import TIERS, Tier, TierStatus
+from tdac_agent.sandbox.tiers import CONFINING, TIERS, Tier, TierStatus
 from tdac_agent.sandbox.zygote import SLOTS, Zygote
 
 # Files that exist nearly everywhere and that no controller may read.
@@ -110,18 +110,32 @@ def available_tiers() -> list[TierStatus]:
 
 @functools.cache
 def best_tier() -> Tier:
-    """Return the best tier that works here.
+    """Return the best tier that works here and promises something.
 
     Raises:
-        SandboxError: None does.
+        SandboxError: None does. What promises nothing must be asked for by its name.
     """
     reasons = []
-    for tier in TIERS:
+    for tier in CONFINING:
         status = _status(tier)
         if status.works:
             return tier
         reasons.append(status.reason)
-    raise SandboxError("no sandbox tier works here: " + "; ".join(reasons))
+    raise nothing_confines(reasons)
+
+
+def nothing_confines(reasons: list[str]) -> SandboxError:
+    """The refusal to run a controller unconfined.
+
+    Args:
+        reasons: Why the tiers do not work.
+    """
+    return SandboxError(
+        "no sandbox works here that keeps a controller from your files and the network;"
+        " use Linux on x86-64 or aarch64 (apt install bubblewrap may help), or run code "
+        "that you trust unconfined: tdac verify --tier rlimits "
+        f"(why: {'; '.join(reasons)})"
+    )
 
 
 def _status(tier: Tier) -> TierStatus:

@@ -41,6 +41,8 @@ TIERS = (
     Tier("landlock", ("rlimits", "landlock", "seccomp"), BUT_NAMES),
     Tier("rlimits", ("rlimits", "seccomp if offered"), ()),
 )
+# One that promises nothing is used where it is named, never by itself.
+CONFINING = tuple(tier for tier in TIERS if tier.promises)
 
 
 @dataclass(frozen=True, slots=True)
