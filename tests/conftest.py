@@ -7,12 +7,13 @@ import random
 import signal
 import sys
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-SAMPLE = 12
+SAMPLE = 120
 ROOT = Path(__file__).resolve().parents[1]
 REAL_DATA = ROOT.parent / "shared" / "data"
 # Their tests import the benchmarks, which are never installed.
@@ -57,10 +58,12 @@ def one_set_of_types() -> Iterator[None]:
     assert not several, [(each.py_func, each.signatures) for each in several]
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(
     config: pytest.Config, items: list[pytest.Item]
 ) -> None:
     """With TDAC_SLOW_SAMPLE set, keeps a seeded sample of the slow tests."""
+    _mark_later_cases(items)
     seed = os.environ.get("TDAC_SLOW_SAMPLE")
     slow = sorted((i for i in items if i.get_closest_marker("slow")), key=_order)
     if seed is None or len(slow) <= SAMPLE:
@@ -69,6 +72,17 @@ def pytest_collection_modifyitems(
     dropped = [item for item in slow if item not in kept]
     config.hook.pytest_deselected(items=dropped)
     items[:] = [item for item in items if item not in dropped]
+
+
+def _mark_later_cases(items: list[pytest.Item]) -> None:
+    """Of a test with `slow_after(N)` all cases but the first N are slow."""
+    seen: Counter[str] = Counter()
+    for item in items:
+        if mark := item.get_closest_marker("slow_after"):
+            test = item.nodeid.partition("[")[0]
+            seen[test] += 1
+            if seen[test] > mark.args[0]:
+                item.add_marker(pytest.mark.slow)
 
 
 def _order(item: pytest.Item) -> int:

@@ -190,6 +190,7 @@ def test_a_persons_rule_counts(builtin):
     )
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "cause",
     [

@@ -59,9 +59,8 @@ def assert_proven(check, repeats):
         assert bool(row.failures) != (row.controller == REFERENCE)
 
 
-@pytest.mark.parametrize(
-    "profile", ["paper", pytest.param("policy", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["paper", "policy"])
 def test_the_shipped_suite_proves_itself(task, profile, warm):
     """The reference passes, each bad controller fails, twice alike; all is reported.
 
@@ -121,6 +120,7 @@ def test_the_impossible_is_found_out(task, suite_of, warm):
     assert check.problems == (told,)
 
 
+@pytest.mark.slow
 def test_a_suite_that_tests_nothing_is_found_out(task, suite_of, warm):
     """Whatever bad controller passes is named."""
     check = check_suite(
@@ -138,6 +138,7 @@ def test_a_suite_that_tests_nothing_is_found_out(task, suite_of, warm):
     )
 
 
+@pytest.mark.slow
 def test_a_task_that_needs_no_control_is_found_out(tmp_path, warm):
     """Where driving straight on is enough, the suite proves nothing about steering."""
     changes = {"start": [95, 60, 0.0], "goal": [140, 60], "tolerance": 30}
@@ -147,6 +148,7 @@ def test_a_task_that_needs_no_control_is_found_out(tmp_path, warm):
     assert check.problems == ("constant passes: nothing that is tested needs more",)
 
 
+@pytest.mark.slow
 def test_repeats_that_disagree_are_found_out(task, suite_of, tmp_path, warm):
     """A test with a mood of its own is named, with what it said each time."""
     moods = tmp_path / "moods.txt"
@@ -171,6 +173,7 @@ def test_mood():
     )
 
 
+@pytest.mark.slow
 def test_own_tests_that_nothing_fails_are_noted(task, suite_of, warm):
     """They may be right, so they are no problem; one that tells controllers apart is
     not mentioned."""
@@ -237,6 +240,7 @@ def events(folder):
     return [json.loads(line) for line in lines]
 
 
+@pytest.mark.slow
 def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
     """It ends as a fault, with the reason on record, before the first call."""
     folder = write_small_task(tmp_path / "task", suite="mine", profile="policy")
@@ -252,6 +256,7 @@ def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
     assert "did not prove itself" in records[-1]["reason"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("who", ["learner", "optimizer"])
 def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
     """Whoever of the two is paid; it is on record before the first call."""

@@ -341,6 +341,7 @@ def test_task_files_that_cannot_be_used(tdac, good, name):
         assert "not" in err
 
 
+@pytest.mark.slow
 def test_verify_says_yes_and_no(tdac, good):
     """Exit 0 for a verified controller, 1 for another; a table for people."""
     code, out, _ = tdac("verify", good, "--profile", "policy", "--paper")
@@ -398,6 +399,7 @@ def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
     assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
 
 
+@pytest.mark.slow
 def test_check_suite_says_yes(tdac, tmp_path):
     """Exit 0 and a table of the controllers."""
     folder = write_small_task(tmp_path / "short", profile="policy", **SHORT)
@@ -408,6 +410,7 @@ def test_check_suite_says_yes(tdac, tmp_path):
     assert "proven: map2d on small, profile policy, seed 0" in out
 
 
+@pytest.mark.slow
 def test_check_suite_says_no(tdac, tmp_path):
     """Exit 1; with --json the record alone on stdout."""
     folder = write_small_task(tmp_path / "short", profile="policy", **SHORT)
@@ -422,6 +425,7 @@ def test_check_suite_says_no(tdac, tmp_path):
     assert record["rows"][0]["controller"] == "reference"
 
 
+@pytest.mark.slow
 def test_check_suite_of_a_broken_suite(tdac, good, tmp_path):
     """Exit 3: neither yes nor no."""
     (tmp_path / "test_mine.py").write_text("import nosuchmodule\n")

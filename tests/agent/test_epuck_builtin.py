@@ -152,6 +152,7 @@ def failed(cause):
     return Report.model_construct(failures=(failure,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "cause",
     [
@@ -291,6 +292,7 @@ def drives(task, starts, parameters, folder, monkeypatch, **options):
     return [episode(module, env, start) for start in starts]
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("name", WORLDS)
 def test_drives_in_bundled_worlds(name, tmp_path, monkeypatch):
     """Every world is solved, from moved starts, too, and at a good speed."""
@@ -342,6 +344,7 @@ SYNTHESES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYNTHESES)
 def test_it_is_verified(name, tmp_path, warm):
     """Every world ends with a controller that passes the whole suite."""
@@ -352,6 +355,7 @@ def test_it_is_verified(name, tmp_path, warm):
     assert read_parameters(source, EPuckParameters) is not None
 
 
+@pytest.mark.slow
 def test_a_collision_is_repaired(crates, tmp_path):
     """A margin that is given up on purpose comes back from the report's diagnosis."""
     careless = render_epuck(EPuckParameters(), crates.nominal)

@@ -39,10 +39,8 @@ def assert_proven(check, repeats):
         assert bool(row.failures) != (row.controller == REFERENCE)
 
 
-@pytest.mark.parametrize(
-    ("profile", "repeats"),
-    [("paper", 1), pytest.param("policy", 2, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("profile", "repeats"), [("paper", 1), ("policy", 2)])
 def test_the_shipped_suite_proves_itself(task, profile, repeats, warm):
     """The reference passes, each bad one fails for how it drives, each time alike."""
     check = check_suite(
@@ -86,6 +84,7 @@ def test_the_nominal_start_alone(name, warm):
     assert verify(source, world, paper=True, judge=warm).failures == ()
 
 
+@pytest.mark.slow
 def test_a_task_that_needs_no_control_is_found_out(warm):
     """Where driving straight on is enough, the suite proves nothing about steering."""
     easy = load_task(
@@ -102,6 +101,7 @@ def test_a_task_that_needs_no_control_is_found_out(warm):
     assert check.problems == ("constant passes: nothing that is tested needs more",)
 
 
+@pytest.mark.slow
 def test_the_short_form(task, warm, tmp_path):
     """A proof, or one clear line about the test that asks for too much."""
     proof = prove_suite(task, profile="policy", judge=warm)

@@ -215,6 +215,7 @@ def test_the_good_one_passes(task, source, warm):
         assert report.provenance.unit == "m"
 
 
+@pytest.mark.slow_after(4)
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_one_fails_where_it_is_wrong(checked, source, name):
     """Exactly the unit tests that are about it fail."""
@@ -224,6 +225,7 @@ def test_a_wrong_one_fails_where_it_is_wrong(checked, source, name):
     assert failed(report, "static") == set()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "name",
     ["parse_world", "build_grid", "astar", "compute_wheel_speeds", "run_episode"],
@@ -235,6 +237,7 @@ def test_a_missing_function_is_named(checked, source, name):
     assert name in message
 
 
+@pytest.mark.slow
 def test_speeds_are_metres_a_second(task, source, warm):
     """`run_episode` that reports rad/s disagrees with the judge's record."""
     spoiled = source + (

@@ -108,6 +108,7 @@ def test_a_trajectory_picture_has_each_run(task):
     assert np.abs(around - TRAIL).sum(axis=2).min() < 60
 
 
+@pytest.mark.slow
 def test_frames_show_what_the_sensors_read(task, warm, tmp_path):
     """A video's frames are of one size, and a ray ends where its reading says."""
     verify(RAM, task, profile="policy", judge=warm, out=tmp_path)
@@ -119,6 +120,7 @@ def test_frames_show_what_the_sensors_read(task, warm, tmp_path):
     assert reaches(np.array([5000.0, 10.0], np.float32)).tolist() == [0.0, 0.07]
 
 
+@pytest.mark.slow
 def test_robust_episodes_are_what_the_environment_draws(task, source, warm):
     """Disturbed episodes: reproducible, in metres, and counted."""
     report = verify_robust(source, task, 6, judge=warm)
@@ -155,6 +157,7 @@ def test_a_run_is_self_contained(task, tmp_path, warm):
     assert load_run(folder).task_sha256 == load_task(folder).sha256() == task.sha256()
 
 
+@pytest.mark.slow
 def test_command_line_verifies_in_a_world(tdac, controller, tmp_path):
     """`--task epuck-NAME` and `--world NAME` are the same; the table is in mm."""
     code, out, _ = tdac("verify", controller, "--task", "epuck-crates")
@@ -169,6 +172,7 @@ def test_command_line_verifies_in_a_world(tdac, controller, tmp_path):
     assert report["provenance"]["task"] == "crates"
 
 
+@pytest.mark.slow
 def test_command_line_lists_what_is_left_out(tdac, controller, tmp_path):
     """A node that may be solid is refused; ignored, the verdict lists it."""
     file = tmp_path / "w.wbt"
@@ -220,6 +224,7 @@ def test_bad_input_is_one_line(tdac, controller, words, message):
     assert err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_tasks_of_files_name_their_world(tmp_path, controller, tdac):
     """A task.yaml names a world beside it, and the profile that it wants."""
     (tmp_path / "mine.wbt").write_text(world_file("crates").read_text())

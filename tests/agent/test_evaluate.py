@@ -114,6 +114,7 @@ def test_who_knows_the_way_gets_there_in_a_world_too(kind, tmp_path):
         assert 1.0 <= figures.time_ratio <= 1.6
 
 
+@pytest.mark.slow
 def test_two_evaluations_with_one_seed_are_equal_to_the_last_byte(
     ours, small_task, warm
 ):
@@ -142,6 +143,7 @@ def test_the_frame_is_tidy(ours):
     assert set(ours.timing_frame()["policy"]) == set(frame["policy"])
 
 
+@pytest.mark.slow
 def test_controllers_drive_the_episodes_of_the_environment(
     controllers, small_task, warm
 ):
@@ -190,6 +192,7 @@ def test_time_outs_end_a_policy_and_not_the_evaluation(controllers, small_task, 
     assert row(found, "reference").successes == 12
 
 
+@pytest.mark.slow
 def test_what_is_builtin_is_what_synth_delivers(small_task, warm):
     """The controller is verified, sandboxed, and named by its hash."""
     found = evaluate(["builtin"], [small_task], 3, judge=warm)
@@ -200,6 +203,7 @@ def test_what_is_builtin_is_what_synth_delivers(small_task, warm):
     assert len(builtin.controller_sha256) == 64
 
 
+@pytest.mark.slow
 def test_random_starts_and_goals(small_task, warm):
     """The privileged reference solves what is drawn; nominal starts are all one."""
     found = evaluate(
@@ -230,9 +234,8 @@ def save(path, algo, env, **options):
     return model
 
 
-@pytest.mark.parametrize(
-    "algo", ["PPO", "SAC", pytest.param("TD3", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("algo", ["PPO", "SAC", "TD3"])
 def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task):
     """Step for step as `model.predict` in the wrapped environment."""
     sb3 = pytest.importorskip("stable_baselines3")
@@ -263,6 +266,7 @@ def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task):
         assert episode.driven == pytest.approx(length, abs=1e-2)
 
 
+@pytest.mark.slow
 def test_a_batch_drives_the_episodes_of_an_evaluation(tmp_path, small_task):
     """Rates are the same as those of the judge, for the same seeds."""
     sb3 = pytest.importorskip("stable_baselines3")

@@ -120,6 +120,7 @@ SAME = {
 }
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("cause", SAME)
 def test_failures_with_one_root_are_one_group(small_task, warm, cause):
     """One mistake that fails tests in many ways is told once, whatever the part."""
@@ -183,6 +184,7 @@ def any_report(small_task, warm):
     return verify(WALL, small_task, profile="policy", paper=True, judge=warm)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(failed=failures())
 def test_whatever_failed_is_told_within_bounds(any_report, failed):

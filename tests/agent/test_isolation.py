@@ -255,6 +255,7 @@ def fresh_probe(small_task):
         return probe(small_task, judge)
 
 
+@pytest.mark.slow
 def test_a_process_begins_without_traces(fresh_probe):
     """There is nothing in it but what the contract gives: no marks, no spare file."""
     seen = fresh_probe["episodes"][0]["error"].split("; ")
@@ -265,6 +266,7 @@ def test_a_process_begins_without_traces(fresh_probe):
     assert seen[-1] == "decimal 28"  # the report has not cut it
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", often(FIRST, ALWAYS))
 def test_a_verification_leaves_nothing_for_the_next(
     small_task, warm, fresh_probe, name
@@ -293,6 +295,7 @@ SPOILERS = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", often(SPOILERS, {"an import", "a kill"}))
 def test_a_fault_leaves_nothing_for_the_next(
     small_task, warm, fresh_probe, tmp_path, name
@@ -304,6 +307,7 @@ def test_a_fault_leaves_nothing_for_the_next(
     assert probe(small_task, warm) == fresh_probe
 
 
+@pytest.mark.slow
 def test_a_judge_that_takes_too_long_is_replaced(
     small_task, warm, fresh_probe, tmp_path, monkeypatch
 ):
@@ -387,6 +391,7 @@ CHANGES = ["source", "map", "start", "horizon", "suite"]
 CHANGES += ["seed", "profile", "limits", "tier"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", often(CHANGES, {"source", "map"}))
 def test_nothing_is_remembered_by_its_name(many, warm, change):
     """The same path, task name or suite with other content gets its own verdict."""
@@ -401,6 +406,7 @@ def test_nothing_is_remembered_by_its_name(many, warm, change):
     assert third == first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", ["this", "another"])
 def test_what_was_read_ahead_changes_nothing(
     small_task, good_source, warm, known, tmp_path
@@ -415,6 +421,7 @@ def test_what_was_read_ahead_changes_nothing(
     assert usual.passed
 
 
+@pytest.mark.slow
 def test_a_good_controller_is_judged_as_ever(small_task, good_source, tmp_path):
     """Its report, and each pose of each episode, are the same after all others."""
     seen = []
@@ -477,6 +484,7 @@ def policy(obs):
 TIERS = [s.tier.name for s in available_tiers() if s.works and s.tier.name != "rlimits"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("tier", TIERS)
 def test_an_episode_leaves_nothing_for_the_next(small_task, good_source, warm, tier):
     """Each of the six has a process and a scratch folder that nobody has used."""

@@ -23,9 +23,8 @@ def template(request):
     return ground.originals(ground.task())[0]
 
 
-@pytest.mark.parametrize(
-    ("count", "kinds"), [(40, 30), pytest.param(150, 50, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "kinds"), [(40, 30), (150, 50)])
 def test_mutants_are_many_and_differ(template, count, kinds):
     """Each parses and is another program than its original and all others."""
     mutants = choose([template], count, 0, seed=1)

@@ -33,6 +33,7 @@ def code_of(notebook):
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
+@pytest.mark.slow
 @every_notebook
 def test_it_runs_offline(path, tmp_path, monkeypatch):
     """Without an error or a warning; each figure is shown as a vector picture."""

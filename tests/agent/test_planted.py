@@ -26,6 +26,7 @@ def found(number):
     return diagnose(rollout, task)
 
 
+@pytest.mark.slow
 def test_nine_in_ten_are_named_right():
     """Of more than 40 faults on bundled maps at most one in ten gets another name."""
     named = [found(n).cause == plant.cause for n, plant in enumerate(PLANTS)]
@@ -141,6 +142,7 @@ CONTROLLERS = {
 }
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_controllers_that_fail(name, small_task, warm, quick):
     """What a controller did wrong is told with its step; bounded, nothing of ours."""

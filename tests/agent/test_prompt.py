@@ -320,6 +320,7 @@ def test_repair_prompts_tell_earlier_attempts_and_rules(small_task, warm):
     assert "test_x" not in told["summarise"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("kind", ["edit", "summarise"])
 @pytest.mark.parametrize("name", ["small_task", "epuck_task"])
 def test_repair_prompts_hide_the_held_out_starts(name, kind, warm, request):

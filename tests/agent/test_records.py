@@ -117,6 +117,7 @@ RUN = Run(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=400)
 @given(st.data())
 def test_a_damaged_run(tmp_path_factory, data):
@@ -140,6 +141,7 @@ def under_way(path):
     return path.exists() and '"verify.start"' in path.read_text()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_synth_leaves_a_readable_run(tmp_path, no_traces, number):
     """Exit 130, status `interrupted`, nothing left running."""

@@ -45,6 +45,7 @@ def test_many_random_grids(block):
         assert_solves(random_env(random), random, jitters=1)
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("name", bundled_maps())
 def test_bundled_maps(name):
     """Every bundled task, in half of its horizon."""

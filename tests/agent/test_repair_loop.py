@@ -118,6 +118,7 @@ def check_life(folder):
     assert "not added: it says what R2 says, which was ended in k=2" in notes[2]
 
 
+@pytest.mark.slow
 def test_a_malformed_answer_about_rules_is_asked_again(
     policy_task, good_source, tmp_path, out, warm
 ):
@@ -139,6 +140,7 @@ def test_a_malformed_answer_about_rules_is_asked_again(
     assert third.count("could not be used") == 1
 
 
+@pytest.mark.slow
 def test_an_unusable_answer_is_asked_again_with_the_reason(
     policy_task, good_source, tmp_path, out, warm
 ):
@@ -156,6 +158,7 @@ def test_an_unusable_answer_is_asked_again_with_the_reason(
     assert (folder / "generate.reply-2.md").read_text() == part
 
 
+@pytest.mark.slow
 def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out, warm):
     """One line each, the one in question left out; no figure of a held-out start."""
     model = Model(
@@ -180,6 +183,7 @@ def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out, warm
     assert "nominal: collision in step " in lines[1]
 
 
+@pytest.mark.slow
 def test_the_prompt_is_on_record(policy_task, good_source, tmp_path, out, warm):
     """A run says which template its questions were made from."""
     model = Model(tmp_path / "model", code(good_source))
@@ -265,6 +269,7 @@ def test_rules_of_what_is_no_run(tmp_path, tdac):
     assert "is not a run folder" in told
 
 
+@pytest.mark.slow
 def test_builtin_learns_by_rules(tmp_path, tdac):
     """The template's own optimizer passes through the same rules, and says so."""
     folder = write_small_task(tmp_path / "task", horizon=40)

@@ -195,6 +195,7 @@ def check_log(results, folder, data):
         assert proven(raw, findings.expected)
 
 
+@pytest.mark.slow
 @FEW
 @given(st.data())
 def test_a_damaged_log(results, tmp_path_factory, data):
@@ -240,6 +241,7 @@ def check_findings(results, folder, data):
         assert sorted(tests) == sorted(expected)
 
 
+@pytest.mark.slow
 @FEW
 @given(st.data())
 def test_damaged_findings(results, tmp_path_factory, data):

@@ -79,6 +79,7 @@ def test_what_is_on_record_is_not_done_again(policy_task, good_source, halted, w
     assert before.censored
 
 
+@pytest.mark.slow
 def test_a_report_of_other_code_does_not_count(policy_task, good_source, halted, warm):
     """Whoever puts a passing report into the folder has the candidate verified anew."""
     other = halted / "iterations/k01/j0/report.json"
@@ -157,6 +158,7 @@ def test_one_process_at_a_time(policy_task, halted, warm):
             synthesize(policy_task, Script(), out=halted, judge=warm)
 
 
+@pytest.mark.slow
 def test_the_same_edit_is_not_tested_again(policy_task, good_source, out, warm):
     """Comments and layout are no change; the model is told, and the report stands."""
     same = f"# repaired\n\n{STILL}"

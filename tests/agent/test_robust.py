@@ -148,6 +148,7 @@ def test_a_seed_stands_for_itself(small_task, good_source, moody, warm):
     assert sorted(e.seed for e in part.worst) == [9, 10, 11, 12, 13]
 
 
+@pytest.mark.slow
 def test_disturbance_is_what_makes_the_difference(small_task, good_source):
     """Each part of it changes the way that is driven, from the same start."""
     none = Disturbance(range_noise=0.0, wheel_slip=0.0, motor_lag=0.0, delay=0)
@@ -240,6 +241,7 @@ def policy(obs):
 """
 
 
+@pytest.mark.slow
 def test_cpu_time_is_limited_for_each_episode(small_task, warm):
     """All together may use more than that."""
     limits = Limits(cpu_seconds=2, reset_seconds=60)
@@ -252,6 +254,7 @@ def test_cpu_time_is_limited_for_each_episode(small_task, warm):
     assert "CPU time" in report.worst[0].error
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("source", "reason"),
     [
@@ -373,6 +376,7 @@ def printed_command(out, name):
     return shlex.split(line.partition(f"tdac {name}")[2])
 
 
+@pytest.mark.slow
 def test_the_printed_command_replays(tdac, good):
     """What `verify --robust` prints plays the very episode."""
     noise = ["--wheel-slip", "0.0345678901", "--delay", "1"]
@@ -388,6 +392,7 @@ def test_the_printed_command_replays(tdac, good):
     assert f"seed {row[1]}: reached after {row[2]} steps" in out
 
 
+@pytest.mark.slow
 def test_the_episode_of_a_suite_is_played_by_its_name(tdac, good):
     """`--episode` takes what the report calls it, and no other word."""
     code, out, _ = tdac("play", good, "--episode", "jitter 2", "--video", "a.gif")
@@ -410,6 +415,7 @@ def test_robust_json(tdac, good):
     assert Path("kept", "report.json").is_file()
 
 
+@pytest.mark.slow
 def test_what_is_not_verified_is_not_disturbed(tdac, good):
     """Exit 1, and it says so."""
     (good / "controller.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")
@@ -422,6 +428,7 @@ def test_what_is_not_verified_is_not_disturbed(tdac, good):
     assert json.loads(out)["robust"] is None
 
 
+@pytest.mark.slow
 def test_the_decision_is_the_exit_code(tdac, good):
     """A verified controller that is rejected when it is disturbed: exit 1."""
     words = ["verify", good, "--profile", "policy", "--robust", 30]
@@ -467,6 +474,7 @@ def test_wrong_words(tdac, good, words, reason):
     assert re.search(reason, err), err
 
 
+@pytest.mark.slow
 def test_an_interrupt_leaves_nothing(good, no_traces):
     """Ctrl-C between disturbed episodes: exit 130, no process, no file."""
     kept = good / "kept"

@@ -69,6 +69,7 @@ operations = st.one_of(
 lives = st.lists(st.lists(operations, max_size=MAX_OPERATIONS), max_size=30)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(lives, st.data())
 def test_a_book_stays_sound(rounds, data):

@@ -47,6 +47,7 @@ def test_characteristics_are_exact(limit, rate):
     assert found.mean_episodes == pytest.approx(mean, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("accept_at", "margin"), [(0.95, 0.05), (0.9, 0.2), (0.5, 0.2)]
 )
@@ -68,6 +69,7 @@ def test_simulated_controllers_fare_as_said(accept_at, margin):
         assert abs(used.mean() - found.mean_episodes) <= 4.0 * error + 1e-9
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("margin", [0.02, 0.05, 0.2])
 @pytest.mark.parametrize("accept_at", [0.5, 0.9, 0.95, 0.99])
 def test_errors_keep_to_walds_bounds(accept_at, margin):

@@ -228,6 +228,7 @@ def spoiled(source, old, new):
     return source.replace(old, new)
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("name", [_marked(name) for name in WRONG])
 def test_a_wrong_controller_fails_its_test(failed, good_source, name):
     """Exactly the tests meant for it fail."""
@@ -235,6 +236,7 @@ def test_a_wrong_controller_fails_its_test(failed, good_source, name):
     assert failed(spoiled(good_source, old, new)) == set(expected)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", BROAD)
 def test_a_broadly_wrong_controller_fails(failed, good_source, name):
     """Its own test fails, whatever else does."""
@@ -254,6 +256,7 @@ def test_words_in_strings_and_comments_are_harmless(failed, good_source):
     assert failed(good_source + WORDS) == set()
 
 
+@pytest.mark.slow
 def test_a_controller_for_the_nominal_start_only_fails(small_task, good_source, warm):
     """The jittered starts catch what the nominal one does not."""
     source = spoiled(good_source, RESET, RESET + GIVE_UP)

@@ -100,6 +100,7 @@ def test_an_unexpected_pass_is_no_pass(check):
     assert not check(text).passed
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
@@ -179,6 +180,7 @@ def pytest_runtest_makereport(item, call):
 """
 
 
+@pytest.mark.slow
 def test_the_users_pytest_does_not_change_a_verdict(
     small_task, tmp_path, monkeypatch, check
 ):
@@ -200,6 +202,7 @@ def test_the_users_pytest_does_not_change_a_verdict(
     assert not verify(nothing, small_task, profile="policy", paper=True).passed
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("body", "tests_run"), [("time.sleep(99)", "xyy"), ("while True: pass", "xy")]
 )
@@ -246,6 +249,7 @@ def test_after(controller):
     assert "AttributeError at nearest_free" in messages["test_it"]
 
 
+@pytest.mark.slow
 def test_an_episode_that_is_kept_waiting_is_run_again(small_task, tmp_path, quick):
     """Its time-out counts only if it comes a second time."""
     write_workdir(tmp_path, small_task)
@@ -259,6 +263,7 @@ def test_an_episode_that_is_kept_waiting_is_run_again(small_task, tmp_path, quic
     assert os.times().elapsed - began >= 3.0
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "source",
     [b"while True:\n    pass\n", b"def policy(obs):\n    while True:\n        pass\n"],
@@ -278,6 +283,7 @@ def test_a_loop_without_end_is_waited_for_once(small_task, tmp_path, quick, sour
     assert 1.0 < judge.cpu_seconds < 2.5
 
 
+@pytest.mark.slow
 def test_provenance_names_what_was_tested(small_task, check):
     """Another controller or suite gives another hash, the rest stays as it was."""
 

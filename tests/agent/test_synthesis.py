@@ -92,6 +92,7 @@ def check_folder(folder, source):
     assert "test_end_to_end.py::test_progress" in rules[0]["evidence"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "reply",
     [
@@ -129,6 +130,7 @@ def test_invalid_answers_are_asked_again_twice(
 GARBAGE = Reply("\n\n  lorem \x1b[31mipsum\n" + "dolor sit amet " * 99)
 
 
+@pytest.mark.slow
 def test_a_model_without_a_usable_answer_is_given_up(
     policy_task, good_source, out, warm
 ):
@@ -248,9 +250,8 @@ def test_a_given_controller_is_tried_first(policy_task, good_source, out, warm):
     assert learner.requests == []
 
 
-@pytest.mark.parametrize(
-    "source", ["", pytest.param("# no line end", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("source", ["", "# no line end"])
 def test_a_given_controller_may_be_poor(policy_task, good_source, out, source, warm):
     """An empty file or one without a line end is a candidate like any other."""
     learner = Script(code(good_source))
@@ -282,6 +283,7 @@ def test_a_folder_in_use(policy_task, out, warm):
     assert [path.name for path in out.iterdir()] == ["mine.txt"]
 
 
+@pytest.mark.slow
 def test_a_run_folder_is_self_contained(tmp_path, good_source, warm):
     """Moved elsewhere it verifies with its own suite, and its controller runs alone."""
     folder = write_small_task(tmp_path / "task", suite="mine")
@@ -317,6 +319,7 @@ def test_a_run_folder_is_self_contained(tmp_path, good_source, warm):
     assert (moved / "controller.mp4").stat().st_size > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("patience", "asked"),
     [

@@ -148,6 +148,7 @@ def test_an_exhausted_budget_stops_a_run(
     assert load_run(out) == run
 
 
+@pytest.mark.slow
 def test_answers_that_report_no_tokens(tmp_path, tdac):
     """They count with what was reserved, which is said beside what was reported."""
     folder = write_small_task(tmp_path / "task", profile="policy")

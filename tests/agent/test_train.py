@@ -123,6 +123,7 @@ def test_a_training_leaves_a_policy_its_facts_and_a_curve(
     assert driver.policy(observation) in env.action_space
 
 
+@pytest.mark.slow
 def test_equal_seeds_learn_alike(tmp_path, small, config):
     """The same plan gives the same curve, another seed another one."""
 
@@ -135,6 +136,7 @@ def test_equal_seeds_learn_alike(tmp_path, small, config):
     assert one != other
 
 
+@pytest.mark.slow
 def test_a_finished_training_goes_on_to_another_end(tmp_path, small, config):
     """What was learnt stays; there is nothing to do for a training that is finished."""
     given = {"episodes": 3, "config": config()}
@@ -151,6 +153,7 @@ def test_a_finished_training_goes_on_to_another_end(tmp_path, small, config):
         train(make_plan((small,), steps=512, seed=1, **given), tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_points_after_the_checkpoint_are_learnt_again(tmp_path, small, config):
     """Of a process that dies between an evaluation and its checkpoint."""
     plan = make_plan((small,), steps=512, episodes=3, config=config())

@@ -70,6 +70,7 @@ def check(trajectory, whole, folder, data):
     assert not reason.endswith(": ")
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=200)
 @given(st.data())
 def test_a_torn_trajectory(trajectory, whole, tmp_path_factory, data):

@@ -31,6 +31,7 @@ def failed_with(report, test):
     return next(f.message for f in report.failures if f.test.endswith(f"::{test}"))
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("profile", "tests"), [("paper", 41), ("policy", 21)])
 def test_a_good_controller_passes(small_task, good_source, profile, tests, no_traces):
     """A controller that solves the task is verified, in both profiles."""
@@ -62,6 +63,7 @@ def shown(report):
     return console.file.getvalue()
 
 
+@pytest.mark.slow
 def test_a_failure_of_run_episode_has_that_name(small_task, good_source, warm):
     """What drives it is said: the policy's own episode begins at the same start."""
     raising = "\n\ndef run_episode(env, max_steps):\n    raise KeyError('speeds')\n"
@@ -72,6 +74,7 @@ def test_a_failure_of_run_episode_has_that_name(small_task, good_source, warm):
     assert "what happened: run_episode: error: " in shown(report)
 
 
+@pytest.mark.slow
 def test_a_cause_is_told_once(small_task, warm):
     """A controller that cannot be imported fails most tests for one reason."""
     report = verify("raise KeyError('speeds')\n", small_task, judge=warm)
@@ -163,6 +166,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_controllers_fail(small_task, quick, no_traces, name):
     """Each is reported as failed, soon and with its reason, and leaves no process."""
@@ -193,6 +197,7 @@ def policy(obs):
 """
 
 
+@pytest.mark.slow
 def test_the_environment_holds_no_key(small_task, monkeypatch, no_traces):
     """A controller that looks for keys finds none, and fails for its import of os."""
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-secret")
@@ -262,6 +267,7 @@ def test_wrong_actions_fail(small_task, answer, warm):
     assert report.episodes[0].steps == 0
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(
     "answer",
     [
@@ -316,6 +322,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_files_fail(small_task, tmp_path, name, warm):
     """A file that is no controller fails with one clear line."""
@@ -344,6 +351,7 @@ def test_files_that_cannot_be_read(what):
         read_source(what)
 
 
+@pytest.mark.slow
 def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     """What all processes of a controller use together is bounded."""
     burn = "\nimport time\n\nwhile time.process_time() < 0.8:\n    pass\n"
@@ -387,6 +395,7 @@ def start_endless(folder, temporary, program=COMMAND):
     return process
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
     """A signal in the middle of a verification ends the judge and its children."""
@@ -397,6 +406,7 @@ def test_an_interrupt_leaves_nothing(tmp_path, no_traces, number):
     assert stderr.decode().strip().splitlines()[-1] == "interrupted"
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel of Linux sees to it")
 @pytest.mark.parametrize("program", [COMMAND, ["-c", SCRIPT]], ids=["tdac", "script"])
 def test_a_caller_that_is_killed_takes_all_with_it(

@@ -44,6 +44,7 @@ def covered_nearby(shapes, x, y, radius):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     angle=st.floats(-10.0, 10.0),
@@ -86,6 +87,7 @@ def assert_same_things(found, expected):
                 assert piece.shape.area == pytest.approx(same.shape.area, abs=1e-8)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_copies_are_the_worlds_they_say(name):
     """Each text reads as its world; the copies have another order, names and more."""
@@ -119,6 +121,7 @@ def test_reordered_text_has_the_same_nodes():
     assert len(one.obstacles) == len(other.obstacles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["epuck", "epuck-room", "epuck-yard"])
 def test_samples_are_what_footprints_say(name):
     """Without inflation a point is occupied just where a footprint covers it."""
@@ -131,6 +134,7 @@ def test_samples_are_what_footprints_say(name):
             assert solid == occupied
 
 
+@pytest.mark.slow
 def test_inflated_samples_are_what_a_ring_of_probes_says():
     """With inflation a point is occupied just where something solid is that near."""
     case = world_cases(flat("epuck-crates"))[1]

@@ -8,6 +8,7 @@ from benchmarks.timing import Row, compared, duration, in_turn
 from tdac_envs.preprocessing import rank_candidates
 
 
+@pytest.mark.slow
 def test_the_straightforward_version_does_the_same_work():
     """Its best score is ours but for how it measures clearance: within 2 px of it."""
     picture, start, goal = floor_plan(0.2)

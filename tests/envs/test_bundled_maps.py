@@ -18,7 +18,6 @@ from tdac_envs.task2d import widest_connected_radius
 EACH_MAP = pytest.mark.parametrize("name", bundled_maps())
 EACH_HAND = pytest.mark.parametrize("hand", [LEFT, RIGHT], ids=["left", "right"])
 JITTERS = range(5)
-QUICK = ("maze", "rooms")
 
 
 @pytest.fixture(scope="module")
@@ -139,14 +138,9 @@ def test_going_straight_fails(name, make):
         assert not run(env, lambda obs: go_straight(obs, robot), seed)["is_success"]
 
 
+@pytest.mark.slow
 @EACH_HAND
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
-        for name in bundled_maps()
-    ],
-)
+@EACH_MAP
 def test_following_a_wall_fails(name, hand, make):
     env = make(name)
     info = run(env, wall_follower(hand, env.nominal.robot))

@@ -434,6 +434,7 @@ print(digest.hexdigest())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["crates", "arena"])
 def test_equal_seeds_give_equal_bits_in_separate_processes(world):
     """Observations, rewards and poses, with all noise, pushing things."""
@@ -479,6 +480,7 @@ def wander(env, steps, seed=0):
             env.reset()
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", bundled_worlds())
 def test_random_steps_are_finite_and_stay_out_of_things(name):
     """In the space, and no deeper than 1 mm in anything."""

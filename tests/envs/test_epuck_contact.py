@@ -94,6 +94,7 @@ def test_the_first_contact_is_the_first_and_a_contact(seed):
             assert oracle_gap(space, at[0], at[1]) == pytest.approx(RADIUS, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_disc_that_was_stopped_may_leave_but_not_go_on():
     """Driving on moves it by nothing, driving off by all of the way."""
     prisms = *arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)]), np.empty(0, np.int64), 0, 1

@@ -150,6 +150,7 @@ def test_the_goal_is_invisible_unless_wanted():
     assert seen[[0, 7]].min() > 100
 
 
+@pytest.mark.slow
 def test_rays_are_those_of_a_physics_engine():
     """Distances to discs and convex polygons, of all sensors, at random poses."""
     rng = np.random.default_rng(5)
@@ -183,6 +184,7 @@ def test_rays_are_those_of_a_physics_engine():
 
 
 class TestNoise:
+    @pytest.mark.slow
     @pytest.mark.parametrize("distance", [0.015, 0.03, 0.05])
     def test_it_is_that_of_the_table(self, distance):
         """Mean and spread of 10^5 readings, within 5 %."""
@@ -197,6 +199,7 @@ class TestNoise:
         assert both.mean() == pytest.approx(value, rel=0.01)
         assert both.std() / value == pytest.approx(sigma, rel=0.05)
 
+    @pytest.mark.slow
     def test_in_the_open_it_is_that_of_the_last_row(self):
         env = EPuckEnv("arena", sensor_noise=1.0, horizon=10**6)
         env.reset(seed=2)

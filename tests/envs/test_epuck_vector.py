@@ -28,6 +28,7 @@ CASES = {
 STEP = 6.28 * 0.02 * 0.032
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
 def test_it_does_what_single_environments_do(case, mode):
@@ -110,6 +111,7 @@ def engine_step(space, robot, left, right):
     space.step(0.032)
 
 
+@pytest.mark.slow
 def test_it_moves_as_a_physics_engine_does():
     """Poses within 1e-6 m over 1,000 steps without a contact."""
     floor = "RectangleArena { floorSize 60 60 }"

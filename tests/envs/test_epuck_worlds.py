@@ -29,6 +29,7 @@ class TestBundled:
         assert any('"NUE"' in world_file(name).read_text() for name in worlds)
         assert any(t.mass for world in worlds.values() for t in world.obstacles)
 
+    @pytest.mark.slow_after(5)
     @every_world
     def test_everything_is_modelled(self, name):
         world = load_world(world_file(name))
@@ -138,6 +139,7 @@ class TestPushing:
         assert np.abs(box_pose(env) - (0.2, 0, 0)).max() < 1e-3
         assert env.pose()[0] == pytest.approx(0.15 - 0.037, abs=1e-3)
 
+    @pytest.mark.slow
     def test_a_box_against_a_wall_stays(self):
         """Neither the box nor the robot gets more than 1 mm into anything."""
         env = pushing_env("Wall { translation 0.32 0 0 size 0.002 1 0.1 }")

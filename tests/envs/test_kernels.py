@@ -147,6 +147,7 @@ class TestRays:
         )
         assert out[0] == 19.5
 
+    @pytest.mark.slow
     @given(st.integers(0, 10**6))
     @exact
     def test_sees_is_symmetric_and_stops_at_walls(self, seed):
@@ -273,6 +274,7 @@ class TestFirstContact:
         assert sum(touch == 2.0 for touch in found if touch is not None) > 5
         assert sum(touch < 1.0 for touch in found if touch is not None) > 5
 
+    @pytest.mark.slow_after(5)
     @pytest.mark.parametrize("turn", TURNS)
     @pytest.mark.parametrize("forward", [20.0, -20.0])
     def test_a_large_disc(self, turn, forward):

@@ -51,6 +51,7 @@ def actions(count, steps, seed=0):
     return drawn
 
 
+@pytest.mark.slow_after(2)
 @cases
 @modes
 def test_it_does_what_single_environments_do(case, mode):

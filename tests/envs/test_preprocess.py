@@ -399,6 +399,7 @@ def small_map() -> np.ndarray:
     return grey
 
 
+@pytest.mark.slow
 def test_paper_preset_is_the_literal_grid() -> None:
     """2 polarities x 5 cleanups x 4 inflations, against a slow plain oracle."""
     grey, start, goal = small_map(), (7, 7), (26, 7)
@@ -442,6 +443,7 @@ def noisy(seed: int, size: int) -> np.ndarray:
     return np.repeat(grey[..., None], 3, axis=2)
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("radius", [0.5, 1.0, 2.5])
 @pytest.mark.parametrize("seed", range(6))
 def test_sharing_work_changes_nothing(seed: int, radius: float) -> None:

@@ -77,6 +77,7 @@ def test_there_are_envs():
     assert {"TDAC-Map2D-v0", "TDAC-EPuck-v0"} <= set(IDS)
 
 
+@pytest.mark.slow_after(2)
 @variants
 def test_gymnasium_has_nothing_to_say(name, options):
     env = gym.make(name, **options, disable_env_checker=True).unwrapped
@@ -164,6 +165,7 @@ def test_the_frame_rate_is_real_time(name):
     assert env.metadata["render_fps"] == round(1 / env.task.dt)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("mode", ["sync", "async"])
 @every_env
 def test_a_vector_of_envs_by_the_prefixed_id(name, mode):

@@ -95,6 +95,7 @@ def scenes(draw):
     return occ, draw(place), draw(place), heading, n_rays, fov, range_max
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(scenes())
 def test_ranges_equal_analytic_ray_and_square_intersections(scene):
@@ -306,6 +307,7 @@ def test_show_names_the_command_when_the_simulator_is_missing(monkeypatch):
         sensors.show(lambda obs: (0.0, 0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("action", "outcome"),
     [((1.0, 1.0), "reached"), ((-1.0, -1.0), "collided")],

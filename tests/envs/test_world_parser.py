@@ -228,6 +228,7 @@ def test_a_wrong_value_says_where(content):
     assert WRONG[content] in str(caught.value)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("tiny", ["1e-9", "1e-300", "0.0001"])
 def test_tiny_lengths_do_no_harm(tiny):
     """Nothing is too small to be drawn."""

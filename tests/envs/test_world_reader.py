@@ -111,6 +111,7 @@ def test_rocks_have_their_true_hull():
     assert flat.shape.bounds == pytest.approx((-0.174, -0.128, 0.22, 0.13), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_pipe_is_a_ring():
     """What is inside the inner radius is free, what is between both is not."""
     pipe = one(

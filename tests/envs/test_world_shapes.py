@@ -139,6 +139,7 @@ def test_cylinders(radius, height, place, turn):
     agrees(parts, points, COARSE * radius + 3e-5)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(radius=lengths, height=lengths, place=places, turn=turns)
 def test_capsules(radius, height, place, turn):
@@ -164,6 +165,7 @@ def test_cones_are_seen(radius, height, turn):
     agrees(obstacle.visible, in_world(points, (0, 0, 0), turn), COARSE * radius + 3e-5)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(scale=st.tuples(lengths, lengths, lengths), turn=turns)
 def test_scaled_spheres_are_ellipsoids(scale, turn):

@@ -38,6 +38,7 @@ def assert_equal(one, two):
         np.testing.assert_array_equal(one, two)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("names", "mode", "variation", "each"), CASES)
 def test_it_tells_what_wrapped_single_environments_tell(names, mode, variation, each):
     """To the last bit, also at the ends of episodes and after them."""

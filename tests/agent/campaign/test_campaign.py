@@ -40,6 +40,7 @@ def test_runs_of_another_file_are_not_made_again(once):
     assert len(list(find_runs(small.folder / "out"))) == 6
 
 
+@pytest.mark.slow
 def test_the_same_command_again_does_nothing_and_says_so(once):
     small, _, _ = once
     before = {p: p.stat().st_mtime_ns for p in (small.folder / "out/runs").rglob("*")}

@@ -38,6 +38,7 @@ def planned(file):
     return make_plan(read_config(file), file.parent)
 
 
+@pytest.mark.slow
 def test_runs_have_the_same_names_whenever_they_are_planned(written):
     """Another R adds runs; whatever else is changed gives other runs."""
     names = [run.name for run in planned(written()).all()]

@@ -11,6 +11,7 @@ from tdac_agent.campaign.on_ray import _start
 ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
 
 
+@pytest.mark.slow
 def test_a_worker_and_a_driver_are_killed(tmp_path):
     """A sample of the next one."""
     check_same_in_the_end(tmp_path, runs=1, kills=2, seconds=6.0)

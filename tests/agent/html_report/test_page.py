@@ -51,6 +51,7 @@ def outline(page):
     return Outline(page)
 
 
+@pytest.mark.slow
 def test_every_tag_is_closed(outline):
     """In the right order, whatever stands between them."""
     assert outline.open == []

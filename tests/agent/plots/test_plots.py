@@ -156,6 +156,7 @@ def test_the_timeline_tells_what_happened(run):
     assert "not used: no code" in told
 
 
+@pytest.mark.slow
 def test_the_timeline_tells_why(run, small_task, good_source):
     """The cause of a failure is that of its report, said once for all its tests."""
     broken = good_source.replace("def policy(obs):", "def policy(obs):\n    1 / 0\n", 1)

@@ -145,9 +145,10 @@ def whole(model, task_folder, tmp_path):
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kills",
-    [[(5, 0.5)], pytest.param([(5, 0.5), (4, 1.0)], marks=pytest.mark.slow)],
+    [[(5, 0.5)], [(5, 0.5), (4, 1.0)]],
     ids=["once", "again"],
 )
 def test_a_run_that_is_killed(model, task_folder, whole, tmp_path, kills):

@@ -40,6 +40,7 @@ def test_what_is_missing(tdac, task_file, monkeypatch, words, expected, tmp_path
     assert list((tmp_path / "here").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_broke(tdac, server, task_file, tmp_path):
     """Exit 3: the reason in one line, and where the run so far is."""
     server.script = [fails(OPENAI, 403, "permission_error", "not for you")]
@@ -54,6 +55,7 @@ def test_what_broke(tdac, server, task_file, tmp_path):
     assert json.loads((tmp_path / "run/run.json").read_text())["status"] == "fault"
 
 
+@pytest.mark.slow
 def test_learner_and_optimizer_are_independent(
     tdac, server, task_file, tmp_path, good_source
 ):

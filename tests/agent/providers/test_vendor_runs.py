@@ -34,6 +34,7 @@ def journal(folder):
     return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
+@pytest.mark.slow
 def test_faults_cost_neither_k_nor_j(
     server, task_file, good_source, tmp_path, monkeypatch, warm
 ):
@@ -112,9 +113,8 @@ def start(words, **variables):
     )
 
 
-@pytest.mark.parametrize(
-    "vendor", [ANTHROPIC, pytest.param(OPENAI, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("vendor", [ANTHROPIC, OPENAI])
 def test_an_interrupt_in_a_call(server, task_file, tmp_path, no_traces, vendor):
     """Ctrl-C while a server is silent: exit 130, and the run can be read."""
     process = None
@@ -155,6 +155,7 @@ def shown_by(pid):
         return b"", b""
 
 
+@pytest.mark.slow
 def test_the_key_is_in_no_place(server, canary, task_file, tmp_path, no_traces):
     """Not in a file, message, command line or child, even where a server repeats it."""
     process, secret, seen = None, canary.encode(), []

@@ -125,6 +125,7 @@ def judged_in_the_crowd(tmp_path, crowd):
     os.sched_setaffinity(0, before)
 
 
+@pytest.mark.slow
 def test_where_the_judge_stands_in_line_no_policy_is_slow(judged_in_the_crowd):
     """15 ms of work a call are within a step, however long the judge waits for a CPU.
 
@@ -136,6 +137,7 @@ def test_where_the_judge_stands_in_line_no_policy_is_slow(judged_in_the_crowd):
     assert rollout.calls.mean() > 0.04
 
 
+@pytest.mark.slow
 def test_on_a_busy_machine_a_slow_policy_is_slow(judged_in_the_crowd):
     """60 ms of work a call are too much in steps of 20 ms."""
     rollout = judged_in_the_crowd(Thinking(0.06))

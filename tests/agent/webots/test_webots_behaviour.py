@@ -530,6 +530,7 @@ class TestSupervisor:
         assert (seen[3], seen[7], seen[11]) == pytest.approx((*off, 0.05), abs=1e-6)
         assert seen[12:] == [0, 0, 0, 1]
 
+    @pytest.mark.slow
     def test_things_that_are_pushed(self, drive):
         """A supervisor sees them where they are now: ahead of the hull, as pushed."""
         world = BLOCKED.replace("0 0 1 0.3", "0 0 1 0").replace(
@@ -694,6 +695,7 @@ class TestFolder:
             pytest.skip("rlimits promises nothing")
         assert run.report.output == "closed\nclosed\nclosed\n"
 
+    @pytest.mark.slow
     def test_processor_time_is_bounded(self, drive, quick):
         """A controller that only computes is ended, and has failed."""
         limits = replace(quick, cpu_seconds=1)
@@ -703,6 +705,7 @@ class TestFolder:
 
 
 class TestTeleports:
+    @pytest.mark.slow_after(3)
     @pytest.mark.parametrize(
         ("call", "told"),
         [

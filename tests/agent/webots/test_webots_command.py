@@ -25,6 +25,7 @@ def record(answer):
     return code, json.loads(out)
 
 
+@pytest.mark.slow
 def test_reached(tdac, there):
     """Exit 0; the record says where, when and how."""
     code, run = record(
@@ -52,6 +53,7 @@ def test_not_reached(tdac, there):
     assert "not run in Webots itself" in out
 
 
+@pytest.mark.slow
 def test_without_a_goal_or_with_another(tdac, there):
     """A world without one is driven in; --goal sets one."""
     words = ["webots", "run", CONTROLLERS / "wall_follower.py", there / "bare.wbt"]
@@ -151,6 +153,7 @@ def test_without_a_sandbox(tdac, there, monkeypatch):
     assert err.startswith("infrastructure fault: the sandbox failed: bubblewrap")
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("tier", [tier.name for tier in TIERS])
 def test_every_sandbox(tdac, there, tier):
     """A run is the same in each tier that works here."""
@@ -166,6 +169,7 @@ def test_every_sandbox(tdac, there, tier):
     assert len(run["output"].splitlines()) == 29
 
 
+@pytest.mark.slow
 def test_another_tolerance(tdac, there):
     """A goal is reached earlier where farther away is near enough."""
     words = ["webots", "run", CONTROLLERS / "module_loop.py", there / "open.wbt"]

@@ -7,6 +7,7 @@ import pytest
 from worlds_for_controllers import BLOCKED, LINE, NO_GOAL, OPEN, PLAIN
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "name",
     [
@@ -28,6 +29,7 @@ def test_reaches_the_goal(drive, name):
     assert report.collisions == 0
 
 
+@pytest.mark.slow
 def test_bug_goes_around_a_box(drive):
     """Where the straight way is blocked, a bug algorithm gets there all the same."""
     report = drive("bug", BLOCKED, steps=2500).report
@@ -35,6 +37,7 @@ def test_bug_goes_around_a_box(drive):
     assert report.way > 0.85
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", ["deprecated_getters", "gps_compass"])
 def test_straight_on_into_a_box(drive, name):
     """The same box is hit by controllers that do not look: counted, not passed."""
@@ -46,6 +49,7 @@ def test_straight_on_into_a_box(drive, name):
     assert -0.14 < x < -0.03
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", ["braitenberg", "wall_follower"])
 def test_keeps_off_walls(drive, name):
     """Without a goal a run passes that drives on and touches nothing."""
@@ -56,6 +60,7 @@ def test_keeps_off_walls(drive, name):
     assert report.way > 1.0
 
 
+@pytest.mark.slow
 def test_line_follower(drive):
     """Three ground sensors keep it on a dark line."""
     run = drive("line_follower", LINE, steps=560, webots_sensors=True)

@@ -180,6 +180,7 @@ def test_bare_interpreter_with_a_stub(verified, tmp_path):
     assert printed == f"reached the goal after {steps_in_env(verified)} steps\n"
 
 
+@pytest.mark.slow
 def test_here_it_takes_as_many_steps(verified, tmp_path):
     """Run as a Webots controller it passes; one step more, for the first samples."""
     project = export_webots(verified, tmp_path / "out")
@@ -189,6 +190,7 @@ def test_here_it_takes_as_many_steps(verified, tmp_path):
     assert report.steps == steps_in_env(verified) + 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["arena", "corridor", "crates"])
 def test_builtin_controllers_of_bundled_worlds(tmp_path, world):
     """A controller of the built-in learner takes as many steps ± 5 %, also bare."""
@@ -245,6 +247,7 @@ def test_the_whole_way(tdac):
     assert abs(here - verified) <= 0.05 * verified
 
 
+@pytest.mark.slow
 def test_command_with_a_controller_that_does_not_get_there(tdac, verified):
     """Exit 1: what drives here is the exported file."""
     (verified / "controller.py").write_text("def policy(obs):\n    return 0.1, -0.1\n")
