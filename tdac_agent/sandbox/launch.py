@@ -131,9 +131,9 @@ def nothing_confines(reasons: list[str]) -> SandboxError:
         reasons: Why the tiers do not work.
     """
     return SandboxError(
-        "no sandbox works here that keeps a controller from your files and the network; "
-        "use Linux on x86-64 or aarch64 (apt install bubblewrap may help), or run what "
-        "you trust unconfined: tdac verify --tier rlimits "
+        "no sandbox works here that keeps a controller from your files and from the "
+        "network; use Linux on x86-64 or aarch64 (apt install bubblewrap may help), or "
+        "run what you trust unconfined: tdac verify --tier rlimits "
         f"(why: {'; '.join(reasons)})"
     )
 
