@@ -48,7 +48,11 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "rows", nargs="*", metavar="ROW", help=f"{', '.join(ROWS)}, {DRAWN}"
     )
-    parser.add_argument("--work", type=Path, help="folder to work in, which is kept")
+    parser.add_argument(
+        "--work",
+        type=Path,
+        help="folder to work in, which is kept; what it has is used",
+    )
     parser.add_argument("--command", default="make test", help="of temporary and busy")
     return parser.parse_args()
 

@@ -30,8 +30,10 @@ class Place:
 
     @functools.cached_property
     def tree(self) -> Path:
-        """A fresh clone of the last commit."""
+        """A fresh clone of the last commit, or the one that is there already."""
         tree = self.folder / "tree"
+        if tree.exists():
+            return tree
         run(["git", "clone", "--quiet", ROOT, tree], cwd=self.folder)
         if subprocess.run(
             ["git", "status", "--porcelain"],
