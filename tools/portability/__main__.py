@@ -16,9 +16,9 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from outcome import FAILED, attempt, told
 from place import ROOT, Place
 from rows import ROWS, drawn
+from table import FAILED, attempt, told
 
 DRAWN = "drawn"
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from outcome import RowFailed
+from table import RowFailed
 
 KEPT_LINES = 400
 # pytest's closing line, with colours or without.

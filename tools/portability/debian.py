@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 from commands import run
-from outcome import CannotRun, RowFailed
 from place import Place
+from table import CannotRun, RowFailed
 
 
 def unpacked(

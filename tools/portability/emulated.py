@@ -11,8 +11,8 @@ from pathlib import Path
 
 from commands import own_environment, run
 from debian import unpacked
-from outcome import CannotRun, RowFailed
 from place import Place
+from table import CannotRun, RowFailed
 
 SCRIPT = Path(__file__).with_name("rollout.py")
 TOLERANCE = 1e-6

@@ -9,8 +9,8 @@ import tempfile
 from pathlib import Path
 
 from commands import run, without
-from outcome import CannotRun
 from place import Place
+from table import CannotRun
 
 NOBODY = 65534
 # A user id as containers have it: without a line in /etc/passwd.

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from commands import run
-from outcome import CannotRun
+from table import CannotRun
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from commands import counted, run
-from outcome import CannotRun, RowFailed
 from place import Place
+from table import CannotRun, RowFailed
 from walls import hidden, shown
 
 Environment = Mapping[str, str]
