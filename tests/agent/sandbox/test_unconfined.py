@@ -60,6 +60,7 @@ def tdac_without_walls(tmp_path):
     return run
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("command", ["verify", "synth"])
 def test_the_judge_refuses_in_one_line(tdac_without_walls, good, tmp_path, command):
     """Exit 3, the reason and what to do; the controller was not started."""
@@ -77,6 +78,7 @@ def test_the_judge_refuses_in_one_line(tdac_without_walls, good, tmp_path, comma
     assert not trace.exists()
 
 
+@pytest.mark.slow
 def test_who_asks_for_it_gets_it(tdac_without_walls, good):
     """A verdict, with a warning that says what it is not worth."""
     words = [good / "controller.py", "--task", good / "task.yaml", "--tier", "rlimits"]
