@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 
 from commands import run
@@ -35,7 +36,7 @@ def unpacked(
     except RowFailed as error:
         raise CannotRun(f"cannot get {', '.join(packages)}: {error}") from None
     for package in sorted(folder.glob("**/*.deb")):
-        run(["dpkg", "-x", package, folder / "root"], cwd=folder)
+        subprocess.run(["dpkg", "-x", package, folder / "root"], check=True)
     return folder / "root"
 
 
