@@ -3,7 +3,7 @@
 #                     Nothing in it needs a quiet machine.
 #   make slow         What needs patience or quiet: each controller of the zoo on every
 #                     sandbox tier, each bundled map, long sweeps of seeds, killed runs.
-#   make slow-sample  Twelve of these tests, as CI runs them.
+#   make slow-sample  120 of these tests, drawn by SAMPLE; CI draws by the commit's hash.
 #   make test-all     Both, and lint: what must pass before a release.
 #   make portability  Other people's machines: no bubblewrap, each tier, lowest and newest
 #                     versions, other Pythons, another user, other processors, a busy
@@ -13,6 +13,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# Chooses which slow tests are run by slow-sample.
+SAMPLE ?= 1
 # A file's tests share what they need, so they are run by one process; in their order
 # the files with short tests come last, and both processes end together.
 PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder
@@ -31,7 +33,7 @@ slow: $(VENV)/.test-installed
 	$(BIN)/pytest $(PARALLEL) -m slow
 
 slow-sample: $(VENV)/.test-installed
-	TDAC_SLOW_SAMPLE=1 $(BIN)/pytest $(PARALLEL) -m slow
+	TDAC_SLOW_SAMPLE=$(SAMPLE) $(BIN)/pytest $(PARALLEL) -m slow
 
 portability:
 	$(PYTHON) tools/portability $(ROWS)
