@@ -34,7 +34,9 @@ ROWS = {
     "temporary": Row(
         suites.temporary, "make test below the temporary folder, no bubblewrap", False
     ),
-    "tiers": Row(tiers.tiers, "sandbox tests, zoo's core, verdicts on every tier", False),
+    "tiers": Row(
+        tiers.tiers, "sandbox tests, zoo's core, verdicts on every tier", False
+    ),
     "verdicts": Row(tiers.verdicts, "a good and a bad controller on every tier", False),
     "lowest": Row(versions.lowest, "tests with the lowest direct versions"),
     "newest": Row(versions.newest, "tests with the newest versions"),
