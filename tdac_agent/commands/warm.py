@@ -13,8 +13,9 @@ import tdac_envs
 from tdac_agent.privileged.controllers import reference_way
 from tdac_agent.reference import steer
 from tdac_agent.surroundings_epuck import world_surroundings
+from tdac_envs import rays
 from tdac_envs.compiled import cache_folder
-from tdac_envs.epuck import kernels
+from tdac_envs.epuck import infrared, kernels
 from tdac_envs.wrapped_vector import WrappedVectorEnv
 
 
@@ -32,13 +33,16 @@ def use_every_kernel() -> None:
     """Calls each kernel, by what calls it in use, on a small map and a small world."""
     image = np.full((60, 90), 255, np.uint8)
     image[25:35, 30:] = 0
-    ends = {"start": (12.0, 12.0), "goal": (80.0, 50.0)}
-    grid, _ = tdac_envs.preprocess(image, **ends, robot_radius=5.0, preset="paper")
-    _use("TDAC-Map2D-v0", map=grid.cells, robot_radius=5.0, **ends)
+    start, goal, radius = (12.0, 12.0), (80.0, 50.0), 5.0
+    grid, _ = tdac_envs.preprocess(image, start, goal, radius, preset="paper")
+    ends = {"start": start, "goal": goal, "robot_radius": radius}
+    disc = _use("TDAC-Map2D-v0", map=grid.cells, **ends)
+    rays.sees(disc.nominal.terrain.leaps, *start, *goal)
     epuck = _use("TDAC-EPuck-v0", world="arena", ground_sensors=True)
-    around, start = world_surroundings(epuck.nominal), epuck.nominal.start
-    around.touch(start, 10.0)
-    around.pull(around.path_from(start))
+    around, pose = world_surroundings(epuck.nominal), epuck.nominal.start
+    around.touch(pose, 10.0)
+    around.pull(around.path_from(pose))
+    infrared.sees(*epuck.nominal.ground.solid.arrays(), 0.0, 0.0, 1.0, 1.0)
     (words,) = epuck.addresses.words
     kernels.turn_wheels(words)
     kernels.finish(words)

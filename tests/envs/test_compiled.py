@@ -157,36 +157,6 @@ def test_without_compiling_the_same_comes_out():
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
 
 
-def test_no_kernel_is_compiled_for_two_sets_of_types():
-    """numba's cache mixes them up where two processes write at once; and it is slow."""
-    script = (
-        "import gymnasium as gym, numpy as np, sys, tdac_envs\n"
-        "from tdac_envs.wrapped_vector import WrappedVectorEnv\n"
-        "for name in ('TDAC-Map2D-v0', 'TDAC-EPuck-v0'):\n"
-        "    for variation in ('nominal', 'random'):\n"
-        "        env = gym.make(name, variation=variation, on_collision='block')\n"
-        "        env.reset(seed=0)\n"
-        "        env.step(env.action_space.sample())\n"
-        "    task = env.unwrapped.nominal\n"
-        "    env.reset(options={'start': task.start[:2], 'goal': list(task.goal)})\n"
-        "    if 'Map' in name:\n"
-        "        env.reset(options={'start': [*map(round, task.start[:2])]})\n"
-        "    envs = gym.make_vec(name, 2, 'vector_entry_point', variation='jitter')\n"
-        "    envs = WrappedVectorEnv(envs, ('goal-relative', 'guidance', 'flatten'))\n"
-        "    envs.reset(seed=0); envs.step(envs.action_space.sample())\n"
-        "cells = np.zeros((90, 120), np.uint8); cells[40:50, 30:] = 1\n"
-        "options = dict(start=(20, 20), goal=(100, 75), robot_radius=5)\n"
-        "env = gym.make('TDAC-Map2D-v0', map=cells > 0, **options)\n"
-        "env.reset(seed=1); env.step(env.action_space.sample())\n"
-        "from tdac_envs.compiled import KERNELS\n"
-        "print(len(KERNELS))\n"
-        "print([k.__name__ for k in KERNELS if len(k.signatures) > 1])\n"
-    )
-    count, several = run(script)[0].split("\n")
-    assert int(count) > 20
-    assert several == "[]"
-
-
 @pytest.mark.parametrize("make", ["link", "loose", "loose file", "loose above"])
 def test_a_folder_that_others_may_write_to_is_not_believed(make, tmp_path):
     """What lies there is run, so nobody else may have put it there."""
@@ -256,6 +226,21 @@ def test_an_unprivileged_user_reads_a_warm_package(home, cold_start, copied_pack
     else:
         assert said.startswith("tdac: compiled code cannot be kept in ")
         assert said.count("\n") == 0
+
+
+def test_warming_uses_every_kernel():
+    """After `tdac warm` nobody waits for a compiler; each has one set of types."""
+    script = (
+        "import importlib, pkgutil, tdac_envs\n"
+        "from tdac_agent.commands.warm import use_every_kernel\n"
+        "use_every_kernel()\n"
+        "for found in pkgutil.walk_packages(tdac_envs.__path__, 'tdac_envs.'):\n"
+        "    if not any(p in found.name for p in ('.draw', '.webots', '.sb3')):\n"
+        "        importlib.import_module(found.name)\n"
+        "from tdac_envs.compiled import KERNELS\n"
+        "print([k.__name__ for k in KERNELS if len(k.signatures) != 1])\n"
+    )
+    assert run(script)[0] == "[]"
 
 
 def test_an_import_compiles_nothing():

@@ -97,7 +97,8 @@ def test_the_first_contact_is_the_first_and_a_contact(seed):
 @pytest.mark.slow
 def test_a_disc_that_was_stopped_may_leave_but_not_go_on():
     """Driving on moves it by nothing, driving off by all of the way."""
-    prisms = *arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)]), np.empty(0, np.int64), 0, 1
+    wall = arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)])
+    prisms = *wall, np.empty(0, np.int64), 0, 1
     state = np.zeros(3)
     assert advance(*prisms, state, 0.3, 0.0, RADIUS)
     stopped = state[0]
