@@ -37,7 +37,7 @@ def use_every_kernel() -> None:
     grid, _ = tdac_envs.preprocess(image, start, goal, radius, preset="paper")
     ends = {"start": start, "goal": goal, "robot_radius": radius}
     disc = _use("TDAC-Map2D-v0", map=grid.cells, **ends)
-    rays.sees(disc.nominal.terrain.leaps, *start, *goal)
+    rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
     epuck = _use("TDAC-EPuck-v0", world="arena", ground_sensors=True)
     around, pose = world_surroundings(epuck.nominal), epuck.nominal.start
     around.touch(pose, 10.0)
