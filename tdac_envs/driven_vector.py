@@ -159,7 +159,9 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     def close_extras(self, **_: Any) -> None:
         """Ends the threads."""
-        self._slices.close()
+        # Gymnasium 1.2 also closes what was refused before it was made.
+        if hasattr(self, "_slices"):
+            self._slices.close()
 
     def pose(self) -> Array:
         """The true poses, shape (num_envs, 3)."""

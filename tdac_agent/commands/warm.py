@@ -42,7 +42,8 @@ def use_every_kernel() -> None:
     around, pose = world_surroundings(epuck.nominal), epuck.nominal.start
     around.touch(pose, 10.0)
     around.pull(around.path_from(pose))
-    infrared.sees(*epuck.nominal.ground.solid.arrays(), 0.0, 0.0, 1.0, 1.0)
+    points, first, extent = epuck.nominal.ground.solid.arrays()
+    infrared.sees(points, first, extent, 0.0, 0.0, 1.0, 1.0)
     (words,) = epuck.addresses.words
     kernels.turn_wheels(words)
     kernels.finish(words)
