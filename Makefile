@@ -55,6 +55,7 @@ $(VENV)/.installed: pyproject.toml
 
 $(VENV)/.test-installed: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[test]"
+	$(BIN)/tdac warm
 	touch $@
 
 $(VENV)/.lint-installed: $(VENV)/.test-installed

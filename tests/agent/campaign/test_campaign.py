@@ -22,7 +22,9 @@ def once(tmp_path_factory):
 def test_runs_that_fail_stop_no_other_and_say_why(once):
     """Exit 3; the reason is told once, with how often it was met, and the way on."""
     _, (code, said, complained), _ = once
-    assert (code, complained) == (3, "")
+    # It may be the first of a machine, which compiles.
+    complaints = [line for line in complained.splitlines() if "compiling" not in line]
+    assert (code, complaints) == (3, [])
     assert said.count("replay") > 0
     assert "2 × fault: replay:demo: another question than" in said
     assert "2 of 4 runs have ended, 2 of them now" in said

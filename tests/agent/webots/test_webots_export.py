@@ -236,6 +236,7 @@ def test_json(tdac, verified):
     assert Path(record["world"]).is_file()
 
 
+@pytest.mark.slow
 def test_the_whole_way(tdac):
     """What `tdac synth` has verified drives as a Webots project; ± 5 % of the steps."""
     assert tdac("synth", "--task", "epuck-crates", "--out", "run")[0] == 0
