@@ -61,6 +61,7 @@ def test_prices_are_the_shipped_ones(homeless):
     assert (done.stdout, done.stderr) == (f"{SHIPPED}\n", "")
 
 
+@pytest.mark.slow
 def test_a_run_is_made_verified_and_reported(homeless, place):
     """Nothing is asked of a home, and nothing said of it."""
     place.chmod(0o777)

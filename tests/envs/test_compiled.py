@@ -56,6 +56,7 @@ def cold_start(copied_package):
     return run(STEP, PYTHONPATH=copied_package)
 
 
+@pytest.mark.slow
 def test_a_cold_start_says_what_it_does_and_a_warm_one_nothing(
     cold_start, copied_package
 ):
@@ -120,6 +121,7 @@ def folder_with(**variables):
     return run(script, **variables)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "setting",
     [{"NUMBA_OPT": "0"}, {"NUMBA_CPU_NAME": "generic"}, {"NUMBA_DEBUGINFO": 1}],

@@ -123,6 +123,7 @@ def test_a_zygote_that_was_killed_is_a_fault_of_the_sandbox():
     zygote.close()
 
 
+@pytest.mark.slow_after(1)
 def test_a_nursery_has_more_children_than_a_zygote_has_places(tier):
     nursery = Nursery(ahead=False)
     children = [nursery.take(tier, Limits()) for _ in range(SLOTS + 2)]
@@ -156,6 +157,7 @@ def test_a_nursery_that_was_not_used_leaves_nothing(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow_after(1)
 def test_processes_share_a_nursery(tier):
     """No two of them get the same child, be it ready or not; each ends its own."""
     nursery = Nursery(ahead=False)
