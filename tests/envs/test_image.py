@@ -21,7 +21,7 @@ GREY = np.where(WALLS, 0, 255).astype(np.uint8)
 
 
 def _palette(path: Path) -> None:
-    picture = Image.fromarray(WALLS.astype(np.uint8), "P")
+    picture = Image.frombytes("P", WALLS.shape[::-1], WALLS.astype(np.uint8).tobytes())
     picture.putpalette([9, 9, 9, 0, 0, 0])
     picture.save(path, transparency=0)
 
