@@ -35,11 +35,11 @@ class Addresses:
 
     def __init__(self, rows: Iterable[tuple[NDArray[Any], ...]]) -> None:
         self._held: list[Any] = list(rows)
-        self.words: Words = np.array([_words(arrays) for arrays in self._held])
+        self.words: Words = np.array([words_of(arrays) for arrays in self._held])
 
     def put(self, row: int, arrays: tuple[NDArray[Any], ...]) -> None:
         """Replaces the arrays of one row."""
-        words = _words(arrays)
+        words = words_of(arrays)
         # At no time, should this be interrupted, is there an address of what is gone.
         self._held[row] = self._held[row], arrays
         self.words[row] = words
@@ -49,15 +49,16 @@ class Addresses:
         raise TypeError("addresses of memory cannot be copied or pickled")
 
 
-def _words(arrays: tuple[NDArray[Any], ...]) -> Words:
-    words = np.zeros((len(arrays), _WORDS), np.int64)
-    for own, array in zip(words, arrays, strict=True):
+def words_of(arrays: Iterable[NDArray[Any]]) -> Words:
+    """Where some arrays are, shape (arrays, 4), as long as somebody else holds them."""
+    words = []
+    for array in arrays:
         if not array.flags.c_contiguous:
             raise ValueError(
                 f"expected C-contiguous arrays, got strides {array.strides}"
             )
-        own[0], own[1 : 1 + array.ndim] = array.ctypes.data, array.shape
-    return words
+        words.append((array.ctypes.data, *array.shape, 0, 0, 0)[:_WORDS])
+    return np.array(words)
 
 
 @intrinsic  # type: ignore[untyped-decorator]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -14,7 +15,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from tdac_envs import stepping
-from tdac_envs.addresses import Addresses
+from tdac_envs.addresses import Addresses, words_of
 from tdac_envs.arguments import whole_number
 from tdac_envs.batching import (
     Array,
@@ -47,11 +48,13 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     Attributes:
         step_rows: The compiled loop of such robots; see `tdac_envs.kernels.step_rows`.
+        copied: Keys of what it copies of what they observe.
         last_poses: True poses in which the episodes ended that the last step began
             anew, with `SAME_STEP`; shape (num_envs, 3), of the others as they are.
     """
 
     step_rows: Callable[..., None]
+    copied: tuple[str, ...]
 
     def __init__(
         self,
@@ -93,7 +96,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._commands = np.zeros((num_envs, 2))
         self.goals = np.array([task.goal for task in self.tasks], np.float32)
         self._starts = np.array([(*task.start, task.shortest) for task in self.tasks])
-        self._addresses = Addresses(map(self._arrays, range(num_envs)))
+        self._bind()
 
     def reset(
         self,
@@ -147,10 +150,9 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             self._slip()
         if self._drawn:
             self._draw(np.flatnonzero(self._over), {})
-        self._act(self._all)
-        observations = {key: seen.copy() for key, seen in self._seen().items()}
-        rewards, terminated, truncated = ends_of(self.robots.outcome)
-        infos = infos_of(self.robots.outcome, self._everyone)
+        observations, outcome = self._act(self._all)
+        rewards, terminated, truncated = ends_of(outcome)
+        infos = infos_of(outcome, self._everyone)
         np.logical_or(terminated, truncated, out=self._over)
         self._complete(observations, range(self.num_envs))
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
@@ -179,12 +181,12 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return tuple(self._seeds)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_slices": None, "_addresses": None}
+        return {**self.__dict__, "_slices": None, "_addresses": None, "_shared": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._slices = Slices(self.threads)
-        self._addresses = Addresses(map(self._arrays, range(self.num_envs)))
+        self._bind()
 
     def _seen(self) -> Observations:
         """What the kernels let the robots observe, in their own arrays."""
@@ -194,14 +196,29 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         """Adds what no kernel does; noise is drawn anew for these robots."""
         raise NotImplementedError
 
-    def _act(self, rows: Rows) -> None:
-        """Makes the step of some robots, or begins their episodes."""
+    def _bind(self) -> None:
+        """Finds out where all arrays are that the kernels take."""
+        self._addresses = Addresses(map(self._arrays, range(self.num_envs)))
         words = self._addresses.words
+        shared = self._over, self._commands, self._starts, words
+        self._shared = Addresses([shared])
 
-        def act(some: Rows) -> None:
-            self.step_rows(some, self._over, self._commands, self._starts, words)
+    def _act(self, rows: Rows) -> tuple[Observations, Array]:
+        """Makes the step of some robots, or begins their episodes.
 
-        self._slices.run(act, rows)
+        Returns:
+            What these observe, without noise, and their outcomes; of the others, these
+            are not filled in.
+        """
+        seen = self._seen()
+        found = {key: np.empty_like(array) for key, array in seen.items()}
+        for key in seen.keys() - set(self.copied):
+            found[key][:] = seen[key]
+        outcome = np.empty_like(self.robots.outcome)
+        out = words_of((outcome, *(found[key] for key in self.copied)))
+        batch = np.concatenate([self._shared.words[0], out])
+        self._slices.run(partial(self.step_rows, batch), rows)
+        return found, outcome
 
     def _arrays(self, i: int) -> tuple[NDArray[Any], ...]:
         """What the kernels take of a robot and its world."""

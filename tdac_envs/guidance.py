@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_envs.addresses import Addresses, Words, plane
+from tdac_envs.addresses import Addresses, Words, block, line, plane
 from tdac_envs.compiled import kernel, subkernel
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.grid import BoolGrid, body_free
@@ -75,10 +75,10 @@ class Route:
         points = np.asarray(places, np.float64)[:, :2]
         cells = np.ascontiguousarray((points - (left, low)) / spacing)
         found = np.empty_like(cells)
-        count, reach = len(cells), self.reach / spacing
-        own = Addresses([(self.roomy, self.shortest)])
-        words = np.broadcast_to(own.words, (count, *own.words.shape[1:])).copy()
-        look_ahead(np.arange(count), words, cells, np.full(count, reach), found)
+        routes = Addresses([(self.roomy, self.shortest)] * len(cells))
+        reaches = np.full(len(cells), self.reach / spacing)
+        batch = Addresses([(routes.words, cells, reaches, found)])
+        look_ahead(batch.words[0], np.arange(len(cells)))
         at = found * spacing + (left, low)
         return np.where(np.isfinite(found), at, self.goal)
 
@@ -225,26 +225,20 @@ def _look_ahead(
 
 
 @kernel
-def look_ahead(
-    rows: Words,
-    words: Words,
-    places: NDArray[np.float64],
-    reaches: NDArray[np.float64],
-    found: NDArray[np.float64],
-) -> None:
+def look_ahead(batch: Words, rows: Words) -> None:
     """Finds the next way-points of many robots, each on a route of its own.
 
     Args:
+        batch: Where these are, of a `tdac_envs.addresses.Addresses`: `words`, shape
+            (n, 2, 4), where `roomy` and `shortest` of a robot's route are; places,
+            shape (n, 2), columns and rows, fractions too; how far to go, shape (n,),
+            in spacings; and shape (n, 2), overwritten with grid points, inf for the
+            goal itself.
         rows: Numbers of the robots, shape (k,).
-        words: Shape (n, 2, 4): where `roomy` and `shortest` of a robot's route are, in
-            a `tdac_envs.addresses.Addresses`.
-        places: Shape (n, 2), columns and rows, fractions too.
-        reaches: Shape (n,): how far to go, in spacings.
-        found: Shape (n, 2), overwritten with grid points; inf for the goal itself.
     """
+    words, places = block(batch[0], np.int64), plane(batch[1], np.float64)
+    reaches, found = line(batch[2], np.float64), plane(batch[3], np.float64)
     for row in rows:
-        roomy, shortest = (
-            plane(words[row, 0], np.float32),
-            plane(words[row, 1], np.float32),
-        )
+        roomy = plane(words[row, 0], np.float32)
+        shortest = plane(words[row, 1], np.float32)
         _look_ahead(roomy, shortest, places[row], reaches[row], found[row])

@@ -38,6 +38,8 @@ from tdac_envs.stepping import (
     X,
     Y,
     apply_command,
+    batch_at,
+    copy_row,
     give_command,
     settle,
     within,
@@ -48,7 +50,7 @@ from tdac_envs.stepping import clear as forget
 # that the next step starts outside it.
 CONTACT_GAP = 1e-6
 # Places of some arrays among those of `begin`.
-STATE, OUTCOME = 5, 10
+STATE, POSE, WHEEL_SPEEDS, RANGES, OUTCOME = 5, 7, 8, 9, 10
 
 
 @subkernel
@@ -248,9 +250,9 @@ def _arrays_at(words: Words) -> Any:
         line(words[4], np.float64),
         line(words[STATE], np.float64),
         plane(words[6], np.float64),
-        line(words[7], np.float32),
-        line(words[8], np.float32),
-        line(words[9], np.float32),
+        line(words[POSE], np.float32),
+        line(words[WHEEL_SPEEDS], np.float32),
+        line(words[RANGES], np.float32),
         line(words[OUTCOME], np.float64),
     )
 
@@ -272,22 +274,22 @@ def drive(words: Words) -> None:
 
 
 @kernel
-def step_rows(
-    rows: Words,
-    over: NDArray[np.bool_],
-    commands: Array,
-    starts: Array,
-    words: Words,
-) -> None:
+def step_rows(batch: Words, rows: Words) -> None:
     """One step of many robots, or the begin of an episode where one is over.
 
+    What comes out of it is copied here: the robots' own memory then stays in the cache
+    of the core that steps them.
+
     Args:
+        batch: Shape (8, 4): where the arrays of `tdac_envs.stepping.batch_at` are,
+            with `words` of shape (n, 11, 4), and what is overwritten, with a row for
+            each robot: outcome, pose, wheel speeds and ranges.
         rows: Numbers of the robots, shape (k,).
-        over: Shape (n,): whether a robot's episode begins.
-        commands: Shape (n, 2): wanted speeds of the wheels.
-        starts: Shape (n, 4): pose in which an episode begins, and the way from there.
-        words: Shape (n, 11, 4); see `begin`.
     """
+    over, commands, starts, words = batch_at(batch)
+    outcomes = plane(batch[4], np.float64)
+    poses, speeds = plane(batch[5], np.float32), plane(batch[6], np.float32)
+    ranges = plane(batch[7], np.float32)
     for row in rows:
         own = _arrays_at(words[row])
         give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
@@ -295,3 +297,7 @@ def step_rows(
             _begin(*own)
         else:
             _drive(*own)
+        copy_row(own[OUTCOME], outcomes, row)
+        copy_row(own[POSE], poses, row)
+        copy_row(own[WHEEL_SPEEDS], speeds, row)
+        copy_row(own[RANGES], ranges, row)

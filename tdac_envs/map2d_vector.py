@@ -36,6 +36,7 @@ class Map2DVectorEnv(DrivenVectorEnv):
     """
 
     step_rows = staticmethod(step_rows)
+    copied = ("pose", "wheel_speeds", "ranges")
 
     def __init__(
         self,

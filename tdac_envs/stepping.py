@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.addresses import Words, block, line, plane
 from tdac_envs.compiled import subkernel
 from tdac_envs.rewards import RewardWeights, step_reward
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 # Entries of `constants`.
 AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
@@ -43,6 +45,30 @@ def clear(
 
 
 @subkernel
+def batch_at(batch: Words) -> tuple[Flags, Array, Array, Words]:
+    """What a loop over the robots of a batch reads, found by addresses.
+
+    Views of these arrays count no references: threads that count in the same place
+    wait for each other, and take half as long again.
+
+    Args:
+        batch: Where they are, shape (4, 4) or more of them.
+
+    Returns:
+        over: Shape (n,): whether a robot's episode begins.
+        commands: Shape (n, 2): wanted speeds of the wheels.
+        starts: Shape (n, 4): pose in which an episode begins, and the way from there.
+        words: Shape (n, arrays, 4): where the arrays of each robot are.
+    """
+    return (
+        line(batch[0], np.bool_),
+        plane(batch[1], np.float64),
+        plane(batch[2], np.float64),
+        block(batch[3], np.int64),
+    )
+
+
+@subkernel
 def give_command(
     begins: bool, command: Array, start: Array, state: Array, outcome: Array
 ) -> None:
@@ -60,6 +86,13 @@ def give_command(
         outcome[REMAINING] = start[3]
     else:
         state[LEFT], state[RIGHT] = command[0], command[1]
+
+
+@subkernel
+def copy_row(source: NDArray[Any], to: NDArray[Any], row: int) -> None:
+    """Copies an array of one dimension to a row of another."""
+    for k in range(source.shape[0]):
+        to[row, k] = source[k]
 
 
 @subkernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from tdac_envs.addresses import Addresses
 from tdac_envs.driven_vector import DrivenVectorEnv, Observations
 from tdac_envs.errors import TaskError
 from tdac_envs.guidance import Route, look_ahead, route_to_goal
-from tdac_envs.slices import Rows, Slices
+from tdac_envs.slices import Slices
 from tdac_envs.wrappers import Frame, check_wrappers, guided_space
 
 Array = NDArray[np.float64]
@@ -36,6 +37,7 @@ class Routes:
         self._tasks: list[Any] = list(batch.tasks)
         self._cells, self._found = np.zeros((count, 2)), np.zeros((count, 2))
         self._goals, self._corners = np.zeros((count, 2)), np.zeros((count, 2))
+        self._reaches = np.zeros(count)
         self._spacings, self.reach = np.ones((count, 1)), np.ones((count, 1))
         # Robots of one setup mostly have one task in the beginning.
         known = {id(task): task for task in self._tasks}
@@ -44,7 +46,9 @@ class Routes:
         self._addresses = Addresses((route.roomy, route.shortest) for route in own)
         for i, route in enumerate(own):
             self._place(i, route)
-        self._slices = Slices(batch.threads)
+        shared = self._addresses.words, self._cells, self._reaches, self._found
+        self._shared = Addresses([shared])
+        self._slices, self._all = Slices(batch.threads), np.arange(count)
 
     def refresh(self) -> None:
         """Has the routes lead to the goals of the episodes that have begun."""
@@ -61,13 +65,7 @@ class Routes:
     def ahead(self, poses: Array) -> Array:
         """The next way-point of each robot, shape (n, 2), as of `Route.ahead`."""
         np.divide(poses[:, :2] - self._corners, self._spacings, out=self._cells)
-        words = self._addresses.words
-        reaches = (self.reach / self._spacings)[:, 0]
-
-        def look(some: Rows) -> None:
-            look_ahead(some, words, self._cells, reaches, self._found)
-
-        self._slices.run(look, np.arange(len(self._tasks)))
+        self._slices.run(partial(look_ahead, self._shared.words[0]), self._all)
         at = self._found * self._spacings + self._corners
         return np.where(np.isfinite(self._found), at, self._goals)
 
@@ -79,6 +77,7 @@ class Routes:
         """Keeps where a robot's route lies."""
         *self._corners[i], self._spacings[i] = route.frame
         self._goals[i], self.reach[i] = route.goal, route.reach
+        self._reaches[i] = route.reach / route.frame[2]
 
 
 class WrappedVectorEnv(VectorWrapper):

@@ -38,7 +38,9 @@ from tdac_envs.stepping import (
     X,
     Y,
     apply_command,
+    batch_at,
     clear,
+    copy_row,
     give_command,
     settle,
     within,
@@ -57,7 +59,8 @@ N_STATE = 10
 FORWARD, TURN = range(10, 12)
 N_OUTCOME = 12
 # Places of some arrays among those of `begin`.
-CONSTANTS, STATE, QUEUE, WHEEL_SPEEDS, OUTCOME = 11, 12, 13, 15, 19
+CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
+OUTCOME = 19
 
 
 @subkernel
@@ -312,10 +315,10 @@ def _arrays_at(words: Words) -> Any:
         line(words[CONSTANTS], np.float64),
         line(words[STATE], np.float64),
         plane(words[QUEUE], np.float64),
-        line(words[14], np.float32),
+        line(words[POSE], np.float32),
         line(words[WHEEL_SPEEDS], np.float32),
-        line(words[16], np.float32),
-        line(words[17], np.float32),
+        line(words[TURNED], np.float32),
+        line(words[READINGS], np.float32),
         plane(words[18], np.float64),
         line(words[OUTCOME], np.float64),
     )
@@ -357,28 +360,31 @@ def finish(words: Words) -> None:
 
 
 @kernel
-def step_rows(
-    rows: Words,
-    over: NDArray[np.bool_],
-    commands: Array,
-    starts: Array,
-    words: Words,
-) -> None:
+def step_rows(batch: Words, rows: Words) -> None:
     """One step of many robots, or the begin of an episode where one is over.
 
+    What comes out of it is copied here: the robots' own memory then stays in the cache
+    of the core that steps them.
+
     Args:
+        batch: Shape (9, 4): where the arrays of `tdac_envs.stepping.batch_at` are,
+            with `words` of shape (n, 20, 4), and what is overwritten, with a row for
+            each robot: outcome, pose, wheel speeds, wheel angles and readings.
         rows: Numbers of the robots, shape (k,).
-        over: Shape (n,): whether a robot's episode begins.
-        commands: Shape (n, 2): wanted speeds of the wheels.
-        starts: Shape (n, 4): pose in which an episode begins, and the way from there.
-        words: Shape (n, 20, 4); see `begin`.
     """
+    over, commands, starts, words = batch_at(batch)
+    outcomes = plane(batch[4], np.float64)
+    poses, speeds = plane(batch[5], np.float32), plane(batch[6], np.float32)
+    turned, readings = plane(batch[7], np.float32), plane(batch[8], np.float32)
     for row in rows:
         own = _arrays_at(words[row])
-        give_command(
-            over[row], commands[row], starts[row], own[STATE], own[OUTCOME]
-        )  # fmt: skip
+        give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
         if over[row]:
             _begin(*own)
         else:
             _drive(*own)
+        copy_row(own[OUTCOME], outcomes, row)
+        copy_row(own[POSE], poses, row)
+        copy_row(own[WHEEL_SPEEDS], speeds, row)
+        copy_row(own[TURNED], turned, row)
+        copy_row(own[READINGS], readings, row)

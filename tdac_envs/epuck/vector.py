@@ -43,6 +43,7 @@ class EPuckVectorEnv(DrivenVectorEnv):
     """
 
     step_rows = staticmethod(step_rows)
+    copied = ("pose", "wheel_speeds", "wheel_positions", "ps")
 
     def __init__(
         self,
