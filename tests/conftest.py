@@ -54,7 +54,7 @@ def one_set_of_types() -> Iterator[None]:
     yield
     compiled = sys.modules.get("tdac_envs.compiled")
     kernels = compiled.KERNELS if compiled else []
-    several = [each for each in kernels if len(each.signatures) > 1]
+    several = [each for each in kernels if len(getattr(each, "signatures", ())) > 1]
     assert not several, [(each.py_func, each.signatures) for each in several]
 
 

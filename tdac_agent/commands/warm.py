@@ -14,7 +14,7 @@ from tdac_agent.privileged.controllers import reference_way
 from tdac_agent.reference import steer
 from tdac_agent.surroundings_epuck import world_surroundings
 from tdac_envs import rays
-from tdac_envs.compiled import cache_folder
+from tdac_envs.code_cache import cache_folder
 from tdac_envs.epuck import infrared, kernels
 from tdac_envs.wrapped_vector import WrappedVectorEnv
 

@@ -14,7 +14,8 @@ import pytest
 
 import tdac_envs
 from tdac_envs import contact, grid, kernels, plan, rays
-from tdac_envs.compiled import cache_folder, constant
+from tdac_envs.code_cache import cache_folder
+from tdac_envs.compiled import constant
 from tdac_envs.contact import first_contact
 from tdac_envs.grid import clearance
 from tdac_envs.rays import cast_ray, leaps_of
@@ -117,7 +118,7 @@ def _names_in_kernels(text):
 
 def folder_with(**variables):
     """The cache folder of a process with these variables, and what it says of it."""
-    script = "from tdac_envs.compiled import cache_folder; print(cache_folder())"
+    script = "from tdac_envs.code_cache import cache_folder; print(cache_folder())"
     return run(script, **variables)
 
 
