@@ -28,7 +28,7 @@ class Slices:
     """
 
     def __init__(self, threads: int | None = None) -> None:
-        self._threads = threads or len(os.sched_getaffinity(0))
+        self._threads = threads or _cores()
         self._executor: ThreadPoolExecutor | None = None
         self._process = os.getpid()
 
@@ -84,3 +84,10 @@ class Slices:
             return None
         there.wait()
         return executor
+
+
+def _cores() -> int:
+    """How many this process may use; elsewhere than on Linux, how many there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
