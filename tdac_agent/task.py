@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from tdac_agent.disturbance import Disturbance
+from tdac_agent.first_run import compile_first
 from tdac_agent.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.task_file import (
     EPUCK,
@@ -116,9 +117,11 @@ def _resolve(name: str | None, spec: TaskFile, base: Path) -> Task:
 def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:
     """Name and setting of a task; the one place where an environment is chosen."""
     if spec.env == EPUCK:
+        compile_first("tdac_envs.epuck")
         from tdac_agent.task_epuck import open_epuck
 
         return open_epuck(spec, base)
+    compile_first("tdac_envs")
     from tdac_agent.task_map2d import open_map
 
     return open_map(spec, base)

@@ -13,20 +13,36 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from numba import config
-
 from tdac_envs.private import copy, is_private, is_usable, user_cache
 
 HERE = Path(__file__).parent
+
+
+def has_code(package: str) -> bool:
+    """Whether the steps of an environment lie compiled on the disk, of some version.
+
+    It does not import numba, which takes a while.
+
+    Args:
+        package: Whose module `kernels` has them.
+    """
+    caches = user_cache()
+    parents = [HERE / "__pycache__", *([caches / "tdac"] if caches else [])]
+    kept = f"tdac-*/{package.rpartition('.')[2]}_*/kernels.drive-*.nbi"
+    return any(any(parent.glob(kept)) for parent in parents)
 
 
 @functools.cache
 def cache_folder() -> Path | None:
     """Where the machine code of this version, on this machine, is kept.
 
-    Beside the byte code, else in the user's own cache. None, said once, where there is
-    no folder that this user alone, or the superuser, can write to.
+    Beside the byte code, else in the user's own cache. None where nothing is compiled,
+    and, said once, where there is no folder that nobody else can write to.
     """
+    from numba import config
+
+    if config.DISABLE_JIT:
+        return None
     name = f"tdac-{_key()}"
     beside, caches = HERE / "__pycache__" / name, user_cache()
     if is_usable(beside, mode=0o755):
@@ -37,10 +53,9 @@ def cache_folder() -> Path | None:
         copy(beside, own)
     if own and is_usable(own):
         return own
-    if not config.DISABLE_JIT:
-        places = " or ".join(str(folder.parent) for folder in (beside, own) if folder)
-        told = f"compiled code cannot be kept in {places}: each start compiles anew"
-        print(f"tdac: {told}", file=sys.stderr, flush=True)
+    places = " or ".join(str(folder.parent) for folder in (beside, own) if folder)
+    told = f"compiled code cannot be kept in {places}: each start compiles anew"
+    print(f"tdac: {told}", file=sys.stderr, flush=True)
     return None
 
 
@@ -50,6 +65,7 @@ def _key() -> str:
     A file that imports `tdac_envs.compiled` may have a kernel, or a constant of one.
     """
     import llvmlite.binding as llvm
+    from numba import config
 
     texts = (file.read_bytes() for file in sorted(HERE.rglob("*.py")))
     sources = [text for text in texts if b"compiled import" in text]

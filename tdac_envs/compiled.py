@@ -84,3 +84,9 @@ class _Progress(event.Listener):  # type: ignore[misc]
 
 
 event.register("numba:compile", _Progress())
+
+if config.DISABLE_JIT:
+    told = (
+        "NUMBA_DISABLE_JIT: nothing is compiled, steps take hundreds of times as long"
+    )
+    print(f"tdac: {told}", file=sys.stderr, flush=True)
