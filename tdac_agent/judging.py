@@ -22,7 +22,7 @@ import traceback
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import cv2
 import gymnasium as gym
@@ -176,17 +176,19 @@ def _rehearse() -> None:
     """Loads what is compiled, and has pytest load what it needs for a suite."""
     for name in LOADED_LATE:
         importlib.import_module(name)
-    env = _small_env()
+    # A job would wait for the compiling of an environment that it has no use for.
+    if has_code("tdac_envs"):
+        _rehearse_episode(_small_env())
+    if has_code("tdac_envs.epuck"):
+        _rehearse_episode(gym.make("tdac_envs:TDAC-EPuck-v0").unwrapped)
+    _run_a_test()
+
+
+def _rehearse_episode(env: Any) -> None:
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     env.nominal.path_from(env.nominal.start)
     spread_starts(env.nominal, 0, 1)
-    if has_code("tdac_envs.epuck"):  # else a job on a map would wait for it
-        world = gym.make("tdac_envs:TDAC-EPuck-v0")
-        world.reset(seed=0)
-        world.step(np.zeros(2, np.float32))
-        spread_starts(world.unwrapped.nominal, 0, 1)  # type: ignore[attr-defined]
-    _run_a_test()
 
 
 def _run_a_test() -> None:

@@ -150,7 +150,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             self._slip()
         if self._drawn:
             self._draw(np.flatnonzero(self._over), {})
-        observations, outcome = self._act(self._all)
+        observations, outcome = self._results()
+        self._act(self._all, observations, outcome)
         rewards, terminated, truncated = ends_of(outcome)
         infos = infos_of(outcome, self._everyone)
         np.logical_or(terminated, truncated, out=self._over)
@@ -200,25 +201,29 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         """Finds out where all arrays are that the kernels take."""
         self._addresses = Addresses(map(self._arrays, range(self.num_envs)))
         words = self._addresses.words
+        self._unread = self._results()
         shared = self._over, self._commands, self._starts, words
         self._shared = Addresses([shared])
 
-    def _act(self, rows: Rows) -> tuple[Observations, Array]:
+    def _results(self) -> tuple[Observations, Array]:
+        """Arrays for what a step returns; what no step changes is filled in."""
+        seen = self._seen()
+        results = {key: np.empty_like(array) for key, array in seen.items()}
+        for key in seen.keys() - set(self.copied):
+            results[key][:] = seen[key]
+        return results, np.empty_like(self.robots.outcome)
+
+    def _act(self, rows: Rows, observations: Observations, outcome: Array) -> None:
         """Makes the step of some robots, or begins their episodes.
 
-        Returns:
-            What these observe, without noise, and their outcomes; of the others, these
-            are not filled in.
+        Args:
+            rows: The robots; the threads share them.
+            observations: What these robots observe, without noise, is put here.
+            outcome: And here, what their steps led to.
         """
-        seen = self._seen()
-        found = {key: np.empty_like(array) for key, array in seen.items()}
-        for key in seen.keys() - set(self.copied):
-            found[key][:] = seen[key]
-        outcome = np.empty_like(self.robots.outcome)
-        out = words_of((outcome, *(found[key] for key in self.copied)))
+        out = words_of((outcome, *(observations[key] for key in self.copied)))
         batch = np.concatenate([self._shared.words[0], out])
         self._slices.run(partial(self.step_rows, batch), rows)
-        return found, outcome
 
     def _arrays(self, i: int) -> tuple[NDArray[Any], ...]:
         """What the kernels take of a robot and its world."""
@@ -230,7 +235,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         if options or self._drawn:
             self._draw(chosen, options)
         self._over[chosen] = True
-        self._act(chosen)
+        # Only the robots' own arrays are read after this.
+        self._act(chosen, *self._unread)
         self._over[chosen] = False
 
     def _draw(self, robots: Rows, options: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """Kernels: compiled once, kept where nobody else writes, and equal to their Python."""
 
 import ast
+import json
 import math
 import os
 import shutil
@@ -65,6 +66,31 @@ def test_a_cold_start_says_what_it_does_and_a_warm_one_nothing(
     pose, said = cold_start
     assert said.startswith(COMPILING + "kernel 1 of at most ")
     assert run(STEP, PYTHONPATH=copied_package) == (pose, "")
+
+
+@pytest.mark.slow
+def test_the_first_run_of_all_compiles_before_the_judge_starts(tmp_path):
+    """Where it is said, and only what the task's own environment needs."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(PACKAGE, tmp_path / "tdac_envs", ignore=ignored)
+    variables = {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    command = ["-m", "tdac_agent", "synth", "--task", "epuck", "--out", "run"]
+    done = subprocess.run(
+        [sys.executable, "-P", *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, **variables},
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    said = [line.startswith(COMPILING) for line in done.stdout.splitlines()]
+    assert said[0]
+    assert sorted(said, reverse=True) == said
+    kept = {folder.name.split("_")[0] for folder in tmp_path.rglob("tdac-*/*")}
+    assert "epuck" in kept
+    assert not list(tmp_path.rglob("tdac-*/tdac_envs_*/kernels.drive-*.nbi"))
 
 
 def test_an_edited_callee_in_another_module_takes_effect(copied_package):
@@ -153,10 +179,11 @@ def test_without_compiling_the_same_comes_out():
         "for k in range(9):\n"
         "    seen += [envs.step(np.full((2, 2), 0.5 + 0.1 * k, np.float32))[0]]\n"
         "    seen += [env.step(np.array([1.0, 0.2 * k], np.float32))[0]]\n"
-        "print([v.ravel().tolist() for each in seen for v in each.values()])\n"
+        "import json\n"
+        "print(json.dumps([v.tolist() for each in seen for v in each.values()]))\n"
     )
     compiled, plain = run(script)[0], run(script, NUMBA_DISABLE_JIT=1)[0]
-    for one, other in zip(eval(compiled), eval(plain), strict=True):
+    for one, other in zip(json.loads(compiled), json.loads(plain), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
 
 
