@@ -285,7 +285,7 @@ def test_the_shipped_hyperparameters_are_whole(algo, env):
         (["--task", "rooms", "--task", "maze", "--wrapper", "guidance"], "several"),
         (["--range-noise", "-1"], "expected a range noise from 0 to 1"),
         (["--algo", "dqn"], "'dqn' is not one of 'ppo', 'sac', 'td3'"),
-        (["--steps", "0"], "greater than or equal to 1"),
+        (["--steps", "0"], "'--steps'"),
         (["--config", "none.yml"], "cannot read hyperparameters"),
         (["--resume", "nowhere"], "no training in 'nowhere'"),
         (["--resume", "nowhere", "--seed", "1"], "leave out --seed"),
