@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 from typing import Any
 
@@ -18,6 +19,15 @@ from tdac_agent.task import SENSORS_FILE, Task
 
 LONGEST_WORLD = 16_000
 """Of a world file's characters, so many are shown."""
+
+HOW_THE_MAP_WAS_MADE = {
+    *("source", "source_sha256", "method", "threshold", "cleanup", "opening"),
+    *("score", "score_terms", "notes"),
+}
+"""Fields of `params.json` that no controller needs."""
+
+FOR_PEOPLE = ("Graphics", "show")
+"""What `sensors.py` has to show a drive: names and documentation are enough."""
 
 
 def context_of(task: Task) -> dict[str, Any]:
@@ -59,7 +69,6 @@ def _of_any(task: Task) -> dict[str, Any]:
             "euclidean": "straight line",
         }[progress.distance],
         "horizon": nominal.horizon,
-        "params_text": task.params.model_dump_json(indent=2),
         "straight": math.dist(nominal.start[:2], nominal.goal),
         "shortest": nominal.shortest,
         "instructions": task.spec.instructions.strip(),
@@ -69,17 +78,23 @@ def _of_any(task: Task) -> dict[str, Any]:
 def _of_map(task: Task) -> dict[str, Any]:
     """What only a map's prompt tells."""
     from tdac_agent.task_map2d import map_setting
+    from tdac_envs.terrain import widest_connected_radius
 
-    grid = map_setting(task.setting).nominal.terrain.grid
+    nominal = map_setting(task.setting).nominal
+    terrain, grid = nominal.terrain, nominal.terrain.grid
+    start = (nominal.start.x, nominal.start.y)
+    params = task.params.model_dump_json(indent=2, exclude=HOW_THE_MAP_WAS_MADE)
     return {
+        "params_text": params,
+        "widest": widest_connected_radius(terrain.clear, start, nominal.goal),
         "number": 6,
         "speed_unit": "px/s",
         "full_speed": "max_wheel_speed",
         "width": grid.width,
         "height": grid.height,
-        "tolerance": task.nominal.goal_tolerance,
-        "radius": task.nominal.body_radius,
-        "sensors_text": SENSORS_FILE.read_text(encoding="utf-8").rstrip(),
+        "tolerance": nominal.goal_tolerance,
+        "radius": nominal.body_radius,
+        "sensors_text": _needed(SENSORS_FILE.read_text(encoding="utf-8")),
     }
 
 
@@ -88,11 +103,20 @@ def _of_world(task: Task) -> dict[str, Any]:
     from tdac_agent.task_epuck import EPuckSetting
     from tdac_envs.bodies import BODY_BOTTOM, BODY_TOP
     from tdac_envs.epuck.infrared import TABLE
+    from tdac_envs.epuck.paths import widest_body
 
     setting = task.setting
     assert isinstance(setting, EPuckSetting)
     nominal, robot = setting.nominal, setting.params.robot
+    start = (nominal.start.x, nominal.start.y)
+    widest = widest_body(nominal.ground, start, nominal.goal)
+    room = max(widest - nominal.body_radius, 0.0)
     return {
+        "params_text": setting.params.model_dump_json(indent=2),
+        # The ground's grid knows distances up to 100 mm.
+        "widest_mm": f"{1e3 * widest:.1f}" if widest < 0.099 else "at least 99",
+        "room_mm": f"{1e3 * room:.1f}",
+        "cell_mm": min(10, max(1, math.floor(1e3 * room))),
         "distances": [f"{1e3 * row[0]:g}" for row in TABLE.tolist()],
         "readings": [f"{row[1]:.0f}" for row in TABLE.tolist()],
         "number": 7,
@@ -109,6 +133,26 @@ def _of_world(task: Task) -> dict[str, Any]:
         "body_top": f"{1e3 * BODY_TOP:g}",
         "world_text": _shown(setting.text),
     }
+
+
+def _needed(source: str) -> str:
+    """The part of `sensors.py` that a controller may use, as it stands in the file."""
+    lines, kept = source.splitlines(), []
+    module = ast.parse(source)
+    for node in module.body:
+        first, last = node.lineno, node.end_lineno
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            if node.name.startswith("_"):
+                continue
+            kept.append("\n")
+            if node.name in FOR_PEOPLE:
+                last = node.body[0].end_lineno
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        kept.append("\n".join(lines[first - 1 : last]))
+        if getattr(node, "name", "") in FOR_PEOPLE:
+            kept.append("    ...")
+    return "\n".join(kept)
 
 
 def _shown(text: str) -> str:

@@ -18,7 +18,7 @@ from tdac_agent.prompt import (
     repair_prompt,
 )
 from tdac_agent.rules import BEGIN, RuleBook
-from tdac_agent.task import load_task, write_workdir
+from tdac_agent.task import SENSORS_FILE, load_task, write_workdir
 from tdac_agent.task_file import bundled_tasks
 from tdac_agent.verification import verify
 from tdac_envs.epuck.env import EPuckEnv
@@ -117,7 +117,8 @@ def test_the_figures_are_those_of_the_task(prompt, small_task):
         assert f"within {figure} steps" in prompt
     assert f"{nominal.goal_tolerance:.1f} px of the" in prompt
     assert "disc of\n  6 px radius" in prompt
-    assert small_task.params.model_dump_json(indent=2) in prompt
+    robot = small_task.params.robot.model_dump_json(indent=2)
+    assert robot.replace("\n", "\n  ") in prompt
 
 
 def test_nothing_is_left_undefined(prompt, epuck_prompt):
@@ -154,7 +155,8 @@ def test_the_e_pucks_figures_are_those_of_the_task(tmp_path):
     assert "`MAX_WHEEL_SPEED`\n   (6.28, rad/s)" in text
     assert "`GOAL_TOLERANCE` (0.0125, m)" in text
     assert "within 12.5 mm of the goal" in text
-    assert "step of\n   0.016 s; a call may take 16 ms" in text
+    assert "step of\n   0.016 s. " in text
+    assert "`policy` 16 ms on average" in text
     for figure in (4321, task.progress_steps):
         assert f"within {figure} steps" in text
 
@@ -235,8 +237,38 @@ def test_what_changes_comes_last(small_task, epuck_task, warm):
     report = verify("def policy(obs):\n    return 1, 1\n", small_task, judge=warm)
     first = generate_prompt(small_task, ())
     stable = first.partition(BEGIN)[0]
-    for kind in ("edit", "summarise"):
-        assert repair_prompt(kind, first, "x = 1", report).startswith(stable)
+    assert repair_prompt("edit", first, "x = 1", report).startswith(stable)
+
+
+def test_the_summariser_reads_first_that_no_file_is_wanted(small_task, warm):
+    """Else the question that it quotes would ask it for a controller."""
+    report = verify("def policy(obs):\n    return 1, 1\n", small_task, judge=warm)
+    first = generate_prompt(small_task, ())
+    text = repair_prompt("summarise", first, "x = 1", report)
+    preface, _, rest = text.partition(first)
+    assert "not\na Python file" in preface
+    assert "exactly one fenced ```json block" in rest
+
+
+def test_the_narrowest_passage_is_told(prompt):
+    """On the route with most room: here a gap of 39 px for a disc of 6 px."""
+    (room,) = re.findall(r"route from start to goal has ([\d.]+) px", prompt)
+    assert float(room) == pytest.approx(39 / 2, abs=1.0)
+    (margin,) = re.findall(r"below ([\d.]+) px of margin", prompt)
+    assert float(margin) == pytest.approx(float(room) - 6, abs=0.11)
+
+
+def test_only_what_concerns_the_task_is_shown(prompt, small_task):
+    """Nothing of how the map was made, nor of how `sensors.py` draws."""
+    assert "score_terms" not in prompt
+    assert "pygame" not in prompt.partition("class Graphics")[0]
+    shown = prompt.partition('```python\n"""Map')[2].partition("```\n")[0]
+    own = SENSORS_FILE.read_text(encoding="utf-8")
+    assert shown.count("\n") < 0.5 * own.count("\n")
+    for line in shown.splitlines()[1:]:
+        assert line.strip() in ("", "...") or line in own
+    for name in ("load_occupancy", "load_params", "Ultrasonic", "Graphics", "show"):
+        assert re.search(rf"^(def|class) {name}\b", shown, re.M), name
 
 
 @pytest.mark.parametrize("name", ["small_task", "epuck_task"])
@@ -249,13 +281,13 @@ def test_the_underspecified_prompt(name, request):
         assert word in text
     assert text.count(BEGIN) == 1
     full = generate_prompt(task, ())
-    assert len(text) < 0.3 * len(full)
+    assert len(text) < 0.4 * len(full)
     for word in (
         "## Advice",
         "## What is tested",
         "within ",
         "1.1",
-        "params.json\n```",
+        "### params.json",
     ):
         assert word in full
         assert word not in text
@@ -331,7 +363,7 @@ def test_repair_prompts_hide_the_held_out_starts(name, kind, warm, request):
     report = verify(source, task, profile="policy", judge=warm)
     text = repair_prompt(kind, prompt, source, report)
     assert source.strip() in text
-    assert text.startswith(prompt)
+    assert prompt in text
     assert "jitter 3" not in text
     assert "test_no_collisions" in text
     assert "What happened: nominal: collision in step" in text
