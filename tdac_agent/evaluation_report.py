@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from tdac_agent.contenders import Kind
 from tdac_agent.exact import sign_test
 from tdac_agent.measures import Measured
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.robust_report import Interval, success_interval
 from tdac_agent.trajectory import Outcome
 from tdac_agent.units import Place
@@ -26,7 +27,7 @@ MOST_REASONS = 3
 _DIGITS = 6
 
 
-class _Record(BaseModel):
+class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 

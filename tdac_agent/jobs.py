@@ -7,6 +7,7 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.report import Episode
 from tdac_agent.sandbox import Limits
 from tdac_agent.task_file import Profile
@@ -33,7 +34,7 @@ class Job(BaseModel):
     trajectories: Path | None = Field(description="Folder for them, if wanted.")
 
 
-class Findings(BaseModel):
+class Findings(PrintableRecord):
     """What the judge's process found, beside pytest's own report log."""
 
     model_config = ConfigDict(extra="forbid")

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.setting import Nominal
 from tdac_agent.surroundings import surroundings_of
 from tdac_agent.trajectory import Outcome, Rollout
@@ -19,7 +20,7 @@ _HIGHEST, _FAINT, _PADDING = 10.0, 0.05, 4
 _DIGITS = 6
 
 
-class Measured(BaseModel):
+class Measured(PrintableRecord):
     """Figures of one episode of an evaluation; lengths in px, of the e-puck in m.
 
     Those of the way are of successes only: what ends at a wall has none.

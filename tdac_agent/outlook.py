@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from tdac_agent.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.dialogue import MAX_ASKS
 from tdac_agent.prices import PriceList
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.prompt import FULL, PromptTemplate, generate_prompt
 from tdac_agent.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.tariff import MAX_COST, OWN_MATTER, UNPRICED_TOKENS, Tariff
@@ -15,7 +16,7 @@ from tdac_agent.tokens import estimate_tokens, most_tokens
 from tdac_agent.workload import tokens_asked, whole
 
 
-class Outlook(BaseModel):
+class Outlook(PrintableRecord):
     """The first question of a run, and bounds of the whole; tokens are estimates."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

@@ -6,10 +6,11 @@ import json
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from tdac_agent.errors import RunError
 from tdac_agent.locks import LOCK_FILE, is_held
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.rules import RuleBook
 from tdac_envs.errors import nearest
 
@@ -24,7 +25,7 @@ GIVEN_FILE = "given.py"
 PROMPT_FILE = "prompt.j2"
 
 
-class Attempt(BaseModel):
+class Attempt(PrintableRecord):
     """One candidate (k, j)."""
 
     model_config = ConfigDict(extra="forbid")
@@ -40,7 +41,7 @@ class Attempt(BaseModel):
     )
 
 
-class Run(BaseModel):
+class Run(PrintableRecord):
     """`run.json`: one synthesis."""
 
     model_config = ConfigDict(extra="forbid")
@@ -56,7 +57,7 @@ class Run(BaseModel):
     seed: int
     status: Status = "running"
     tau: int | None = Field(None, description="Iteration k of the first success.")
-    attempts: list[Attempt] = []
+    attempts: list[Attempt] = Field(default_factory=list)
     tokens_in: int = 0
     tokens_out: int = 0
     tokens_cached: int = Field(0, description="Of tokens_in, read from a cache.")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.units import Place
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
@@ -31,7 +32,7 @@ Cause = Literal[
 ]
 
 
-class _Record(BaseModel):
+class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from pydantic import BaseModel, BeforeValidator, Field, StrictInt, ValidationError
+from pydantic import BaseModel, Field, StrictInt, ValidationError
 
 from tdac_agent.errors import Fault
 from tdac_agent.jobs import Findings
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.report import (
     MAX_MESSAGE,
     Diagnosis,
@@ -27,29 +28,21 @@ NOT_RUN = "the test did not run to its end"
 TORN = "the report log is torn or unfinished, so that nothing in it counts as passed"
 
 
-def _without_surrogates(value: Any) -> Any:
-    """What a test says may quote half a character, which no report can hold."""
-    return value.encode("utf-8", "replace").decode() if type(value) is str else value
-
-
-Text = Annotated[str, BeforeValidator(_without_surrogates)]
-
-
-class _Crash(BaseModel):
-    message: Text
+class _Crash(PrintableRecord):
+    message: str
     lineno: int | None = None
 
 
-class _Details(BaseModel):
+class _Details(PrintableRecord):
     reprcrash: _Crash | None = None
 
 
-class _Collected(BaseModel):
+class _Collected(PrintableRecord):
     """pytest's word about a file; it has more fields than are read here."""
 
-    nodeid: Text
+    nodeid: str
     outcome: Literal["passed", "failed", "skipped"]
-    longrepr: _Details | tuple[str, int | None, Text] | Text | None = None
+    longrepr: _Details | tuple[str, int | None, str] | str | None = None
 
 
 class _Tested(_Collected):
@@ -57,7 +50,7 @@ class _Tested(_Collected):
 
     when: Literal["setup", "call", "teardown"]
     wasxfail: Any = None
-    user_properties: list[tuple[str, Any]] = []
+    user_properties: list[tuple[str, Any]] = Field(default_factory=list)
 
     @property
     def passed(self) -> bool:
@@ -232,8 +225,7 @@ def _message(record: _Collected) -> str:
     head, separator, tail = text.partition(": ")
     if separator and head.startswith("tdac_agent."):
         text = tail
-    shown = "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)
-    return shown if len(shown) <= MAX_MESSAGE else f"{shown[:MAX_MESSAGE]} …"
+    return text if len(text) <= MAX_MESSAGE else f"{text[:MAX_MESSAGE]} …"
 
 
 def _of_crash(crash: _Crash) -> str:

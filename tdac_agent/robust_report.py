@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from tdac_agent.disturbance import Disturbance
 from tdac_agent.exact import CONFIDENCE, exact_interval
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.seeded import SeededEpisode
 from tdac_agent.sequential import Characteristics, Decision, SequentialTest
 from tdac_agent.trajectory import Outcome
@@ -18,7 +19,7 @@ from tdac_agent.units import Place
 WORST = 20
 
 
-class _Record(BaseModel):
+class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 

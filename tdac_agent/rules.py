@@ -11,8 +11,9 @@ import re
 import unicodedata
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.tokens import estimate_tokens
 
 BEGIN, END = "AUTO_REPAIR_RULES_BEGIN", "AUTO_REPAIR_RULES_END"
@@ -27,7 +28,7 @@ Scope = Literal["task", "environment", "code"]
 Status = Literal["in force", "dropped", "made room"]
 
 
-class _Record(BaseModel):
+class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 

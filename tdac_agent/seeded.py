@@ -23,6 +23,7 @@ from tdac_agent.episode import not_driven
 from tdac_agent.files import write_atomic
 from tdac_agent.measures import Measured, measure
 from tdac_agent.nursery import Nursery
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.report import Cause
 from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
 from tdac_agent.sequential import SequentialTest
@@ -58,7 +59,7 @@ class SeededJob(BaseModel):
     out: Path
 
 
-class SeededEpisode(BaseModel):
+class SeededEpisode(PrintableRecord):
     """Figures of one disturbed episode; distances in px, of the e-puck in m.
 
     `cause`, `step`, `x`, `y` and `side` are the diagnosis of a failure.
@@ -86,7 +87,7 @@ class SeededEpisode(BaseModel):
         return self.outcome == "reached" and not self.collisions
 
 
-class Ending(BaseModel):
+class Ending(PrintableRecord):
     """What the judge's process found beside the episodes."""
 
     model_config = ConfigDict(extra="forbid")

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.privileged import REFERENCE
 from tdac_agent.report import OWN, Report
 from tdac_agent.task_file import Profile
@@ -18,7 +19,7 @@ from tdac_agent.task_file import Profile
 CLOCK = frozenset({"call_ms_mean", "call_ms_p99"})
 
 
-class _Record(BaseModel):
+class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 

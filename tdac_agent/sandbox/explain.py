@@ -6,6 +6,7 @@ import re
 import signal
 from pathlib import Path
 
+from tdac_agent.plain import printable
 from tdac_agent.sandbox.errors import ControllerError
 from tdac_agent.sandbox.inner.wire import RemoteError
 
@@ -27,11 +28,7 @@ def controller_error(error: RemoteError, phase: str, root: Path) -> ControllerEr
 def clean(text: str, root: Path) -> str:
     """Return `text` without paths of the private folder, addresses, odd characters."""
     text = text[: 4 * MAX_TEXT].replace(f"{root / 'work'}/", "").replace(f"{root}/", "")
-    text = _ADDRESS.sub("", text).encode("utf-8", "replace").decode("utf-8")
-    text = "".join(
-        c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text
-    )
-    return text[:MAX_TEXT]
+    return printable(_ADDRESS.sub("", text))[:MAX_TEXT]
 
 
 def explain_end(status: int, phase: str, cpu_seconds: float, cpu_limit: float) -> str:

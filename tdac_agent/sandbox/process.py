@@ -6,6 +6,7 @@ import math
 import time
 import weakref
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
@@ -13,7 +14,7 @@ from typing import Any, Protocol
 from tdac_agent.sandbox.conversation import Conversation
 from tdac_agent.sandbox.ending import ChildUsage, Ending
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
-from tdac_agent.sandbox.inner.wire import Handle, Kind
+from tdac_agent.sandbox.inner.wire import Handle, Kind, is_name
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
 from tdac_agent.sandbox.zygote import Forked
 
@@ -130,7 +131,7 @@ class Child:
         """Import the controller; return its public names, each with its type's name."""
         seconds = timeout or self.limits.import_seconds
         names = self._talk.request(Kind.LOAD, None, "import", seconds)
-        if type(names) is not dict:
+        if type(names) is not dict or not all(map(is_name, chain(*names.items()))):
             self._talk.breach("expected the controller's names", "import")
         return names
 

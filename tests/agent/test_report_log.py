@@ -128,7 +128,7 @@ def test_whole_results_are_read(results):
         "test_skips": "Skipped: no reason",
         "test_expected_to_fail": "line 19: an assertion without a message",
         "test_teardown": "ValueError: teardown",
-        "test_half_a_character": "it is ?\ufffd[31m",
+        "test_half_a_character": "it is \ufffd\ufffd[31m",
     }
 
 

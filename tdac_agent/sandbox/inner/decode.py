@@ -20,11 +20,14 @@ from .wire import (
     MAX_DIMENSIONS,
     MAX_INT_BYTES,
     MAX_ITEMS,
+    MAX_TEXT,
     ODD_KEY,
     U32,
     Handle,
     RemoteError,
     WireError,
+    is_name,
+    printable,
 )
 
 # Two floats in a tuple or a list, as most answers are.
@@ -199,20 +202,30 @@ def _numbers(data: bytes, code: int, count: int, start: int) -> Any:
 
 def _take_handle(r: _Reader) -> object:
     number = _take_u32(r)
-    handle = Handle(number, _take_text(r))
+    handle = Handle(number, _take_name(r))
     return handle if r.resolve is None else r.resolve(handle)
 
 
 def _take_error(r: _Reader) -> RemoteError:
     line = _take_u32(r)
-    return RemoteError(_take_text(r), _take_text(r), _take_text(r), line)
+    return RemoteError(_take_name(r), _take_text(r), _take_text(r), line)
+
+
+def _take_name(r: _Reader) -> str:
+    name = _take_text(r)
+    if not is_name(name):
+        raise WireError("a text that is too long or cannot be printed")
+    return name
 
 
 def _take_text(r: _Reader) -> str:
     if r.data[r.pos] != ord("s"):
         raise WireError("expected a text")
     r.pos += 1
-    return _take_str(r)
+    text = _take_str(r)
+    if printable(text, MAX_TEXT) != text:
+        raise WireError("a text that is too long or cannot be printed")
+    return text
 
 
 _CONSTANTS = {ord("N"): None, ord("T"): True, ord("F"): False}

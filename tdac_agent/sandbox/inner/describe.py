@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from types import TracebackType
 
-from .wire import RemoteError
+from .wire import MAX_NAME, MAX_TEXT, RemoteError, printable
 
 FILE_NAME = "controller.py"
-MAX_MESSAGE = 2000
 MAX_LINES = 12
+MAX_LINE = 160
 
 
 def describe(error: BaseException, source: str) -> RemoteError:
@@ -24,7 +24,10 @@ def describe(error: BaseException, source: str) -> RemoteError:
             texts[half:-half] = [f"  ... {len(texts) - MAX_LINES} more ..."]
         line = frames[-1][0] if frames else 0
         return RemoteError(
-            type_name(error), _message(error), "\n".join(texts), max(line, 0)
+            type_name(error),
+            _message(error),
+            printable("\n".join(texts), MAX_TEXT),
+            max(line, 0),
         )
     except BaseException:
         return RemoteError(type_name(error), "", "", 0)
@@ -32,13 +35,14 @@ def describe(error: BaseException, source: str) -> RemoteError:
 
 def type_name(value: object) -> str:
     """Return the name of the class of `value`, past any metaclass."""
-    return str(type.__dict__["__name__"].__get__(type(value)))[:200]
+    name = str(type.__dict__["__name__"].__get__(type(value)))
+    return printable(name.replace("\n", " "), MAX_NAME)
 
 
 def _message(error: BaseException) -> str:
     try:
         message = error.msg if isinstance(error, SyntaxError) else str(error)
-        return message[:MAX_MESSAGE]
+        return printable(message, MAX_TEXT)
     except BaseException:
         return "(its text cannot be read)"
 
@@ -55,4 +59,4 @@ def _own_frames(traceback: TracebackType | None) -> list[tuple[int, str]]:
 
 def _frame_text(number: int, name: str, lines: list[str]) -> str:
     text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
-    return f"  line {number}, in {name}: {text[:160]}"
+    return f"  line {number}, in {name[:MAX_LINE]}: {text[:MAX_LINE]}"

@@ -12,7 +12,7 @@ from .encode import encode
 from .layout import Layout
 from .link import Link
 from .program import run_program
-from .wire import Handle, Kind, WireError
+from .wire import Handle, Kind, WireError, is_name
 
 MAX_HANDLES = 10_000
 MAX_NAMES = 1000
@@ -105,9 +105,9 @@ class Server:
         self._module.__file__ = FILE_NAME
         sys.modules["controller"] = self._module
         exec(code, self._module.__dict__)
-        names = [n for n in vars(self._module) if type(n) is str and n[:1] != "_"]
         members = vars(self._module)
-        return {name[:200]: type_name(members[name]) for name in names[:MAX_NAMES]}
+        names = [name for name in members if is_name(name) and name[:1] != "_"]
+        return {name: type_name(members[name]) for name in names[:MAX_NAMES]}
 
     def _keep(self, value: object) -> Handle:
         number = self._numbers.get(id(value))

@@ -5,6 +5,7 @@ encoded value. A value is a tag byte and its content. The decoder turns any byte
 a value or a `WireError`, in memory bounded by the length of the bytes; it runs no
 code of the sender. Exact types are kept: a numpy scalar comes back as that scalar.
 Subclasses of built-in types (a named tuple, an `IntEnum`) come back as the built-in.
+Names of types, and what an exception says, are bounded and printable.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ ARRAY_ITEMS = 10
 # Below CPython's limit of 4300 decimal digits, so that every int can be printed.
 MAX_INT_BYTES = 1024
 MAX_DIMENSIONS = 8
+# Characters of a name, and of any other text about an exception.
+MAX_NAME, MAX_TEXT = 200, 2000
 
 _INTEGERS = ("i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8")
 DTYPES = tuple(np.dtype(c) for c in ("?", *_INTEGERS, "f2", "f4", "f8"))
@@ -59,6 +62,19 @@ class Kind(IntEnum):
 
 class WireError(Exception):
     """Bytes that are not a value, or a value that cannot be sent."""
+
+
+def printable(text: str, most: int) -> str:
+    """At most so many characters of a text, with a mark for each that is not one."""
+    text = text[:most]
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)
+
+
+def is_name(value: object) -> bool:
+    """Whether a value is a text that may be the name of a type or a variable."""
+    return type(value) is str and len(value) <= MAX_NAME and value.isprintable()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,13 @@ from hypothesis.extra import numpy as hnp
 from tdac_agent.episode import as_wheels, wrong_action
 from tdac_agent.sandbox.inner import wire
 from tdac_agent.sandbox.inner.decode import decode
+from tdac_agent.sandbox.inner.describe import FILE_NAME, describe
 from tdac_agent.sandbox.inner.encode import encode
 from tdac_agent.sandbox.inner.layout import Layout
 from tdac_agent.sandbox.inner.wire import Handle, RemoteError, WireError
 
 texts = st.text(st.characters(exclude_categories=()), max_size=20)
+names = texts.filter(str.isprintable)
 dtypes = st.sampled_from(wire.DTYPES)
 scalars = dtypes.flatmap(lambda d: hnp.arrays(d, ())).map(lambda a: a[()])
 arrays = dtypes.flatmap(
@@ -31,7 +33,7 @@ hashable = st.recursive(
     | st.floats()
     | texts
     | st.binary(max_size=20)
-    | st.builds(Handle, st.integers(0, 2**32 - 1), texts),
+    | st.builds(Handle, st.integers(0, 2**32 - 1), names),
     lambda inner: st.lists(inner, max_size=4).map(tuple),
     max_leaves=6,
 )
@@ -149,8 +151,36 @@ def test_numpy_scalars_stay_apart_from_python_numbers():
 
 
 def test_an_error_keeps_its_parts():
-    error = RemoteError("ValueError", "no", "  line 3, in f: raise", 3)
+    error = RemoteError("ValueError", "no,\nno", "  line 3, in f: raise", 3)
     assert decode(encode(error)) == error
+
+
+ODD = "\ud800 \x1b[2J \u202e \x00 \n"
+
+
+@given(texts)
+def test_whatever_a_controller_raises_can_be_sent(text):
+    """The child itself describes an exception so that the wire carries it."""
+    kind = type("E", (Exception,), {})
+    kind.__name__ = text.replace("\0", "") + 300 * "n"
+    for message in (text, 3000 * ODD):
+        described = describe(kind(message), "")
+        assert decode(encode(described)) == described
+
+
+def test_lines_of_a_traceback_are_bounded():
+    """Odd names of functions and lines of any length are cut, and printable."""
+    source = "def f(): raise ValueError" + 4000 * " " + "# \u202e" + 4000 * "x"
+    code = compile(source, FILE_NAME, "exec")
+    members = {}
+    exec(code, members)
+    members["f"].__code__ = members["f"].__code__.replace(co_name=300 * ODD)
+    try:
+        members["f"]()
+    except ValueError as error:
+        described = describe(error, source)
+    assert decode(encode(described)) == described
+    assert 100 < len(described.traceback) < 400
 
 
 @pytest.mark.parametrize(
@@ -236,6 +266,14 @@ def test_a_list_that_holds_itself_is_refused():
         (b"n\x63", "not a value"),
         (b"h\0\0\0\0N", "expected a text"),
         (b"l\x01\0\0\0" * 40, "nested too deep"),
+        (encode(Handle(0, "\ud800")), "cannot be printed"),
+        (encode(Handle(0, "\x1b[2J")), "cannot be printed"),
+        (encode(Handle(0, "a\nb")), "cannot be printed"),
+        (encode(Handle(0, "n" * 201)), "too long"),
+        (encode(RemoteError("\u202e", "", "", 0)), "cannot be printed"),
+        (encode(RemoteError("E", "\ud800", "", 0)), "cannot be printed"),
+        (encode(RemoteError("E", "", "\x9b31m", 0)), "cannot be printed"),
+        (encode(RemoteError("E", "m" * 2001, "", 0)), "too long"),
     ],
 )
 def test_forged_bytes_are_refused(data, match):
