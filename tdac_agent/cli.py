@@ -31,6 +31,7 @@ from tdac_agent.commands import (
     webots_flags,
 )
 from tdac_agent.commands.mistakes import explain, fail
+from tdac_agent.commands.terminal import filter_streams
 
 app = typer.Typer(
     name="tdac",
@@ -142,6 +143,7 @@ def _is_number(word: str) -> bool:
 
 def main() -> None:
     """Does what the command line says: every known error is one clear line."""
+    filter_streams()
     # Its threads would keep a core busy, waiting for work that nothing here has.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # To look for some, pydantic reads what every installed package says of itself.

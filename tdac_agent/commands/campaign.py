@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 
 from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
@@ -22,6 +21,7 @@ from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.commands.campaign_live import LiveView
 from tdac_agent.commands.campaign_table import make_console, told_counts
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.sentences import tell
 from tdac_agent.lifecycle import model_warnings
 from tdac_agent.provider import Provider

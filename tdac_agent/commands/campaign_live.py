@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.markup import escape
 from rich.padding import Padding
@@ -22,6 +22,7 @@ from tdac_agent.commands.campaign_table import (
     told_counts,
     told_time,
 )
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.sentences import tell
 
 FRAME_LINES = 10

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from rich.console import Console
 from rich.markup import escape
 
 from tdac_agent.commands.campaign_table import ALWAYS, SOMETIMES, make_table
+from tdac_agent.commands.console import Console
 from tdac_agent.metrics import Rate
 
 WIDE = 110

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich import box
-from rich.console import Console
 from rich.table import Table
 
 from tdac_agent.budget import told_usd
 from tdac_agent.campaign.plan import Cell
 from tdac_agent.campaign.progress import Progress
+from tdac_agent.commands.console import Console
 
 COLOURS = {"verified": "green", "not verified": "red"}
 LABEL_WIDTH = 6
@@ -59,7 +59,7 @@ def _several(rows: Sequence[tuple[object, ...]], column: int) -> bool:
 
 def make_console(*, stderr: bool) -> Console:
     """A console; a file has room for wide tables."""
-    console = Console(stderr=stderr, highlight=False, emoji=False)
+    console = Console(stderr=stderr, highlight=False)
     if not console.is_terminal:
         console.width = max(console.width, FILE_WIDTH)
     return console

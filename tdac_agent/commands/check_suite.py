@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import TaskFlags, check_tier
 from tdac_agent.commands.sentences import tell
 from tdac_agent.privileged import REFERENCE
@@ -29,7 +29,7 @@ def run(
 ) -> int:
     """Checks a suite and prints; returns the exit code."""
     check_tier(tier)
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     with WarmJudge() as judge, console.status("preparing the task …") as status:
         task = flags.load()
         check = check_suite(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
-
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.synth import next_folder, synthesise_and_show
 from tdac_agent.providers.replay import DEMO
 from tdac_agent.records import load_run
@@ -28,7 +27,7 @@ def run(out: Path | None, as_json: bool) -> int:
         out: Run folder; the next free one by default.
         as_json: Whether to print the record.
     """
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     recorded = load_run(DEMO)
     about = {"prompt": recorded.prompt, "task": recorded.task}
     console.print(_ABOUT.format(date=recorded.started[:10], **about))

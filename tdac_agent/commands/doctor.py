@@ -10,10 +10,10 @@ import platform
 import sys
 from dataclasses import asdict, dataclass
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.display import has_display
 from tdac_agent.commands.trials import attempt
 from tdac_agent.sandbox import available_tiers
@@ -95,7 +95,7 @@ def _sandbox() -> list[Check]:
 def _trials() -> list[Check]:
     """What a first hour needs, tried; films are no part of what is needed."""
     checks = []
-    with Console(stderr=True, emoji=False).status("") as told:
+    with Console(stderr=True).status("") as told:
         for title, name, needed in TRIALS:
             told.update(f"trying {title}; the first time it is compiled …")
             checks.append(Check(title, *attempt(name), needed))
@@ -154,7 +154,7 @@ def _versions() -> dict[str, str]:
 
 
 def _show(checks: list[Check]) -> None:
-    console = Console(emoji=False)
+    console = Console()
     grid = Table.grid(padding=(0, 1, 0, 0))
     grid.add_column()
     grid.add_column(no_wrap=True)

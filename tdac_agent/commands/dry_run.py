@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from rich.console import Console
-
 from tdac_agent.budget import told_usd
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.commands.sentences import tell
 from tdac_agent.outlook import Outlook, foresee
@@ -65,7 +64,7 @@ def run(
         return 0
     sys.stdout.write(outlook.prompt)
     sys.stdout.flush()
-    console = Console(stderr=True, highlight=False, emoji=False)
+    console = Console(stderr=True, highlight=False)
     unbounded = _unbounded(outlook) if models["base_url"] is None else []
     for line in [*_lines(outlook), *_needed([*missing, *unbounded])]:
         tell(console, line)

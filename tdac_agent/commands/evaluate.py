@@ -6,10 +6,10 @@ import sys
 from pathlib import Path
 from typing import Literal
 
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.evaluate_view import show_evaluation
 from tdac_agent.commands.flags import check_tier
 from tdac_agent.entrants import entrants_of
@@ -41,7 +41,7 @@ def run(
     names = None if wrappers is None else wrapper_names(wrappers)
     entrants_of(policies, names)  # before anything is started
     _check_places(csv, out)
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     columns = (
         TextColumn("{task.fields[doing]}"),
         BarColumn(),

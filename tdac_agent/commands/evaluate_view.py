@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.sentences import tell
 from tdac_agent.evaluation_report import (
     Comparison,

@@ -8,9 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import check_tier
 from tdac_agent.deploy.webots import SPARE, Project, export_webots
 from tdac_agent.webots_report import WebotsReport
@@ -29,7 +29,7 @@ def run(run_folder: Path, out: Path, tier: str, as_json: bool) -> int:
     if as_json:
         sys.stdout.write(json.dumps(_record(project, done.report), indent=2) + "\n")
     else:
-        _show(project, done.report, Console(emoji=False))
+        _show(project, done.report, Console())
     return 0 if done.report.passed else 1
 
 

@@ -6,11 +6,12 @@ import json
 import sys
 from pathlib import Path
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import check_finite, in_pixels
 from tdac_envs.candidates import Candidate, Preset
 from tdac_envs.errors import TaskError
@@ -63,7 +64,7 @@ def run(
         }
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
         return
-    console = Console(emoji=False)
+    console = Console()
     if start is None:  # no candidate has a figure, nor a place in an order
         console.print(f"reading: {escape(_describe(ranked[0]))}", highlight=False)
     else:

@@ -10,6 +10,8 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
+from tdac_agent.commands.terminal import unfiltered
+
 
 def explain(error: Exception) -> NoReturn:
     """Ends the process with one line on what was wrong; a traceback only for a bug."""
@@ -38,14 +40,15 @@ def fail(message: str, code: int) -> NoReturn:
 @contextmanager
 def begun() -> Generator[None]:
     """Shows on a terminal that a command loads what it needs: that may take seconds."""
-    shown = sys.stderr.isatty()
+    terminal = unfiltered(sys.stderr)
+    shown = terminal.isatty()
     if shown:
-        print("starting …", end="\r", file=sys.stderr, flush=True)
+        print("starting …", end="\r", file=terminal, flush=True)
     try:
         yield
     finally:
         if shown:
-            print("\x1b[2K", end="", file=sys.stderr, flush=True)
+            print("\x1b[2K", end="", file=terminal, flush=True)
 
 
 def fitted(line: str) -> str:

@@ -16,6 +16,7 @@ from tdac_agent.errors import Fault
 from tdac_agent.judge import JITTERS, Judge
 from tdac_agent.nursery import Nursery
 from tdac_agent.pictures import pictures_of
+from tdac_agent.plain import one_line
 from tdac_agent.sandbox import Limits, SandboxError
 from tdac_agent.task import Task, write_workdir
 from tdac_agent.trajectory import Rollout
@@ -109,4 +110,4 @@ def _checked(episode: str | None) -> str:
 
 
 def _because(rollout: Rollout) -> str:
-    return f": {rollout.error}" if rollout.error else ""
+    return f": {one_line(rollout.error)}" if rollout.error else ""

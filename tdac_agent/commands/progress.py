@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.console import Console
 from rich.live import Live
 from rich.markup import escape
 from rich.spinner import Spinner
 from rich.table import Table
 
 from tdac_agent.budget import told_usd
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.run_view import told_tests
 
 _ANSWERS = (

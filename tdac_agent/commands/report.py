@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
 from rich.markup import escape
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.sentences import tell
 from tdac_agent.errors import RunError
 from tdac_agent.files import write_atomic
@@ -31,7 +31,7 @@ def run(place: Path, out: Path | None) -> int:
         write_atomic(file, page.html)
     except OSError as error:
         raise RunError(f"cannot write {file}: {error.strerror}") from error
-    console = Console(emoji=False)
+    console = Console()
     for line in page.unreadable:
         tell(console, f"not readable: {line}", "yellow")
     runs = "1 run" if page.runs == 1 else f"{page.runs} runs"

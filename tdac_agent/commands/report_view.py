@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich import box
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.sentences import tell
 from tdac_agent.feedback import group_failures
 from tdac_agent.report import Failure, Report
@@ -51,7 +51,7 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
     console.print(
         f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
         f"passed in {report.seconds:.1f} s  (task {escape(about.task)}, profile "
-        f"{about.profile}, sandbox {about.sandbox})"
+        f"{about.profile}, sandbox {escape(about.sandbox)})"
     )
     if _lacks_names(report):
         console.print(
@@ -106,8 +106,8 @@ def episode_table(report: Report) -> Table:
     for episode in (e for e in report.episodes if e.outcome != "not run"):
         colour = "green" if episode.outcome == "reached" else "red"
         table.add_row(
-            episode.name,
-            f"[{colour}]{episode.outcome}[/]",
+            escape(episode.name),
+            f"[{colour}]{escape(episode.outcome)}[/]",
             str(episode.steps),
             str(episode.collisions),
             _of(units.scale, episode.d_min, episode.d0),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.progress import TimeRemainingColumn as TimeLeft
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.robust_flags import RobustFlags
 from tdac_agent.robust import verify_robust
 from tdac_agent.robust_report import RobustReport
@@ -36,7 +36,7 @@ def measure(
         TextColumn("{task.fields[successes]} reached"),
         TimeLeft(),
     )
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     # Drawn where there is something new, and not ten times a second.
     bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
     seen = (0, 0)

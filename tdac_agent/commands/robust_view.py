@@ -5,10 +5,10 @@ from __future__ import annotations
 import shlex
 from functools import partial
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.sentences import tell
 from tdac_agent.robust_report import Interval, RobustReport, SequentialResult
 from tdac_agent.seeded import SeededEpisode

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.run_view import told_tests
 from tdac_agent.records import Run, load_rules, load_run
 from tdac_agent.rules import RepairRule, RuleBook
@@ -22,7 +22,7 @@ def run(folder: Path, as_json: bool) -> int:
     if as_json:
         sys.stdout.write(book.model_dump_json(indent=2) + "\n")
         return 0
-    console = Console(emoji=False)
+    console = Console()
     title = f"{record.task}: rules by {record.optimizer}, {record.status}"
     if book.rules:
         console.print(f"[bold]{escape(title)}[/]\n")

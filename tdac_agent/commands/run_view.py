@@ -5,12 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from rich.console import Console
 from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
 from tdac_agent.budget import told_usd
+from tdac_agent.commands.console import Console
 from tdac_agent.records import Attempt, Run
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from rich import box
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.budget import told_usd
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.run_view import way_on
 from tdac_agent.commands.sentences import tell
 from tdac_agent.errors import RunError
@@ -49,7 +49,7 @@ def run(folder: Path, as_json: bool) -> int:
     if as_json:
         sys.stdout.write(json.dumps(rows, indent=2) + "\n")
         return 0
-    console = Console(emoji=False)
+    console = Console()
     if rows:
         console.print(_table(rows, console.width))
         for row in rows:

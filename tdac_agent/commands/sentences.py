@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rich.console import Console
 from rich.text import Text
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.mistakes import folded
 
 

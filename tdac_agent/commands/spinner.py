@@ -26,9 +26,9 @@ class Spinner:
         if self._done:
             return
         self._done = True
-        from rich.console import Console
+        from tdac_agent.commands.console import Console
 
-        console = Console(stderr=True, emoji=False)
+        console = Console(stderr=True)
         self._shown.enter_context(console.status(self._text))
 
     def __enter__(self) -> Spinner:

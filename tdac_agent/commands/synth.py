@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import TaskFlags
 from tdac_agent.commands.progress import Progress
 from tdac_agent.commands.run_view import show_run
@@ -40,7 +40,7 @@ def run(
         start_from: Controller to begin with.
         as_json: Whether to print the record.
     """
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     source = None if start_from is None else read_text(start_from)
     with console.status("preparing the task …"):
         task = flags.load()
@@ -57,7 +57,7 @@ def resume(folder: Path, limits: dict[str, Any], as_json: bool) -> int:
         limits: `max_cost` and `max_tokens`, None where they stay.
         as_json: Whether to print the record.
     """
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     before = load_run(folder)
     if before.finished:
         return _show(before, console, before=before)

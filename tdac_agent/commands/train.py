@@ -11,10 +11,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.evaluate import wrapper_names
 from tdac_agent.commands.flags import flag
 from tdac_agent.disturbance import Disturbance
@@ -50,7 +50,7 @@ def run(
         resume: Folder of a training to go on with.
         as_json: Whether to print JSON.
     """
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     with console.status("preparing the tasks …"):
         plan, folder = _asked_for(given, steps, out, resume)
         check_extra()

@@ -86,26 +86,24 @@ def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
     """The file and its task, which takes a while where it is not a run folder's own."""
     if not flags.given():
         return controller_and_task(controller, flags)
-    from rich.console import Console
+    from tdac_agent.commands.console import Console
 
-    with Console(stderr=True, emoji=False).status("preparing the task …"):
+    with Console(stderr=True).status("preparing the task …"):
         return controller_and_task(controller, flags)
 
 
 def _show(report: Report, out: Path | None) -> None:
-    from rich.console import Console
-
+    from tdac_agent.commands.console import Console
     from tdac_agent.commands.report_view import show_report
 
-    show_report(report, Console(emoji=False), out)
+    show_report(report, Console(), out)
 
 
 def _show_robust(measured: RobustReport | None, replay: list[str]) -> None:
-    from rich.console import Console
-
+    from tdac_agent.commands.console import Console
     from tdac_agent.commands.robust_view import show_robust
 
-    console = Console(emoji=False)
+    console = Console()
     if measured is None:
         console.print("robustness not measured: the controller is not verified")
     else:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rich.console import Console
 from rich.markup import escape
 
+from tdac_agent.commands.console import Console
 from tdac_agent.kernels_used import use_map_kernels, use_world_kernels
 from tdac_envs.code_cache import cache_folder
 
@@ -16,5 +16,5 @@ def run() -> int:
     folder = cache_folder()
     if folder is not None:
         told = f"compiled code lies ready in {escape(str(folder))}"
-        Console(emoji=False).print(told, highlight=False, soft_wrap=True)
+        Console().print(told, highlight=False, soft_wrap=True)
     return 3 if folder is None else 0

@@ -11,13 +11,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import check_finite, check_tier
+from tdac_agent.plain import printable
 from tdac_agent.webots_report import WebotsReport
 from tdac_agent.webots_run import WebotsRun, frames, run_controller
 from tdac_envs.epuck.env import EPuckEnv
@@ -62,7 +63,7 @@ def run(
         "goal_tolerance": TOLERANCE if tolerance is None else tolerance,
         "webots_sensors": webots_sensors,
     }
-    console = Console(stderr=as_json, emoji=False)
+    console = Console(stderr=as_json)
     env = stage.make_env(**options)
     with _bar(console) as bar:
         watch = _watcher(bar, controller.name, env.nominal.horizon)
@@ -107,14 +108,6 @@ def _film(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
     write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
 
 
-def printable(text: str) -> str:
-    """A text without what would steer a terminal."""
-    return "".join(
-        c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}"
-        for c in _STEERING.sub("", text)
-    )
-
-
 def _once(text: str) -> str:
     """A text in which lines that repeat say how often, where they are first."""
     lines = text.rstrip().splitlines()
@@ -138,7 +131,9 @@ def _show(report: WebotsReport, console: Console) -> None:
         )
     if report.output.strip():
         console.print("[cyan]the controller printed[/]")
-        console.print(Text(_once(printable(report.output))), soft_wrap=True)
+        console.print(
+            Text(_once(printable(_STEERING.sub("", report.output)))), soft_wrap=True
+        )
     if report.error is not None:
         console.print("[red]the controller failed[/]")
         console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)

@@ -11,10 +11,10 @@ from typing import Any
 
 import cv2
 from rich.box import SIMPLE
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from tdac_agent.commands.console import Console
 from tdac_envs.bodies import floor_under
 from tdac_envs.errors import WorldError
 from tdac_envs.footprint import Disc, Polygon, Rectangle
@@ -34,7 +34,7 @@ def run(file: str, png: Path | None, as_json: bool) -> None:
     if as_json:
         sys.stdout.write(json.dumps(_record(world), indent=2) + "\n")
         return
-    console = Console(emoji=False)
+    console = Console()
     console.print(f"[bold]{escape(world.source)}[/], Webots {world.version}", end="")
     console.print(f", step {world.time_step:g} ms")
     console.print(_people(world))
