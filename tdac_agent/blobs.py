@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tdac_agent.files import write_atomic
+from tdac_envs.intake import RECORD_BYTES, read_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +32,8 @@ class Blobs:
     def get(self, name: str) -> str | None:
         """The text with a hash; None where it is missing or damaged."""
         try:
-            raw = (self.folder / name).read_bytes()
-        except (OSError, ValueError):
+            raw = read_file(self.folder / name, RECORD_BYTES)
+        except OSError:
             return None
         if hashlib.sha256(raw).hexdigest() != name:
             return None

@@ -14,6 +14,7 @@ from tdac_agent.sandbox import ControllerFault, Limits
 from tdac_agent.setting import Nominal
 from tdac_agent.task import Task
 from tdac_agent.trajectory import Rollout
+from tdac_envs.intake import RECORD_BYTES, read_file
 
 NO_SANDBOX = "none"
 """In the place of a tier, of policies that need none."""
@@ -94,7 +95,7 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
 def source_of(contender: Contender) -> bytes:
     """Source of a controller."""
     assert contender.file is not None
-    return contender.file.read_bytes()
+    return read_file(contender.file, RECORD_BYTES)
 
 
 def _driven_here(stage: Stage, record: Record, seed: int) -> Driven:

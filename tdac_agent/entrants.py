@@ -9,14 +9,16 @@ from pathlib import Path
 
 from tdac_agent.contenders import Contender, Kind
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.learned import read_metadata
+from tdac_agent.learned import check_kind
 from tdac_agent.provenance import sha256_of
+from tdac_agent.sb3_file import MOST_BYTES, load_weights, read_policy
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
 from tdac_agent.task_file import TASK_FILE, read_task_file
 from tdac_agent.verification import read_source
 from tdac_envs.errors import TaskError, hint
-from tdac_envs.wrappers import WRAPPERS
+from tdac_envs.intake import read_file
+from tdac_envs.wrappers import WRAPPERS, check_wrappers
 
 OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
 BUILTIN = "builtin"
@@ -109,7 +111,8 @@ def _env_of(run_folder: Path) -> str | None:
 
 
 def _learned(word: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
-    saved = read_metadata(file)
+    found = read_policy(file)
+    saved = found.saved
     if saved is not None:
         names = saved.wrappers
     elif wrappers is not None:
@@ -120,7 +123,10 @@ def _learned(word: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
             f"{word!r} does not say which observations it was trained with: give "
             f"--wrapper NAME for each of its wrappers ({known}), or --wrapper none"
         )
-    sha256 = sha256_of(file.read_bytes())
+    check_wrappers(names)
+    check_kind(found)
+    load_weights(found.weights)
+    sha256 = sha256_of(read_file(file, MOST_BYTES))
     return Entrant(word, Contender("sb3", file.resolve(), names), sha256)
 
 

@@ -25,6 +25,7 @@ from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, load_task
 from tdac_agent.trajectory import Trajectory, nominal_first
 from tdac_envs.errors import TdacError
+from tdac_envs.intake import RECORD_BYTES, parse_json, read_file
 
 MOST_BYTES = 8 << 20
 T = TypeVar("T")
@@ -152,10 +153,9 @@ def run_folders(place: Path) -> list[Path]:
 
 
 def read_text(path: Path, most: int = MOST_BYTES) -> str | None:
-    """A text as far as it is one; None where there is no file."""
+    """A text as far as it is one; None where there is no file, or a huge one."""
     try:
-        with path.open("rb") as file:
-            return file.read(most).decode("utf-8", "replace")
+        return read_file(path, most).decode("utf-8", "replace")
     except OSError:
         return None
 
@@ -198,8 +198,8 @@ def _state(attempt: Attempt | None) -> State:
 
 def _report(path: Path, problems: list[str]) -> Report | None:
     try:
-        return Report.model_validate_json(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
+        return Report.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+    except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "damaged"
         problems.append(f"{'/'.join(path.parts[-4:])}: {reason}")
         return None

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.files import sync_folder
+from tdac_envs.intake import read_file
 
 JournalRecord = dict[str, Any]
+JOURNAL_BYTES = 256 << 20
 
 
 def append_record(path: Path, record: JournalRecord) -> None:
@@ -51,7 +53,7 @@ def _write(handle: int, line: bytes) -> None:
 def read_records(path: Path) -> list[JournalRecord]:
     """All whole records; a torn or foreign line is none, a missing file has none."""
     try:
-        raw = path.read_bytes()
+        raw = read_file(path, JOURNAL_BYTES)
     except FileNotFoundError:
         return []
     return _records(raw)
@@ -72,9 +74,7 @@ def read_on(path: Path, offset: int) -> tuple[list[JournalRecord], int]:
 
 
 def _behind(path: Path, offset: int) -> bytes:
-    with path.open("rb") as file:
-        file.seek(offset)
-        return file.read()
+    return read_file(path, JOURNAL_BYTES, offset)
 
 
 def _records(raw: bytes) -> list[JournalRecord]:
@@ -88,7 +88,7 @@ def mend(path: Path) -> None:
     A last line that only lacks its end is kept, as `read_records` does.
     """
     try:
-        raw = path.read_bytes()
+        raw = read_file(path, JOURNAL_BYTES)
     except FileNotFoundError:
         return
     tail = raw.rpartition(b"\n")[2]

@@ -7,93 +7,34 @@ are plain JSON; the network around them is made anew.
 
 from __future__ import annotations
 
-import io
-import json
 import re
-import zipfile
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from gymnasium import Space, spaces
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.files import write_atomic
 from tdac_agent.sandbox import ControllerFault
+from tdac_agent.sb3_file import ACTIVATION, SavedNetwork, load_weights, read_policy
 from tdac_agent.setting import JudgedEnv
 from tdac_envs.driven import Observation
-from tdac_envs.errors import TaskError, first_problem
+from tdac_envs.errors import TaskError
 from tdac_envs.extras import install_command
+from tdac_envs.intake import one_line
 from tdac_envs.wrappers import wrap
 
-METADATA = "tdac.json"
-MOST_BYTES = 256 << 20
 _NETWORKS = {
     "stable_baselines3.common.policies": "ActorCriticPolicy",
     "stable_baselines3.sac.policies": "SACPolicy",
     "stable_baselines3.td3.policies": "TD3Policy",
 }
 """By the module of the saved policy's class, the class for observations in a Box."""
-_FOR_TRAINING = {"optimizer_class", "optimizer_kwargs"}
-_ACTIVATION = re.compile(r"<class 'torch\.nn\.modules\.activation\.(\w+)'>")
-
-
-class SavedPolicy(BaseModel):
-    """`tdac.json` in a policy's zip file, or beside it as `NAME.json`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    schema_version: Literal[1] = 1
-    algo: str = Field(description="ppo, sac, …")
-    tasks: tuple[str, ...] = Field((), description="That it was trained on.")
-    wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
-    variation: str = Field("jitter", description="Of the starts in training.")
-    steps: int | None = Field(None, description="Of training.")
-    seed: int | None = None
-
-
-def read_metadata(file: Path) -> SavedPolicy | None:
-    """What a policy's file says about itself; None where it says nothing.
-
-    Raises:
-        ControllerFileError: It is no policy of stable-baselines3, or says nonsense.
-    """
-    try:
-        with zipfile.ZipFile(file) as archive:
-            names = archive.namelist()
-            if not {"data", "policy.pth"} <= set(names):
-                raise zipfile.BadZipFile("it holds no `data` and no `policy.pth`")
-            text = archive.read(METADATA) if METADATA in names else None
-    except (OSError, zipfile.BadZipFile) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise ControllerFileError(
-            f"{str(file)!r} is no policy of stable-baselines3: {reason}"
-        ) from error
-    beside = file.with_suffix(".json")
-    if text is None and beside.is_file():
-        text = beside.read_bytes()
-    if text is None:
-        return None
-    try:
-        return SavedPolicy.model_validate_json(text)
-    except ValidationError as error:
-        told = f"{METADATA} of {file}: {first_problem(error)}"
-        raise ControllerFileError(told) from error
-
-
-def write_metadata(file: Path, saved: SavedPolicy) -> None:
-    """Puts what is to be known about a policy into its file, in the place of older."""
-    content = io.BytesIO()
-    with zipfile.ZipFile(file) as old, zipfile.ZipFile(content, "w") as new:
-        for item in old.infolist():
-            if item.filename != METADATA:
-                new.writestr(item, old.read(item))
-        new.writestr(METADATA, saved.model_dump_json(indent=2))
-    write_atomic(file, content.getvalue())
+_WITHOUT_SDE = "stable_baselines3.td3.policies"
+_ACTIVATIONS = {"ReLU", "Tanh", "ELU", "LeakyReLU", "GELU", "SiLU", "Sigmoid", "SELU"}
 
 
 class Learned:
@@ -123,7 +64,12 @@ class Learned:
     def policy(self, observation: Observation) -> NDArray[np.float32]:
         """The action, shape (2,), float32."""
         seen = self._seen(self._env, observation)
-        action, _ = self._network.predict(seen, deterministic=True)
+        try:
+            action, _ = self._network.predict(seen, deterministic=True)
+        # Of weights that no training makes, whatever torch makes of them.
+        except (ValueError, RuntimeError) as error:
+            told = f"the policy's network: {one_line(error)}"
+            raise ControllerFault(told, "policy") from error
         return np.asarray(action, np.float32)
 
     def waited(self) -> float:
@@ -135,11 +81,6 @@ class Learned:
         if env is env.unwrapped:
             return observation
         return env.observation(self._seen(env.env, observation))
-
-
-def _without_extra() -> ControllerFault:
-    needed = f"SB3 policies need an extra: {install_command('sb3')}"
-    return ControllerFault(needed, "import")
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,83 +106,86 @@ def _network(file: Path, fit: _Spaces) -> Any:
         ControllerFault: It does not fit them, or is of a kind that is not known.
     """
     try:
-        import torch
-    except ImportError as error:
-        raise _without_extra() from error
+        saved = read_policy(file)
+        weights = load_weights(saved.weights)
+    except ControllerFileError as error:
+        raise ControllerFault(str(error), "import") from error
+    import torch
+
     torch.set_num_threads(1)
-    with zipfile.ZipFile(file) as archive:
-        data = json.loads(archive.read("data"))
-        weights = _weights(archive)
-    kind = _class(data, isinstance(fit.observation, spaces.Dict))
-    kwargs = _kwargs(data.get("policy_kwargs") or {})
-    kwargs.setdefault("use_sde", bool(data.get("use_sde", False)))
-    if kind.__name__.startswith("TD3") or "td3" in kind.__module__:
-        kwargs.pop("use_sde")
-    network = kind(fit.observation, fit.action, lambda _: 0.0, **kwargs)
+    network = _made(saved, fit.observation, fit.action)
     try:
         network.load_state_dict(weights)
     except RuntimeError as error:
-        first = " ".join(str(error).split())[:160]
         raise ControllerFault(
             "the policy was trained on other observations than its wrappers give on "
-            f"this task: {first}",
+            f"this task: {one_line(error)[:160]}",
             "import",
         ) from error
     network.set_training_mode(False)
     return network
 
 
-def _weights(archive: zipfile.ZipFile) -> Any:
-    import torch
+def check_kind(saved: SavedNetwork) -> None:
+    """Refuses a policy of which no network can be made.
 
-    if archive.getinfo("policy.pth").file_size > MOST_BYTES:
-        raise ControllerFault("the policy's weights are too large", "import")
+    Raises:
+        ControllerFileError: It is of a kind that is not known, its settings do not
+            fit its class, or an extra is not installed.
+    """
     try:
-        content = io.BytesIO(archive.read("policy.pth"))
-        return torch.load(content, map_location="cpu", weights_only=True)
-    # torch has no one error for what is not its own.
-    except Exception as error:
-        reason = str(error).partition("\n")[0]
-        raise ControllerFault(
-            f"the policy's weights cannot be read: {reason}", "import"
-        ) from error
+        _made(saved, spaces.Box(-1.0, 1.0, (4,)), spaces.Box(-1.0, 1.0, (2,)))
+    except ControllerFault as fault:
+        raise ControllerFileError(str(fault)) from fault
 
 
-def _class(data: dict[str, Any], several: bool) -> Any:
+def _made(saved: SavedNetwork, observation: Space[Any], action: Space[Any]) -> Any:
+    """A network without its weights.
+
+    Raises:
+        ControllerFault: It is of a kind that is not known, or its settings do not fit
+            its class.
+    """
+    kind = _class(saved.module, isinstance(observation, spaces.Dict))
+    try:
+        return kind(observation, action, lambda _: 0.0, **_kwargs(saved))
+    # What does not fit a class has errors of all kinds.
+    except (TypeError, ValueError, KeyError, AssertionError, RuntimeError) as error:
+        told = f"the policy's settings do not fit its class: {one_line(error)}"
+        raise ControllerFault(told, "import") from error
+
+
+def _class(module: str, several: bool) -> Any:
     """The class of the network; `several` for observations in a Dict."""
     try:
         from importlib import import_module
 
-        module = str((data.get("policy_class") or {}).get("__module__"))
         name = _NETWORKS[module]
         if several:
             actor_critic = name == "ActorCriticPolicy"
             name = "MultiInputActorCriticPolicy" if actor_critic else "MultiInputPolicy"
         return getattr(import_module(module), name)
     except ImportError as error:
-        raise _without_extra() from error
+        needed = f"SB3 policies need an extra: {install_command('sb3')}"
+        raise ControllerFault(needed, "import") from error
     except KeyError as error:
         raise ControllerFault(
-            f"a policy of {module} cannot be evaluated, but of PPO, A2C, SAC and TD3",
+            f"a policy of {module[:80]} cannot be evaluated, but of PPO, A2C, SAC and "
+            "TD3",
             "import",
         ) from error
 
 
-def _kwargs(saved: dict[str, Any]) -> dict[str, Any]:
-    """Settings of the network, as they were saved: JSON, or Python's words for it."""
+def _kwargs(saved: SavedNetwork) -> dict[str, Any]:
+    """Arguments of the network's class."""
     from torch import nn
 
-    kwargs = {}
-    for key, value in saved.items():
-        if key.startswith(":") or key in _FOR_TRAINING:
-            continue
-        found = _ACTIVATION.fullmatch(value) if isinstance(value, str) else None
-        if found:
-            kwargs[key] = getattr(nn, found.group(1))
-        elif isinstance(value, str):
-            raise ControllerFault(
-                f"the policy's {key} is code, {value[:80]}, which is not run", "import"
-            )
-        else:
-            kwargs[key] = value
+    kwargs = saved.settings.model_dump(exclude_unset=True)
+    found = re.fullmatch(ACTIVATION, kwargs.pop("activation_fn", None) or "")
+    if found is not None:
+        kwargs["activation_fn"] = getattr(nn, found[1], None)
+        if found[1] not in _ACTIVATIONS:
+            raise ControllerFault(f"no activation {found[1][:80]} is known", "import")
+    if saved.module == _WITHOUT_SDE:
+        kwargs.pop("use_sde")
     return kwargs

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -20,6 +19,7 @@ from tdac_agent.rule_answer import MAX_OPERATIONS
 from tdac_agent.rules import MAX_RULE_CHARS, RepairRule, render_block
 from tdac_agent.task import Task
 from tdac_envs.errors import TdacError
+from tdac_envs.intake import TEXT_BYTES, read_file
 
 VARIANTS = ("full", "underspecified")
 
@@ -56,7 +56,7 @@ def load_template(given: str) -> PromptTemplate:
     if given in VARIANTS:
         return PromptTemplate(given)
     try:
-        return PromptTemplate(given, Path(given).read_text(encoding="utf-8"))
+        return PromptTemplate(given, read_file(given, TEXT_BYTES).decode("utf-8"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
         known = ", ".join(VARIANTS)

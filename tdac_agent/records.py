@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Literal
 
@@ -12,7 +11,8 @@ from tdac_agent.errors import RunError
 from tdac_agent.locks import LOCK_FILE, is_held
 from tdac_agent.printable_record import PrintableRecord
 from tdac_agent.rules import RuleBook
-from tdac_envs.errors import nearest
+from tdac_envs.errors import nearest, why
+from tdac_envs.intake import RECORD_BYTES, parse_json, read_file
 
 Status = Literal[
     "running", "verified", "not verified", "interrupted", "fault", "budget"
@@ -157,16 +157,14 @@ def load_run(folder: Path) -> Run:
     """
     path = folder / RUN_FILE
     try:
-        content = json.loads(path.read_bytes().decode("utf-8"))
+        content = parse_json(read_file(path, RECORD_BYTES))
         return Run.model_validate({**content, "folder": folder})
-    # Not all of a damaged file is a JSONDecodeError: wrong encodings, endless numbers
-    # and deep nesting are not. A ValidationError is a ValueError.
     except FileNotFoundError as error:
         raise RunError(f"{folder} is not a run folder: {_missing(folder)}") from error
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        told = error.strerror if isinstance(error, OSError) else str(error)
-        reason = str(told).partition("\n")[0]
-        raise RunError(f"{folder} is not a run folder: {RUN_FILE}: {reason}") from error
+    except (OSError, ValueError, TypeError) as error:
+        raise RunError(
+            f"{folder} is not a run folder: {RUN_FILE}: {why(error)}"
+        ) from error
 
 
 def _missing(folder: Path) -> str:
@@ -188,9 +186,8 @@ def load_rules(folder: Path) -> RuleBook:
     """
     path = folder / RULES_FILE
     try:
-        return RuleBook.model_validate_json(path.read_bytes())
+        return RuleBook.model_validate(parse_json(read_file(path, RECORD_BYTES)))
     except FileNotFoundError:
         return RuleBook()
     except (OSError, ValueError) as error:
-        reason = str(error).partition("\n")[0]
-        raise RunError(f"{path} holds no rules: {reason}") from error
+        raise RunError(f"{path} holds no rules: {why(error)}") from error

@@ -13,6 +13,8 @@ from tdac_agent.prompt import VARIANTS
 from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import TASK_FILE
+from tdac_envs.errors import why
+from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 
 # What decides the questions of a run and what becomes of the answers, in plain words;
 # two runs that differ in none of it are one run.
@@ -101,13 +103,25 @@ def asked_for(folder: Path) -> dict[str, Any]:
         "patience": run.patience,
         "seed": run.seed,
         "index": run.index,
-        "start_from": given.read_text("utf-8") if given.is_file() else None,
+        "start_from": _text(given) if given.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
         "prompt": run.prompt if run.prompt in VARIANTS else str(prompt),
         "max_output": run.max_output,
         "out": folder,
     }
+
+
+def _text(file: Path) -> str:
+    """A controller of a run.
+
+    Raises:
+        RunError: It cannot be read, or is not UTF-8.
+    """
+    try:
+        return read_file(file, TEXT_BYTES).decode("utf-8")
+    except (OSError, ValueError) as error:
+        raise RunError(f"cannot read {file}: {why(error)}") from error
 
 
 def _task(folder: Path) -> Task:
@@ -122,9 +136,9 @@ def _task(folder: Path) -> Task:
     task = load_task(folder)
     setting: Any = task.setting
     try:
-        text = (folder / "params.json").read_bytes()
-        params = type(setting.params).model_validate_json(text)
+        raw = read_file(folder / "params.json", TEXT_BYTES)
+        params = type(setting.params).model_validate(parse_json(raw))
     except (OSError, ValueError) as error:
-        reason = str(error).partition("\n")[0]
-        raise RunError(f"cannot go on with {folder}: params.json: {reason}") from error
+        told = f"cannot go on with {folder}: params.json: {why(error)}"
+        raise RunError(told) from error
     return replace(task, setting=replace(setting, params=params))

@@ -22,6 +22,7 @@ from tdac_agent.task_file import (
     bundled_task,
     read_task_file,
 )
+from tdac_envs.intake import printable
 
 SENSORS_FILE = Path(__file__).parent.parent / "tdac_envs" / "sensors.py"
 MIN_PROGRESS_STEPS = 400
@@ -111,7 +112,7 @@ def load_task(source: str | Path | TaskFile, *, base: Path | None = None) -> Tas
 def _resolve(name: str | None, spec: TaskFile, base: Path) -> Task:
     own, setting = _open(spec, base)
     suite = None if spec.suite is None else base / spec.suite
-    return Task(spec.name or name or own, spec, setting, suite)
+    return Task(spec.name or printable(name or own), spec, setting, suite)
 
 
 def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:

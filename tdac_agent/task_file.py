@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from tdac_envs.arguments import MOST_STEPS
 from tdac_envs.errors import TaskError, first_problem, hint
+from tdac_envs.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.maps import bundled_maps
+from tdac_envs.params import MOST_RAYS, Length, Place
 from tdac_envs.worlds import bundled_worlds
 
 TASK_FILE = "task.yaml"
@@ -24,6 +26,14 @@ OWN_KEYS: dict[EnvName, tuple[str, ...]] = {
     EPUCK: ("world", "ignore", "left_out"),
 }
 """Keys of a task file that mean something in one environment only."""
+Steps = Annotated[int, Field(gt=0, le=MOST_STEPS)]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+def _names_a_file(name: str) -> str:
+    if not name.isprintable() or "/" in name:
+        raise ValueError("expected characters that can be shown, and no /")
+    return name
 
 
 class _Strict(BaseModel):
@@ -33,12 +43,12 @@ class _Strict(BaseModel):
 class RobotSpec(_Strict):
     """The robot's body, where it differs from the default."""
 
-    radius: float | None = Field(None, gt=0, description="px")
-    axle: float | None = Field(None, gt=0, description="px; default 2 x radius")
-    max_wheel_speed: float | None = Field(None, gt=0, description="px/s")
-    n_rays: int | None = Field(None, ge=1)
+    radius: Length | None = Field(None, description="px")
+    axle: Length | None = Field(None, description="px; default 2 x radius")
+    max_wheel_speed: Length | None = Field(None, description="px/s")
+    n_rays: int | None = Field(None, ge=1, le=MOST_RAYS)
     field_of_view: float | None = Field(None, gt=0, le=360, description="degrees")
-    range_max: float | None = Field(None, gt=0, description="px")
+    range_max: Length | None = Field(None, description="px")
     image: Path | None = Field(None, description="Picture of the robot, nose to +x.")
 
 
@@ -46,7 +56,7 @@ class ProgressSpec(_Strict):
     """The progress test: d_min <= fraction * d0 within so many steps."""
 
     fraction: float = Field(0.7, gt=0, lt=1)
-    steps: int | None = Field(None, gt=0, description="Default max(400, 0.16 horizon).")
+    steps: Steps | None = Field(None, description="Default max(400, 0.16 horizon).")
     distance: Literal["geodesic", "euclidean"] = "geodesic"
 
 
@@ -54,25 +64,27 @@ class TaskFile(_Strict):
     """Contents of `task.yaml`, schema 1."""
 
     schema_version: Literal[1] = Field(1, alias="schema")
-    name: str | None = Field(None, description="For people.")
+    name: Annotated[Name, AfterValidator(_names_a_file)] | None = Field(
+        None, description="For people; names files, too."
+    )
     env: EnvName = MAP2D
     map: str = Field("maze", description="Bundled name, or a path beside this file.")
     world: str = Field("arena", description="The same of a Webots world.")
-    ignore: tuple[str, ...] = Field(
+    ignore: tuple[Name, ...] = Field(
         (), description="Nodes of the world that may be solid and are left out."
     )
-    left_out: tuple[str, ...] = Field(
+    left_out: tuple[Name, ...] = Field(
         (), description="Nodes that were left out when the world was written."
     )
     robot: RobotSpec = RobotSpec()
-    start: tuple[float, float] | tuple[float, float, float] | None = None
-    goal: tuple[float, float] | None = None
+    start: tuple[Place, Place] | tuple[Place, Place, Place] | None = None
+    goal: tuple[Place, Place] | None = None
     snap: bool = Field(False, description="Move start and goal to a free place.")
-    tolerance: float | None = Field(None, gt=0, description="px; e-puck: m")
-    dt: float | None = Field(
-        None, gt=0, description="s; default 0.05, e-puck: the world's basicTimeStep."
+    tolerance: Length | None = Field(None, description="px; e-puck: m")
+    dt: Length | None = Field(
+        None, description="s; default 0.05, e-puck: the world's basicTimeStep."
     )
-    horizon: int | None = Field(None, gt=0, description="steps")
+    horizon: Steps | None = Field(None, description="steps")
     progress: ProgressSpec = ProgressSpec()
     variation: Literal["nominal", "jitter", "random"] = "jitter"
     suite: Path | None = Field(None, description="Folder with further test files.")
@@ -93,16 +105,15 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
         TaskError: It cannot be read, or has a wrong or unknown key.
     """
     try:
-        data = yaml.safe_load(path.read_text())
+        data = parse_yaml(read_file(path, TEXT_BYTES))
     except OSError as error:
         known = bundled_tasks()
         raise TaskError(
             f"no task {str(asked)!r}: {error.strerror}{hint(str(asked), known)}; "
             f"bundled tasks: {', '.join(known)}"
         ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise TaskError(f"{path} is not a task file: {reason}") from error
+    except ValueError as error:
+        raise TaskError(f"{path} is not a task file: {error}") from error
     if not isinstance(data, dict):
         raise TaskError(f"{path} is not a task file: expected `key: value` lines")
     return checked(data, str(path))

@@ -11,8 +11,9 @@ import cv2
 from tdac_agent.setting import Original, Setting
 from tdac_agent.task_file import RobotSpec, TaskFile
 from tdac_agent.units import PIXELS, Units
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import MapError, TaskError
 from tdac_envs.grid import OccupancyGrid
+from tdac_envs.image import picture_size, read_bytes
 from tdac_envs.map2d import Map2DEnv
 from tdac_envs.map_folder import write_grid
 from tdac_envs.maps import bundled_maps
@@ -22,6 +23,8 @@ from tdac_envs.source2d import prepare
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
 
 DT = 0.05
+ROBOT_IMAGE_BYTES = 16 << 20
+ROBOT_IMAGE_PIXELS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +109,7 @@ class Map2DSetting:
     def write_files(self, folder: Path) -> None:
         """Writes `params.json`, `occupancy.npy`, `occupancy.png` and `robot.png`."""
         write_grid(folder, self.nominal.terrain.grid, self.params)
-        (folder / "robot.png").write_bytes(self.robot_image.read_bytes())
+        (folder / "robot.png").write_bytes(read_bytes(self.robot_image))
 
     def portable(self) -> dict[str, Any]:
         """The map is the folder's own grid."""
@@ -156,10 +159,29 @@ def open_map(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
-    if not cv2.haveImageReader(str(robot_image)):
-        raise TaskError(f"the robot image {str(robot_image)!r} is not a PNG or JPEG")
+    if spec.robot.image is not None:
+        _check_robot_image(robot_image)
     name = spec.map if bundled else Path(spec.map).stem
     return name, Map2DSetting(params, nominal, prepared.image, robot_image)
+
+
+def _check_robot_image(file: Path) -> None:
+    """Refuses a picture that cannot be drawn, or is too large for that.
+
+    Raises:
+        TaskError: It is one.
+    """
+    try:
+        width, height = picture_size(read_bytes(file, ROBOT_IMAGE_BYTES), file.name)
+    except MapError as error:
+        raise TaskError(f"the robot image: {error}") from error
+    if not cv2.haveImageReader(str(file)):
+        raise TaskError(f"the robot image {str(file)!r} is not a PNG or JPEG")
+    if width * height > ROBOT_IMAGE_PIXELS:
+        raise TaskError(
+            f"the robot image {str(file)!r} has {width} x {height} pixels; the limit "
+            f"is {ROBOT_IMAGE_PIXELS / 1e6:g} megapixels: scale it down"
+        )
 
 
 def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:

@@ -10,8 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.errors import RunError
+from tdac_envs.errors import why
+from tdac_envs.intake import read_array, read_file, read_zip
 
 SCHEMA_VERSION = 1
+MOST_BYTES = 256 << 20
 Outcome = Literal["reached", "collision", "out of time", "stopped", "not run", "error"]
 
 
@@ -66,24 +69,27 @@ class Trajectory:
             RunError: The file is missing, damaged or something else.
         """
         try:
-            # np.load itself leaves a damaged file open.
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-                if data["schema_version"] != SCHEMA_VERSION:
-                    raise ValueError(f"schema version {data['schema_version']}")
-                loaded = cls(
-                    data["poses"],
-                    data["actions"],
-                    data["path_distances"],
-                    data["ranges"],
-                    int(data["collisions"]),
-                    float(data["dt"]),
-                )
+            data = _arrays(read_file(path, MOST_BYTES))
+            if data["schema_version"] != SCHEMA_VERSION:
+                raise ValueError(f"schema version {data['schema_version']}")
+            loaded = cls(
+                data["poses"],
+                data["actions"],
+                data["path_distances"],
+                data["ranges"],
+                int(data["collisions"]),
+                float(data["dt"]),
+            )
             _check_shapes(loaded)
-        # zipfile, zlib and numpy have dozens of errors for a damaged file.
-        except Exception as error:
-            reason = str(error).partition("\n")[0] or type(error).__name__
-            raise RunError(f"{path} is no trajectory: {reason}") from error
+        except (OSError, ValueError, TypeError, KeyError, OverflowError) as error:
+            raise RunError(f"{path} is no trajectory: {why(error)}") from error
         return loaded
+
+
+def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
+    """The arrays of an `.npz` file; raises ValueError where it is something else."""
+    parts = read_zip(content, MOST_BYTES)
+    return {name.removesuffix(".npy"): read_array(part) for name, part in parts.items()}
 
 
 def nominal_first(path: Path) -> tuple[bool, str]:

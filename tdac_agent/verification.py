@@ -20,6 +20,7 @@ from tdac_agent.task import Task, lay_out
 from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Trajectory, nominal_first
 from tdac_agent.warm import WarmJudge
+from tdac_envs.intake import RECORD_BYTES, parse_json, read_file
 
 SHIPPED_SUITES = Path(__file__).parent / "suites"
 SHIPPED_SUITE = SHIPPED_SUITES / "map2d"
@@ -111,7 +112,8 @@ def kept_report(folder: Path, task: Task, source: str, seed: int) -> Report | No
     None where it is of other bytes, another task, suite, seed or version of a package.
     """
     try:
-        report = Report.model_validate_json((folder / "report.json").read_bytes())
+        raw = read_file(folder / "report.json", RECORD_BYTES)
+        report = Report.model_validate(parse_json(raw))
     except (OSError, ValueError):
         return None
     about = report.provenance
@@ -155,16 +157,10 @@ def read_source(controller: str | bytes | Path) -> bytes:
     if isinstance(controller, str) and "\n" in controller:
         return controller.encode("utf-8", "surrogatepass")
     try:
-        with Path(controller).open("rb") as file:
-            raw = file.read(MAX_FILE_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        message = f"cannot read the controller {str(controller)!r}: {reason}"
+        return read_file(controller, MAX_FILE_BYTES)
+    except OSError as error:
+        message = f"cannot read the controller {str(controller)!r}: {error.strerror}"
         raise ControllerFileError(message) from error
-    if len(raw) > MAX_FILE_BYTES:
-        size = f"larger than {MAX_FILE_BYTES >> 20} MB"
-        raise ControllerFileError(f"{str(controller)!r} is no controller: {size}")
-    return raw
 
 
 def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> None:

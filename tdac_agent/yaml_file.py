@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeVar
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
 from tdac_envs.errors import TdacError, first_problem
+from tdac_envs.intake import TEXT_BYTES, parse_yaml, read_file
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -23,17 +23,11 @@ def read_yaml(file: Path, form: type[M], what: str, refusal: type[TdacError]) ->
         refusal: Raised where it cannot be read, or has a wrong or unknown key.
     """
     try:
-        return form.model_validate(yaml.safe_load(file.read_text("utf-8")))
+        return form.model_validate(parse_yaml(read_file(file, TEXT_BYTES)))
     except ValidationError as error:
         # A key may have another name in a file than in Python.
         known = [field.alias or name for name, field in form.model_fields.items()]
         raise refusal(f"{file}: {first_problem(error, known)}") from error
-    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        raise refusal(f"cannot read {what} {file}: {_reason(error)}") from error
-
-
-def _reason(error: Exception) -> str:
-    told = " ".join(str(error).split())
-    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark:
-        return f"line {error.problem_mark.line + 1}: {error.problem}"
-    return (error.strerror or told) if isinstance(error, OSError) else told
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise refusal(f"cannot read {what} {file}: {reason}") from error

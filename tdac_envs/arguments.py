@@ -11,12 +11,20 @@ import numpy as np
 
 from tdac_envs.errors import TaskError
 
+LARGEST = 1e9
+"""Bound of every number that a user gives, so that what is computed stays finite."""
+SMALLEST = 1e-9
+"""Bound of one that must be above 0."""
+MOST_STEPS = 10_000_000
+"""Of an episode: the longest path on the largest map, at a crawl."""
+
 
 def finite_numbers(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
     """The values as floats.
 
     Raises:
-        TaskError: There are not `count` of them, or one is not a finite number.
+        TaskError: There are not `count` of them, or one is not a finite number, or
+            beyond `LARGEST`.
     """
     try:
         numbers = tuple(float(value) for value in values)
@@ -24,6 +32,8 @@ def finite_numbers(name: str, values: Sequence[float], count: int) -> tuple[floa
         numbers = ()
     if len(numbers) != count or not all(map(math.isfinite, numbers)):
         raise TaskError(f"expected {name} to be {count} finite numbers, got {values!r}")
+    for number in numbers:
+        _bounded(name, number)
     return numbers
 
 
@@ -37,7 +47,7 @@ def finite(name: str, value: float) -> float:
     """The value as a float.
 
     Raises:
-        TaskError: It is not a finite number.
+        TaskError: It is not a finite number, or beyond `LARGEST`.
     """
     try:
         number = float(value)
@@ -45,7 +55,13 @@ def finite(name: str, value: float) -> float:
         number = math.nan
     if not math.isfinite(number):
         raise TaskError(f"expected {name} to be a finite number, got {value!r}")
+    _bounded(name, number)
     return number
+
+
+def _bounded(name: str, number: float) -> None:
+    if abs(number) > LARGEST:
+        raise TaskError(f"expected {name} within +-{LARGEST:g}, got {number:g}")
 
 
 def positive(name: str, value: float) -> float:
@@ -57,6 +73,8 @@ def positive(name: str, value: float) -> float:
     number = finite(name, value)
     if number <= 0.0:
         raise TaskError(f"expected {name} above 0, got {value!r}")
+    if number < SMALLEST:
+        raise TaskError(f"expected {name} of at least {SMALLEST:g}, got {value!r}")
     return number
 
 
@@ -94,6 +112,21 @@ def whole_number(name: str, value: float, least: int) -> int:
             f"expected {name} to be a whole number from {least}, got {value!r}"
         )
     return int(value)
+
+
+def steps_of(horizon: float) -> int:
+    """The horizon as an int.
+
+    Raises:
+        TaskError: It is not a whole number from 1 to `MOST_STEPS`.
+    """
+    steps = whole_number("horizon", horizon, 1)
+    if steps > MOST_STEPS:
+        raise TaskError(
+            f"expected a horizon of at most {MOST_STEPS} steps, got {steps}: "
+            "give faster wheels or longer steps"
+        )
+    return steps
 
 
 def check_reset_options(options: dict[str, Any]) -> None:

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+LONGEST = 200
+"""Characters that are quoted from a file, at most."""
+
 
 class TdacError(Exception):
     """Something the user gave cannot be used; the message says what and what to do."""
@@ -41,11 +44,21 @@ def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
     problems = error.errors(include_url=False)
     unknown = (p for p in problems if p["type"] == "extra_forbidden")
     first = next(unknown, problems[0])
-    place = ".".join(map(str, first["loc"]))
+    place = ".".join(map(str, first["loc"]))[:LONGEST]
     reason = _PLAINLY.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "extra_forbidden":
         reason += hint(place, known)
     return f"{place}: {reason}" if place else reason
+
+
+def why(error: Exception) -> str:
+    """Why a file cannot be used, in a line: it cannot be read, or says nonsense."""
+    from pydantic import ValidationError
+
+    if isinstance(error, ValidationError):
+        return first_problem(error)
+    told = error.strerror if isinstance(error, OSError) else error
+    return " ".join(str(told).split())[:LONGEST]
 
 
 def hint(typed: str, known: Iterable[str]) -> str:

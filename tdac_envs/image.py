@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import io
 import warnings
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.errors import MapError
 from tdac_envs.grid import BoolGrid
+from tdac_envs.intake import IMAGE_BYTES, one_line, printable, read_file
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -95,7 +98,7 @@ def read_picture(path: Path) -> MapImage:
     """Reads a PNG, JPEG, PGM, BMP, GIF, TIFF or WebP file of any depth."""
     data = read_bytes(path)
     return MapImage(
-        decode(data, path.name), path.name, hashlib.sha256(data).hexdigest()
+        decode(data, path.name), printable(path.name), hashlib.sha256(data).hexdigest()
     )
 
 
@@ -123,10 +126,10 @@ def from_array(array: NDArray[np.generic]) -> MapImage:
     return MapImage(pixels if depth == 3 else _stack(pixels[..., 0]), "array", digest)
 
 
-def read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path, most: int = IMAGE_BYTES) -> bytes:
     """The file's bytes, or a MapError that says why not."""
     try:
-        return path.read_bytes()
+        return read_file(path, most)
     except FileNotFoundError:
         raise MapError(f"{path}: no such file; check the path") from None
     except IsADirectoryError:
@@ -149,7 +152,22 @@ def decode(data: bytes, name: str) -> ColourImage:
 
     The size is checked from the header, before any pixel is decoded.
     """
-    from PIL import Image, ImageOps, UnidentifiedImageError
+    from PIL import ImageOps
+
+    with _opened(data, name) as picture:
+        return _to_rgb(ImageOps.exif_transpose(picture))
+
+
+def picture_size(data: bytes, name: str) -> tuple[int, int]:
+    """Width and height of the picture in a file's bytes, by its header."""
+    with _opened(data, name) as picture:
+        return picture.size
+
+
+@contextmanager
+def _opened(data: bytes, name: str) -> Generator[Image.Image]:
+    """The picture in a file's bytes, whatever is wrong with it as a MapError."""
+    from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
@@ -157,7 +175,7 @@ def decode(data: bytes, name: str) -> ColourImage:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             picture = Image.open(io.BytesIO(data), formats=_FORMATS)
             check_size(name, *picture.size)
-            return _to_rgb(ImageOps.exif_transpose(picture))
+            yield picture
     except Image.DecompressionBombError:
         raise MapError(
             f"{name}: more than {MAX_PIXELS / 1e6:.0f} megapixels: scale it down first"
@@ -167,9 +185,12 @@ def decode(data: bytes, name: str) -> ColourImage:
             f"{name}: not an image; expected PNG, JPEG, PGM or BMP, a ROS map.yaml "
             "or a MovingAI .map"
         ) from None
-    except (OSError, ValueError, SyntaxError, EOFError, IndexError) as error:
+    except MapError:
+        raise
+    # Pillow has dozens of errors for a damaged file.
+    except Exception as error:
         raise MapError(
-            f"{name}: the image is damaged ({error}); save it again"
+            f"{name}: the image is damaged ({one_line(error)}); save it again"
         ) from error
 
 

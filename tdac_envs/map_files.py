@@ -7,23 +7,24 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_envs.errors import MapError, first_problem
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import ColourImage, MapImage, check_size, decode, read_bytes
+from tdac_envs.intake import TEXT_BYTES, parse_yaml, printable
+from tdac_envs.params import Length, Place
 
 
 class RosMap(BaseModel):
     """Contents of a ROS `map.yaml` (wiki.ros.org/map_server)."""
 
     # Tools add fields of their own (e.g. `lethal_cost`), which change nothing here.
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     image: str = Field(description="Picture, relative to the yaml file.")
-    resolution: float = Field(gt=0, description="Metres per pixel.")
-    origin: tuple[float, float, float] = Field(
+    resolution: Length = Field(description="Metres per pixel.")
+    origin: tuple[Place, Place, Place] = Field(
         (0.0, 0.0, 0.0), description="Pose of the lower-left pixel, m and rad."
     )
     negate: bool = Field(False, description="Light pixels are the obstacles.")
@@ -38,14 +39,14 @@ def read_ros_yaml(path: Path) -> MapImage:
     Raises:
         MapError: The yaml or its picture cannot be used.
     """
-    text = read_bytes(path)
+    text = read_bytes(path, TEXT_BYTES)
     ros = _parse_ros(text, path)
     picture = path.parent / ros.image
     data = read_bytes(picture)
     colour = decode(data, picture.name)
     return MapImage(
         colour,
-        path.name,
+        printable(path.name),
         hashlib.sha256(text + data).hexdigest(),
         ~_known_free(colour, ros),
         f"ros {ros.mode}",
@@ -56,9 +57,9 @@ def read_ros_yaml(path: Path) -> MapImage:
 
 def _parse_ros(text: bytes, path: Path) -> RosMap:
     try:
-        fields = yaml.safe_load(text)
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise MapError(f"{path}: not valid YAML") from None
+        fields = parse_yaml(text)
+    except ValueError as error:
+        raise MapError(f"{path}: {error}") from None
     if not isinstance(fields, dict) or "image" not in fields:
         raise MapError(f"{path}: not a ROS map: expected a field `image`")
     try:
@@ -86,25 +87,26 @@ def read_movingai(path: Path) -> MapImage:
             (movingai.com/benchmarks/formats.html).
     """
     data = read_bytes(path)
-    lines = data.decode("ascii", errors="replace").splitlines()
+    lines = data.splitlines()
     size = {}
     for line in lines[1:3]:
-        key, _, value = line.strip().partition(" ")
-        size[key] = int(value) if value.strip().isdigit() else 0
-    width, height = size.get("width", 0), size.get("height", 0)
-    header = lines[:1] and lines[0].startswith("type") and lines[3:4]
-    if not header or lines[3].strip() != "map" or 0 in (width, height):
+        key, _, value = line.strip().partition(b" ")
+        number = value.strip()
+        size[key] = int(number) if number.isdigit() and len(number) < 10 else 0
+    width, height = size.get(b"width", 0), size.get(b"height", 0)
+    header = lines[:1] and lines[0].startswith(b"type") and lines[3:4]
+    if not header or lines[3].strip() != b"map" or 0 in (width, height):
         raise MapError(
             f"{path}: not a MovingAI map: expected the lines `type octile`, "
             "`height H`, `width W` and `map`"
         )
     check_size(path.name, width, height)
-    rows = [row.rstrip("\r") for row in lines[4 : 4 + height]]
+    rows = lines[4 : 4 + height]
     if len(rows) < height or any(len(row) != width for row in rows):
         raise MapError(f"{path}: expected {height} rows of {width} cells")
-    cells = np.array([list(row) for row in rows])
-    occupied = ~np.isin(cells, [".", "G", "S"])
+    cells = np.frombuffer(b"".join(rows), np.uint8).reshape(height, width)
+    occupied = ~np.isin(cells, np.frombuffer(b".GS", np.uint8))
     shade = np.where(occupied, 0, 255).astype(np.uint8)
     digest = hashlib.sha256(data).hexdigest()
     colour = np.repeat(shade[..., None], 3, axis=2)
-    return MapImage(colour, path.name, digest, occupied, "movingai")
+    return MapImage(colour, printable(path.name), digest, occupied, "movingai")

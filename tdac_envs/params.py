@@ -4,29 +4,39 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from tdac_envs.arguments import LARGEST, SMALLEST
 from tdac_envs.errors import MapError, first_problem
+from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 
 PIXELS_PER_METRE = 3779.52
 """Pixels per metre of the paper's 2-D setting (96 dpi)."""
 
+Place = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+"""A coordinate."""
+Length = Annotated[float, Field(gt=0, ge=SMALLEST, le=LARGEST)]
+"""Above 0."""
+MOST_RAYS = 4096
 
-class RobotParams(BaseModel):
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class RobotParams(_Record):
     """The differential-drive robot: a disc with a fan of ultrasonic rays."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    radius: float = Field(15.0, gt=0, description="Body radius, px.")
-    axle_length: float = Field(30.0, gt=0, description="Distance of the wheels, px.")
-    max_wheel_speed: float = Field(75.59, gt=0, description="Wheel limit, px/s.")
-    n_rays: int = Field(18, ge=1, le=4096, description="Number of range rays.")
+    radius: Length = Field(15.0, description="Body radius, px.")
+    axle_length: Length = Field(30.0, description="Distance of the wheels, px.")
+    max_wheel_speed: Length = Field(75.59, description="Wheel limit, px/s.")
+    n_rays: int = Field(18, ge=1, le=MOST_RAYS, description="Number of range rays.")
     field_of_view_deg: float = Field(
         110.0, gt=0, le=360, description="Whole angle of the fan, degrees."
     )
-    range_max: float = Field(220.0, gt=0, description="Range without a hit, px.")
+    range_max: Length = Field(220.0, description="Range without a hit, px.")
 
     @classmethod
     def disc(cls, radius: float) -> RobotParams:
@@ -34,20 +44,16 @@ class RobotParams(BaseModel):
         return cls(radius=radius, axle_length=2 * radius)
 
 
-class ScoreTerms(BaseModel):
+class ScoreTerms(_Record):
     """The terms of the score of Algorithm 1."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     min_clearance: float = Field(description="Smallest clearance on the path, px.")
     path_length: float = Field(description="Length of the path, px.")
     sharpness: float = Field(description="Boundary sharpness of the grid.")
 
 
-class MapParams(BaseModel):
+class MapParams(_Record):
     """Contents of `params.json`; points are (x, y) in pixels, headings in rad."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     schema_version: Literal[1] = 1
     source: str = Field(description="File name of the map image.")
@@ -56,9 +62,9 @@ class MapParams(BaseModel):
     )
     width: int = Field(gt=0, description="px")
     height: int = Field(gt=0, description="px")
-    start: tuple[float, float] | None = None
-    heading: float = 0.0
-    goal: tuple[float, float] | None = None
+    start: tuple[Place, Place] | None = None
+    heading: Place = 0.0
+    goal: tuple[Place, Place] | None = None
     robot: RobotParams = RobotParams()
     polarity: Literal["dark", "light", "mixed", "given"] = Field(
         description="Which pixels are obstacles; `given` where the file says so."
@@ -67,11 +73,11 @@ class MapParams(BaseModel):
     threshold: float | None = Field(None, description="Luminance, 0..255.")
     cleanup: int = Field(0, ge=0, description="Strength of the noise removal, px.")
     opening: int = Field(0, ge=0, description="Obstacle lines thinner are dropped, px.")
-    inflation: float = Field(0, ge=0, description="Planner's margin, px.")
+    inflation: float = Field(0, ge=0, le=LARGEST, description="Planner's margin, px.")
     score: float | None = None
     score_terms: ScoreTerms | None = None
-    resolution: float | None = Field(None, description="Metres per pixel.")
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    resolution: Length | None = Field(None, description="Metres per pixel.")
+    origin: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
     notes: tuple[str, ...] = Field((), description="What was changed, e.g. by snap.")
 
     def save(self, path: Path) -> None:
@@ -86,8 +92,10 @@ class MapParams(BaseModel):
             MapError: It is missing, not JSON, or has a wrong or unknown field.
         """
         try:
-            return cls.model_validate_json(path.read_text())
+            return cls.model_validate(parse_json(read_file(path, TEXT_BYTES)))
         except OSError as error:
             raise MapError(f"cannot read {path}: {error.strerror}") from error
         except ValidationError as error:
             raise MapError(f"{path}: {first_problem(error)}") from error
+        except ValueError as error:
+            raise MapError(f"{path}: {error}") from error

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from tdac_envs.arguments import finite, finite_numbers, finite_point, positive
 from tdac_envs.errors import MapError, TaskError, hint
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
-from tdac_envs.image import load_image, read_bytes
+from tdac_envs.image import check_size, load_image, read_bytes
+from tdac_envs.intake import printable, read_array
 from tdac_envs.maps import BundledMap, bundled_map, bundled_maps
 from tdac_envs.metric import Point, resolution_of, to_pixels
 from tdac_envs.params import MapParams, RobotParams
@@ -236,13 +237,18 @@ def _as_cells(source: NDArray[Any] | Sequence[Sequence[Any]]) -> NDArray[Any]:
 def _from_folder(folder: Path) -> Prepared:
     params = MapParams.load(folder / "params.json")
     grid = _read_cells(folder / "occupancy.npy")
+    if (grid.width, grid.height) != (params.width, params.height):
+        raise MapError(
+            f"{folder}: occupancy.npy has {grid.width} x {grid.height} pixels, "
+            f"params.json says {params.width} x {params.height}"
+        )
     return Prepared(
         OccupancyGrid(grid.cells, params.resolution, params.origin), params, None
     )
 
 
 def _from_npy(path: Path) -> Prepared:
-    return _from_cells(_read_cells(path).cells, path.name)
+    return _from_cells(_read_cells(path).cells, printable(path.name))
 
 
 def _from_cells(cells: NDArray[Any], name: str) -> Prepared:
@@ -262,9 +268,11 @@ def _from_cells(cells: NDArray[Any], name: str) -> Prepared:
 
 def _read_cells(path: Path) -> OccupancyGrid:
     try:
-        cells = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        cells = read_array(read_bytes(path))
+    except ValueError as error:
         raise MapError(f"cannot read the grid {path}: {error}") from error
+    if cells.ndim == 2:
+        check_size(path.name, cells.shape[1], cells.shape[0])
     if cells.dtype != np.bool_:
         raise MapError(f"{path}: expected a bool array, got {cells.dtype}")
     return OccupancyGrid(cells)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.arguments import finite_numbers, finite_point, positive, whole_number
+from tdac_envs.arguments import finite_numbers, finite_point, positive, steps_of
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import body_free
 from tdac_envs.params import RobotParams
@@ -170,9 +170,9 @@ def make_task(
             f"the start is already at the goal: {math.dist(begin[:2], end):.1f} px "
             f"apart with a tolerance of {tolerance:.1f} px; move one of them"
         )
-    steps = default_horizon(shortest, robot, dt)
-    if horizon is not None:
-        steps = whole_number("horizon", horizon, 1)
+    if horizon is None:
+        horizon = default_horizon(shortest, robot, dt)
+    steps = steps_of(horizon)
     return Map2DTask(terrain, begin, end, robot, tolerance, dt, steps, field, shortest)
 
 

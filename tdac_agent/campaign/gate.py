@@ -27,6 +27,7 @@ from tdac_agent.provider import (
     missing_for,
     served_at,
 )
+from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 
 FIRST = 8.0
 """Places in the beginning."""
@@ -98,7 +99,7 @@ class Gate:
     def _read(self) -> tuple[float, float]:
         """Places, and when they were last cut."""
         with suppress(OSError, ValueError, KeyError, TypeError):
-            known = json.loads((self._folder / "state.json").read_bytes())
+            known = parse_json(read_file(self._folder / "state.json", TEXT_BYTES))
             return min(self._most, float(known["places"])), float(known["cut_at"])
         return min(self._most, FIRST), 0.0
 

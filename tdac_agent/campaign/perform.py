@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 import shutil
 import sys
 import traceback
@@ -24,6 +23,7 @@ from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import TASK_FILE
 from tdac_agent.warm import WarmJudge
 from tdac_envs.errors import TdacError
+from tdac_envs.intake import RECORD_BYTES, parse_json, read_file
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
 """Nobody waits for a single answer of a campaign."""
@@ -176,7 +176,7 @@ def read_outcome(name: str, runs: Path) -> Outcome | None:
         runs: The folder of all runs.
     """
     try:
-        known = json.loads((runs / name / RUN_FILE).read_bytes())
+        known = parse_json(read_file(runs / name / RUN_FILE, RECORD_BYTES))
         cost = known["cost"]
         return Outcome(
             name,

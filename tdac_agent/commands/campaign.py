@@ -27,6 +27,7 @@ from tdac_agent.lifecycle import model_warnings
 from tdac_agent.provider import Provider
 from tdac_agent.providers import choose_models
 from tdac_agent.tariff import bounds_of, tariffs_of
+from tdac_envs.intake import TEXT_BYTES, read_file
 
 FOLDER = Path("campaigns")
 
@@ -75,7 +76,7 @@ def run(wanted: Wanted, as_json: bool) -> int:
     with console.status("reading the tasks …"):
         plan = make_plan(config, file.parent)
     folder = wanted.folder(config)
-    with campaign_folder(folder, shard, file.read_text("utf-8")):
+    with campaign_folder(folder, shard, read_file(file, TEXT_BYTES).decode("utf-8")):
         terms = Terms(
             folder=str(folder.resolve()),
             workers=wanted.workers or len(os.sched_getaffinity(0)),

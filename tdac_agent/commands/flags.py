@@ -14,6 +14,7 @@ from tdac_agent.task_file import EPUCK, TaskFile, checked
 from tdac_envs.errors import TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.image import load_image
+from tdac_envs.intake import TEXT_BYTES, read_file
 from tdac_envs.maps import bundled_map, bundled_maps
 from tdac_envs.metric import resolution_of, to_pixels
 from tdac_envs.source2d import check_exists
@@ -194,5 +195,8 @@ def _text(given: str | None) -> str:
         return ""
     path = Path(given)
     if len(given) < 250 and "\n" not in given and path.is_file():
-        return path.read_text(encoding="utf-8", errors="replace")
+        try:
+            return read_file(path, TEXT_BYTES).decode("utf-8", "replace")
+        except OSError as error:
+            raise TaskError(f"cannot read {given}: {error.strerror}") from error
     return given

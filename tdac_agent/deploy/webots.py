@@ -15,6 +15,7 @@ from tdac_agent.task import Task, load_task
 from tdac_agent.task_epuck import WORLD_FILE
 from tdac_agent.task_file import EPUCK
 from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.wbt.writer import write_world
 
 POLICY = "tdac_policy.py"
@@ -106,7 +107,7 @@ def _world(task: EPuckTask, name: str) -> str:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_file(path, RECORD_BYTES)
     except OSError as error:
         raise RunError(f"cannot read {path}: {error.strerror}") from error
 
@@ -114,8 +115,8 @@ def _read(path: Path) -> bytes:
 def _verified_steps(run_folder: Path) -> int | None:
     """Steps of the nominal episode, as the run's report has them."""
     try:
-        text = (run_folder / "report.json").read_text(encoding="utf-8")
-        report = Report.model_validate_json(text)
+        raw = read_file(run_folder / "report.json", RECORD_BYTES)
+        report = Report.model_validate(parse_json(raw))
     except (OSError, ValueError):
         return None
     steps = [e.steps for e in report.episodes if e.name == "nominal"]

@@ -12,6 +12,7 @@ from tdac_agent.errors import ProviderError
 from tdac_agent.files import write_atomic
 from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
+from tdac_envs.intake import RECORD_BYTES, read_file
 
 POLL_SECONDS = 0.5
 
@@ -70,7 +71,7 @@ class Manual:
             if not path.exists():
                 write_atomic(path, question)
                 return number
-            if path.read_bytes() == question:
+            if read_file(path, RECORD_BYTES) == question:
                 if repeat == 0:
                     return number
                 repeat -= 1
@@ -89,7 +90,7 @@ class Manual:
         """The text of an answer, once it is there and no longer grows."""
         before = None
         while True:
-            now = path.read_bytes() if path.exists() else b""
+            now = read_file(path, RECORD_BYTES) if path.exists() else b""
             if now.strip() and now == before:
                 return now.decode("utf-8", "replace")
             before = now

@@ -18,6 +18,7 @@ from tdac_agent.provenance import sha256_of
 from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.records import JOURNAL, load_run
+from tdac_envs.intake import RECORD_BYTES, read_file
 
 DEMO = Path(__file__).parents[1] / "demo"
 Place = tuple[str, int, int]
@@ -82,8 +83,9 @@ class Replay:
         try:
             prompt, answer = _files(self._folder, place, number + 1)
             where = f"{at} in {prompt}"
-            notes = self._compare(prompt.read_text("utf-8"), request, where)
-            text = answer.read_bytes().decode("utf-8", "surrogatepass")
+            recorded = read_file(prompt, RECORD_BYTES).decode("utf-8")
+            notes = self._compare(recorded, request, where)
+            text = read_file(answer, RECORD_BYTES).decode("utf-8", "surrogatepass")
             record = [r for r in self._replies if _place(r) == place][number]
         except (OSError, IndexError):
             raise PermanentFault(

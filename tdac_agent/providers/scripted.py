@@ -25,6 +25,7 @@ from tdac_agent.setting import Setting
 from tdac_agent.shipped import shipped
 from tdac_agent.yaml_file import read_yaml
 from tdac_envs.errors import hint
+from tdac_envs.intake import TEXT_BYTES, read_file
 
 _KINDS: tuple[Kind, ...] = ("generate", "edit")
 
@@ -135,7 +136,7 @@ def _source(choice: Choice, script: Path, setting: Setting) -> str:
         return _filled_in(choice.parameters, script, setting)
     file = script.parent / choice.file
     try:
-        return file.read_text("utf-8").rstrip() + "\n"
+        return read_file(file, TEXT_BYTES).decode("utf-8").rstrip() + "\n"
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
         raise ProviderError(f"{script}: {file}: {reason}") from error

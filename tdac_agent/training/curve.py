@@ -9,6 +9,8 @@ from pathlib import Path
 
 from tdac_agent.errors import RunError
 from tdac_agent.files import write_atomic
+from tdac_envs.errors import why
+from tdac_envs.intake import RECORD_BYTES, read_file
 
 CURVE_FILE = "learning_curve.csv"
 PLAN_FILE = "training.json"
@@ -64,11 +66,11 @@ def read_curve(folder: Path) -> list[Point]:
     if not file.is_file():
         return []
     try:
-        with file.open(newline="", encoding="utf-8") as lines:
-            rows = list(csv.DictReader(lines))
+        text = read_file(file, RECORD_BYTES).decode("utf-8")
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
         return [
             Point(int(row["steps"]), *(float(row[f.name]) for f in fields(Point)[1:]))
             for row in rows
         ]
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise RunError(f"cannot read {file}: {error}") from error
+    except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
+        raise RunError(f"cannot read {file}: {why(error)}") from error

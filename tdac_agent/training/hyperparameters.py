@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import yaml
 
 from tdac_agent.shipped import shipped
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import TaskError, why
+from tdac_envs.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.wrappers import WRAPPERS
 
 Algo = Literal["ppo", "sac", "td3"]
@@ -55,10 +55,10 @@ def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
         TaskError: The file cannot be read, or lacks or misuses a key.
     """
     try:
-        data = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        reason = " ".join(str(error).split())
-        raise TaskError(f"cannot read hyperparameters: {reason}") from error
+        data = parse_yaml(read_file(file, TEXT_BYTES))
+    except (OSError, ValueError) as error:
+        told = f"cannot read hyperparameters {file}: {why(error)}"
+        raise TaskError(told) from error
     if not isinstance(data, dict) or not isinstance(data.get(env), dict):
         raise TaskError(f"{file} has no hyperparameters for {env}")
     model = dict(data[env])

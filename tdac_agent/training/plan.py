@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.disturbance import Disturbance
 from tdac_agent.errors import RunError
@@ -19,7 +19,8 @@ from tdac_agent.training.hyperparameters import (
     config_file,
     read_hyperparameters,
 )
-from tdac_envs.errors import TaskError, first_problem
+from tdac_envs.errors import TaskError, why
+from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.wrappers import check_wrappers
 
 Variation = Literal["nominal", "jitter", "mixed", "random"]
@@ -128,12 +129,12 @@ def read_plan(folder: Path) -> TrainingPlan:
     """
     file = folder / PLAN_FILE
     try:
-        return TrainingPlan.model_validate_json(file.read_bytes())
+        return TrainingPlan.model_validate(parse_json(read_file(file, TEXT_BYTES)))
     except OSError as error:
         reason = error.strerror
         raise RunError(f"no training in {str(folder)!r}: {file}: {reason}") from error
-    except ValidationError as error:
-        raise RunError(f"{file}: {first_problem(error)}") from error
+    except ValueError as error:
+        raise RunError(f"{file}: {why(error)}") from error
 
 
 def tasks_of(plan: TrainingPlan) -> list[Task]:

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.files import write_atomic
-from tdac_agent.learned import SavedPolicy, write_metadata
 from tdac_agent.provenance import versions
+from tdac_agent.sb3_file import SavedPolicy, write_metadata
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import TrainingPlan
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.arguments import finite_numbers, finite_point, positive, whole_number
+from tdac_envs.arguments import finite_numbers, finite_point, positive, steps_of
 from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.kernels import WHEEL_RADIUS
@@ -142,9 +142,8 @@ def make_task(
         )
     shortest = way(ground, field, begin[:2])
     task = EPuckTask(ground, begin, end, limit, tolerance, dt, 1, field, shortest)
-    if horizon is None:
-        return replace(task, horizon=default_horizon(task))
-    return replace(task, horizon=whole_number("horizon", horizon, 1))
+    steps = default_horizon(task) if horizon is None else horizon
+    return replace(task, horizon=steps_of(steps))
 
 
 def default_horizon(task: EPuckTask) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 from tdac_envs.arguments import finite_point
 from tdac_envs.bodies import bodies, floor_under
 from tdac_envs.errors import WorldError, WorldFileError
+from tdac_envs.intake import printable, read_file
 from tdac_envs.wbt.fields import number, numbers, text
 from tdac_envs.wbt.found import Found
 from tdac_envs.wbt.frames import Frame, world_frame
@@ -16,7 +17,7 @@ from tdac_envs.wbt.tree import Document, Node, parse
 from tdac_envs.wbt.walk import walk
 from tdac_envs.world import EPuck, World
 
-LARGEST_FILE = 2_000_000
+LARGEST_FILE = 2 << 20
 """Bytes."""
 
 _FLU_SINCE = (2022, 1)
@@ -47,7 +48,7 @@ def load_world(
             and column.
     """
     file = Path(path)
-    return read_world(read_text(file), file.name, robot=robot, goal=goal)
+    return read_world(read_text(file), printable(file.name), robot=robot, goal=goal)
 
 
 def read_world(
@@ -96,15 +97,13 @@ def read_text(path: Path) -> str:
         WorldError: It cannot be read, or is too large.
     """
     try:
-        data = path.read_bytes() if path.stat().st_size <= LARGEST_FILE else None
+        data = read_file(path, LARGEST_FILE)
     except FileNotFoundError:
         raise WorldError(f"{path}: no such file; check the path") from None
     except IsADirectoryError:
         raise WorldError(f"{path}: is a folder; give the .wbt file in it") from None
     except OSError as error:
         raise WorldError(f"{path}: cannot be read: {error.strerror}") from error
-    if data is None:
-        raise WorldError(f"{path}: larger than {LARGEST_FILE / 1e6:g} MB")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:

@@ -1,6 +1,7 @@
 """Evaluation: the same episodes for all, whoever drives, and what is said of them."""
 
 import base64
+import io
 import json
 import math
 import pickle
@@ -24,15 +25,11 @@ from tdac_agent.driving import Stage, drive_seed
 from tdac_agent.evaluation import NO_DISTURBANCE, episode_seeds, evaluate
 from tdac_agent.evaluation_report import compare
 from tdac_agent.exact import sign_test
-from tdac_agent.learned import (
-    Learned,
-    SavedPolicy,
-    read_metadata,
-    write_metadata,
-)
+from tdac_agent.learned import Learned
 from tdac_agent.measures import measure, shortest_way, spectral_arc_length
 from tdac_agent.overlay import COLOURS
 from tdac_agent.sandbox import ControllerFault
+from tdac_agent.sb3_file import SavedPolicy, read_metadata, write_metadata
 from tdac_agent.task import load_task
 from tdac_envs.errors import TaskError
 from tdac_envs.map2d import Map2DEnv
@@ -459,8 +456,11 @@ def test_usage_errors_are_one_line(tdac, words, message, tmp_path):
     (here / "world" / "controller.py").write_text("def policy(obs): return 0, 0")
     (here / "text.zip").write_text("no zip")
     with zipfile.ZipFile(here / "plain.zip", "w") as archive:
-        for name in ("data", "policy.pth"):
-            archive.writestr(name, "{}")
+        weights = io.BytesIO()
+        with zipfile.ZipFile(weights, "w") as inner:
+            inner.writestr("archive/data.pkl", pickle.dumps({}))
+        archive.writestr("data", "{}")
+        archive.writestr("policy.pth", weights.getvalue())
     code, text, errors = tdac("evaluate", *words)
     assert (code, text) == (2, "")
     assert len(errors.strip().splitlines()) == 1

@@ -15,7 +15,8 @@ import yaml
 from small import write_small_task
 
 from tdac_agent.errors import RunError
-from tdac_agent.learned import Learned, read_metadata
+from tdac_agent.learned import Learned
+from tdac_agent.sb3_file import read_metadata
 from tdac_agent.task import load_task
 from tdac_agent.training.curve import Point, read_curve, write_curve
 from tdac_agent.training.hyperparameters import (
