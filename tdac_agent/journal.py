@@ -12,7 +12,7 @@ from tdac_agent.files import sync_folder
 from tdac_envs.intake import read_file
 
 JournalRecord = dict[str, Any]
-JOURNAL_BYTES = 256 << 20
+JOURNAL_BYTES = 256_000_000
 
 
 def append_record(path: Path, record: JournalRecord) -> None:

@@ -25,7 +25,7 @@ from tdac_envs.intake import TEXT_BYTES, one_line, parse_json, read_file, read_z
 METADATA = "tdac.json"
 WEIGHTS = "policy.pth"
 DATA = "data"
-MOST_BYTES = 128 << 20
+MOST_BYTES = 128_000_000
 """Of the file, and of its parts when they are unpacked."""
 
 # All that a saved network is made of; others could fill the memory from a few bytes.

@@ -77,7 +77,7 @@ class TaskFile(_Strict):
         (), description="Nodes that were left out when the world was written."
     )
     robot: RobotSpec = RobotSpec()
-    start: tuple[Place, Place] | tuple[Place, Place, Place] | None = None
+    start: Annotated[tuple[Place, ...] | None, Field(min_length=2, max_length=3)] = None
     goal: tuple[Place, Place] | None = None
     snap: bool = Field(False, description="Move start and goal to a free place.")
     tolerance: Length | None = Field(None, description="px; e-puck: m")

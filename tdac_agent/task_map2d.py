@@ -23,7 +23,7 @@ from tdac_envs.source2d import prepare
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
 
 DT = 0.05
-ROBOT_IMAGE_BYTES = 16 << 20
+ROBOT_IMAGE_BYTES = 16_000_000
 ROBOT_IMAGE_PIXELS = 4_000_000
 
 

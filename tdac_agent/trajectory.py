@@ -14,7 +14,7 @@ from tdac_envs.errors import why
 from tdac_envs.intake import read_array, read_file, read_zip
 
 SCHEMA_VERSION = 1
-MOST_BYTES = 256 << 20
+MOST_BYTES = 256_000_000
 Outcome = Literal["reached", "collision", "out of time", "stopped", "not run", "error"]
 
 
@@ -81,7 +81,7 @@ class Trajectory:
                 float(data["dt"]),
             )
             _check_shapes(loaded)
-        except (OSError, ValueError, TypeError, KeyError, OverflowError) as error:
+        except (OSError, ValueError, TypeError, LookupError, OverflowError) as error:
             raise RunError(f"{path} is no trajectory: {why(error)}") from error
         return loaded
 

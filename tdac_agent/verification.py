@@ -26,7 +26,7 @@ SHIPPED_SUITES = Path(__file__).parent / "suites"
 SHIPPED_SUITE = SHIPPED_SUITES / "map2d"
 EVERY_TASK = SHIPPED_SUITES / "every_task.py"
 DEADLINE_SECONDS = 900.0
-MAX_FILE_BYTES = 64 << 20
+MAX_FILE_BYTES = 64_000_000
 
 
 def verify(

@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 
 from tdac_envs.errors import LONGEST
 
-TEXT_BYTES = 1 << 20
+TEXT_BYTES = 1_000_000
 """Largest file that a person writes."""
-RECORD_BYTES = 64 << 20
+RECORD_BYTES = 32_000_000
 """Largest file that this program writes of a run, but for pictures and arrays."""
-IMAGE_BYTES = 512 << 20
+IMAGE_BYTES = 512_000_000
 """Largest picture or grid: 64 megapixels, 8 bytes each."""
 
 _MOST_NODES = 20_000
@@ -71,11 +71,16 @@ def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
         with open(handle, "rb", closefd=False) as file:
             file.seek(offset)
             data = file.read(most + 1)
+    except OSError as error:
+        if error.filename is None:
+            raise _refused(error.errno or 0, str(error.strerror), path) from None
+        raise
     finally:
         os.close(handle)
+    if data is None:  # nothing yet: it is regular by its name only
+        raise _refused(errno.EINVAL, "not a regular file", path)
     if len(data) > most:
-        size = f"{most >> 20} MB" if most >> 20 else f"{most} bytes"
-        raise _refused(errno.EFBIG, f"larger than {size}", path)
+        raise _refused(errno.EFBIG, f"larger than {most / 1e6:g} MB", path)
     return data
 
 
@@ -135,7 +140,7 @@ def read_zip(
             if any(item.compress_type not in _BOUNDED for item in there):
                 raise ValueError("packed by a method that is not used here")
             if sum(item.file_size for item in there) > most:
-                raise ValueError(f"more than {most >> 20} MB when unpacked")
+                raise ValueError(f"more than {most / 1e6:g} MB when unpacked")
             return {item.filename: archive.read(item) for item in there}
     except ValueError:
         raise
@@ -155,7 +160,8 @@ def parse_yaml(text: bytes) -> Any:
     except yaml.MarkedYAMLError as error:
         where = error.problem_mark or error.context_mark
         line = f"line {where.line + 1}: " if where else ""
-        raise ValueError(line + one_line(error.problem or error.context)) from None
+        told = one_line(error.problem or error.context)
+        raise ValueError(f"not valid YAML: {line}{told}") from None
     # The constructors of dates, numbers and tags have dozens of errors.
     except Exception as error:
         raise ValueError(f"not valid YAML: {one_line(error)}") from None

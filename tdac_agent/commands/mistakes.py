@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import sys
 import textwrap
@@ -16,7 +17,7 @@ from tdac_agent.commands.terminal import unfiltered
 def explain(error: Exception) -> NoReturn:
     """Ends the process with one line on what was wrong; a traceback only for a bug."""
     from tdac_agent.errors import Fault
-    from tdac_envs.errors import TdacError
+    from tdac_envs.errors import LONGEST, TdacError
 
     if hasattr(error, "format_message"):  # usage, as typer found it
         _explain_usage(error)
@@ -25,7 +26,9 @@ def explain(error: Exception) -> NoReturn:
     if isinstance(error, Fault):
         fail(f"infrastructure fault: {error}", 3)
     if isinstance(error, OSError) and error.filename:
-        fail(f"error: {error.filename}: {error.strerror}", 3)
+        # No machine would take such a name.
+        code = 2 if error.errno in (errno.ENAMETOOLONG, errno.ELOOP) else 3
+        fail(f"error: {str(error.filename)[:LONGEST]}: {error.strerror}", code)
     traceback.print_exception(error)
     fail("internal error: please report the lines above", 3)
 

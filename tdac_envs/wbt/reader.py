@@ -17,7 +17,7 @@ from tdac_envs.wbt.tree import Document, Node, parse
 from tdac_envs.wbt.walk import walk
 from tdac_envs.world import EPuck, World
 
-LARGEST_FILE = 2 << 20
+LARGEST_FILE = 2_000_000
 """Bytes."""
 
 _FLU_SINCE = (2022, 1)
