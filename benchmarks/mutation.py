@@ -93,7 +93,12 @@ def _warm_judge() -> WarmJudge:
 def _report(original: Original, text: str) -> Report:
     task, profile = _task(original.kind), original.profile
     return verify(
-        text.encode(), task, profile=profile, limits=LIMITS, judge=_warm_judge()
+        text.encode(),
+        task,
+        profile=profile,
+        seed=0,
+        limits=LIMITS,
+        judge=_warm_judge(),
     )
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from tdac_agent.budget import Budget
 from tdac_agent.errors import RunError
 from tdac_agent.files import clear_unfinished
+from tdac_agent.installation import drawn_seed, lasting_secret
 from tdac_agent.journal import mend, read_records
 from tdac_agent.locks import LOCK_FILE, hold
 from tdac_agent.past import read_past
@@ -22,6 +23,7 @@ from tdac_agent.provenance import sha256_of
 from tdac_agent.provider import Provider, served_at
 from tdac_agent.recorder import Event, Recorder
 from tdac_agent.records import JOURNAL, Run
+from tdac_agent.resume import run_there
 from tdac_agent.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.task import Task
 from tdac_agent.verification import suite_sha256
@@ -106,6 +108,17 @@ def describe(
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         **facts,
     )
+
+
+def settled_seed(given: int | None, out: Path) -> int | None:
+    """The seed of a run; None where each of its candidates has its own.
+
+    Where no secret can be kept, a run is given one at its beginning.
+    """
+    if given is not None or lasting_secret() is not None:
+        return given
+    before = run_there(out)
+    return drawn_seed() if before is None else before.seed
 
 
 @contextmanager

@@ -244,6 +244,7 @@ class Recorder:
             valid=report is not None,
             passed=report is not None and report.passed,
             failed_tests=failed,
+            seed=None if report is None else report.provenance.seed,
             notes=notes,
             unchanged=unchanged,
         )

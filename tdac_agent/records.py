@@ -35,6 +35,7 @@ class Attempt(PrintableRecord):
     valid: bool = Field(description="False where the model gave no code.")
     passed: bool
     failed_tests: tuple[str, ...] = ()
+    seed: int | None = Field(None, description="Of its moved starts.")
     notes: tuple[str, ...] = ()
     unchanged: bool = Field(
         False, description="The code of the attempt before, whose report stands."
@@ -54,7 +55,9 @@ class Run(PrintableRecord):
     optimizer: str
     iterations: int = Field(description="K")
     patience: int = Field(description="J")
-    seed: int
+    seed: int | None = Field(
+        description="Of the moved starts of all candidates; None: each has its own."
+    )
     status: Status = "running"
     tau: int | None = Field(None, description="Iteration k of the first success.")
     attempts: list[Attempt] = Field(default_factory=list)

@@ -76,7 +76,9 @@ def check_same(before: Run, now: Run) -> None:
 
 def _difference(words: str, there: object, here: object) -> str:
     """Short values are told; of hashes it is enough that they differ."""
-    if isinstance(there, int) or words in {"learner", "optimizer", "task"}:
+    if words == "seed":
+        there, here = ("none" if value is None else value for value in (there, here))
+    if isinstance(there, int) or words in {"learner", "optimizer", "task", "seed"}:
         return f"{words} {there} there, {here} here"
     return f"another {words}"
 

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from tdac_agent.errors import Fault
+from tdac_agent.installation import seed_of
 from tdac_agent.privileged import (
     BAD,
     DO_NOTHING,
@@ -39,7 +40,7 @@ def check_suite(
     suite: Path | None = None,
     shipped: Path | None = None,
     tier: str = "auto",
-    seed: int = 0,
+    seed: int | None = None,
     repeats: int = REPEATS,
     bad: Sequence[str] = BAD,
     judge: WarmJudge | None = None,
@@ -53,7 +54,8 @@ def check_suite(
         suite: Folder with further tests; the task's own by default.
         shipped: Folder of tests in the place of the shipped ones.
         tier: Sandbox tier, `auto` for the best one here.
-        seed: Of the jittered starts.
+        seed: Of the jittered starts of all controllers; by default it follows from the
+            task and a secret of this installation.
         repeats: Verifications of each controller, which must agree. Of the slow one
             the clock decides: it has one, of the nominal episode alone.
         bad: Names of the bad controllers.
@@ -67,6 +69,8 @@ def check_suite(
     if repeats < 1:
         raise ValueError(f"expected at least 1 repeat, got {repeats}")
     began = time.monotonic()
+    # The reference knows its starts, so that they cannot follow from its bytes.
+    seed = seed_of(b"", task) if seed is None else seed
     with contextlib.ExitStack() as stack:
         warm = judge or stack.enter_context(WarmJudge(task=task))
         ask = partial(
@@ -101,7 +105,7 @@ def prove_suite(
     profile: Profile | None = None,
     suite: Path | None = None,
     tier: str = "auto",
-    seed: int = 0,
+    seed: int | None = None,
     judge: WarmJudge | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> SuiteCheck:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from tdac_agent.beginning import account_of, describe, hold_folder, open_record
+from tdac_agent.beginning import (
+    account_of,
+    describe,
+    hold_folder,
+    open_record,
+    settled_seed,
+)
 from tdac_agent.budget import Budget
 from tdac_agent.calls import Calls, OutOfBudget
 from tdac_agent.dialogue import Candidate, Dialogue
@@ -38,7 +44,7 @@ def synthesize(
     out: Path,
     iterations: int = 20,
     patience: int = 1,
-    seed: int = 0,
+    seed: int | None = None,
     start_from: str | None = None,
     base_url: str | None = None,
     prompt: str = "full",
@@ -65,7 +71,8 @@ def synthesize(
         out: New or empty folder for the run, or one with the same run.
         iterations: K.
         patience: J, edits per iteration.
-        seed: Of the jittered starts.
+        seed: Of the jittered starts of all candidates; by default each has its own, as
+            for `verify`.
         start_from: Source of a controller to begin with instead of a generated one.
         base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
         prompt: Template of the question for a new controller: `full`,
@@ -106,7 +113,7 @@ def synthesize(
         iterations=iterations,
         patience=patience,
         refine=refine,
-        seed=seed,
+        seed=settled_seed(seed, out),
     )
     account = account_of(models, run_there(out), max_cost, max_tokens, budget)
     with hold_folder(out):

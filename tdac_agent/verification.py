@@ -11,6 +11,7 @@ from pathlib import Path
 
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.files import write_atomic
+from tdac_agent.installation import seed_of
 from tdac_agent.jobs import Findings, Job
 from tdac_agent.provenance import origin, sha256_of, versions
 from tdac_agent.report import OWN, SHIPPED, Provenance, Report
@@ -38,7 +39,7 @@ def verify(
     suite: Path | None = None,
     shipped: Path | None = None,
     tier: str = "auto",
-    seed: int = 0,
+    seed: int | None = None,
     limits: Limits | None = None,
     out: Path | None = None,
     judge: WarmJudge | None = None,
@@ -55,7 +56,8 @@ def verify(
             default.
         shipped: Folder of tests in the place of the shipped ones.
         tier: Sandbox tier, `auto` for the best one here.
-        seed: Of the jittered starts.
+        seed: Of the jittered starts; by default it follows from the controller, the
+            task and a secret of this installation, so that no author can aim at it.
         limits: Of the controller's processes; `cpu_seconds` is for all of them.
         out: Folder for `report.json` and `trajectories/`, with a picture of each
             episode that failed; none by default.
@@ -81,7 +83,7 @@ def verify(
             profile=profile or task.spec.profile,
             paper=paper,
             tier=tier,
-            seed=seed,
+            seed=seed_of(source, task) if seed is None else seed,
             limits=limits or Limits(),
             out=folder / "results",
             trajectories=None if out is None else folder / "trajectories",
@@ -106,11 +108,15 @@ def verify(
     return report
 
 
-def kept_report(folder: Path, task: Task, source: str, seed: int) -> Report | None:
+def kept_report(
+    folder: Path, task: Task, source: str, seed: int | None
+) -> Report | None:
     """The report of a verification in a folder, if that is one of this very controller.
 
-    None where it is of other bytes, another task, suite, seed or version of a package.
+    None where it is of other bytes, another task, suite, seed or version of a package;
+    a seed of None is the controller's own, which nobody else can have made up.
     """
+    raw = source.encode("utf-8", "surrogatepass")
     try:
         raw = read_file(folder / "report.json", RECORD_BYTES)
         report = Report.model_validate(parse_json(raw))
@@ -118,12 +124,12 @@ def kept_report(folder: Path, task: Task, source: str, seed: int) -> Report | No
         return None
     about = report.provenance
     wanted = {
-        "controller_sha256": sha256_of(source.encode("utf-8", "surrogatepass")),
+        "controller_sha256": sha256_of(raw),
         "task_sha256": task.sha256(),
         "suite_sha256": suite_sha256(task),
         "profile": task.spec.profile,
         "paper": False,
-        "seed": seed,
+        "seed": seed_of(raw, task) if seed is None else seed,
         "versions": versions(),
     }
     same = all(getattr(about, name) == value for name, value in wanted.items())

@@ -18,11 +18,20 @@ LEAST_FREE = 100_000_000
 
 def user_cache() -> Path | None:
     """The user's folder for what can be made again; None for a user without a home."""
-    named = os.environ.get("XDG_CACHE_HOME", "")
+    return _user_folder("XDG_CACHE_HOME", ".cache")
+
+
+def user_state() -> Path | None:
+    """The user's folder for what lasts, and is neither data nor a setting."""
+    return _user_folder("XDG_STATE_HOME", ".local/state")
+
+
+def _user_folder(variable: str, below_home: str) -> Path | None:
+    named = os.environ.get(variable, "")
     if os.path.isabs(named):
         return Path(named)
     with contextlib.suppress(RuntimeError):
-        return Path.home() / ".cache"
+        return Path.home() / below_home
     return None
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import random
 import signal
 import sys
+import tempfile
 import zlib
 from collections import Counter
 from collections.abc import Iterator
@@ -23,7 +25,19 @@ sys.path.append(str(ROOT))
 def pytest_configure() -> None:
     """Interrupts reach what tests start, also where they are run in the background."""
     _set_up_hypothesis()
+    _set_up_secret()
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _set_up_secret() -> None:
+    """An installation of the tests' own, whose secret is the same in each run."""
+    folder = tempfile.TemporaryDirectory(prefix="tdac-state-")
+    secret = Path(folder.name, "tdac", "secret")
+    secret.parent.mkdir()
+    secret.touch(0o600)
+    secret.write_bytes(bytes(range(32)))
+    os.environ["XDG_STATE_HOME"] = folder.name
+    atexit.register(folder.cleanup)
 
 
 def _set_up_hypothesis() -> None:

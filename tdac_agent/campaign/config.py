@@ -51,7 +51,12 @@ class CampaignConfig(BaseModel):
         description="N of `best of N`; by default as many answers as the dual tier "
         "may have: K·(J + 2).",
     )
-    seed: int = Field(0, ge=0, description="Of the first run; the next has the next.")
+    seed: int | None = Field(
+        None,
+        ge=0,
+        description="Of the moved starts of the first run; the next has the next. By "
+        "default they follow from a secret of the installation, and differ elsewhere.",
+    )
     base_url: str | None = Field(None, description="As for --base-url.")
     max_output: int = Field(MAX_OUTPUT_TOKENS, ge=1, description="As for --max-output.")
     max_cost: float | None = Field(

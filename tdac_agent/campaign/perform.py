@@ -15,8 +15,10 @@ from tdac_agent.budget import Budget
 from tdac_agent.campaign.gate import gated
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import Fault
+from tdac_agent.installation import seed_of
 from tdac_agent.providers import choose_models
 from tdac_agent.records import JOURNAL, RUN_FILE, Run
+from tdac_agent.resume import run_there
 from tdac_agent.retry import RetryPolicy
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task, load_task
@@ -143,7 +145,7 @@ def _synthesize(
         iterations=cell.iterations,
         patience=cell.patience,
         refine=cell.refine,
-        seed=planned.seed,
+        seed=_seed(planned, task, folder),
         base_url=cell.base_url,
         prompt=cell.prompt,
         max_output=cell.max_output,
@@ -153,6 +155,19 @@ def _synthesize(
         judge=judge,
         on_event=tell,
     )
+
+
+def _seed(planned: PlannedRun, task: Task, folder: Path) -> int:
+    """The seed of a run: the file's, the one on record, or one that nobody can guess.
+
+    It is the same for the runs of all kinds on a task that have the same number.
+    """
+    if planned.seed is not None:
+        return planned.seed
+    before = run_there(folder)
+    if before is not None and before.seed is not None:
+        return before.seed
+    return seed_of(f"run {planned.index}".encode(), task)
 
 
 @functools.lru_cache(maxsize=1)

@@ -67,12 +67,12 @@ class PlannedRun:
     Attributes:
         cell: What it is of.
         index: Its number among those of its cell, from 1.
-        seed: Of its jittered starts.
+        seed: Of its jittered starts; None where the file has none.
     """
 
     cell: Cell
     index: int
-    seed: int
+    seed: int | None
 
     @property
     def name(self) -> str:
@@ -121,13 +121,13 @@ class Plan:
         cells: The kinds of run, in the file's order.
         tasks: By `Cell.task`.
         runs: R of each.
-        seed: Of the first run.
+        seed: Of the first run, where one is given.
     """
 
     cells: tuple[Cell, ...]
     tasks: Mapping[str, Task]
     runs: int
-    seed: int
+    seed: int | None
 
     def __len__(self) -> int:
         return len(self.cells) * self.runs
@@ -140,7 +140,8 @@ class Plan:
         numbered = product(range(1, self.runs + 1), self.cells)
         for number, (index, cell) in enumerate(numbered):
             if number % shard.n == shard.i - 1:
-                yield PlannedRun(cell, index, self.seed + index - 1)
+                seed = None if self.seed is None else self.seed + index - 1
+                yield PlannedRun(cell, index, seed)
 
 
 def make_plan(config: CampaignConfig, base: Path) -> Plan:

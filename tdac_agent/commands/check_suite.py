@@ -23,7 +23,7 @@ def run(
     profile: Profile | None,
     suite: Path | None,
     tier: str,
-    seed: int,
+    seed: int | None,
     repeats: int,
     as_json: bool,
 ) -> int:

@@ -30,7 +30,7 @@ def check_suite(
     suite: Suite = None,
     profile: Profile = None,
     tier: Tier = "auto",
-    seed: JitterSeed = 0,
+    seed: JitterSeed = None,
     repeats: Annotated[
         int, typer.Option(min=1, help="Verifications of each, which must agree.")
     ] = 5,

@@ -91,7 +91,13 @@ Suite = Annotated[
     typer.Option("--suite", help="Folder with your own test_*.py files, run as well."),
 ]
 JitterSeed = Annotated[
-    int, typer.Option("--seed", min=0, help="Of the jittered starts.")
+    Optional[int],  # noqa: UP045
+    typer.Option(
+        "--seed",
+        min=0,
+        help="Of the jittered starts.  [default: follows from controller, task and a "
+        "secret of this installation]",
+    ),
 ]
 Tier = Annotated[
     str,

@@ -13,6 +13,7 @@ from tdac_agent.contenders import Contender
 from tdac_agent.disturbance import Disturbance
 from tdac_agent.driving import Driven, Stage, drive_seed
 from tdac_agent.errors import Fault
+from tdac_agent.installation import seed_of
 from tdac_agent.judge import JITTERS, Judge
 from tdac_agent.nursery import Nursery
 from tdac_agent.pictures import pictures_of
@@ -75,7 +76,8 @@ def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work = Path(folder)
         write_workdir(work, task)
-        judge = Judge(task, source, work, tier=tier, seed=0, at_a_time=1)
+        seed = seed_of(source, task)
+        judge = Judge(task, source, work, tier=tier, seed=seed, at_a_time=1)
         try:
             return judge.drive(name)
         finally:

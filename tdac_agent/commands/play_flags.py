@@ -35,7 +35,7 @@ def play(
     episode: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option(
-            help="Episode of the suite, of its --seed 0: `nominal`, `jitter 1` …  "
+            help="Episode of `tdac verify` without --seed: `nominal`, `jitter 1` …  "
             "[default: nominal]"
         ),
     ] = None,

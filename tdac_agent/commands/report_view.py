@@ -51,7 +51,7 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
     console.print(
         f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
         f"passed in {report.seconds:.1f} s  (task {escape(about.task)}, profile "
-        f"{about.profile}, sandbox {escape(about.sandbox)})"
+        f"{about.profile}, sandbox {escape(about.sandbox)}, seed {about.seed})"
     )
     if _lacks_names(report):
         console.print(

@@ -85,7 +85,7 @@ def synth(
             "--resume", metavar="RUN", help="Go on with a run, as it was begun."
         ),
     ] = None,
-    seed: JitterSeed = 0,
+    seed: JitterSeed = None,
     as_json: Json = False,
 ) -> None:
     """Write, test and repair a controller until it is verified."""

@@ -31,7 +31,7 @@ def run(
     paper: bool,
     suite: Path | None,
     tier: str,
-    seed: int,
+    seed: int | None,
     junit: Path | None,
     out: Path | None,
     as_json: bool,

@@ -39,7 +39,7 @@ def verify(
     ] = False,
     suite: Suite = None,
     tier: Tier = "auto",
-    seed: JitterSeed = 0,
+    seed: JitterSeed = None,
     junit: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(help="Write a JUnit XML report."),

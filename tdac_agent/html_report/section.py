@@ -136,7 +136,7 @@ def _origin(told: Told) -> Iterator[tuple[str, str]]:
     for model, address in run.served_at.items():
         yield f"served at ({model})", address
     yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
-    yield "loop", f"K = {run.iterations}, J = {run.patience}, seed {run.seed}"
+    yield "loop", f"K = {run.iterations}, J = {run.patience}"
     yield "tokens and cost", spent(told)
     if told.report is not None:
         yield from _verified_with(told.report)
@@ -172,7 +172,8 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     if run.given_sha256 is not None:
         words += ["--from", f"{name}/{GIVEN_FILE}"]
     words += ["-K", str(run.iterations), "-J", str(run.patience)]
-    yield shlex.join([*words, "--seed", str(run.seed)]), "asks anew"
+    words += [] if run.seed is None else ["--seed", str(run.seed)]
+    yield shlex.join(words), "asks anew"
     again = ["tdac", "synth", "--task", name, "--learner", f"replay:{name}"]
     yield shlex.join(again), "the answers on record again; nobody is asked"
     if not run.finished and told.status != "running":

@@ -15,7 +15,10 @@ WAYS = (
     ["unshare", "--user", "--map-user=12345", "--map-group=12345"],
     ["setpriv", "--reuid=12345", "--regid=12345", "--clear-groups"],
 )
-HOMES = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "MPLCONFIGDIR", "TDAC_PRICES")
+HOMES = (
+    *("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"),
+    *("MPLCONFIGDIR", "TDAC_PRICES"),
+)
 
 
 def call(way, *words, **options):

@@ -16,10 +16,12 @@ Every file starts with comment lines `# key: value` (further lines are indented)
     also          further kinds of task it is judged in
     repeat        `N TEXT`: the source ends with so many repetitions of a text
     hides         pattern that the feedback must not match
+    seed          `of the installation`, where it is not 0
     limits        `name=value` of the sandbox, where not the zoo's or the usual ones
 
-`@SECRET@`, `@TARGET@`, `@PACKAGE@`, `@TCP@`, `@UDP@` and `@UNIX@` in a source stand for
-a secret file, a folder to write to, the installed package, two ports, a socket file.
+`@SECRET@`, `@TARGET@`, `@PACKAGE@`, `@TCP@`, `@UDP@`, `@UNIX@` and `@STATE@` in a
+source stand for a secret file, a folder to write to, the installed package, two ports,
+a socket file, and the secret of the installation.
 """
 
 from __future__ import annotations

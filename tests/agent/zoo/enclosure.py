@@ -20,6 +20,7 @@ from grounds import zoo_task
 import tdac_agent
 from tdac_agent.errors import Fault
 from tdac_agent.feedback import render_feedback
+from tdac_agent.installation import lasting_secret, secret_file
 from tdac_agent.report import Report
 from tdac_agent.sandbox import Limits
 from tdac_agent.verification import verify
@@ -85,6 +86,7 @@ class Enclosure:
                     zoo_task(case.kind),
                     profile=case.header["profile"],  # type: ignore[arg-type]
                     tier=tier,
+                    seed=None if case.header.get("seed") else 0,
                     limits=_limits(case),
                     judge=self._judge,
                 )
@@ -215,6 +217,7 @@ class Canaries:
             "TCP": self._sockets["tcp"].getsockname()[1],
             "UDP": self._sockets["udp"].getsockname()[1],
             "UNIX": self._folder / "socket",
+            "STATE": secret_file(),
         }
         for name, value in places.items():
             source = source.replace(f"@{name}@".encode(), str(value).encode())
@@ -226,6 +229,7 @@ class Canaries:
         written = {path.name: path.read_text() for path in self._target.glob("*")}
         return {
             "file read": self._token in text,
+            "secret read": (lasting_secret() or b"?").hex() in text,
             "file written": written != {"kept.txt": "kept"},
             "code changed": _code_hash() != self._code,
             "terminal": "\\u001b" in text,

@@ -3,12 +3,15 @@
 import pytest
 from cases import all_cases, tiers_of, working_tiers
 from enclosure import Enclosure, differences
-from grounds import KINDS
+from grounds import KINDS, zoo_task
+
+from tdac_agent.verification import verify
 
 CASES = all_cases()
-ALWAYS = {"astar_pursuit", "forged_positions", "proc_walk"}
+ALWAYS = {"astar_pursuit", "forged_positions", "proc_walk", "tapes_of_known_starts"}
+ALWAYS |= {"installation_secret"}
 KEYS = {"idea", "profile", "verdict", "fails", "error", "why", "tiers", "onto", "also"}
-KEYS |= {"repeat", "hides", "limits"}
+KEYS |= {"repeat", "hides", "limits", "seed"}
 # Of attacks, good controllers, and good ones in full contract, by kind of task.
 AT_LEAST = {"map2d": (60, 20, 10), "epuck": (26, 8, 3)}
 
@@ -44,6 +47,13 @@ def check():
 
     with Enclosure() as enclosure:
         yield judged
+
+
+def test_tapes_pass_where_the_starts_are_known():
+    """The attack works but for the secret of the installation."""
+    case = next(case for case in CASES if case.name == "tapes_of_known_starts")
+    report = verify(case.body, zoo_task(case.kind), profile="policy", seed=0)
+    assert report.passed
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c.name in ALWAYS], ids=str)
