@@ -1,6 +1,7 @@
 """A campaign from the command line: it goes on, repeats nothing, and fails alone."""
 
 import json
+from collections import Counter
 from pathlib import Path
 
 import pandas as pd
@@ -64,7 +65,7 @@ def test_the_tables_hold_each_run_once_with_the_columns_of_the_metrics(once):
     assert list(tried.columns) == list(CANDIDATE_COLUMNS)
     assert runs["run"].is_unique
     assert set(tried["run"]) <= set(runs["run"])
-    assert sorted(runs["seed"]) == [0, 0, 1, 1]
+    assert sorted(Counter(runs["seed"]).values()) == [2, 2]  # pairs
     builtin = runs[runs["learner"] == "builtin"]
     assert (builtin["tau"] == 1).all()
     assert runs["learner"].str.startswith("scripted:").sum() == 2
