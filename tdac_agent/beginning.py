@@ -26,6 +26,7 @@ from tdac_agent.records import JOURNAL, Run
 from tdac_agent.resume import run_there
 from tdac_agent.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.task import Task
+from tdac_agent.trust import OWN_SUITE, is_own_folder, sign
 from tdac_agent.verification import suite_sha256
 
 
@@ -162,6 +163,9 @@ def open_record(
     }
     if before is not None:
         run.id, run.started, run.prompt = before.id, before.started, before.prompt
+        # What somebody else began stays theirs, whatever was allowed this time.
+        if is_own_folder(before):
+            run.mark = sign(run, run.folder / OWN_SUITE if task.suite else None)
     try:
         mend(run.folder / JOURNAL)
         past = read_past(read_records(run.folder / JOURNAL))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import jinja2
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from tdac_agent.feedback import render_feedback
 from tdac_agent.prompt_context import context_of
@@ -67,7 +68,8 @@ def load_template(given: str) -> PromptTemplate:
 
 @functools.cache
 def _templates() -> jinja2.Environment:
-    return jinja2.Environment(
+    # A template of the user's own is text to be filled in, and no program.
+    return ImmutableSandboxedEnvironment(
         loader=jinja2.PackageLoader("tdac_agent", "prompts"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

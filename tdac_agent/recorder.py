@@ -33,8 +33,8 @@ from tdac_agent.retry import Missed
 from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, portable_task_file, write_workdir
 from tdac_agent.task_file import TASK_FILE
+from tdac_agent.trust import OWN_SUITE, sign
 
-OWN_SUITE = "suite"
 Event = Callable[[dict[str, Any]], None]
 
 
@@ -73,7 +73,6 @@ class Recorder:
         folder = self.run.folder
         self.save()
         write_workdir(folder, task)
-        write_atomic(folder / TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE))
         if task.suite is not None:
             ignored = shutil.ignore_patterns("__pycache__")
             own = folder / OWN_SUITE
@@ -85,6 +84,10 @@ class Recorder:
             write_atomic(folder / PROMPT_FILE, template.text)
         if given is not None:
             write_atomic(folder / GIVEN_FILE, given)
+        self.run.mark = sign(self.run, folder / OWN_SUITE if task.suite else None)
+        self.save()
+        # What has a task and no mark was not begun here.
+        write_atomic(folder / TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE))
         self.event("run.start", task=task.name, learner=self.run.learner, **facts)
 
     def resume(self, before: Run, **facts: Any) -> None:
@@ -95,7 +98,8 @@ class Recorder:
             **facts: For the journal.
         """
         past = self.past
-        limits = {name: getattr(self.run, name) for name in ("max_cost", "max_tokens")}
+        kept = ("max_cost", "max_tokens", "mark")
+        limits = {name: getattr(self.run, name) for name in kept}
         going = {"status": "running", "censored": False}
         ended = dict.fromkeys(("reason", "enough", "outlook"), "")
         self._write(before.model_copy(update={**going, **ended, **limits}))

@@ -85,6 +85,9 @@ class Run(PrintableRecord):
     cost_lost: float = Field(
         0.0, description="USD at most of calls whose answer was lost, on top."
     )
+    mark: str = Field(
+        "", description="By which the installation that began it knows it again."
+    )
     id: str = ""
     started: str
     seconds: float = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from tdac_agent.prompt import VARIANTS
 from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import TASK_FILE
+from tdac_agent.trust import is_own, is_own_folder, permit, wishes_of
 from tdac_envs.errors import why
 from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 
@@ -74,6 +76,20 @@ def check_same(before: Run, now: Run) -> None:
         )
 
 
+def check_own(before: Run) -> None:
+    """Refuses to take the verdict of a run that somebody else has made.
+
+    Raises:
+        RunError: It is one.
+    """
+    if not is_own_folder(before):
+        raise RunError(
+            f"{before.folder} holds a run that was not begun here, {before.status} by "
+            f"its own account: test it with tdac verify {before.folder}, or give a new "
+            "folder with --out"
+        )
+
+
 def _difference(words: str, there: object, here: object) -> str:
     """Short values are told; of hashes it is enough that they differ."""
     if words == "seed":
@@ -83,10 +99,19 @@ def _difference(words: str, there: object, here: object) -> str:
     return f"another {words}"
 
 
-def asked_for(folder: Path) -> dict[str, Any]:
+def asked_for(
+    folder: Path, given: Mapping[str, Any] | None = None, *, trust: bool = False
+) -> dict[str, Any]:
     """The arguments of `synthesize` with which a run was begun.
 
+    Args:
+        folder: Of the run.
+        given: Arguments in the place of those on record, `suite` among them; they
+            allow what a run of somebody else's wants.
+        trust: Whether such a run may do all that it wants.
+
     Raises:
+        NotTrustedError: It is somebody else's, and something is not allowed.
         RunError: There is no run that can be read.
         TaskError: Its task cannot be read.
     """
@@ -96,22 +121,30 @@ def asked_for(folder: Path) -> dict[str, Any]:
             f"the run in {folder} ended before it had begun: give its command again, "
             f"with --out {folder}"
         )
-    given, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
-    return {
-        "task": _task(folder),
+    flags = {name: value for name, value in (given or {}).items() if value is not None}
+    task = _task(folder)
+    if not is_own(run, task.suite):
+        permit(folder, wishes_of(run, task, flags), trust=trust)
+    suite = flags.pop("suite", None)
+    if task.suite is not None:
+        task = replace(task, suite=suite or task.suite, trusted=True)
+    beginning, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
+    on_record = {
+        "task": task,
         "learner": run.learner,
         "optimizer": run.optimizer,
         "iterations": run.iterations,
         "patience": run.patience,
         "seed": run.seed,
         "index": run.index,
-        "start_from": _text(given) if given.is_file() else None,
+        "start_from": _text(beginning) if beginning.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
         "prompt": run.prompt if run.prompt in VARIANTS else str(prompt),
         "max_output": run.max_output,
         "out": folder,
     }
+    return {**on_record, **flags}
 
 
 def _text(file: Path) -> str:

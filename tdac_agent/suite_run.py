@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 from tdac_agent.jobs import Job
@@ -33,6 +34,9 @@ def judge_suite(
     from tdac_agent.findings import driven, findings_of
     from tdac_agent.suite_plugin import JudgePlugin, run_tests
 
+    if len(job.suites) > 1:
+        # What lies beside tests of somebody else's is not what they were compiled to.
+        sys.pycache_prefix = str(job.out / "bytecode")
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
     run_tests(job.suites, job.out / "report.jsonl", plugin)
     with ThreadPoolExecutor() as pool:  # most of it is compression

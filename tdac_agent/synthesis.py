@@ -25,7 +25,7 @@ from tdac_agent.providers import choose_models
 from tdac_agent.recorder import Event, Recorder
 from tdac_agent.records import Run
 from tdac_agent.report import Report
-from tdac_agent.resume import check_same, run_there
+from tdac_agent.resume import check_own, check_same, run_there
 from tdac_agent.retry import RetryPolicy
 from tdac_agent.suite_check import prove_suite
 from tdac_agent.task import Task
@@ -121,6 +121,7 @@ def synthesize(
         if before is not None:
             check_same(before, run)
             if before.finished:
+                check_own(before)
                 return before
         recorder = open_record(
             task, run, before, template, start_from, account, on_event
@@ -212,7 +213,8 @@ def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
     Raises:
         Fault: It does not: no controller can pass it, or one that does nothing can.
     """
-    if recorder.past.proven:
+    # Nothing is believed of a run that somebody else began.
+    if recorder.past.proven and recorder.run.mark:
         return
 
     def tell(doing: str) -> None:
@@ -237,7 +239,8 @@ def _verify(
     """The report on a candidate; one on record is not made again."""
     seed = recorder.run.seed
     recorder.event("verify.start", k=k, j=j)
-    return kept_report(folder, task, source, seed) or verify(
+    kept = kept_report(folder, task, source, seed) if recorder.run.mark else None
+    return kept or verify(
         folder / "controller.py", task, seed=seed, out=folder, judge=judge
     )
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from tdac_agent.disturbance import Disturbance
+from tdac_agent.errors import RunError
 from tdac_agent.first_run import compile_first
 from tdac_agent.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.task_file import (
@@ -37,12 +38,16 @@ class Task:
         spec: The file's contents.
         setting: Environment, world, start and goal.
         suite: Folder with further test files, where there is one.
+        trusted: Whether its tests may run: they are not in the sandbox.
+        folder: Of its file, where it has one.
     """
 
     name: str
     spec: TaskFile
     setting: Setting
     suite: Path | None = None
+    trusted: bool = True
+    folder: Path | None = None
 
     @property
     def params(self) -> Params:
@@ -83,7 +88,9 @@ class Task:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_task(source: str | Path | TaskFile, *, base: Path | None = None) -> Task:
+def load_task(
+    source: str | Path | TaskFile, *, base: Path | None = None, trust: bool = False
+) -> Task:
     """Reads and checks a task.
 
     Args:
@@ -91,6 +98,8 @@ def load_task(source: str | Path | TaskFile, *, base: Path | None = None) -> Tas
             one, or its contents.
         base: Folder that relative paths in the contents refer to; the file's own
             by default.
+        trust: Whether tests that a file brings may run, whoever wrote it; those of a
+            run that was begun here may.
 
     Raises:
         TaskError: The file or the task cannot be used; the message says what to do.
@@ -106,7 +115,21 @@ def load_task(source: str | Path | TaskFile, *, base: Path | None = None) -> Tas
     path = path / TASK_FILE if path.is_dir() else path
     spec, base = read_task_file(path, source), base or path.parent
     name = path.parent.resolve().name if path.name == TASK_FILE else path.stem
-    return _resolve(name, spec, base)
+    task = replace(_resolve(name, spec, base), folder=path.parent)
+    if task.suite is None or trust:
+        return task
+    return replace(task, trusted=_is_of_own_run(path.parent, task.suite))
+
+
+def _is_of_own_run(folder: Path, suite: Path) -> bool:
+    """Whether a task is that of a run which was begun here, with these tests."""
+    from tdac_agent.records import load_run  # its models take a while to build
+    from tdac_agent.trust import is_own
+
+    try:
+        return is_own(load_run(folder), suite)
+    except (RunError, OSError):
+        return False
 
 
 def _resolve(name: str | None, spec: TaskFile, base: Path) -> Task:

@@ -20,6 +20,7 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.task import Task, lay_out
 from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Trajectory, nominal_first
+from tdac_agent.trust import allowed
 from tdac_agent.warm import WarmJudge
 from tdac_envs.intake import RECORD_BYTES, parse_json, read_file
 
@@ -147,6 +148,8 @@ def _suites(
     """The folders of tests: the shipped ones, and further ones where there are any."""
     suites = {SHIPPED: _suite_folder(shipped or SHIPPED_SUITES / task.setting.suite)}
     extra = suite or task.suite
+    if suite is None:
+        allowed(task, None, trust=False)
     if extra is not None:
         suites[OWN] = _suite_folder(extra)
     return suites

@@ -180,7 +180,7 @@ def _budget(terms: Terms) -> Budget:
 @functools.lru_cache(maxsize=4)
 def _task(name: str) -> Task:
     """A task, which a worker has many runs of."""
-    return load_task(name)
+    return load_task(name, trust=True)  # asked for when the campaign was planned
 
 
 def read_outcome(name: str, runs: Path) -> Outcome | None:

@@ -7,18 +7,20 @@ import importlib.metadata
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
+from tdac_agent.campaign.wishes import wishes_of
 from tdac_agent.prices import FREE
 from tdac_agent.prompt import VARIANTS, generate_prompt, load_template
 from tdac_agent.providers.choice import Options, answers_sha256
 from tdac_agent.records import Setting
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import bundled_task
+from tdac_agent.trust import permit
 from tdac_agent.verification import suite_sha256
 
 
@@ -144,19 +146,24 @@ class Plan:
                 yield PlannedRun(cell, index, seed)
 
 
-def make_plan(config: CampaignConfig, base: Path) -> Plan:
+def make_plan(config: CampaignConfig, base: Path, *, trust: bool = False) -> Plan:
     """The plan of a campaign; its tasks are read and found feasible.
 
     Args:
         config: The file's contents.
         base: Its folder.
+        trust: Whether it may run, and reach, what it names.
 
     Raises:
+        NotTrustedError: It names a program, a server, a template or tests.
         TdacError: A task or a prompt cannot be used.
     """
     tasks = {
         name: (place := _task(name, base), load_task(place)) for name in config.tasks
     }
+    wishes = wishes_of(config, base, [task for _, task in tasks.values()])
+    permit(f"the campaign {config.name}", wishes, trust=trust)
+    tasks = {n: (place, replace(t, trusted=True)) for n, (place, t) in tasks.items()}
     prompts = {name: _prompt(name, base) for name in config.prompts}
     kinds = product(
         config.tasks,

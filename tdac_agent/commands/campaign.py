@@ -43,6 +43,7 @@ class Wanted:
         workers: Runs at a time.
         shard: Part of all runs, `i/n`.
         out: The campaign's folder.
+        trust: Whether the file may run, and reach, what it names.
     """
 
     given: str
@@ -51,6 +52,7 @@ class Wanted:
     workers: int | None
     shard: str
     out: Path | None
+    trust: bool = False
 
     def folder(self, config: CampaignConfig) -> Path:
         """The campaign's folder, by default one of its name."""
@@ -64,6 +66,7 @@ class Wanted:
         for flag, value in flags.items():
             words += [] if value is None else [flag, str(value)]
         words += [] if self.executor == "local" else ["--executor", self.executor]
+        words += ["--trust"] if self.trust else []
         words += [] if self.shard == "1/1" else ["--shard", self.shard]
         return shlex.join(words)
 
@@ -74,7 +77,7 @@ def run(wanted: Wanted, as_json: bool) -> int:
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
     config = with_limits(read_config(file), wanted.limits)
     with console.status("reading the tasks …"):
-        plan = make_plan(config, file.parent)
+        plan = make_plan(config, file.parent, trust=wanted.trust)
     folder = wanted.folder(config)
     with campaign_folder(folder, shard, read_file(file, TEXT_BYTES).decode("utf-8")):
         terms = Terms(

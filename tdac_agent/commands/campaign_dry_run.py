@@ -66,7 +66,7 @@ def run(wanted: Wanted, as_json: bool) -> int:
     for name in config.models:
         check_name(name)
     with console.status("reading the tasks …"):
-        plan = make_plan(config, file.parent)
+        plan = make_plan(config, file.parent, trust=wanted.trust)
     prices, folder = load_prices(), wanted.folder(config)
     progress, _ = look(plan, shard, folder / RUNS)
     rows = [

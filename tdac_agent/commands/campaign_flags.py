@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.commands.options import BUDGET, Json, finite_cost
+from tdac_agent.commands.options import BUDGET, Json, Trust, finite_cost
 
 app = typer.Typer()
 
@@ -75,6 +75,7 @@ def campaign(
             rich_help_panel=BUDGET,
         ),
     ] = None,
+    trust: Trust = False,
     as_json: Json = False,
 ) -> None:
     """Make many runs: learners × optimizers × tasks × settings × R, and their tables.
@@ -85,7 +86,7 @@ def campaign(
 
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
     given = {name: value for name, value in limits.items() if value is not None}
-    wanted = command.Wanted(config, given, executor, workers, shard, out)
+    wanted = command.Wanted(config, given, executor, workers, shard, out, trust)
     if dry_run:
         from tdac_agent.commands import campaign_dry_run as dry
 

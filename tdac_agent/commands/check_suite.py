@@ -15,6 +15,7 @@ from tdac_agent.privileged import REFERENCE
 from tdac_agent.suite_check import check_suite
 from tdac_agent.suite_proof import Row, SuiteCheck
 from tdac_agent.task_file import Profile
+from tdac_agent.trust import allowed
 from tdac_agent.warm import WarmJudge
 
 
@@ -22,6 +23,7 @@ def run(
     flags: TaskFlags,
     profile: Profile | None,
     suite: Path | None,
+    trust: bool,
     tier: str,
     seed: int | None,
     repeats: int,
@@ -31,11 +33,10 @@ def run(
     check_tier(tier)
     console = Console(stderr=as_json)
     with WarmJudge() as judge, console.status("preparing the task …") as status:
-        task = flags.load()
+        task = allowed(flags.load(), suite, trust=trust)
         check = check_suite(
             task,
             profile=profile,
-            suite=suite,
             tier=tier,
             seed=seed,
             repeats=repeats,

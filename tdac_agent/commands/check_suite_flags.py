@@ -14,6 +14,7 @@ from tdac_agent.commands.options import (
     Profile,
     Suite,
     Tier,
+    Trust,
     takes_task,
 )
 
@@ -28,6 +29,7 @@ app = typer.Typer()
 def check_suite(
     named_task: NamedTask,
     suite: Suite = None,
+    trust: Trust = False,
     profile: Profile = None,
     tier: Tier = "auto",
     seed: JitterSeed = None,
@@ -41,5 +43,5 @@ def check_suite(
         from tdac_agent.commands import check_suite as command
 
     raise typer.Exit(
-        command.run(named_task(), profile, suite, tier, seed, repeats, as_json)
+        command.run(named_task(), profile, suite, trust, tier, seed, repeats, as_json)
     )

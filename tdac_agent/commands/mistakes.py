@@ -22,7 +22,10 @@ def explain(error: Exception) -> NoReturn:
     if hasattr(error, "format_message"):  # usage, as typer found it
         _explain_usage(error)
     if isinstance(error, TdacError):
-        fail(f"error: {error}", 2)
+        *others, last = getattr(error, "lines", (str(error),))
+        for line in others:
+            print(fitted(f"error: {line}"), file=sys.stderr)
+        fail(f"error: {last}", 2)
     if isinstance(error, Fault):
         fail(f"infrastructure fault: {error}", 3)
     if isinstance(error, OSError) and error.filename:

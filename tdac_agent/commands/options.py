@@ -90,6 +90,14 @@ Suite = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--suite", help="Folder with your own test_*.py files, run as well."),
 ]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust",
+        help="Let a folder or file of somebody else's do what it wants: it is listed. "
+        "Holds for this command alone.",
+    ),
+]
 JitterSeed = Annotated[
     Optional[int],  # noqa: UP045
     typer.Option(

@@ -15,10 +15,11 @@ from tdac_agent.commands.progress import Progress
 from tdac_agent.commands.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.records import Run, load_run
-from tdac_agent.resume import asked_for, run_there
+from tdac_agent.resume import asked_for, check_own, run_there
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import Task
 from tdac_agent.task_file import TASK_FILE
+from tdac_agent.trust import allowed
 from tdac_agent.verification import read_source
 
 _EXIT = {"verified": 0, "budget": 4}
@@ -29,6 +30,8 @@ def run(
     wanted: dict[str, Any],
     out: Path | None,
     start_from: Path | None,
+    suite: Path | None,
+    trust: bool,
     as_json: bool,
 ) -> int:
     """Synthesises and prints; returns the exit code.
@@ -38,32 +41,43 @@ def run(
         wanted: Further arguments of `synthesize`.
         out: Run folder; the next free one by default.
         start_from: Controller to begin with.
+        suite: Folder with further tests.
+        trust: Whether what the task brings may run.
         as_json: Whether to print the record.
     """
     console = Console(stderr=as_json)
     source = None if start_from is None else read_text(start_from)
     with console.status("preparing the task …"):
-        task = flags.load()
+        task = allowed(flags.load(), suite, trust=trust)
     folder = out if out is not None else next_folder(task.name)
     wanted = {**wanted, "task": task, "out": folder, "start_from": source}
     return synthesise_and_show(wanted, console)
 
 
-def resume(folder: Path, limits: dict[str, Any], as_json: bool) -> int:
+def resume(
+    folder: Path,
+    given: dict[str, Any],
+    limits: dict[str, Any],
+    trust: bool,
+    as_json: bool,
+) -> int:
     """Goes on with a run as it was begun; returns the exit code.
 
     Args:
         folder: Of the run.
+        given: Flags that allow what the run of somebody else's wants.
         limits: `max_cost` and `max_tokens`, None where they stay.
+        trust: Whether a run of somebody else's may do what it wants.
         as_json: Whether to print the record.
     """
     console = Console(stderr=as_json)
     before = load_run(folder)
     if before.finished:
+        check_own(before)
         return _show(before, console, before=before)
     with console.status("preparing the task …"):
-        wanted = asked_for(folder)
-    return synthesise_and_show({**wanted, **limits}, console)
+        wanted = asked_for(folder, {**given, **limits}, trust=trust)
+    return synthesise_and_show(wanted, console)
 
 
 def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:

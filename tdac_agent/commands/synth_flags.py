@@ -18,11 +18,17 @@ from tdac_agent.commands.options import (
     MaxTokens,
     NamedTask,
     Optimizer,
+    Suite,
+    Trust,
     takes_task,
 )
 
 app = typer.Typer()
-WITH_RESUME = frozenset({"resume", "max_cost", "max_tokens", "as_json"})
+ALLOWED = ("learner", "optimizer", "base_url", "prompt", "suite", "seed")
+"""Flags that allow what a run of somebody else's wants, beside --resume."""
+WITH_RESUME = frozenset(
+    {"resume", "max_cost", "max_tokens", "as_json", "trust", *ALLOWED}
+)
 
 
 @app.command(
@@ -45,6 +51,7 @@ def synth(
     j: Annotated[
         int, typer.Option("-J", "--patience", min=0, help="Edits per iteration.")
     ] = 1,
+    suite: Suite = None,
     learner: Learner = "builtin",
     optimizer: Optimizer = None,
     base_url: BaseUrl = None,
@@ -86,6 +93,7 @@ def synth(
         ),
     ] = None,
     seed: JitterSeed = None,
+    trust: Trust = False,
     as_json: Json = False,
 ) -> None:
     """Write, test and repair a controller until it is verified."""
@@ -96,7 +104,11 @@ def synth(
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
     if resume is not None:
         _refuse_others(context)
-        raise typer.Exit(command.resume(resume, limits, as_json))
+        given = {name: context.params[name] for name in ALLOWED}
+        given = {
+            name: value for name, value in given.items() if _is_typed(context, name)
+        }
+        raise typer.Exit(command.resume(resume, given, limits, trust, as_json))
     models = {
         "learner": learner,
         "optimizer": optimizer,
@@ -112,7 +124,9 @@ def synth(
         )
     loop = {"iterations": k, "patience": j, "refine": refine, "seed": seed}
     wanted = {**models, **limits, **loop}
-    raise typer.Exit(command.run(named_task(), wanted, out, from_, as_json))
+    raise typer.Exit(
+        command.run(named_task(), wanted, out, from_, suite, trust, as_json)
+    )
 
 
 def _refuse_others(context: typer.Context) -> None:

@@ -18,6 +18,7 @@ from tdac_agent.nursery import Nursery
 from tdac_agent.report import Report
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import TASK_FILE, Profile
+from tdac_agent.trust import allowed
 from tdac_agent.warm import WarmJudge
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def run(
     profile: Profile | None,
     paper: bool,
     suite: Path | None,
+    trust: bool,
     tier: str,
     seed: int | None,
     junit: Path | None,
@@ -44,6 +46,7 @@ def run(
     if out is not None:
         _check_folder(out)
     file, task = _prepared(controller, flags)
+    task = allowed(task, suite, trust=trust)
     gc.freeze()
     gc.enable()
     with WarmJudge(nursery) as judge:
@@ -56,7 +59,6 @@ def run(
                 task,
                 profile=profile,
                 paper=paper,
-                suite=suite,
                 tier=tier,
                 seed=seed,
                 out=out,

@@ -18,6 +18,7 @@ from tdac_agent.commands.options import (
     RangeNoise,
     Suite,
     Tier,
+    Trust,
     WheelSlip,
     takes_task,
 )
@@ -38,6 +39,7 @@ def verify(
         bool, typer.Option("--paper", help="Nominal start only, as in the paper.")
     ] = False,
     suite: Suite = None,
+    trust: Trust = False,
     tier: Tier = "auto",
     seed: JitterSeed = None,
     junit: Annotated[
@@ -108,6 +110,7 @@ def verify(
             profile,
             paper,
             suite,
+            trust,
             tier,
             seed,
             junit,

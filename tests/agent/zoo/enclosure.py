@@ -226,13 +226,24 @@ class Canaries:
     def signs(self, report: Report) -> dict[str, bool]:
         """What can be harmed, and whether it was."""
         text = report.model_dump_json()
-        written = {path.name: path.read_text() for path in self._target.glob("*")}
         return {
             "file read": self._token in text,
             "secret read": (lasting_secret() or b"?").hex() in text,
+            "terminal": "\\u001b" in text,
+            **self.touched(),
+        }
+
+    @property
+    def port(self) -> int:
+        """Of the TCP socket that listens."""
+        return int(self._sockets["tcp"].getsockname()[1])
+
+    def touched(self) -> dict[str, bool]:
+        """What can be written to or called, and whether it was."""
+        written = {path.name: path.read_text() for path in self._target.glob("*")}
+        return {
             "file written": written != {"kept.txt": "kept"},
             "code changed": _code_hash() != self._code,
-            "terminal": "\\u001b" in text,
             **{name: _was_called(sock) for name, sock in self._sockets.items()},
         }
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import yaml
 
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import EPUCK, TaskFile
@@ -23,17 +24,28 @@ def zoo_task(kind: str) -> Task:
 
 def map_task() -> Task:
     """Two walls to drive around, on 200 x 150 px, for a body of 6 px."""
+    with tempfile.TemporaryDirectory() as name:
+        return load_task(write_map_task(Path(name)))
+
+
+def write_map_task(folder: Path, **changes: object) -> Path:
+    """Writes the files of the same task, of which some keys may differ."""
     picture = np.full((150, 200), 255, np.uint8)
     picture[:4] = picture[-4:] = picture[:, :4] = picture[:, -4:] = 0
     picture[:96, 60:69] = picture[55:, 125:134] = 0
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        cv2.imwrite(str(folder / "map.png"), picture)
-        (folder / "task.yaml").write_text(
-            "{schema: 1, name: zoo, map: map.png, robot: {radius: 6}, horizon: 500, "
-            "start: [30, 40, 0.0], goal: [165, 110], tolerance: 8}"
-        )
-        return load_task(folder)
+    cv2.imwrite(str(folder / "map.png"), picture)
+    content = {
+        "schema": 1,
+        "name": "zoo",
+        "map": "map.png",
+        "robot": {"radius": 6},
+        "horizon": 500,
+        "start": [30, 40, 0.0],
+        "goal": [165, 110],
+        "tolerance": 8,
+    }
+    (folder / "task.yaml").write_text(yaml.safe_dump({**content, **changes}))
+    return folder
 
 
 def world_task() -> Task:

@@ -1,0 +1,41 @@
+"""What a campaign's file wants to run, or to reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from tdac_agent.campaign.config import CampaignConfig
+from tdac_agent.prompt import VARIANTS
+from tdac_agent.shipped import shipped
+from tdac_agent.task import Task
+from tdac_agent.trust import Wish, asking, file_sha256, suite_wish
+
+
+def wishes_of(
+    config: CampaignConfig, base: Path, tasks: Iterable[Task]
+) -> Iterator[Wish]:
+    """All that the user has to allow; nothing of a shipped file.
+
+    The models of the vendors are what a campaign is for, and `max_cost` bounds them.
+
+    Args:
+        config: What the file says.
+        base: Its folder.
+        tasks: Those that it names.
+    """
+    if base.resolve() == shipped("offline.yaml").parent.resolve():
+        return
+    for name in config.models:
+        if name.startswith("command:"):
+            yield Wish(asking("model", name))
+    if config.base_url is not None:
+        yield Wish(f"send its questions, with your key, to {config.base_url}")
+    for name in config.prompts:
+        if name not in VARIANTS:
+            template = base / name
+            digest = file_sha256(template) if template.is_file() else ""
+            yield Wish(f"fill in the template {template}", (), digest)
+    for task in tasks:
+        if task.suite is not None and not task.trusted:
+            yield Wish(suite_wish(task.suite).what, (), suite_wish(task.suite).sha256)

@@ -1,0 +1,321 @@
+"""Folders and files of somebody else's that try to run something, or to reach out.
+
+Each is made from a run of this very installation, which is then changed: what is not
+as it was begun is somebody else's. A command is tried on it; where it is refused,
+nothing may have run, and one line says what was wanted and how to allow it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+from enclosure import KEY, Canaries
+from grounds import write_map_task
+
+from tdac_agent.records import load_run
+from tdac_agent.report import Report
+from tdac_agent.synthesis import synthesize
+from tdac_agent.task import load_task
+
+MOST_SECONDS = 300
+STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+FORGED_TEST = """
+from pathlib import Path
+
+Path("@TARGET@/came").write_text("by a test")
+
+
+def test_own():
+    pass
+"""
+CONFTEST = """
+from pathlib import Path
+
+import pytest
+
+Path("@TARGET@/came").write_text("by a conftest")
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    result = yield
+    result.get_result().outcome = "passed"
+"""
+TEMPLATE = (
+    "{{ rules_block }}"
+    "{{ cycler.__init__.__globals__.os.system('touch @TARGET@/came') }}"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where an attack is made: a run to be changed, beside canaries."""
+
+    run: Path
+    target: Path
+    tcp: int
+
+    def filled(self, text: str) -> str:
+        """A text with the places that an attack is to reach."""
+        return text.replace("@TARGET@", str(self.target))
+
+    def change(self, **fields: object) -> None:
+        """Changes fields of `run.json`; a run that had ended is to go on."""
+        file = self.run / "run.json"
+        known = json.loads(file.read_text())
+        file.write_text(json.dumps({**known, "status": "interrupted", **fields}))
+
+    def set_suite(self, name: str, text: str) -> Path:
+        """Gives the run's task a suite with one more file; its task file."""
+        suite, file = self.run / "suite", self.run / "task.yaml"
+        suite.mkdir()
+        (suite / "test_own.py").write_text(self.filled(FORGED_TEST))
+        (suite / name).write_text(self.filled(text))
+        task = yaml.safe_load(file.read_text())
+        file.write_text(yaml.safe_dump({**task, "suite": "suite"}))
+        (self.run / "controller.py").write_text(STILL)
+        return file
+
+
+Build = Callable[[Place], list[str | Path]]
+
+
+@dataclass(frozen=True, slots=True)
+class Foreign:
+    """One attack.
+
+    Attributes:
+        name: What comes from somebody else.
+        build: Makes it, and gives the words of the command.
+        wants: Pattern of what the refusal says is wanted, and of what allows it.
+        code: Exit code that is expected.
+        works: Whether it reaches its aim with `--trust`.
+    """
+
+    name: str
+    build: Build
+    wants: str
+    code: int = 2
+    works: bool = True
+
+
+ATTACKS: list[Foreign] = []
+
+
+def attack(wants: str, **expected: object) -> Callable[[Build], Build]:
+    """Adds a function to the attacks; its name is theirs."""
+
+    def add(build: Build) -> Build:
+        ATTACKS.append(Foreign(build.__name__, build, wants, **expected))  # type: ignore[arg-type]
+        return build
+
+    return add
+
+
+SUITE = r"run the tests in \S+ \(sha256 [0-9a-f]{12}\).* --suite \S+suite, or .*--trust"
+
+
+@attack(SUITE)
+def tests_of_a_run(place: Place) -> list[str | Path]:
+    place.set_suite("test_more.py", FORGED_TEST)
+    return ["verify", place.run]
+
+
+@attack(SUITE)
+def conftest_of_a_run(place: Place) -> list[str | Path]:
+    place.set_suite("conftest.py", CONFTEST)
+    return ["verify", place.run]
+
+
+@attack(SUITE)
+def tests_beside_a_controller(place: Place) -> list[str | Path]:
+    place.set_suite("conftest.py", CONFTEST)
+    return ["verify", place.run / "controller.py"]
+
+
+@attack(SUITE)
+def tests_of_a_task_file(place: Place) -> list[str | Path]:
+    file = place.set_suite("conftest.py", CONFTEST)
+    shutil.copy(file, place.run / "nice.yaml")
+    words = ["--task", place.run / "nice.yaml"]
+    return ["verify", place.run / "controller.py", *words]
+
+
+@attack(SUITE)
+def tests_that_are_to_prove_themselves(place: Place) -> list[str | Path]:
+    place.set_suite("conftest.py", CONFTEST)
+    return ["check-suite", "--task", place.run, "--repeats", "1"]
+
+
+@attack(SUITE)
+def tests_of_a_task_for_synthesis(place: Place) -> list[str | Path]:
+    place.set_suite("conftest.py", CONFTEST)
+    return ["synth", "--task", place.run / "task.yaml", "-K", "1", "-J", "0"]
+
+
+@attack(SUITE)
+def tests_of_a_run_that_goes_on(place: Place) -> list[str | Path]:
+    place.set_suite("conftest.py", CONFTEST)
+    place.change()
+    return ["synth", "--resume", place.run]
+
+
+@attack(
+    r"run the program `touch .*` as its learner.* --learner 'command:touch .*--trust"
+)
+def program_as_learner(place: Place) -> list[str | Path]:
+    program = place.filled("command:touch @TARGET@/came")
+    place.change(learner=program, optimizer=program)
+    return ["synth", "--resume", place.run]
+
+
+@attack(r"run the program `touch .*` as its optimizer.* --optimizer .*--trust", code=2)
+def program_as_optimizer(place: Place) -> list[str | Path]:
+    (place.run / "given.py").write_text(STILL)
+    place.change(optimizer=place.filled("command:touch @TARGET@/came"))
+    return ["synth", "--resume", place.run]
+
+
+@attack(r"fill in the template \S+ \(sha256 [0-9a-f]{12}\).*--prompt", works=False)
+def template_that_computes(place: Place) -> list[str | Path]:
+    (place.run / "prompt.j2").write_text(place.filled(TEMPLATE))
+    place.change(prompt="mine.j2")
+    return ["synth", "--resume", place.run]
+
+
+@attack(r"ask openai:m as its learner: .*--learner openai:m, or with --trust")
+def server_that_gets_the_key(place: Place) -> list[str | Path]:
+    url = f"http://127.0.0.1:{place.tcp}/v1"
+    model = {"learner": "openai:m", "optimizer": "openai:m", "base_url": url}
+    place.change(**model, served_at={"openai:m": url}, max_tokens=10**6)
+    return ["synth", "--resume", place.run]
+
+
+@attack(r"choose where the moved starts lie \(seed 0\).*--seed 0", works=False)
+def seed_that_suits_a_tape(place: Place) -> list[str | Path]:
+    place.change(seed=0)
+    return ["synth", "--resume", place.run]
+
+
+@attack(r"spend up to 1e\+06 USD.*--max-cost 1e\+06", works=False)
+def limit_of_cost(place: Place) -> list[str | Path]:
+    place.change(max_cost=1e6)
+    return ["synth", "--resume", place.run]
+
+
+@attack("verified by its own account: test it with tdac verify", works=False)
+def verdict_of_its_own(place: Place) -> list[str | Path]:
+    (place.run / "controller.py").write_text(STILL)
+    place.change(status="verified", max_tokens=12345)
+    return ["synth", "--resume", place.run]
+
+
+@attack("not verified", code=1, works=False)
+def report_of_its_own(place: Place) -> list[str | Path]:
+    """A forged report on a controller that does not move, which nobody tests again."""
+    folder = place.run / "iterations" / "k01" / "j0"
+    (place.run / "given.py").write_text(STILL)
+    report = Report.model_validate_json((folder / "report.json").read_bytes())
+    digest = __import__("hashlib").sha256(STILL.encode()).hexdigest()
+    about = report.provenance.model_copy(update={"controller_sha256": digest})
+    forged = report.model_copy(update={"provenance": about})
+    (folder / "report.json").write_text(forged.model_dump_json())
+    place.change(given_sha256=digest, iterations=1, patience=0, max_tokens=12345)
+    return ["synth", "--resume", place.run]
+
+
+def campaign(place: Place, **fields: object) -> list[str | Path]:
+    """A campaign of one run."""
+    content = {"schema": 1, "name": "nice", "tasks": [str(place.run / "task.yaml")]}
+    content |= {"learners": ["builtin"], "runs": 1, "iterations": 1}
+    file = place.run.parent / "nice.yaml"
+    file.write_text(yaml.safe_dump({**content, **fields}))
+    return ["campaign", file, "--out", place.run.parent / "campaign", "--workers", "1"]
+
+
+@attack(r"run the program `touch .*` as its model: .*--trust")
+def program_of_a_campaign(place: Place) -> list[str | Path]:
+    program = place.filled("command:touch @TARGET@/came")
+    return campaign(place, learners=[program], max_tokens=100_000)
+
+
+@attack(r"send its questions, with your key, to http://127.*: .*--trust")
+def server_of_a_campaign(place: Place) -> list[str | Path]:
+    url = f"http://127.0.0.1:{place.tcp}/v1"
+    return campaign(place, learners=["openai:m"], base_url=url, max_tokens=100_000)
+
+
+@attack(r"fill in the template \S+ \(sha256 .*--trust", works=False)
+def template_of_a_campaign(place: Place) -> list[str | Path]:
+    (place.run.parent / "mine.j2").write_text(place.filled(TEMPLATE))
+    return campaign(place, prompts=["mine.j2"])
+
+
+@attack(r"run the tests in \S+ \(sha256 .*--trust")
+def tests_of_a_campaign(place: Place) -> list[str | Path]:
+    place.set_suite("conftest.py", CONFTEST)
+    return campaign(place)
+
+
+def make_own_run(folder: Path) -> Path:
+    """A run of this installation, verified at once."""
+    with tempfile.TemporaryDirectory() as name:
+        task = load_task(write_map_task(Path(name), profile="policy"))
+        run = synthesize(task, out=folder, iterations=1)
+    assert run.verified
+    return folder
+
+
+def problems_of(one: Foreign, own: Path, place: Path, *, trust: bool) -> list[str]:
+    """How an attack on a copy of a run comes out otherwise than it must.
+
+    Args:
+        one: The attack.
+        own: A run of this installation.
+        place: Empty folder.
+        trust: Whether to allow it.
+    """
+    run = Path(shutil.copytree(own, place / "run"))
+    with Canaries(str(place)) as canaries:
+        words = one.build(Place(run, place / "target", canaries.port))
+        words += ["--trust"] if trust else []
+        code, said = tdac(words, place)
+        reached = [name for name, sign in canaries.touched().items() if sign]
+    if trust:
+        return [] if bool(reached) == one.works else [f"reached {reached}: {said}"]
+    found = [f"reached {reached}"] if reached else []
+    if code != one.code:
+        found.append(f"exit {code}, expected {one.code}: {said}")
+    refusals = [line for line in said.splitlines() if line.startswith("error: ")]
+    lines = refusals if one.code == 2 else said.splitlines()
+    if not any(re.search(one.wants, line) for line in lines):
+        found.append(f"no line matches {one.wants!r}: {said}")
+    before = load_run(own)
+    if one.code == 2 and (run / "run.json").stat().st_size == 0:
+        found.append(f"run.json is gone, was {before.status}")
+    return found
+
+
+def tdac(words: list[str | Path], place: Path) -> tuple[int, str]:
+    """Exit code of a command, and all that it said."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tdac_agent", *map(str, words)],
+        cwd=place,
+        env={**os.environ, KEY: "key-12345678", "OPENAI_API_KEY": "key-12345678"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=MOST_SECONDS,
+        check=False,
+    )
+    return done.returncode, done.stdout + done.stderr
