@@ -47,6 +47,7 @@ def synthesize(
     seed: int | None = None,
     start_from: str | None = None,
     base_url: str | None = None,
+    key_over_http: bool = False,
     prompt: str = "full",
     refine: bool = True,
     max_output: int = MAX_OUTPUT_TOKENS,
@@ -75,6 +76,8 @@ def synthesize(
             for `verify`.
         start_from: Source of a controller to begin with instead of a generated one.
         base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
+        key_over_http: Whether a key may go to such a server unencrypted, where it is
+            on another machine.
         prompt: Template of the question for a new controller: `full`,
             `underspecified`, or a file (docs/prompts.md).
         refine: Whether failures become rules of the prompt; without, each new
@@ -100,7 +103,9 @@ def synthesize(
         Fault: Sandbox, suite or provider broken; the run's record says so, too.
     """
     template = load_template(prompt)
-    models = choose_models(learner, optimizer, task.setting, base_url)
+    models = choose_models(
+        learner, optimizer, task.setting, base_url, key_over_http=key_over_http
+    )
     run = describe(
         task,
         models,

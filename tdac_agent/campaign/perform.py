@@ -44,6 +44,7 @@ class Terms:
         max_cost: USD of all together.
         max_tokens: Of all together.
         keep: `all`, or `records`.
+        key_over_http: As for `synthesize`.
     """
 
     folder: str
@@ -51,6 +52,7 @@ class Terms:
     max_cost: float | None
     max_tokens: int | None
     keep: str
+    key_over_http: bool = False
 
     @property
     def runs(self) -> Path:
@@ -131,7 +133,13 @@ def _synthesize(
 ) -> Run:
     cell = planned.cell
     task = _task(cell.task)
-    models = choose_models(cell.learner, cell.optimizer, task.setting, cell.base_url)
+    models = choose_models(
+        cell.learner,
+        cell.optimizer,
+        task.setting,
+        cell.base_url,
+        key_over_http=terms.key_over_http,
+    )
     gates, same = Path(terms.folder) / "gates", models[0] is models[1]
     learner = gated(models[0], gates, terms.workers)
     optimizer = learner if same else gated(models[1], gates, terms.workers)

@@ -44,6 +44,7 @@ class Wanted:
         shard: Part of all runs, `i/n`.
         out: The campaign's folder.
         trust: Whether the file may run, and reach, what it names.
+        key_over_http: Whether a key may go to another machine unencrypted.
     """
 
     given: str
@@ -53,6 +54,7 @@ class Wanted:
     shard: str
     out: Path | None
     trust: bool = False
+    key_over_http: bool = False
 
     def folder(self, config: CampaignConfig) -> Path:
         """The campaign's folder, by default one of its name."""
@@ -67,6 +69,7 @@ class Wanted:
             words += [] if value is None else [flag, str(value)]
         words += [] if self.executor == "local" else ["--executor", self.executor]
         words += ["--trust"] if self.trust else []
+        words += ["--key-over-http"] if self.key_over_http else []
         words += [] if self.shard == "1/1" else ["--shard", self.shard]
         return shlex.join(words)
 
@@ -86,9 +89,10 @@ def run(wanted: Wanted, as_json: bool) -> int:
             max_cost=config.max_cost,
             max_tokens=config.max_tokens,
             keep=config.keep,
+            key_over_http=wanted.key_over_http,
         )
         progress, left = look(plan, shard, terms.runs)
-        check_models(plan, left, config)
+        check_models(plan, left, config, key_over_http=wanted.key_over_http)
         _tell_heading(console, config, progress, folder)
         _tell_remarks(console, plan, terms)
         try:
@@ -113,7 +117,11 @@ def with_limits(config: CampaignConfig, limits: dict[str, Any]) -> CampaignConfi
 
 
 def check_models(
-    plan: Plan, left: Iterable[PlannedRun], config: CampaignConfig
+    plan: Plan,
+    left: Iterable[PlannedRun],
+    config: CampaignConfig,
+    *,
+    key_over_http: bool = False,
 ) -> None:
     """Makes each model once, so that a missing key is known before the night.
 
@@ -123,7 +131,13 @@ def check_models(
     models: list[Provider] = []
     for cell in dict.fromkeys(planned.cell for planned in left):
         setting = plan.tasks[cell.task].setting
-        models += choose_models(cell.learner, cell.optimizer, setting, cell.base_url)
+        models += choose_models(
+            cell.learner,
+            cell.optimizer,
+            setting,
+            cell.base_url,
+            key_over_http=key_over_http,
+        )
     bounds_of(models, tariffs_of(models), config.max_cost, config.max_tokens)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.commands.options import BUDGET, Json, Trust, finite_cost
+from tdac_agent.commands.options import BUDGET, Json, KeyOverHttp, Trust, finite_cost
 
 app = typer.Typer()
 
@@ -76,6 +76,7 @@ def campaign(
         ),
     ] = None,
     trust: Trust = False,
+    key_over_http: KeyOverHttp = False,
     as_json: Json = False,
 ) -> None:
     """Make many runs: learners × optimizers × tasks × settings × R, and their tables.
@@ -86,7 +87,8 @@ def campaign(
 
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
     given = {name: value for name, value in limits.items() if value is not None}
-    wanted = command.Wanted(config, given, executor, workers, shard, out, trust)
+    places = (executor, workers, shard, out)
+    wanted = command.Wanted(config, given, *places, trust, key_over_http)
     if dry_run:
         from tdac_agent.commands import campaign_dry_run as dry
 

@@ -28,8 +28,8 @@ def run(
 
     Args:
         flags: That name the task.
-        models: `learner`, `optimizer`, `base_url`, `prompt`, `max_output`, `max_cost`
-            and `max_tokens`, as for `synthesize`.
+        models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
+            `max_output`, `max_cost` and `max_tokens`, as for `synthesize`.
         k: Iterations.
         j: Edits per iteration.
         refine: Whether failures become rules.
@@ -41,7 +41,8 @@ def run(
         check_name(name)
     template, prices = load_template(models["prompt"]), load_prices()
     task = flags.load()
-    options = Options(task.setting, models["base_url"])
+    over_http = models["key_over_http"]
+    options = Options(task.setting, models["base_url"], over_http)
     missing = [
         m for name in (learner, optimizer) for m in missing_before(name, options)
     ]

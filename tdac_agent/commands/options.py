@@ -144,6 +144,14 @@ BaseUrl = Annotated[
         rich_help_panel=MODELS,
     ),
 ]
+KeyOverHttp = Annotated[
+    bool,
+    typer.Option(
+        "--key-over-http",
+        help="Let a key go unencrypted to a server on another machine.",
+        rich_help_panel=MODELS,
+    ),
+]
 MaxOutput = Annotated[
     Optional[int],  # noqa: UP045
     typer.Option(

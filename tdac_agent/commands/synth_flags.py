@@ -12,6 +12,7 @@ from tdac_agent.commands.options import (
     BaseUrl,
     JitterSeed,
     Json,
+    KeyOverHttp,
     Learner,
     MaxCost,
     MaxOutput,
@@ -24,7 +25,10 @@ from tdac_agent.commands.options import (
 )
 
 app = typer.Typer()
-ALLOWED = ("learner", "optimizer", "base_url", "prompt", "suite", "seed")
+ALLOWED = (
+    *("learner", "optimizer", "base_url", "key_over_http"),
+    *("prompt", "suite", "seed"),
+)
 """Flags that allow what a run of somebody else's wants, beside --resume."""
 WITH_RESUME = frozenset(
     {"resume", "max_cost", "max_tokens", "as_json", "trust", *ALLOWED}
@@ -55,6 +59,7 @@ def synth(
     learner: Learner = "builtin",
     optimizer: Optimizer = None,
     base_url: BaseUrl = None,
+    key_over_http: KeyOverHttp = False,
     max_output: MaxOutput = None,
     max_cost: MaxCost = None,
     max_tokens: MaxTokens = None,
@@ -113,6 +118,7 @@ def synth(
         "learner": learner,
         "optimizer": optimizer,
         "base_url": base_url,
+        "key_over_http": key_over_http,
         "prompt": prompt,
         "max_output": MAX_OUTPUT_TOKENS if max_output is None else max_output,
     }

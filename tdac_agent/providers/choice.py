@@ -41,10 +41,12 @@ class Options:
     Attributes:
         setting: The task's, for providers that know the environments.
         base_url: Where its models are served, if not where they usually are.
+        key_over_http: Whether a key may go to another machine unencrypted.
     """
 
     setting: Setting
     base_url: str | None = None
+    key_over_http: bool = False
 
 
 Make = Callable[[str, Options], Provider]
@@ -57,6 +59,8 @@ def choose_models(
     optimizer: str | Provider | None,
     setting: Setting,
     base_url: str | None = None,
+    *,
+    key_over_http: bool = False,
 ) -> tuple[Provider, Provider]:
     """The Learner and the Optimizer; one and the same where they are named so.
 
@@ -65,6 +69,7 @@ def choose_models(
         optimizer: The same; None for the learner.
         setting: The task's.
         base_url: Of the models that are served somewhere.
+        key_over_http: As for `Options`.
 
     Raises:
         ProviderError: A name is unknown, or cannot be used.
@@ -72,7 +77,7 @@ def choose_models(
     named = [name for name in (learner, optimizer) if isinstance(name, str)]
     if base_url is not None:
         _check_url(base_url, named)
-    options = Options(setting, base_url)
+    options = Options(setting, base_url, key_over_http)
     first = choose_model(learner, options) if isinstance(learner, str) else learner
     if optimizer is None or optimizer == learner:
         return first, first

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import re
 import unicodedata
@@ -10,6 +11,7 @@ from urllib.parse import urlsplit, urlunsplit
 from tdac_agent.errors import ProviderError
 from tdac_agent.warm import SECRET
 
+NO_KEY = "none"
 SHORTEST_SECRET = 8
 LONGEST_LINE = 300
 
@@ -27,7 +29,21 @@ def read_key(variable: str, vendor: str, *, needed: bool) -> str:
         )
     if not key.isascii() or not key.isprintable() or " " in key:
         raise ProviderError(f"the value of {variable} is no key: it has odd characters")
-    return key or "none"
+    return key or NO_KEY
+
+
+def keeps_secrets(url: str | None) -> bool:
+    """Whether nobody on the way to a server can read along: https, or this machine."""
+    if url is None:
+        return True
+    parts = urlsplit(url)
+    host = parts.hostname or ""
+    if parts.scheme == "https" or host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def without_secrets(text: str) -> str:

@@ -13,7 +13,13 @@ from tdac_agent.errors import ProviderError
 from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.providers.patience import CONNECT_SECONDS, STALL_SECONDS, within
-from tdac_agent.providers.secrets import one_line, public_url, read_key
+from tdac_agent.providers.secrets import (
+    NO_KEY,
+    keeps_secrets,
+    one_line,
+    public_url,
+    read_key,
+)
 from tdac_envs.extras import install_command
 
 C = TypeVar("C")
@@ -45,19 +51,26 @@ class VendorModel(ABC, Generic[C]):
         model: Its id.
         base_url: Of the server; None for the vendor's own.
         stall: Seconds of silence after which the connection is given up.
+        key_over_http: Whether the key may go to another machine unencrypted.
     """
 
     vendor: ClassVar[Vendor]
     paid = True
 
     def __init__(
-        self, model: str, base_url: str | None, stall: float = STALL_SECONDS
+        self,
+        model: str,
+        base_url: str | None,
+        stall: float = STALL_SECONDS,
+        *,
+        key_over_http: bool = False,
     ) -> None:
         self.name = f"{self.vendor.package}:{model}"
         self._model = model
         self._base_url = base_url
         self.served_at = None if base_url is None else public_url(base_url)
         self._stall = stall
+        self._key_over_http = key_over_http
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -87,7 +100,7 @@ class VendorModel(ABC, Generic[C]):
             example = f"{vendor.package}:{vendor.example}"
             raise ProviderError(f"which model? As in {example}")
         base_url = options.base_url or os.environ.get(vendor.base_url) or None
-        return cls(words, base_url)
+        return cls(words, base_url, key_over_http=options.key_over_http)
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
@@ -121,4 +134,11 @@ class VendorModel(ABC, Generic[C]):
 
     def _read_key(self) -> str:
         vendor = self.vendor
-        return read_key(vendor.key, vendor.company, needed=self._base_url is None)
+        url = self._base_url
+        key = read_key(vendor.key, vendor.company, needed=url is None)
+        if key != NO_KEY and not (self._key_over_http or keeps_secrets(url)):
+            raise ProviderError(
+                f"the key in {vendor.key} would go unencrypted to {self.served_at}: "
+                "use https, unset the variable, or allow it with --key-over-http"
+            )
+        return key

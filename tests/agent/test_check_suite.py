@@ -247,8 +247,9 @@ def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
     (folder / "mine").mkdir()
     (folder / "mine" / "test_mine.py").write_text(IMPOSSIBLE)
     learner, out = Paid(good_source), tmp_path / "run"
+    task = load_task(folder, trust=True)
     with pytest.raises(Fault, match=r"own/test_mine\.py::test_flies: it took 3 steps"):
-        synthesize(load_task(folder), learner, out=out, judge=warm)
+        synthesize(task, learner, out=out, judge=warm)
     assert learner.calls == 0
     assert load_run(out).status == "fault"
     records = events(out)

@@ -446,10 +446,11 @@ def test_synth_writes_a_run(tdac, good):
 
 def test_synth_says_no(tdac, tmp_path):
     """Exit 1 where nothing was verified in K iterations."""
-    folder = write_small_task(tmp_path / "task", suite="mine", profile="policy")
+    folder = write_small_task(tmp_path / "task", profile="policy")
     (folder / "mine").mkdir()
     (folder / "mine" / "test_no.py").write_text("def test_no():\n    assert 0, 'no'\n")
-    code, out, _ = tdac("synth", "--task", folder, "-K", 1, "-J", 0)
+    suite = ("--suite", folder / "mine")
+    code, out, _ = tdac("synth", "--task", folder, *suite, "-K", 1, "-J", 0)
     assert code == 1
     assert "not verified after 1 iteration;" in out
     assert Path("runs/small-1/run.json").is_file()

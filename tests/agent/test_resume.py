@@ -245,9 +245,12 @@ def test_a_folder_knows_how_it_was_begun(tmp_path, name, warm):
 
 def test_resume_takes_no_other_flags(tdac, halted):
     """It goes on as it was begun; a folder without a run is one clear line."""
-    code, _, err = tdac("synth", "--resume", halted, "-K", 3, "--learner", "builtin")
+    code, _, err = tdac("synth", "--resume", halted, "-K", 3, "--out", "x")
     assert code == 2
-    assert "a run goes on as it was begun: leave out -K, --learner" in err
+    assert "a run goes on as it was begun: leave out -K, --out" in err
+    code, _, err = tdac("synth", "--resume", halted, "--learner", "builtin")
+    assert code == 2
+    assert "holds another run (learner " in err
     code, _, err = tdac("synth", "--resume", halted.parent)
     assert code == 2
     assert "is not a run folder" in err

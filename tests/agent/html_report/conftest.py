@@ -26,7 +26,8 @@ def runs(tmp_path_factory, good_source, warm):
     name = place / f"hostile {EVIL.replace('/', '')}"
     model = Model(CRASHES, CRASHES_LATER, HITS, HITS.replace("1.0", "0.9"))
     task = load_task(
-        write_small_task(place.parent / "evil", profile="policy", suite="../suite")
+        write_small_task(place.parent / "evil", profile="policy", suite="../suite"),
+        trust=True,
     )
     synthesize(task, model, out=name, iterations=2, patience=1, judge=warm)
     synthesize(

@@ -7,13 +7,16 @@ nothing may have run, and one line says what was wanted and how to allow it.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -163,7 +166,7 @@ def tests_of_a_task_for_synthesis(place: Place) -> list[str | Path]:
     return ["synth", "--task", place.run / "task.yaml", "-K", "1", "-J", "0"]
 
 
-@attack(SUITE)
+@attack(SUITE, works=False)
 def tests_of_a_run_that_goes_on(place: Place) -> list[str | Path]:
     place.set_suite("conftest.py", CONFTEST)
     place.change()
@@ -182,7 +185,8 @@ def program_as_learner(place: Place) -> list[str | Path]:
 @attack(r"run the program `touch .*` as its optimizer.* --optimizer .*--trust", code=2)
 def program_as_optimizer(place: Place) -> list[str | Path]:
     (place.run / "given.py").write_text(STILL)
-    place.change(optimizer=place.filled("command:touch @TARGET@/came"))
+    program = place.filled("command:touch @TARGET@/came")
+    place.change(optimizer=program, given_sha256=digest_of(STILL), max_tokens=10**6)
     return ["synth", "--resume", place.run]
 
 
@@ -226,12 +230,17 @@ def report_of_its_own(place: Place) -> list[str | Path]:
     folder = place.run / "iterations" / "k01" / "j0"
     (place.run / "given.py").write_text(STILL)
     report = Report.model_validate_json((folder / "report.json").read_bytes())
-    digest = __import__("hashlib").sha256(STILL.encode()).hexdigest()
+    digest = digest_of(STILL)
     about = report.provenance.model_copy(update={"controller_sha256": digest})
     forged = report.model_copy(update={"provenance": about})
     (folder / "report.json").write_text(forged.model_dump_json())
     place.change(given_sha256=digest, iterations=1, patience=0, max_tokens=12345)
     return ["synth", "--resume", place.run]
+
+
+def digest_of(text: str) -> str:
+    """Hash of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def campaign(place: Place, **fields: object) -> list[str | Path]:
@@ -289,7 +298,7 @@ def problems_of(one: Foreign, own: Path, place: Path, *, trust: bool) -> list[st
     with Canaries(str(place)) as canaries:
         words = one.build(Place(run, place / "target", canaries.port))
         words += ["--trust"] if trust else []
-        code, said = tdac(words, place)
+        code, said = tdac(words, place, lambda: any(canaries.touched().values()))
         reached = [name for name, sign in canaries.touched().items() if sign]
     if trust:
         return [] if bool(reached) == one.works else [f"reached {reached}: {said}"]
@@ -306,16 +315,25 @@ def problems_of(one: Foreign, own: Path, place: Path, *, trust: bool) -> list[st
     return found
 
 
-def tdac(words: list[str | Path], place: Path) -> tuple[int, str]:
-    """Exit code of a command, and all that it said."""
-    done = subprocess.run(
+def tdac(
+    words: list[str | Path], place: Path, enough: Callable[[], bool]
+) -> tuple[int, str]:
+    """Exit code of a command, which is interrupted when it is enough; what it said."""
+    process = subprocess.Popen(
         [sys.executable, "-m", "tdac_agent", *map(str, words)],
         cwd=place,
         env={**os.environ, KEY: "key-12345678", "OPENAI_API_KEY": "key-12345678"},
         stdin=subprocess.DEVNULL,
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
-        timeout=MOST_SECONDS,
-        check=False,
     )
-    return done.returncode, done.stdout + done.stderr
+    deadline = time.monotonic() + MOST_SECONDS
+    while True:
+        try:
+            said, _ = process.communicate(timeout=0.2)
+        except subprocess.TimeoutExpired:
+            if enough() or time.monotonic() > deadline:
+                process.send_signal(signal.SIGINT)
+        else:
+            return process.returncode, said
