@@ -101,6 +101,7 @@ class Provenance(_Record):
     """What the verdict is about."""
 
     task: str
+    called: str = Field("", description="The task in words, not by its name alone.")
     task_sha256: str
     unit: Place = Field("px", description="Of places and lengths.")
     left_out: tuple[str, ...] = Field(
@@ -112,6 +113,7 @@ class Provenance(_Record):
     controller_sha256: str
     suite: str
     suite_sha256: str
+    own_suite: str = Field("", description="Tests beside the shipped ones, in words.")
     profile: Literal["policy", "paper"]
     paper: bool = Field(description="Nominal start only.")
     seed: int

@@ -132,7 +132,7 @@ def asked_for(
     on_record = {
         "task": task,
         "learner": run.learner,
-        "optimizer": run.optimizer,
+        "optimizer": None if run.optimizer == run.learner else run.optimizer,
         "iterations": run.iterations,
         "patience": run.patience,
         "seed": run.seed,

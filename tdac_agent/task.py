@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import math
@@ -21,6 +22,7 @@ from tdac_agent.task_file import (
     TASK_FILE,
     TaskFile,
     bundled_task,
+    bundled_tasks,
     read_task_file,
 )
 from tdac_envs.intake import printable
@@ -149,6 +151,27 @@ def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:
     from tdac_agent.task_map2d import open_map
 
     return open_map(spec, base)
+
+
+def called(task: Task) -> str:
+    """A task in words: a bundled one by its name, others with what they are about.
+
+    Anybody's map may have the name of a bundled one, and its goal may be anywhere.
+    """
+    name, setting = task.name, task.setting
+    if name in bundled_tasks():
+        known = _bundled(name)
+        if known.sha256() == task.sha256():
+            return name
+        same = known.setting.world_sha256() == setting.world_sha256()
+        name += ", changed" if same else ", not the bundled one"
+    tolerance = setting.units.told(task.nominal.goal_tolerance)
+    return f"{name} (map {setting.world_sha256()[:8]}, goal within {tolerance})"
+
+
+@functools.cache
+def _bundled(name: str) -> Task:
+    return load_task(name)
 
 
 def write_workdir(folder: Path, task: Task) -> None:

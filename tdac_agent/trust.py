@@ -122,8 +122,7 @@ def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
     """
     if "learner" not in given and run.learner != OURS:
         yield Wish(asking("learner", run.learner), ("--learner", run.learner))
-    told = run.optimizer in {OURS, run.learner} and "learner" not in given
-    if "optimizer" not in given and run.optimizer != OURS and not told:
+    if "optimizer" not in given and run.optimizer not in {OURS, run.learner}:
         yield Wish(asking("optimizer", run.optimizer), ("--optimizer", run.optimizer))
     if run.base_url is not None and "base_url" not in given:
         what = f"send its questions, with your key, to {run.base_url}"

@@ -17,7 +17,7 @@ from tdac_agent.provenance import origin, sha256_of, versions
 from tdac_agent.report import OWN, SHIPPED, Provenance, Report
 from tdac_agent.report_log import read_findings, read_outcomes, verdict_of
 from tdac_agent.sandbox import Limits
-from tdac_agent.task import Task, lay_out
+from tdac_agent.task import Task, called, lay_out
 from tdac_agent.task_file import Profile
 from tdac_agent.trajectory import Trajectory, nominal_first
 from tdac_agent.trust import allowed
@@ -220,12 +220,24 @@ def _provenance(
 ) -> Provenance:
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
+        called=called(task),
+        own_suite=_own(suites),
         suite=" + ".join(folder.name for folder in suites.values()),
         suite_sha256=_hash(suites),
         profile=job.profile,
         paper=job.paper,
         seed=job.seed,
     )
+
+
+def _own(suites: dict[str, Path]) -> str:
+    """Name and hash of tests that are not shipped; empty without."""
+    own = suites.get(OWN)
+    return f"{own.name} {_hash_of(own)[:8]}" if own else ""
+
+
+def _hash_of(folder: Path) -> str:
+    return sha256_of(json.dumps(_suite_hash(folder), sort_keys=True).encode())
 
 
 def _hash(suites: dict[str, Path]) -> str:

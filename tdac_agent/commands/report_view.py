@@ -21,13 +21,19 @@ MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason: how many are named, and how many of more."""
 
 
-def show_report(report: Report, console: Console, out: Path | None = None) -> None:
+def show_report(
+    report: Report,
+    console: Console,
+    out: Path | None = None,
+    folder: Path | None = None,
+) -> None:
     """Prints the verdict, the failures with their diagnosis, and the episodes.
 
     Args:
         report: What to show.
         console: Where to.
         out: Folder to which the report and its pictures were written.
+        folder: Of the task's file, where it is not a bundled one.
     """
     verdict, about = report.verdict, report.provenance
     for warning in about.warnings:
@@ -48,10 +54,15 @@ def show_report(report: Report, console: Console, out: Path | None = None) -> No
     if out is not None:
         _show_files(out, console)
     colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
+    task = about.called or about.task
+    # Anybody's task may have any name.
+    task += f" of {folder}" if folder is not None and task != about.task else ""
+    own = f" with the tests of {about.own_suite}" if about.own_suite else ""
     console.print(
         f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
-        f"passed in {report.seconds:.1f} s  (task {escape(about.task)}, profile "
-        f"{about.profile}, sandbox {escape(about.sandbox)}, seed {about.seed})"
+        f"passed in {report.seconds:.1f} s  (task {escape(task)}, profile "
+        f"{about.profile}{escape(own)}, sandbox {escape(about.sandbox)}, "
+        f"seed {about.seed})"
     )
     if _lacks_names(report):
         console.print(

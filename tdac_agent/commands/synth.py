@@ -17,7 +17,7 @@ from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.records import Run, load_run
 from tdac_agent.resume import asked_for, check_own, run_there
 from tdac_agent.synthesis import synthesize
-from tdac_agent.task import Task
+from tdac_agent.task import Task, called
 from tdac_agent.task_file import TASK_FILE
 from tdac_agent.trust import allowed
 from tdac_agent.verification import read_source
@@ -140,8 +140,8 @@ def _heading(task: Task, learner: str, optimizer: str | None) -> str:
     if optimizer not in (None, learner):
         model += f", optimizer [bold]{escape(str(optimizer))}[/]"
     return (
-        f"task [bold]{escape(task.name)}[/]: {units.told(nominal.shortest)} for a disc "
-        f"of {radius:g} {units.length}, at most {nominal.horizon} steps; learner "
+        f"task [bold]{escape(called(task))}[/]: {units.told(nominal.shortest)} for a "
+        f"disc of {radius:g} {units.length}, at most {nominal.horizon} steps; learner "
         f"[bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
     )
 

@@ -68,7 +68,7 @@ def run(
         if junit is not None:
             write_junit(report, junit)
         if not as_json:
-            _show(report, out)
+            _show(report, out, task.folder)
         measured = None
         if robust.robust is not None and report.passed:
             from tdac_agent.commands.robust import measure
@@ -94,11 +94,11 @@ def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
         return controller_and_task(controller, flags)
 
 
-def _show(report: Report, out: Path | None) -> None:
+def _show(report: Report, out: Path | None, folder: Path | None) -> None:
     from tdac_agent.commands.console import Console
     from tdac_agent.commands.report_view import show_report
 
-    show_report(report, Console(), out)
+    show_report(report, Console(), out, folder)
 
 
 def _show_robust(measured: RobustReport | None, replay: list[str]) -> None:
