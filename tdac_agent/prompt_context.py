@@ -80,10 +80,11 @@ def _of_map(task: Task) -> dict[str, Any]:
     from tdac_agent.task_map2d import map_setting
     from tdac_envs.terrain import widest_connected_radius
 
-    nominal = map_setting(task.setting).nominal
+    setting = map_setting(task.setting)
+    nominal = setting.nominal
     terrain, grid = nominal.terrain, nominal.terrain.grid
     start = (nominal.start.x, nominal.start.y)
-    params = task.params.model_dump_json(indent=2, exclude=HOW_THE_MAP_WAS_MADE)
+    params = setting.params.model_dump_json(indent=2, exclude=HOW_THE_MAP_WAS_MADE)
     return {
         "params_text": params,
         "widest": widest_connected_radius(terrain.clear, start, nominal.goal),

@@ -119,8 +119,8 @@ def kept_report(
     """
     raw = source.encode("utf-8", "surrogatepass")
     try:
-        raw = read_file(folder / "report.json", RECORD_BYTES)
-        report = Report.model_validate(parse_json(raw))
+        told = read_file(folder / "report.json", RECORD_BYTES)
+        report = Report.model_validate(parse_json(told))
     except (OSError, ValueError):
         return None
     about = report.provenance
