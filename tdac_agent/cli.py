@@ -148,6 +148,8 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # To look for some, pydantic reads what every installed package says of itself.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # It writes names of files to stderr itself, past every filter.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     # It says at length where it keeps its fonts if it cannot write to a home.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     for number in (signal.SIGTERM, signal.SIGHUP):

@@ -160,13 +160,32 @@ def _reached_modules(tree: ast.Module) -> Iterator[str]:
     """Modules that are reached through an imported one, such as `random._os`."""
     imports = [n for n in nodes_of(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
     bound = {name for name, _ in _bindings([*imports])}
-    for node in nodes_of(tree):
-        if isinstance(node, ast.Attribute) and _is_hidden(node.attr):
-            root: ast.expr = node
-            while isinstance(root, ast.Attribute):
-                root = root.value
-            if isinstance(root, ast.Name) and root.id in bound:
-                yield f"line {node.lineno}: use of {ast.unparse(node)}"
+    inner: set[ast.expr] = set()
+    for node in nodes_of(tree):  # the longest form of a name comes first
+        if isinstance(node, ast.Attribute) and node not in inner:
+            root, hidden = _taken_apart(node, inner)
+            if hidden is not None and isinstance(root, ast.Name) and root.id in bound:
+                between = "." if hidden.value is root else "…"
+                yield f"line {node.lineno}: use of {root.id}{between}{hidden.attr}"
+
+
+def _taken_apart(
+    node: ast.Attribute, inner: set[ast.expr]
+) -> tuple[ast.expr, ast.Attribute | None]:
+    """What a name with dots begins with, and the first hidden module in it.
+
+    Args:
+        node: The name.
+        inner: Gets its parts, which are names with dots, too.
+    """
+    root: ast.expr = node
+    hidden = None
+    while isinstance(root, ast.Attribute):
+        if _is_hidden(root.attr):
+            hidden = root
+        inner.add(root)
+        root = root.value
+    return root, hidden
 
 
 def calls_in(*nodes: ast.AST) -> set[str]:
@@ -187,8 +206,10 @@ def has_main_guard(tree: ast.Module) -> bool:
 def _is_main_test(test: ast.expr) -> bool:
     if not (isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Eq)):
         return False
-    sides = {ast.unparse(side) for side in (test.left, *test.comparators)}
-    return sides == {"__name__", "'__main__'"}
+    sides = [test.left, *test.comparators]
+    names = [side.id for side in sides if isinstance(side, ast.Name)]
+    values = [side.value for side in sides if isinstance(side, ast.Constant)]
+    return len(sides) == 2 and names == ["__name__"] and values == ["__main__"]
 
 
 def positional_arity(function: ast.FunctionDef) -> tuple[int, int]:

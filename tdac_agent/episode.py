@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_agent.plain import shown
 from tdac_agent.sandbox import (
     Child,
     ControllerFault,
@@ -162,9 +163,7 @@ def as_wheels(action: Any) -> NDArray[np.float32] | None:
 
 def wrong_action(action: Any) -> str:
     """Says what is wrong with an answer of `policy`, in bounded length."""
-    text = repr(action)
-    text = text if len(text) <= 80 else f"{text[:77]}..."
-    return f"policy must return two finite numbers (left, right), got {text}"
+    return f"policy must return two finite numbers (left, right), got {shown(action)}"
 
 
 def run_policy(

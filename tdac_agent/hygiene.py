@@ -23,6 +23,8 @@ SAVERS = frozenset(
         *("dump", "open_memmap", "write_text", "write_bytes"),
     ]
 )
+# A longer name is no module that draws random numbers, and may take long to spell.
+MOST_DOTS = 3
 SURFACES = frozenset({"surface", "screen", "window", "map_img", "display"})
 
 
@@ -141,10 +143,14 @@ def _is_none(node: ast.expr) -> bool:
 
 
 def _spelled(node: ast.expr) -> str:
-    """A name with dots, such as `np.random`; else an empty text."""
-    if isinstance(node, ast.Attribute):
-        return f"{_spelled(node.value)}.{node.attr}"
-    return node.id if isinstance(node, ast.Name) else ""
+    """A name with up to three dots, such as `np.random`; else an empty text."""
+    names: list[str] = []
+    while isinstance(node, ast.Attribute) and len(names) < MOST_DOTS:
+        names.append(node.attr)
+        node = node.value
+    if not isinstance(node, ast.Name):
+        return ""
+    return ".".join([node.id, *reversed(names)])
 
 
 def _random_modules(tree: ast.Module) -> set[str]:

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Generator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -32,6 +32,7 @@ from tdac_agent.suite_episode import (
     skipped,
 )
 from tdac_agent.task import Task
+from tdac_agent.time_limit import time_limit
 from tdac_agent.trajectory import Rollout
 from tdac_agent.turns import Turns
 from tdac_envs.task2d import Pose
@@ -64,6 +65,7 @@ class Judge:
         nursery: Where children are started ahead; one of its own by default.
         crew: Processes that drive; of its own by default, forked now.
         at_a_time: How many episodes may go on side by side.
+        wall_seconds: How long all of it may take.
 
     Attributes:
         tier: Name of the tier that was used.
@@ -83,6 +85,7 @@ class Judge:
         nursery: Nursery | None = None,
         crew: SuiteCrew | None = None,
         at_a_time: int = min(SIZE, EPISODES),
+        wall_seconds: float = WALL_SECONDS,
     ) -> None:
         self.task = task
         self.source = source
@@ -91,7 +94,8 @@ class Judge:
         self.fault: str | None = None
         self._seed = seed
         self._limits = limits or Limits()
-        self._deadline = time.monotonic() + WALL_SECONDS
+        self._deadline = time.monotonic() + wall_seconds
+        self._too_long = f"the verification took longer than {wall_seconds:g} s"
         self._brief = Brief(source, workdir, tier, self._limits, self._deadline)
         self._own = ExitStack()
         if nursery is None:
@@ -127,6 +131,10 @@ class Judge:
             with self._ours():
                 self._unit = Unit(self._loaded(), self._deadline, self._ours)
         return self._unit
+
+    def time_limit(self) -> AbstractContextManager[None]:
+        """Ends a test when the verification has taken too long."""
+        return time_limit(self._deadline, self._too_long)
 
     def call_may_pass(self) -> bool:
         """Whether the latest call took too long, and maybe by the machine's doing.
@@ -333,9 +341,7 @@ class Judge:
         if self.cpu_seconds >= self._limits.cpu_seconds:
             raise ControllerFault(f"the controller {self._overspent()}", "import")
         if time.monotonic() > self._deadline:
-            raise ControllerFault(
-                f"the verification took longer than {WALL_SECONDS:g} s", "import"
-            )
+            raise ControllerFault(self._too_long, "import")
 
     def _remember(self, fault: ControllerFault, *, final: bool) -> None:
         """An import that failed is not tried again, unless it may pass."""

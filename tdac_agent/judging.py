@@ -64,7 +64,7 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
     # What a controller returned is told in messages, and may be long.
-    np.set_printoptions(threshold=16, edgeitems=2)
+    np.set_printoptions(threshold=16, edgeitems=1)
     if nursery is None:
         nursery = Nursery()
         _rehearse()

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import re
+import reprlib
+from typing import Any
 
 MAX_MESSAGE = 300
+MAX_VALUE = 80
+"""Characters of a value that is quoted."""
 MARK = "\N{REPLACEMENT CHARACTER}"
 # Python calls none of these printable; line ends, tabs, and spaces that people write.
 _KEPT = frozenset("\n\t\u00a0\u2009\u202f\u3000")
@@ -27,6 +31,31 @@ def printable(text: str) -> str:
 def one_line(text: str) -> str:
     """The printable text in one line: no part of it can look like a line of ours."""
     return " ".join(printable(text).split())
+
+
+class _Short(reprlib.Repr):
+    """Looks at the first items of each collection only, and not far into it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel = 3
+        self.maxstring = self.maxlong = self.maxother = MAX_VALUE
+
+    def repr_bytes(self, value: bytes, _: int) -> str:
+        """The first of many."""
+        return repr(value[:MAX_VALUE])
+
+    def repr_ndarray(self, value: Any, _: int) -> str:
+        """A small array whole, of another what it is."""
+        if value.size <= 16:
+            return repr(value)
+        return f"array of shape {value.shape} and type {value.dtype}"
+
+
+def shown(value: object, most: int = MAX_VALUE) -> str:
+    """What a value looks like, in so many characters; none costs much to describe."""
+    text = printable(_Short().repr(value))
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def plain(message: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,8 @@ UNUSED_PLUGINS = (
     "faulthandler",
     "legacypath",
 )
+# Of a traceback, of which only the end is told.
+MOST_CALLS = 50
 
 
 class JudgePlugin:
@@ -58,14 +61,29 @@ class JudgePlugin:
         items[:] = sorted(chosen, key=lambda i: GROUPS.index(group_of(id_of(i.nodeid))))
         self.expected = [id_of(item.nodeid) for item in items]
 
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_setup(self) -> Generator[None]:
+        """Ends what a test prepares when the verification has taken too long."""
+        with self._judge.time_limit():
+            return (yield)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self) -> Generator[None]:
+        """The same for the test itself, and for what it says."""
+        with self._judge.time_limit():
+            return (yield)
+
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
         """Cuts what an error says, before a report takes it apart line by line.
 
-        A message may quote megabytes that a controller returned.
+        A message may quote megabytes that a controller returned, and a source that is
+        nested deeply gives a traceback of many calls.
         """
         error = None if call.excinfo is None else call.excinfo.value
-        while error is not None:
+        known: set[int] = set()
+        while error is not None and id(error) not in known:
+            known.add(id(error))
             _shorten(error)
             error = error.__cause__ or error.__context__
 
@@ -85,6 +103,11 @@ class JudgePlugin:
 
 
 def _shorten(error: BaseException) -> None:
+    call = error.__traceback__
+    for _ in range(MOST_CALLS):
+        call = call and call.tb_next
+    if call is not None:
+        call.tb_next = None
     text = str(error)
     if len(text) > MAX_MESSAGE:
         error.args = (f"{text[:MAX_MESSAGE]} …",)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tdac_agent import contract, hygiene
+from tdac_agent.plain import shown
 
 SCHEMA_STEPS = 50
 
@@ -127,12 +128,12 @@ def check_claims(episode, task, where=""):
         f"{length}/s"
     )
     assert result["collisions"] == record.collisions, (
-        f"collisions is {result['collisions']}, on record are {record.collisions}"
-        f"{where}"
+        f"collisions is {shown(result['collisions'])}, on record are "
+        f"{record.collisions}{where}"
     )
-    assert math.isclose(result["dt"], record.dt), f"dt is {result['dt']}"
+    assert math.isclose(result["dt"], record.dt), f"dt is {shown(result['dt'])}"
     goal = tuple(float(v) for v in result["goal"])
-    assert np.allclose(goal, task.nominal.goal), f"goal is {goal}"
+    assert np.allclose(goal, task.nominal.goal), f"goal is {shown(goal)}"
 
 
 @pytest.mark.parametrize("steps", [10, 50])
@@ -207,7 +208,7 @@ def check_path(oracle, case, path, is_point):
     assert path, f"{case.name}: [], but a path of {case.length:.1f} px exists"
     assert all(map(is_point, path)), f"{case.name}: points must be (int, int)"
     ends = (path[0], path[-1])
-    assert ends == (case.start, case.goal), f"{case.name}: runs {ends}"
+    assert ends == (case.start, case.goal), f"{case.name}: runs {shown(ends)}"
     error = oracle.path_error(case.occ, path)
     assert error is None, f"{case.name}: {error}"
     length = oracle.path_length(path)

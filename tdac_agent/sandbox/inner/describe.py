@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from types import TracebackType
 
 from .wire import MAX_NAME, MAX_TEXT, RemoteError, printable
@@ -14,15 +15,14 @@ MAX_LINE = 160
 def describe(error: BaseException, source: str) -> RemoteError:
     """Return name, message, and where in the controller `error` was raised."""
     try:
-        frames = _own_frames(error.__traceback__)
+        first, left_out, last = _own_frames(error.__traceback__)
         if isinstance(error, SyntaxError) and error.filename == FILE_NAME:
-            frames.append((error.lineno or 0, "<module>"))
+            last.append((error.lineno or 0, "<module>"))
         lines = source.splitlines()
-        texts = [_frame_text(number, name, lines) for number, name in frames]
-        if len(texts) > MAX_LINES:
-            half = MAX_LINES // 2
-            texts[half:-half] = [f"  ... {len(texts) - MAX_LINES} more ..."]
-        line = frames[-1][0] if frames else 0
+        texts = [_frame_text(*frame, lines) for frame in (*first, *last)]
+        if left_out:
+            texts.insert(len(first), f"  ... {left_out} more ...")
+        line = (last or first or [(0, "")])[-1][0]
         return RemoteError(
             type_name(error),
             _message(error),
@@ -47,14 +47,22 @@ def _message(error: BaseException) -> str:
         return "(its text cannot be read)"
 
 
-def _own_frames(traceback: TracebackType | None) -> list[tuple[int, str]]:
-    frames = []
+def _own_frames(
+    traceback: TracebackType | None,
+) -> tuple[list[tuple[int, str]], int, deque[tuple[int, str]]]:
+    """Return the first frames, how many are left out, and the last, of any number."""
+    half = MAX_LINES // 2
+    first: list[tuple[int, str]] = []
+    last: deque[tuple[int, str]] = deque(maxlen=half)
+    left_out = 0
     while traceback is not None:
         code = traceback.tb_frame.f_code
         if code.co_filename == FILE_NAME:
-            frames.append((traceback.tb_lineno, code.co_name))
+            left_out += len(last) == half
+            kept = first if len(first) < half else last
+            kept.append((traceback.tb_lineno, code.co_name))
         traceback = traceback.tb_next
-    return frames
+    return first, left_out, last
 
 
 def _frame_text(number: int, name: str, lines: list[str]) -> str:

@@ -27,7 +27,8 @@ ODD_KEY = 10
 ARRAY_ITEMS = 10
 # Below CPython's limit of 4300 decimal digits, so that every int can be printed.
 MAX_INT_BYTES = 1024
-MAX_DIMENSIONS = 8
+# One of more dimensions is printed with many of its items, however few of each.
+MAX_DIMENSIONS = 4
 # Characters of a name, and of any other text about an exception.
 MAX_NAME, MAX_TEXT = 200, 2000
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from tdac_agent.plain import shown
 from tdac_agent.suites.every_task import check_path
 from tdac_agent.world_oracle import occupied_at
 
@@ -23,10 +24,10 @@ def cases(oracle, task):
 
 def numbers(value, count, name):
     """A tuple, list or array of so many finite numbers, as floats."""
-    assert isinstance(value, list | tuple | np.ndarray), f"{name} is {value!r}"
+    assert isinstance(value, list | tuple | np.ndarray), f"{name} is {shown(value)}"
     assert len(value) == count, f"{name} has {len(value)} numbers, not {count}"
     found = [float(v) for v in value]
-    assert all(map(math.isfinite, found)), f"{name} is {value!r}: not finite"
+    assert all(map(math.isfinite, found)), f"{name} is {shown(value)}: not finite"
     return found
 
 
@@ -51,18 +52,18 @@ def test_robot_constants(controller, task):
     }
     for name, value in expected.items():
         found = controller.constant(name)
-        assert isinstance(found, int | float), f"{name} is {found!r}, not a number"
+        assert isinstance(found, int | float), f"{name} is {shown(found)}, not a number"
         assert math.isclose(found, value, rel_tol=1e-6), (
-            f"{name} = {found}, not {value:g}"
+            f"{name} = {shown(found)}, not {value:g}"
         )
 
 
 def test_file_constant(controller):
     """`WORLD_FILE` names the world of the working folder."""
     value = controller.constant("WORLD_FILE")
-    assert isinstance(value, str), f"WORLD_FILE is {value!r}, not a file name"
+    assert isinstance(value, str), f"WORLD_FILE is {shown(value)}, not a file name"
     base = value.replace("\\", "/").rsplit("/", 1)[-1]
-    assert base == "world.wbt", f"WORLD_FILE = {value!r}, expected 'world.wbt'"
+    assert base == "world.wbt", f"WORLD_FILE = {shown(value)}, expected 'world.wbt'"
 
 
 def test_parse_world(controller, cases):

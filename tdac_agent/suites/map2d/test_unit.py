@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tdac_agent.plain import shown
 from tdac_agent.suites.every_task import check_path
 
 pytestmark = pytest.mark.paper
@@ -38,9 +39,9 @@ def test_robot_constants(controller, task):
     }
     for name, value in expected.items():
         found = controller.constant(name)
-        assert isinstance(found, int | float), f"{name} is {found!r}, not a number"
+        assert isinstance(found, int | float), f"{name} is {shown(found)}, not a number"
         assert math.isclose(found, value, rel_tol=1e-6), (
-            f"{name} = {found}, not {value}"
+            f"{name} = {shown(found)}, not {value}"
         )
 
 
@@ -49,7 +50,7 @@ def test_tuning_constants(controller, name):
     """The tuning constants are numbers that are not negative."""
     value = controller.constant(name)
     good = isinstance(value, int | float) and math.isfinite(value) and value >= 0
-    assert good, f"{name} is {value!r}, not a number of at least 0"
+    assert good, f"{name} is {shown(value)}, not a number of at least 0"
 
 
 @pytest.mark.parametrize("name", ["MAP_IMG", "PARAMS_JSON", "ROBOT_IMG"])
@@ -57,9 +58,9 @@ def test_file_constants(controller, name):
     """The file constants name a file of the working folder."""
     known = {"occupancy.png", "occupancy.npy", "params.json", "robot.png"}
     value = controller.constant(name)
-    assert isinstance(value, str), f"{name} is {value!r}, not a file name"
+    assert isinstance(value, str), f"{name} is {shown(value)}, not a file name"
     base = value.replace("\\", "/").rsplit("/", 1)[-1]
-    assert base in known, f"{name} = {value!r}, expected one of {', '.join(known)}"
+    assert base in known, f"{name} = {shown(value)}, expected one of {', '.join(known)}"
 
 
 def test_is_occupied_inside(small_map):
@@ -69,7 +70,9 @@ def test_is_occupied_inside(small_map):
     answers = own.call_each("is_occupied", pixels)
     assert len(answers) == len(pixels), f"{len(answers)} answers to {len(pixels)}"
     for (x, y), found in zip(pixels, answers, strict=True):
-        assert found == occ[y, x], f"is_occupied({x}, {y}) is {found}, not {occ[y, x]}"
+        assert found == occ[y, x], (
+            f"is_occupied({x}, {y}) is {shown(found)}, not {occ[y, x]}"
+        )
 
 
 def test_is_occupied_returns_bool(small_map):
@@ -86,7 +89,7 @@ def test_is_occupied_outside(small_map):
     _, own = small_map
     for x, y in ((-1, 0), (0, -1), (37, 0), (0, 23), (-37, -23), (22, 36), (10**6, 3)):
         found = own.call("is_occupied", x, y)
-        assert found, f"is_occupied({x}, {y}) outside a 37 x 23 map is {found}"
+        assert found, f"is_occupied({x}, {y}) outside a 37 x 23 map is {shown(found)}"
 
 
 def test_nearest_free_of_a_free_pixel(controller, small_map):
@@ -95,7 +98,7 @@ def test_nearest_free_of_a_free_pixel(controller, small_map):
     for y, x in np.argwhere(~occ)[::40].tolist():
         for reach in (10, 0):
             found = controller.call("nearest_free", own, x, y, reach)
-            assert is_int_pair(found), f"nearest_free is {found!r}, not (int, int)"
+            assert is_int_pair(found), f"nearest_free is {shown(found)}, not (int, int)"
             assert found == (x, y), f"nearest_free({x}, {y}, {reach}) is {found}: free"
 
 
@@ -106,7 +109,7 @@ def test_nearest_free_is_nearest(controller, oracle):
     for y, x in np.argwhere(occ)[::60].tolist():
         best = oracle.nearest_free_distance(occ, x, y)
         found = controller.call("nearest_free", own, x, y, math.ceil(best))
-        assert is_int_pair(found), f"nearest_free returned {found!r}, not (int, int)"
+        assert is_int_pair(found), f"nearest_free is {shown(found)}, not (int, int)"
         fx, fy = found
         inside = 0 <= fx < 40 and 0 <= fy < 30
         assert inside, f"nearest_free({x}, {y}) is {found}: outside the map"
@@ -125,7 +128,7 @@ def test_nearest_free_at_the_end_of_its_reach(controller):
         own = controller.call("OccMap2D", occ)
         found = controller.call("nearest_free", own, 15, 10, 5)
         only = (15 + dx, 10 + dy)
-        assert found == only, f"nearest_free(15, 10, 5) is {found}, not {only}"
+        assert found == only, f"nearest_free(15, 10, 5) is {shown(found)}, not {only}"
 
 
 def test_nearest_free_raises(controller):

@@ -162,7 +162,9 @@ ODD = "\ud800 \x1b[2J \u202e \x00 \n"
 def test_whatever_a_controller_raises_can_be_sent(text):
     """The child itself describes an exception so that the wire carries it."""
     kind = type("E", (Exception,), {})
-    kind.__name__ = text.replace("\0", "") + 300 * "n"
+    kind.__name__ = (
+        text.replace("\0", "").encode("utf-8", "replace").decode() + 300 * "n"
+    )
     for message in (text, 3000 * ODD):
         described = describe(kind(message), "")
         assert decode(encode(described)) == described
