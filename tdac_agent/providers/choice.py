@@ -75,7 +75,7 @@ def choose_models(
         ProviderError: A name is unknown, or cannot be used.
     """
     named = [name for name in (learner, optimizer) if isinstance(name, str)]
-    if base_url is not None:
+    if base_url is not None and named:  # others have been made with theirs
         _check_url(base_url, named)
     options = Options(setting, base_url, key_over_http)
     first = choose_model(learner, options) if isinstance(learner, str) else learner

@@ -102,14 +102,15 @@ class Foreign:
         build: Makes it, and gives the words of the command.
         wants: Pattern of what the refusal says is wanted, and of what allows it.
         code: Exit code that is expected.
-        works: Whether it reaches its aim with `--trust`.
+        works: Whether it reaches its aim with `--trust`; None where there is no
+            such flag, since nothing of it is ever used.
     """
 
     name: str
     build: Build
     wants: str
     code: int = 2
-    works: bool = True
+    works: bool | None = True
 
 
 ATTACKS: list[Foreign] = []
@@ -238,6 +239,26 @@ def report_of_its_own(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
+def looks(*words: str) -> None:
+    """Adds a command that reads a run in which everything is hostile."""
+
+    def build(place: Place) -> list[str | Path]:
+        program = place.filled("command:touch @TARGET@/came")
+        (place.run / "prompt.j2").write_text(place.filled(TEMPLATE))
+        place.set_suite("conftest.py", CONFTEST)
+        place.change(learner=program, optimizer=program, prompt="mine.j2")
+        return [place.run if word == "RUN" else word for word in words]
+
+    ATTACKS.append(Foreign(f"all_of_a_run_in_{words[0]}", build, "", 0, works=None))
+
+
+looks("report", "RUN")
+looks("rules", "RUN")
+looks("runs", ".")
+looks("evaluate", "RUN", "--task", "RUN", "--episodes", "1")
+looks("synth", "--task", "maze", "--learner", "replay:run", "--dry-run")
+
+
 def digest_of(text: str) -> str:
     """Hash of a text."""
     return hashlib.sha256(text.encode()).hexdigest()
@@ -255,13 +276,13 @@ def campaign(place: Place, **fields: object) -> list[str | Path]:
 @attack(r"run the program `touch .*` as its model: .*--trust")
 def program_of_a_campaign(place: Place) -> list[str | Path]:
     program = place.filled("command:touch @TARGET@/came")
-    return campaign(place, learners=[program], max_tokens=100_000)
+    return campaign(place, learners=[program], max_tokens=10**6)
 
 
 @attack(r"send its questions, with your key, to http://127.*: .*--trust")
 def server_of_a_campaign(place: Place) -> list[str | Path]:
     url = f"http://127.0.0.1:{place.tcp}/v1"
-    return campaign(place, learners=["openai:m"], base_url=url, max_tokens=100_000)
+    return campaign(place, learners=["openai:m"], base_url=url, max_tokens=10**6)
 
 
 @attack(r"fill in the template \S+ \(sha256 .*--trust", works=False)

@@ -1,5 +1,7 @@
 """Judges the whole zoo and prints a table; exit 1 where a verdict is not as expected.
 
+After the controllers come the folders and files of somebody else's.
+
 python tests/agent/zoo/run.py [NAME ...] [--kind KIND] [--tier TIER] [--core]
 """
 
@@ -11,18 +13,22 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
+from pathlib import Path
 from queue import SimpleQueue
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
 from cases import Case, all_cases, tiers_of, working_tiers
 from enclosure import Enclosure, Result, differences
+from foreign import ATTACKS, Foreign, make_own_run, problems_of
 from grounds import KINDS, zoo_task
 from rich.console import Console
 from rich.table import Table
 
 # One more than the least machine has processors: some attacks only wait.
 WORKERS = 3
+FOREIGN = "foreign"
 Job = tuple[Case, str]
 Told = dict[tuple[str, str], list[tuple[Result, bool]]]
 CONSOLE = Console(width=100, highlight=False)
@@ -30,7 +36,9 @@ CONSOLE = Console(width=100, highlight=False)
 
 def main(
     names: Annotated[list[str] | None, typer.Argument(help="All by default.")] = None,
-    kind: Annotated[str | None, typer.Option(help="Only this kind of task.")] = None,
+    kind: Annotated[
+        str | None, typer.Option(help="Only this kind of task, or `foreign` files.")
+    ] = None,
     tier: Annotated[str | None, typer.Option(help="Only on this one.")] = None,
     core: Annotated[bool, typer.Option(help="Only what is judged on all.")] = False,
     workers: Annotated[int, typer.Option(help="Verifications at a time.")] = WORKERS,
@@ -41,8 +49,11 @@ def main(
         raise typer.BadParameter(
             f"expected one that works here ({works}), got {tier!r}"
         )
-    if kind not in (None, *KINDS):
-        raise typer.BadParameter(f"expected one of {', '.join(KINDS)}, got {kind!r}")
+    if kind not in (None, *KINDS, FOREIGN):
+        known = ", ".join((*KINDS, FOREIGN))
+        raise typer.BadParameter(f"expected one of {known}, got {kind!r}")
+    if kind == FOREIGN:
+        raise typer.Exit(1 if wrong_foreign(workers) else 0)
     cases = chosen_cases(names or [], [kind] if kind else list(KINDS))
     cases = [case for case in cases if case.every_tier or not core]
     jobs = [(case, t) for case in cases for t in tiers_of(case) if tier in (None, t)]
@@ -65,7 +76,31 @@ def main(
         f"{len(cases)} controllers, {len(jobs)} verdicts, {len(late)} of them at the "
         f"second try, {wrong} not as expected, {time.monotonic() - began:.0f} s"
     )
+    # They never come as far as a sandbox.
+    if not names and kind is None and tier is None:
+        wrong += wrong_foreign(workers)
     raise typer.Exit(1 if wrong or not jobs else 0)
+
+
+def wrong_foreign(workers: int) -> int:
+    """Tries what comes from somebody else; how much of it is not as expected."""
+    wrong = 0
+    with TemporaryDirectory() as name, ThreadPoolExecutor(workers) as pool:
+        folder = Path(name).resolve()
+        own = make_own_run(folder / "own")
+
+        def tried(one: Foreign) -> tuple[Foreign, list[str]]:
+            (folder / one.name).mkdir()
+            return one, problems_of(one, own, folder / one.name, trust=False)
+
+        for one, problems in pool.map(tried, ATTACKS):
+            wrong += bool(problems)
+            mark = "  <-- not as expected" if problems else ""
+            CONSOLE.print(f"{FOREIGN}/{one.name:40} exit {one.code}{mark}")
+            for problem in problems:
+                CONSOLE.print(f"    {problem[:600]}", markup=False)
+    CONSOLE.print(f"{len(ATTACKS)} {FOREIGN} files, {wrong} not as expected")
+    return wrong
 
 
 def chosen_cases(names: list[str], kinds: list[str]) -> list[Case]:

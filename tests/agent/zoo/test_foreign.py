@@ -27,8 +27,11 @@ def test_nothing_runs_and_a_line_says_what_was_wanted(one, own, tmp_path):
     assert problems_of(one, own, tmp_path, trust=False) == []
 
 
+ALLOWED = [one for one in ATTACKS if one.works is not None]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("one", ATTACKS, ids=lambda one: one.name)
+@pytest.mark.parametrize("one", ALLOWED, ids=lambda one: one.name)
 def test_it_works_with_trust(one, own, tmp_path):
     """So the attack is one; a template computes nothing even then."""
     assert problems_of(one, own, tmp_path, trust=True) == []
