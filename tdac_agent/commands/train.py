@@ -39,6 +39,7 @@ def run(
     steps: int | None,
     out: Path | None,
     resume: Path | None,
+    trust: bool,
     as_json: bool,
 ) -> int:
     """Trains and prints; returns the exit code: 1 where nothing was learnt.
@@ -48,6 +49,7 @@ def run(
         steps: Of training.
         out: Folder; the next free one by default.
         resume: Folder of a training to go on with.
+        trust: Whether its checkpoint may be loaded, whoever wrote it.
         as_json: Whether to print JSON.
     """
     console = Console(stderr=as_json)
@@ -65,7 +67,7 @@ def run(
     with Progress(*columns, console=console, transient=True) as bar:
         watch = _Watch(bar, console, plan)
         try:
-            points = train(plan, folder, watch)
+            points = train(plan, folder, watch, trust=trust)
         except KeyboardInterrupt:
             told = f"go on: tdac train --resume {shlex.quote(str(folder))}"
             console.print(escape(told), soft_wrap=True)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.commands.options import Json
+from tdac_agent.commands.options import Json, Trust
 
 app = typer.Typer()
 TRAINING, DISTURBED = "Training", "Variation and noise"
@@ -122,6 +122,7 @@ def train(
             rich_help_panel=DISTURBED,
         ),
     ] = None,
+    trust: Trust = False,
     as_json: Json = False,
 ) -> None:
     """Train a baseline with stable-baselines3 on the same tasks."""
@@ -145,4 +146,4 @@ def train(
         **noise,
     }
     flags = {name: value for name, value in given.items() if value is not None}
-    raise typer.Exit(command.run(flags, steps, out, resume, as_json))
+    raise typer.Exit(command.run(flags, steps, out, resume, trust, as_json))

@@ -6,8 +6,6 @@ Needs the extra `tdac[sb3]`: import it where it is used.
 from __future__ import annotations
 
 import importlib.util
-import io
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -21,14 +19,13 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor
 
 from tdac_agent.errors import RunError
-from tdac_agent.files import write_atomic
 from tdac_agent.training.curve import Point, read_curve, write_curve
 from tdac_agent.training.hyperparameters import model_arguments
 from tdac_agent.training.plan import TrainingPlan, make_batch
 from tdac_agent.training.policy_files import write_policy
+from tdac_agent.training.vouched import CHECKPOINT, REPLAY, put
 
 ALGOS = {"ppo": PPO, "sac": SAC, "td3": TD3}
-CHECKPOINT, REPLAY = "checkpoint.zip", "replay.pkl"
 EVALUATION_SEED = 1_000_000
 """Added to a training's seed; `tdac evaluate` draws other episodes."""
 Watch = Callable[[int, Point | None, Point | None], None]
@@ -196,7 +193,7 @@ def _write_checkpoint(model: Any, folder: Path) -> None:
     if hasattr(model, "replay_buffer"):
         draft = folder / f".{REPLAY}"
         model.save_replay_buffer(draft)
-        os.replace(draft, folder / REPLAY)
-    content = io.BytesIO()
-    model.save(content)
-    write_atomic(folder / CHECKPOINT, content.getvalue())
+        put(draft, folder / REPLAY)
+    draft = folder / f".{CHECKPOINT}"
+    model.save(draft)
+    put(draft, folder / CHECKPOINT)

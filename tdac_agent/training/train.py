@@ -9,6 +9,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.locks import LOCK_FILE, hold
 from tdac_agent.training.curve import PLAN_FILE, Point
 from tdac_agent.training.plan import TrainingPlan, read_plan, write_plan
+from tdac_agent.training.vouched import check
 from tdac_envs.errors import TaskError
 from tdac_envs.extras import install_command
 
@@ -16,7 +17,13 @@ if TYPE_CHECKING:
     from tdac_agent.training.learning import Watch
 
 
-def train(plan: TrainingPlan, folder: Path, watch: Watch | None = None) -> list[Point]:
+def train(
+    plan: TrainingPlan,
+    folder: Path,
+    watch: Watch | None = None,
+    *,
+    trust: bool = False,
+) -> list[Point]:
     """Trains, and leaves the best policy and its learning curve in a folder.
 
     Where the folder has the same training already, interrupted or killed, it goes on
@@ -26,11 +33,13 @@ def train(plan: TrainingPlan, folder: Path, watch: Watch | None = None) -> list[
         plan: See `make_plan`.
         folder: Is made if it is missing.
         watch: Told the steps so far, new evaluations, and the best one.
+        trust: Whether a checkpoint may be loaded that was not written here.
 
     Returns:
         The learning curve.
 
     Raises:
+        NotTrustedError: The checkpoint was not written here.
         RunError: The folder holds another training or something else, or cannot be
             used, or another process trains in it.
         TaskError: The extra is missing, or a task has changed.
@@ -42,6 +51,7 @@ def train(plan: TrainingPlan, folder: Path, watch: Watch | None = None) -> list[
     with hold(folder / LOCK_FILE) as held:
         if not held:
             raise RunError(f"another process trains in {folder}")
+        check(folder, trust=trust)
         return learn(plan, folder, watch or (lambda *_: None))
 
 

@@ -1,11 +1,15 @@
 """Training of baselines: what it leaves, how it goes on, what it refuses."""
 
+import base64
 import csv
 import json
+import os
+import pickle
 import re
 import signal
 import subprocess
 import sys
+import zipfile
 from dataclasses import replace
 from itertools import pairwise
 
@@ -152,6 +156,40 @@ def test_a_finished_training_goes_on_to_another_end(tmp_path, small, config):
     assert (tmp_path / "out" / "checkpoint.zip").read_bytes() == before
     with pytest.raises(RunError, match="holds another training"):
         train(make_plan((small,), steps=512, seed=1, **given), tmp_path / "out")
+
+
+class Evil:
+    """Runs a command where it is loaded."""
+
+    def __init__(self, canary):
+        self.canary = canary
+
+    def __reduce__(self):
+        return os.system, (f"touch {self.canary}",)
+
+
+@pytest.mark.parametrize("name", ["checkpoint.zip", "replay.pkl"])
+def test_a_foreign_checkpoint_is_not_loaded(tmp_path, small, config, name, tdac):
+    """It may run anything: one line, unless it is trusted; then the attack works."""
+    out, canary = tmp_path / "out", tmp_path / "canary"
+    plan = make_plan((small,), "sac", steps=64, episodes=2, config=config("sac"))
+    train(plan, out)
+    if name == "replay.pkl":
+        (out / name).write_bytes(pickle.dumps(Evil(canary)))
+    else:
+        evil = base64.b64encode(pickle.dumps(Evil(canary))).decode()
+        with zipfile.ZipFile(out / name, "w") as file:
+            file.writestr("data", json.dumps({"x": {":serialized:": evil}}))
+    words = ("train", "--resume", out, "--steps", 128)
+    code, _, err = tdac(*words)
+    line = f"error: {out}, which was not begun here, wants to load {out / name}, which"
+    assert code == 2
+    assert [part.startswith(line) for part in err.splitlines()] == [True]
+    assert err.endswith("allow it with --trust\n")
+    assert not canary.exists()
+    code, _, err = tdac(*words, "--trust")
+    assert "trusted for this once" in err
+    assert canary.exists()
 
 
 @pytest.mark.slow

@@ -1,0 +1,67 @@
+"""Checkpoints that this installation has written: to load one runs what is in it."""
+
+from __future__ import annotations
+
+import hmac
+import os
+from pathlib import Path
+
+from tdac_agent.files import sync_folder, write_atomic
+from tdac_agent.installation import keyed, lasting_secret
+from tdac_agent.trust import Wish, file_sha256, permit
+
+CHECKPOINT, REPLAY = "checkpoint.zip", "replay.pkl"
+MARKS = "checkpoint.mark"
+"""MACs of the latest files, a line each; those before them are good, too."""
+KEPT = 4
+
+
+def put(draft: Path, file: Path) -> None:
+    """Moves a file that was written into its place, and vouches for it before."""
+    marks = file.parent / MARKS
+    if lasting_secret() is not None:
+        lines = [*_lines(marks)[1 - KEPT :], _mark(file.name, draft)]
+        write_atomic(marks, "\n".join(lines) + "\n")
+    with draft.open("rb") as written:
+        os.fsync(written.fileno())
+    os.replace(draft, file)
+    sync_folder(file.parent)
+
+
+def check(folder: Path, *, trust: bool) -> None:
+    """Refuses to load what somebody else may have written.
+
+    Args:
+        folder: Of a training.
+        trust: Whether the user trusts it, this time.
+
+    Raises:
+        NotTrustedError: There is such a file.
+    """
+    files = [folder / name for name in (CHECKPOINT, REPLAY)]
+    permit(
+        folder,
+        [
+            Wish(f"load {file}, which may run anything", (), file_sha256(file))
+            for file in files
+            if file.is_file() and not _is_own(file)
+        ],
+        trust=trust,
+    )
+
+
+def _is_own(file: Path) -> bool:
+    mark = _mark(file.name, file).encode()
+    known = [line.encode() for line in _lines(file.parent / MARKS)]
+    own = lasting_secret() is not None
+    return own and any(hmac.compare_digest(mark, line) for line in known)
+
+
+def _mark(name: str, file: Path) -> str:
+    return keyed(f"checkpoint|{name}|{file_sha256(file)}".encode()).hex()
+
+
+def _lines(marks: Path) -> list[str]:
+    if not marks.is_file():
+        return []
+    return marks.read_text(encoding="utf-8", errors="replace").splitlines()[-KEPT:]
