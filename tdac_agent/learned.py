@@ -148,11 +148,19 @@ def _made(saved: SavedNetwork, observation: Space[Any], action: Space[Any]) -> A
     """
     kind = _class(saved.module, isinstance(observation, spaces.Dict))
     try:
-        return kind(observation, action, lambda _: 0.0, **_kwargs(saved))
+        given = {**_kwargs(saved), "optimizer_class": _NoOptimizer}
+        return kind(observation, action, lambda _: 0.0, **given)
     # What does not fit a class has errors of all kinds.
     except (TypeError, ValueError, KeyError, AssertionError, RuntimeError) as error:
         told = f"the policy's settings do not fit its class: {one_line(error)}"
         raise ControllerFault(told, "import") from error
+
+
+class _NoOptimizer:
+    """Stands where training has one; torch's own load its compiler, and leave files."""
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        pass
 
 
 def _class(module: str, several: bool) -> Any:

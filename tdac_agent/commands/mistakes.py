@@ -13,6 +13,8 @@ from typing import Any, NoReturn
 
 from tdac_agent.commands.terminal import unfiltered
 
+LONGEST_LINE = 1000
+
 
 def explain(error: Exception) -> NoReturn:
     """Ends the process with one line on what was wrong; a traceback only for a bug."""
@@ -39,7 +41,10 @@ def explain(error: Exception) -> NoReturn:
 def fail(message: str, code: int) -> NoReturn:
     """Ends the process with a line on stderr."""
     sys.stdout.flush()
-    print(fitted(" ".join(message.split())), file=sys.stderr)
+    line = " ".join(message.split())
+    if len(line) > LONGEST_LINE:  # of what it quotes the beginning is enough
+        line = f"{line[:600]} … {line[-300:]}"
+    print(fitted(line), file=sys.stderr)
     sys.exit(code)
 
 

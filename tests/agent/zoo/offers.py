@@ -1,0 +1,146 @@
+"""Files that somebody else offers: what a command does with them, within which limits.
+
+An offer is a folder with hostile files and a command line that reads them. Whatever is
+in it, the command ends with the exit code that the offer names and one line, in little
+time and memory, and leaves nothing behind.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+SECONDS = 60.0
+MEMORY = 1_500_000_000
+"""Bytes at most, of which torch has a third."""
+KEPT_BACK = 4_000_000_000
+"""Bytes that a command gets at all, so that no attack ends the machine."""
+Maker = Callable[[Path], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A hostile folder.
+
+    Attributes:
+        surface: What kind of file it is about.
+        name: Of the attack.
+        words: Command line, given in the folder.
+        make: Writes the files.
+        says: Pattern of the line on stderr.
+        code: Exit code.
+        endless: Whether who reads it carelessly has to be stopped from outside.
+    """
+
+    surface: str
+    name: str
+    words: tuple[str, ...]
+    make: Maker
+    says: str
+    code: int = 2
+    endless: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.surface}/{self.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a command did."""
+
+    code: int
+    errors: str
+    seconds: float
+    memory: int
+    left: tuple[str, ...]
+
+
+def take(offer: Offer) -> Outcome:
+    """Gives a command what is offered, in a process of its own."""
+    with tempfile.TemporaryDirectory(prefix="zoo-offer-") as name:
+        here, temporary = Path(name, "here"), Path(name, "temporary")
+        here.mkdir()
+        temporary.mkdir()
+        offer.make(here)
+        before = _inside(here)
+        began = time.monotonic()
+        with (Path(name) / "errors").open("w+b") as errors:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "tdac_agent", *offer.words],
+                cwd=here,
+                env=os.environ | {"TMPDIR": str(temporary)},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                start_new_session=True,
+            )
+            resource.prlimit(process.pid, resource.RLIMIT_DATA, (KEPT_BACK, KEPT_BACK))
+            code, memory = _ended(process)
+            seconds = time.monotonic() - began
+            errors.seek(0)
+            told = errors.read().decode("utf-8", "backslashreplace")
+        left = (*sorted(_inside(here) - before), *sorted(_inside(temporary)))
+        return Outcome(code, told, seconds, memory, left)
+
+
+def differences(offer: Offer, outcome: Outcome) -> list[str]:
+    """How an outcome differs from what every offer must come to."""
+    found = line_problems(offer, outcome.code, outcome.errors)
+    if outcome.seconds >= SECONDS:
+        found.append(f"took {outcome.seconds:.0f} s")
+    if outcome.memory > MEMORY:
+        found.append(f"took {outcome.memory / 1e6:.0f} MB")
+    if outcome.left:
+        found.append(f"left {', '.join(outcome.left)}")
+    return found
+
+
+def line_problems(offer: Offer, code: int, errors: str) -> list[str]:
+    """What is wrong with an exit code and the line on stderr."""
+    found = []
+    if code != offer.code:
+        found.append(f"exit {code}, expected {offer.code}: {errors[-400:]}")
+    elif len(errors.strip().splitlines()) != 1 or len(errors) > 1000:
+        found.append(f"expected one line: {errors[:400]}")
+    elif not re.search(offer.says, errors):
+        found.append(f"expected {offer.says!r}: {errors}")
+    return found
+
+
+def all_offers() -> list[Offer]:
+    """Every offer of the zoo."""
+    import maps
+    import policies
+    import records
+    import tasks
+    import worlds
+
+    modules = (maps, worlds, tasks, records, policies)
+    return [offer for module in modules for offer in module.OFFERS]
+
+
+def _ended(process: subprocess.Popen[bytes]) -> tuple[int, int]:
+    """Exit code and peak memory of a process; its session is ended if it is late."""
+    handle = os.pidfd_open(process.pid)
+    try:
+        if not select.select([handle], [], [], SECONDS)[0]:
+            os.killpg(process.pid, signal.SIGKILL)
+        _, status, usage = os.wait4(process.pid, 0)
+    finally:
+        os.close(handle)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, usage.ru_maxrss * 1024
+
+
+def _inside(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
