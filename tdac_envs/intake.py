@@ -62,11 +62,14 @@ def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
     except ValueError:  # a null character, or a lone surrogate
         raise _refused(errno.EINVAL, "not the name of a file", path) from None
     try:
-        mode = os.fstat(handle).st_mode
+        status = os.fstat(handle)
+        mode = status.st_mode
         if stat.S_ISDIR(mode):
             raise _refused(errno.EISDIR, os.strerror(errno.EISDIR), path)
         if not stat.S_ISREG(mode):
             raise _refused(errno.EINVAL, "not a regular file", path)
+        if status.st_size - offset > most:
+            raise _too_large(most, path)
         # Some files of /proc are regular, have no size, and do not end.
         with open(handle, "rb", closefd=False) as file:
             file.seek(offset)
@@ -80,8 +83,12 @@ def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
     if data is None:  # nothing yet: it is regular by its name only
         raise _refused(errno.EINVAL, "not a regular file", path)
     if len(data) > most:
-        raise _refused(errno.EFBIG, f"larger than {most / 1e6:g} MB", path)
+        raise _too_large(most, path)
     return data
+
+
+def _too_large(most: int, path: str | Path) -> OSError:
+    return _refused(errno.EFBIG, f"larger than {most / 1e6:g} MB", path)
 
 
 def _refused(number: int, why: str, path: str | Path) -> OSError:

@@ -1,5 +1,8 @@
 """Every attack is refused and harms nothing; every good controller passes."""
 
+import signal
+
+import offers
 import pytest
 from cases import all_cases, tiers_of, working_tiers
 from enclosure import Enclosure, differences
@@ -72,3 +75,58 @@ RUNS = [(case, tier) for case in CASES for tier in tiers_of(case)]
 def test_the_zoo(case, tier, check):
     """Verdict, failing tests, messages and harm are as each header says."""
     check(case, tier)
+
+
+OFFERS = offers.all_offers()
+SURFACES = {"maps": 30, "worlds": 10, "tasks": 30, "records": 10, "policies": 40}
+AT_ONCE = [offer for offer in OFFERS if not offer.endless]
+FEW = {"maps/pipe", "worlds/endless", "tasks/endless", "records/pipe", "policies/bomb"}
+SECONDS = 60
+
+
+def test_each_surface_has_its_attacks():
+    """So many for each, no two of one name."""
+    names = [str(offer) for offer in OFFERS]
+    assert len(names) == len(set(names))
+    for surface, least in SURFACES.items():
+        assert sum(name.startswith(f"{surface}/") for name in names) >= least
+
+
+@pytest.fixture
+def impatient():
+    """Interrupts a test that waits for what never comes."""
+
+    def late(number, frame):
+        raise TimeoutError(f"still at work after {SECONDS} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(SECONDS)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize("offer", AT_ONCE, ids=str)
+def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, impatient):
+    """With exit code 2 and no traceback, whatever is in it; nothing is written."""
+    here = tmp_path / "here"
+    offer.make(here)
+    before = sorted(here.rglob("*"))
+    code, _, errors = tdac(*offer.words)
+    assert offers.line_problems(offer, code, errors) == []
+    assert sorted(here.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    "offer", [offer for offer in OFFERS if str(offer) in FEW], ids=str
+)
+def test_what_has_no_end_is_not_waited_for(offer):
+    """A device, a pipe and a bomb: refused at once, in little memory."""
+    assert offers.differences(offer, offers.take(offer)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("offer", OFFERS, ids=str)
+def test_the_offers(offer):
+    """As a process: exit code, line, time and memory are as expected, nothing left."""
+    assert offers.differences(offer, offers.take(offer)) == []
