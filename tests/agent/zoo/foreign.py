@@ -18,12 +18,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import yaml
 from enclosure import KEY, Canaries
 from grounds import write_map_task
+from rich.console import Console
 
 from tdac_agent.records import load_run
 from tdac_agent.report import Report
@@ -358,3 +361,24 @@ def tdac(
                 process.send_signal(signal.SIGINT)
         else:
             return process.returncode, said
+
+
+def wrong_foreign(workers: int, console: Console) -> int:
+    """Tries each of them and prints a line; how many are not as expected."""
+    wrong = 0
+    with TemporaryDirectory() as name, ThreadPoolExecutor(workers) as pool:
+        folder = Path(name).resolve()
+        own = make_own_run(folder / "own")
+
+        def tried(one: Foreign) -> tuple[Foreign, list[str]]:
+            (folder / one.name).mkdir()
+            return one, problems_of(one, own, folder / one.name, trust=False)
+
+        for one, problems in pool.map(tried, ATTACKS):
+            wrong += bool(problems)
+            mark = "  <-- not as expected" if problems else ""
+            console.print(f"foreign/{one.name:40} exit {one.code}{mark}")
+            for problem in problems:
+                console.print(f"    {problem[:600]}", markup=False)
+    console.print(f"{len(ATTACKS)} foreign folders and files, {wrong} not as expected")
+    return wrong

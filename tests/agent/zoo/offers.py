@@ -17,8 +17,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+
+from rich.console import Console
 
 SECONDS = 60.0
 MEMORY = 1_500_000_000
@@ -127,6 +130,33 @@ def all_offers() -> list[Offer]:
 
     modules = (maps, worlds, tasks, records, policies)
     return [offer for module in modules for offer in module.OFFERS]
+
+
+def chosen_offers(names: list[str]) -> list[Offer]:
+    """The offers of these names or surfaces; all where none is given."""
+    return [
+        offer
+        for offer in all_offers()
+        if not names or {offer.name, offer.surface, str(offer)} & set(names)
+    ]
+
+
+def wrong_offers(offers: list[Offer], workers: int, console: Console) -> int:
+    """Takes some offers, prints a count by surface; how many went wrong."""
+    right: dict[str, list[bool]] = {offer.surface: [] for offer in offers}
+    with ThreadPoolExecutor(workers) as pool:
+        for offer, outcome in zip(offers, pool.map(take, offers), strict=True):
+            problems = differences(offer, outcome)
+            right[offer.surface].append(not problems)
+            mark = "  <-- not as expected" if problems else ""
+            told = f"{outcome.seconds:5.1f} s {outcome.memory / 1e6:5.0f} MB{mark}"
+            console.print(f"{offer!s:36} exit {outcome.code} {told}", markup=False)
+            for problem in problems:
+                console.print(f"    {problem[:600]}", markup=False)
+    for surface, results in right.items():
+        told = f"{len(results)} offers, {results.count(False)} not as expected"
+        console.print(f"{surface}: {told}")
+    return sum(results.count(False) for results in right.values())
 
 
 def _ended(process: subprocess.Popen[bytes]) -> tuple[int, int]:

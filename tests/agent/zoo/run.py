@@ -3,9 +3,6 @@
 After the controllers come the folders and files of somebody else's.
 
 python tests/agent/zoo/run.py [NAME ...] [--kind KIND] [--tier TIER] [--core]
-
-Controllers come first, then files that somebody else offers: maps, worlds, tasks,
-records of runs, policies. These have no kind of task and no tier.
 """
 
 from __future__ import annotations
@@ -16,23 +13,20 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
-from pathlib import Path
 from queue import SimpleQueue
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
-import offers
 import typer
 from cases import Case, all_cases, tiers_of, working_tiers
 from enclosure import Enclosure, Result, differences
-from foreign import ATTACKS, Foreign, make_own_run, problems_of
+from foreign import wrong_foreign
 from grounds import KINDS, zoo_task
+from offers import chosen_offers, wrong_offers
 from rich.console import Console
 from rich.table import Table
 
 # One more than the least machine has processors: some attacks only wait.
 WORKERS = 3
-FOREIGN = "foreign"
 Job = tuple[Case, str]
 Told = dict[tuple[str, str], list[tuple[Result, bool]]]
 CONSOLE = Console(width=100, highlight=False)
@@ -53,14 +47,12 @@ def main(
         raise typer.BadParameter(
             f"expected one that works here ({works}), got {tier!r}"
         )
-    if kind not in (None, *KINDS, FOREIGN):
-        known = ", ".join((*KINDS, FOREIGN))
-        raise typer.BadParameter(f"expected one of {known}, got {kind!r}")
-    if kind == FOREIGN:
-        raise typer.Exit(1 if wrong_foreign(workers) else 0)
-    chosen = names or []
-    wanted = [] if kind or tier or core else chosen_offers(chosen)
-    cases = chosen_cases(chosen, [kind] if kind else list(KINDS), wanted)
+    if kind not in (None, *KINDS):
+        raise typer.BadParameter(f"expected one of {', '.join(KINDS)}, got {kind!r}")
+    everything = not (kind or tier or core)
+    offers = chosen_offers(names or []) if everything else []
+    kinds = [kind] if kind else list(KINDS)
+    cases = [] if names and offers else chosen_cases(names or [], kinds)
     cases = [case for case in cases if case.every_tier or not core]
     jobs = [(case, t) for case in cases for t in tiers_of(case) if tier in (None, t)]
     # What waits for a limit comes first, so that it is not waited for at the end.
@@ -82,86 +74,20 @@ def main(
         f"{len(cases)} controllers, {len(jobs)} verdicts, {len(late)} of them at the "
         f"second try, {wrong} not as expected, {time.monotonic() - began:.0f} s"
     )
-    wrong += take_offers(wanted)
-    # They never come as far as a sandbox.
-    if not names and kind is None and tier is None:
-        wrong += wrong_foreign(workers)
-    raise typer.Exit(1 if wrong or not (jobs or wanted) else 0)
+    wrong += wrong_offers(offers, workers, CONSOLE)
+    if everything and not names:
+        wrong += wrong_foreign(workers, CONSOLE)
+    raise typer.Exit(1 if wrong or not (jobs or offers) else 0)
 
 
-def wrong_foreign(workers: int) -> int:
-    """Tries what comes from somebody else; how much of it is not as expected."""
-    wrong = 0
-    with TemporaryDirectory() as name, ThreadPoolExecutor(workers) as pool:
-        folder = Path(name).resolve()
-        own = make_own_run(folder / "own")
-
-        def tried(one: Foreign) -> tuple[Foreign, list[str]]:
-            (folder / one.name).mkdir()
-            return one, problems_of(one, own, folder / one.name, trust=False)
-
-        for one, problems in pool.map(tried, ATTACKS):
-            wrong += bool(problems)
-            mark = "  <-- not as expected" if problems else ""
-            CONSOLE.print(f"{FOREIGN}/{one.name:40} exit {one.code}{mark}")
-            for problem in problems:
-                CONSOLE.print(f"    {problem[:600]}", markup=False)
-    CONSOLE.print(f"{len(ATTACKS)} {FOREIGN} files, {wrong} not as expected")
-    return wrong
-
-
-def take_offers(wanted: list[offers.Offer]) -> int:
-    """Takes what is offered and prints a count by surface; how many went wrong."""
-    right: dict[str, list[bool]] = {offer.surface: [] for offer in wanted}
-    with ThreadPoolExecutor(WORKERS - 1) as pool:
-        outcomes = zip(wanted, pool.map(offers.take, wanted), strict=True)
-        for offer, outcome in outcomes:
-            problems = offers.differences(offer, outcome)
-            right[offer.surface].append(not problems)
-            mark = "  <-- not as expected" if problems else ""
-            CONSOLE.print(
-                f"{offer!s:36} exit {outcome.code} {outcome.seconds:5.1f} s "
-                f"{outcome.memory / 1e6:5.0f} MB{mark}",
-                markup=False,
-            )
-            for problem in problems:
-                CONSOLE.print(f"    {problem[:600]}", markup=False)
-    table = Table("surface")
-    for column in ("offers", "as expected"):
-        table.add_column(column, justify="right")
-    for surface, results in right.items():
-        table.add_row(surface, str(len(results)), str(sum(results)))
-    if wanted:
-        CONSOLE.print(table)
-    return sum(results.count(False) for results in right.values())
-
-
-def chosen_offers(names: list[str]) -> list[offers.Offer]:
-    """The offers of these names or surfaces; all where none is given."""
-    return [
-        offer
-        for offer in offers.all_offers()
-        if not names or {offer.name, offer.surface, str(offer)} & set(names)
-    ]
-
-
-def chosen_cases(
-    names: list[str], kinds: list[str], wanted: list[offers.Offer]
-) -> list[Case]:
-    """The cases of these names and kinds of task; of all names where none is given.
-
-    Args:
-        names: Some of them may be of offers.
-        kinds: Of task.
-        wanted: The offers of these names.
-    """
+def chosen_cases(names: list[str], kinds: list[str]) -> list[Case]:
+    """The cases of these names and kinds of task; of all names where none is given."""
     cases = [case for case in all_cases() if case.kind in kinds]
     known = {case.name for case in cases}
-    known |= {word for o in wanted for word in (o.name, o.surface, str(o))}
     for name in names:
         if name not in known:
             near = ", ".join(difflib.get_close_matches(name, known))
-            raise typer.BadParameter(f"no {name!r} in the zoo; near: {near or 'none'}")
+            raise typer.BadParameter(f"no controller {name!r}; near: {near or 'none'}")
     return [case for case in cases if not names or case.name in names]
 
 
