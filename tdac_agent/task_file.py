@@ -22,7 +22,7 @@ EnvName = Literal["TDAC-Map2D-v0", "TDAC-EPuck-v0"]
 MAP2D: EnvName = "TDAC-Map2D-v0"
 EPUCK: EnvName = "TDAC-EPuck-v0"
 OWN_KEYS: dict[EnvName, tuple[str, ...]] = {
-    MAP2D: ("map", "robot", "snap"),
+    MAP2D: ("map", "robot", "snap", "polarity", "threshold"),
     EPUCK: ("world", "ignore", "left_out"),
 }
 """Keys of a task file that mean something in one environment only."""
@@ -80,6 +80,12 @@ class TaskFile(_Strict):
     start: Annotated[tuple[Place, ...] | None, Field(min_length=2, max_length=3)] = None
     goal: tuple[Place, Place] | None = None
     snap: bool = Field(False, description="Move start and goal to a free place.")
+    polarity: Literal["dark", "light"] | None = Field(
+        None, description="Which pixels of the map image are obstacles."
+    )
+    threshold: float | None = Field(
+        None, ge=0, lt=255, description="Luminance above which a pixel is light."
+    )
     tolerance: Length | None = Field(None, description="px; e-puck: m")
     dt: Length | None = Field(
         None, description="s; default 0.05, e-puck: the world's basicTimeStep."

@@ -17,7 +17,7 @@ from tdac_envs.image import picture_size, read_bytes
 from tdac_envs.map2d import Map2DEnv
 from tdac_envs.map_folder import write_grid
 from tdac_envs.maps import bundled_maps
-from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.params import MapParams, RobotParams, Said
 from tdac_envs.render import ROBOT_IMAGE
 from tdac_envs.source2d import prepare
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
@@ -153,6 +153,7 @@ def open_map(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         spec.goal,
         robot_radius=spec.robot.radius,
         snap=spec.snap,
+        said=Said(spec.polarity, spec.threshold),
     )
     params = _with_robot(prepared.params, spec.robot)
     nominal = _feasible(prepared.grid, params, spec)

@@ -45,13 +45,6 @@ def unknown_level(luminance: GreyImage) -> int | None:
     return None
 
 
-def unevenly_lit(luminance: GreyImage) -> bool:
-    """Whether it is a photograph: no level holds much of either side of Otsu's cut."""
-    counts = np.bincount(luminance.ravel(), minlength=256)
-    cut = int(otsu(luminance)) + 1
-    return all(side.max() < 0.1 * side.sum() for side in (counts[:cut], counts[cut:]))
-
-
 def outside(luminance: GreyImage, light_free: bool, ignored: BoolGrid) -> BoolGrid:
     """The paper around a plan: what joins the border without crossing any faint line.
 
@@ -91,21 +84,6 @@ def chroma(colour: ColourImage) -> GreyImage:
 def saturated(colour: ColourImage) -> BoolGrid:
     """Pixels of strong colour, where marks and coloured lines are drawn."""
     return np.asarray(chroma(colour) >= MARK_CHROMA)
-
-
-def local_light(luminance: GreyImage) -> BoolGrid:
-    """Pixels lighter than their surroundings say; for uneven lighting.
-
-    The brightness of light paper is estimated as the closing of the picture, in a
-    window wider than any wall, and divided out.
-    """
-    window = max(2 * (min(luminance.shape) // 16) + 1, 15)
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (window, window))
-    paper = cv2.morphologyEx(luminance, cv2.MORPH_CLOSE, kernel)
-    paper = cv2.GaussianBlur(paper, (0, 0), window / 2).astype(np.float32)
-    even = np.clip(luminance * (255.0 / np.maximum(paper, 1.0)), 0, 255)
-    levels = np.rint(even).astype(np.uint8)
-    return np.asarray(levels > otsu(levels))
 
 
 def disc(shape: tuple[int, ...], x: float, y: float, radius: float) -> BoolGrid:

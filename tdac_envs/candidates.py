@@ -104,7 +104,7 @@ def _paper_grid(scene: Scene) -> list[Candidate]:
     """Polarity x cleanup x inflation, literally, but nothing computed twice."""
     given = scene.image.occupied
     bases = (
-        [plain_reading(scene, light_free) for light_free in (True, False)]
+        [plain_reading(scene, polarity == "dark") for polarity in scene.polarities]
         if given is None
         else [Reading(given, "given", scene.image.method)]
     )

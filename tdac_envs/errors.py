@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -22,6 +23,24 @@ class MapError(TdacError):
 
 class TaskError(TdacError):
     """A start, goal or robot does not make a feasible task on its map."""
+
+
+class PolarityError(TaskError):
+    """Dark or light obstacles: both are likely, and only the user can tell.
+
+    Attributes:
+        name: Of the map.
+        pictures: By polarity, what shows it: colours, grid and parameters.
+        folder: Where the command line writes both previews, if it is asked for.
+    """
+
+    def __init__(
+        self, message: str, name: str = "", pictures: dict[str, Any] | None = None
+    ) -> None:
+        super().__init__(message)
+        self.name = name
+        self.pictures = pictures or {}
+        self.folder: Path | None = None
 
 
 class WorldError(TdacError):

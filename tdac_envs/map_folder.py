@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.errors import MapError
+from tdac_envs.errors import MapError, PolarityError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.params import MapParams
 from tdac_envs.plan import plan_path
@@ -63,6 +63,33 @@ def write_map(
             f"{folder}: cannot be written: {error.strerror}; choose another folder"
         ) from error
     return [folder / name for name in FILES]
+
+
+def write_previews(error: PolarityError) -> list[Path]:
+    """Writes `preview-dark.png` and `preview-light.png` of a map that may be either.
+
+    Args:
+        error: Of `preprocess`; its `folder`, or `NAME-map`, takes them.
+
+    Raises:
+        MapError: The folder cannot be written.
+    """
+    from tdac_envs.preview import draw_preview
+
+    folder = error.folder or Path(f"{Path(error.name).stem}-map")
+    files = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for polarity, (colour, grid, params) in error.pictures.items():
+            way = shortest_path(grid, params)
+            preview = draw_preview(colour, grid.cells, params, way)
+            files.append(folder / f"preview-{polarity}.png")
+            _save_png(files[-1], cv2.cvtColor(preview, cv2.COLOR_RGB2BGR))
+    except OSError as fault:
+        raise MapError(
+            f"{folder}: cannot be written: {fault.strerror}; choose another folder"
+        ) from fault
+    return files
 
 
 def write_grid(folder: Path, grid: OccupancyGrid, params: MapParams) -> None:

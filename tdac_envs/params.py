@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_envs.arguments import LARGEST, SMALLEST
-from tdac_envs.errors import MapError, first_problem
+from tdac_envs.errors import MapError, TaskError, first_problem
 from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 
 PIXELS_PER_METRE = 3779.52
@@ -20,6 +21,34 @@ Place = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[float, Field(gt=0, ge=SMALLEST, le=LARGEST)]
 """Above 0."""
 MOST_RAYS = 4096
+Shade = Literal["dark", "light"]
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What the user says of a picture; None where it is to be found out.
+
+    Attributes:
+        polarity: Which pixels are obstacles.
+        threshold: Luminance, 0..255, above which a pixel is light.
+    """
+
+    polarity: Shade | None = None
+    threshold: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.polarity not in (None, "dark", "light"):
+            raise TaskError(
+                f"unknown polarity {self.polarity!r}; expected 'dark' where dark "
+                "pixels are the obstacles, or 'light'"
+            )
+        if self.threshold is not None and not 0 <= self.threshold < 255:
+            raise TaskError(
+                f"expected a threshold from 0 to below 255, got {self.threshold:g}"
+            )
+
+
+UNSAID = Said()
 
 
 class _Record(BaseModel):

@@ -22,7 +22,9 @@ _WIDE = 0.01
 """The same as a share of the picture's side, above which a shape is no wall."""
 
 
-def light_free_evidence(luminance: GreyImage, light: BoolGrid) -> float:
+def light_free_evidence(
+    luminance: GreyImage, light: BoolGrid, photo: bool = False
+) -> float:
     """Log-odds that the light pixels are the free ones.
 
     Free space tends to be one connected, wide piece; walls are thin and in many
@@ -31,6 +33,7 @@ def light_free_evidence(luminance: GreyImage, light: BoolGrid) -> float:
     Args:
         luminance: Shape (height, width), uint8.
         light: Shape (height, width), bool, the pixels above the threshold.
+        photo: Whether a camera made it, so that single levels mean nothing.
     """
     light = _without_frame(light)
     share, border = float(light.mean()), float(_rim(light).mean())
@@ -45,9 +48,13 @@ def light_free_evidence(luminance: GreyImage, light: BoolGrid) -> float:
         + _W_PIECES * _clip(pieces, 1.0)
         + _W_THIN * (_thinness(width_d) - _thinness(width_l))
         + _W_OUTSIDE * _outside(border, width_l, width_d, math.sqrt(light.size))
-        + _W_EXTREMES * _extremes(luminance)
-        + _W_SAVER * _map_saver(luminance)
+        + (0.0 if photo else _levels(luminance))
     )
+
+
+def _levels(luminance: GreyImage) -> float:
+    """What single grey levels tell of a file that a mapping tool wrote."""
+    return _W_EXTREMES * _extremes(luminance) + _W_SAVER * _map_saver(luminance)
 
 
 def _rim(side: BoolGrid) -> BoolGrid:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.candidates import Candidate, Preset, ranked
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import PolarityError, TaskError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.image import MapImage, from_array, load_image
-from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.params import UNSAID, MapParams, RobotParams, Said, Shade
 from tdac_envs.readings import readings
-from tdac_envs.scene import Reading, Scene
+from tdac_envs.scene import Reading, Scene, unclear
 from tdac_envs.score import Point, nearest_free
 
 Source = str | Path | NDArray[np.generic] | MapImage
+
+_CLOSE_CALL = "dark and light obstacles are both likely"
 
 
 def preprocess(
@@ -28,6 +32,8 @@ def preprocess(
     preset: Preset = "default",
     snap: bool = False,
     heading: float = 0.0,
+    polarity: Shade | None = None,
+    threshold: float | None = None,
 ) -> tuple[OccupancyGrid, MapParams]:
     """The occupancy grid of a map picture, and what was chosen to get it.
 
@@ -42,15 +48,23 @@ def preprocess(
         snap: Move start and goal to the nearest pixel that is free for the body;
             `MapParams.notes` says from where.
         heading: Start heading, rad, from +x towards +y.
+        polarity: Which pixels are obstacles; found out from the picture if None.
+        threshold: Luminance, 0..255, above which a pixel is light; found out if None.
 
     Raises:
         MapError: The image cannot be used.
+        PolarityError: There is a task, and both polarities are likely.
         TaskError: No reading of it makes the task feasible; says why.
     """
-    grid, params, _ = examine(
-        image, start, goal, robot_radius, preset=preset, snap=snap, heading=heading
+    scene, notes = _scene(
+        image, start, goal, robot_radius, snap, Said(polarity, threshold)
     )
-    return grid, params
+    candidates = ranked(scene, preset)
+    if unclear(scene, candidates[0].reading.polarity):
+        if scene.trip is not None:
+            raise _close_call(scene, preset, heading)
+        notes.append(f"{_CLOSE_CALL}; give polarity='dark' or 'light'")
+    return _result(scene, candidates[0], preset, heading, notes)
 
 
 def examine(
@@ -62,29 +76,89 @@ def examine(
     preset: Preset,
     snap: bool,
     heading: float,
+    said: Said,
 ) -> tuple[OccupancyGrid, MapParams, list[Candidate]]:
     """The same as `preprocess`, and every candidate that was looked at; see `ranked`.
 
     Raises:
         MapError: As `preprocess` does.
+        PolarityError: Both polarities are likely, also without a task.
         TaskError: As `preprocess` does.
     """
+    scene, notes = _scene(image, start, goal, robot_radius, snap, said)
+    candidates = ranked(scene, preset)
+    if unclear(scene, candidates[0].reading.polarity):
+        raise _close_call(scene, preset, heading)
+    grid, params = _result(scene, candidates[0], preset, heading, notes)
+    return grid, params, candidates
+
+
+def _scene(
+    image: Source,
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+    robot_radius: float,
+    snap: bool,
+    said: Said,
+) -> tuple[Scene, list[str]]:
+    """The picture and what is asked of it, and notes on what was moved."""
     source = as_image(image)
+    if source.occupied is not None and said != UNSAID:
+        raise TaskError(
+            f"{source.name} says itself which cells are obstacles; leave out polarity "
+            "and threshold"
+        )
     notes: list[str] = []
     ends: list[Point | None] = []
     for name, point in (("start", start), ("goal", goal)):
         pixel = None if point is None else _to_pixel(source, name, point)
         if pixel is not None and snap:
-            pixel = _snapped(source, name, pixel, robot_radius, notes)
+            pixel = _snapped(source, name, pixel, robot_radius, said, notes)
         ends.append(pixel)
-    scene = Scene.of(source, ends[0], ends[1], robot_radius)
-    candidates = ranked(scene, preset)
-    best = candidates[0]
+    return Scene.of(source, ends[0], ends[1], robot_radius, said), notes
+
+
+def _result(
+    scene: Scene, best: Candidate, preset: Preset, heading: float, notes: list[str]
+) -> tuple[OccupancyGrid, MapParams]:
+    """The chosen grid.
+
+    Raises:
+        TaskError: The task is infeasible on it.
+    """
     if best.reason is not None:
-        raise TaskError(f"{source.name}: {best.reason()}")
-    grid = OccupancyGrid(best.reading.cells, source.resolution, source.origin)
-    notes += _changed(best.reading, preset)
-    return grid, _params(scene, best, heading, notes), candidates
+        raise TaskError(f"{scene.image.name}: {best.reason()}")
+    return _grid(scene, best), _params(
+        scene, best, heading, notes + _changed(best.reading, preset)
+    )
+
+
+def _grid(scene: Scene, best: Candidate) -> OccupancyGrid:
+    image = scene.image
+    return OccupancyGrid(best.reading.cells, image.resolution, image.origin)
+
+
+def _close_call(scene: Scene, preset: Preset, heading: float) -> PolarityError:
+    """The error that names both readings of a picture, and has what shows them."""
+    told: list[str] = []
+    pictures: dict[str, Any] = {}
+    for polarity in scene.polarities:
+        one = replace(scene, said=replace(scene.said, polarity=polarity))
+        best = ranked(one, preset)[0]
+        free = float(1 - best.reading.cells.mean())
+        told.append(f"{polarity} obstacles leave {free:.0%} free{_way(best)}")
+        params = _params(one, best, heading, [])
+        pictures[polarity] = (scene.image.colour, _grid(one, best), params)
+    message = f"{scene.image.name}: {_CLOSE_CALL}: {', '.join(told)}"
+    advice = "give polarity='dark' or 'light' (--polarity dark or --polarity light)"
+    return PolarityError(f"{message}; {advice}", scene.image.name, pictures)
+
+
+def _way(best: Candidate) -> str:
+    """How far it is to the goal on a reading, as a remark."""
+    if best.terms is not None:
+        return f" and a path of {best.terms.path_length:.0f} px"
+    return "" if best.reason is None else " and no path"
 
 
 def rank_candidates(
@@ -123,10 +197,15 @@ def _to_pixel(image: MapImage, name: str, point: tuple[float, float]) -> Point:
 
 
 def _snapped(
-    image: MapImage, name: str, point: Point, radius: float, notes: list[str]
+    image: MapImage,
+    name: str,
+    point: Point,
+    radius: float,
+    said: Said,
+    notes: list[str],
 ) -> Point:
     """The point moved to the nearest pixel that is free for the body."""
-    reading = next(readings(Scene.of(image, None, None, radius)))
+    reading = next(readings(Scene.of(image, None, None, radius, said)))
     free = body_free(clearance(reading.cells), radius)
     moved = nearest_free(free, *point)
     if moved is None or moved == point:

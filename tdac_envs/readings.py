@@ -18,18 +18,20 @@ from tdac_envs.binarize import (
     chroma,
     disc,
     floor_distance,
-    local_light,
     otsu,
     outside,
-    unevenly_lit,
 )
 from tdac_envs.cleanup import thick_share, without_lines, without_specks
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage, luminance
+from tdac_envs.lighting import LEVEL
+from tdac_envs.params import UNSAID
 from tdac_envs.scene import Reading, Scene, decide_light_free, touches
 
 SLIVER = 6.0
 """Widest strip along the outside of a plan that belongs to it, px."""
+_FAINT = 0.3
+"""From half-way between wall and floor towards the floor, where photographs are cut."""
 
 
 def readings(scene: Scene) -> Iterator[Reading]:
@@ -46,8 +48,7 @@ def readings(scene: Scene) -> Iterator[Reading]:
     plain = plain_reading(scene, light_free)
     unmarked = _without_marks(scene, plain)
     if not scene.ends:
-        photographed = unevenly_lit(scene.luminance)
-        yield _local(scene, plain) if photographed else unmarked or plain
+        yield unmarked or plain
         return
     beyond = _beyond_the_plan(scene, plain)
     for reading in _outwards(scene, plain, unmarked):
@@ -57,7 +58,7 @@ def readings(scene: Scene) -> Iterator[Reading]:
 def _outwards(
     scene: Scene, plain: Reading, unmarked: Reading | None
 ) -> Iterator[Reading]:
-    mixed = _mixed(scene)
+    mixed = _mixed(scene) if scene.said == UNSAID else None
     if mixed is not None:
         yield mixed
         for extent in (4, 8, 16):
@@ -72,10 +73,6 @@ def _outwards(
         yield _without(base, 4)
         return
     yield from _bolder(base)
-    if unevenly_lit(scene.luminance):
-        local = _local(scene, base)
-        yield local
-        yield from _bolder(local)
 
 
 def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
@@ -110,23 +107,40 @@ def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
 
 
 def plain_reading(scene: Scene, light_free: bool) -> Reading:
-    """Otsu's threshold, with two things that it cannot know.
+    """One threshold, with two things that it cannot know.
 
     A map saver's "unknown" grey counts as occupied, and where most walls are drawn in
     strong colours, the light ones among these (green, yellow) are walls as well.
     """
     threshold, method = scene.threshold, "otsu"
+    if scene.said.threshold is not None:
+        method = "threshold as given"
+    elif scene.photo:
+        method = "light evened"
+    if scene.said.polarity is not None:
+        method += ", polarity as given"
     level = scene.unknown
     if level is not None:
         threshold = _beside(level, threshold, light_free)
         method = f"otsu, unknown grey {level} not free"
     reading = _cut(scene.luminance, threshold, light_free, method)
+    if scene.photo:
+        reading = _of_photo(scene, light_free, method)
     strong = scene.saturated
     coloured = int((strong & reading.cells).sum()) > 0.5 * int(reading.cells.sum())
     if coloured and strong.mean() < 0.3 and not touches(strong, scene.ends):
         method = f"{method}, coloured walls"
         return replace(reading, cells=reading.cells | strong, method=method)
     return reading
+
+
+def _of_photo(scene: Scene, light_free: bool, method: str) -> Reading:
+    """A photograph cut nearer to the floor: blur makes thin walls faint."""
+    grey = scene.luminance
+    floor = float(np.median(grey[(grey > scene.threshold) == light_free]))
+    cut = scene.threshold + _FAINT * (floor - scene.threshold)
+    # The threshold is none of the picture as it came.
+    return replace(_cut(grey, cut, light_free, method), threshold=None)
 
 
 def _beside(level: int, threshold: float, light_free: bool) -> float:
@@ -181,7 +195,9 @@ def _mixed(scene: Scene) -> Reading | None:
     grey = int(luminance(np.rint(floor).astype(np.uint8)[None, None])[0, 0])
     gap = scene.luminance.astype(np.int16) - grey
     like = (np.abs(gap) < 8).astype(np.uint8)
-    rim = (cv2.dilate(like, np.ones((5, 5), np.uint8)) > 0) & (np.abs(gap) >= 20)
+    # Noise makes the floor of a photograph darker and lighter, too, but not by so much.
+    far = max(20.0, abs(grey - LEVEL)) if scene.photo else 20.0
+    rim = (cv2.dilate(like, np.ones((5, 5), np.uint8)) > 0) & (np.abs(gap) >= far)
     darker = float((gap[rim] < 0).mean()) if rim.any() else 0.0
     if like.mean() < 0.02 or not 0.2 <= darker <= 0.8:
         return None
@@ -222,10 +238,3 @@ def _note(
         cleanup=cleanup,
         opening=opening,
     )
-
-
-def _local(scene: Scene, base: Reading) -> Reading:
-    """A threshold that follows the lighting."""
-    grey = scene.luminance if base.polarity == "dark" else 255 - scene.luminance
-    light = local_light(np.asarray(grey, np.uint8))
-    return replace(base, cells=~light, method="local threshold", threshold=None)

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from tdac_envs.binarize import (
-    disc,
-    local_light,
-    otsu,
-    saturated,
-    unevenly_lit,
-    unknown_level,
-)
+from tdac_envs.binarize import disc, otsu, saturated, unknown_level
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage, MapImage, luminance
+from tdac_envs.lighting import LEVEL, evened, photographed
+from tdac_envs.params import UNSAID, Said, Shade
 from tdac_envs.polarity import light_free_evidence
 from tdac_envs.score import Point, Trip
 
-Polarity = Literal["dark", "light", "mixed", "given"]
+Polarity = Shade | Literal["mixed", "given"]
 
 # Start and goal of a real task are free with the body's disc around them, so two
 # clean discs outweigh a doubtful picture but not a clear one.
 _W_TASK = 2.0
+CLOSE = 0.5
+"""Log-odds below which the user is asked; public maps with a task are above 4."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,25 +48,53 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A picture with what is asked of it, and what all its readings need."""
+    """A picture with what is asked of it, and what all its readings need.
+
+    Attributes:
+        image: The map; a photograph with its light evened.
+        luminance: Of its colours.
+        start: Pixel (x, y), or None.
+        goal: Pixel (x, y), or None.
+        radius: Of the body, px.
+        said: What the user says of it.
+        photo: Whether it is a photograph whose light was evened.
+    """
 
     image: MapImage
     luminance: GreyImage
     start: Point | None
     goal: Point | None
     radius: float
+    said: Said = UNSAID
+    photo: bool = False
 
     @classmethod
     def of(
-        cls, image: MapImage, start: Point | None, goal: Point | None, radius: float
+        cls,
+        image: MapImage,
+        start: Point | None,
+        goal: Point | None,
+        radius: float,
+        said: Said = UNSAID,
     ) -> Scene:
         """The scene of an image and a task; start and goal may be missing."""
-        return cls(image, luminance(image.colour), start, goal, radius)
+        grey, task = luminance(image.colour), (start, goal, radius, said)
+        by_itself = image.occupied is None and said.threshold is None
+        even = evened(image.colour, grey) if by_itself and photographed(grey) else None
+        if even is None:
+            return cls(image, grey, *task)
+        return cls(replace(image, colour=even.colour), even.luminance, *task, True)
 
     @property
     def ends(self) -> list[Point]:
         """Start and goal, as far as given."""
         return [point for point in (self.start, self.goal) if point is not None]
+
+    @property
+    def polarities(self) -> tuple[Shade, ...]:
+        """Those that may be: both, unless the user says which."""
+        said = self.said.polarity
+        return ("dark", "light") if said is None else (said,)
 
     @property
     def trip(self) -> Trip | None:
@@ -80,8 +105,25 @@ class Scene:
 
     @cached_property
     def threshold(self) -> float:
-        """Otsu's threshold of the luminance."""
-        return otsu(self.luminance)
+        """Above it a pixel is light: as given, of evened light, or Otsu's."""
+        if self.said.threshold is not None:
+            return self.said.threshold
+        return LEVEL if self.photo else otsu(self.luminance)
+
+    @cached_property
+    def evidence(self) -> float:
+        """Log-odds that the light side is free, start and goal considered."""
+        light = self.luminance > self.threshold
+        found = light_free_evidence(self.luminance, light, self.photo)
+        # A mark may cover start or goal; paper may be coloured all over.
+        neutral = ~self.saturated
+        neutral = neutral if neutral.mean() > 0.5 else np.ones_like(neutral)
+        for x, y in self.ends:
+            judged = disc(light.shape, x, y, self.radius) & neutral
+            if not judged.any():
+                continue
+            found += _W_TASK * (2 * float(light[judged].mean()) - 1)
+        return found
 
     @cached_property
     def saturated(self) -> BoolGrid:
@@ -91,7 +133,8 @@ class Scene:
     @cached_property
     def unknown(self) -> int | None:
         """The "unknown" grey, unless start and goal both stand on it."""
-        level = unknown_level(self.luminance)
+        by_itself = self.said.threshold is None and not self.photo
+        level = unknown_level(self.luminance) if by_itself else None
         if level is None:
             return None
         shades = [abs(int(self.luminance[y, x]) - level) for x, y in self.ends]
@@ -99,24 +142,19 @@ class Scene:
 
 
 def decide_light_free(scene: Scene) -> bool:
-    """Whether the light side is free, from the picture, start and goal."""
-    grey = scene.luminance
-    if unevenly_lit(grey):
-        negative = np.asarray(255 - grey, np.uint8)
-        on_light, on_dark = local_light(grey), local_light(negative)
-        return _evidence(scene, grey, on_light) >= _evidence(scene, negative, on_dark)
-    return _evidence(scene, grey, grey > scene.threshold) > 0
+    """Whether the light side is free: as given, or from picture, start and goal."""
+    if scene.said.polarity is not None:
+        return scene.said.polarity == "dark"
+    return scene.evidence > 0
 
 
-def _evidence(scene: Scene, grey: GreyImage, light: BoolGrid) -> float:
-    """Log-odds that `light` is free, start and goal considered."""
-    evidence = light_free_evidence(grey, light)
-    neutral = ~scene.saturated
-    for x, y in scene.ends:
-        around = disc(light.shape, x, y, scene.radius)
-        judged = around & neutral if (around & neutral).any() else around
-        evidence += _W_TASK * (2 * float(light[judged].mean()) - 1)
-    return evidence
+def unclear(scene: Scene, polarity: Polarity) -> bool:
+    """Whether the other polarity is nearly as likely as this one, or likelier."""
+    settled = scene.image.occupied is not None or scene.said.polarity is not None
+    if settled or polarity not in ("dark", "light"):
+        return False
+    towards = scene.evidence if polarity == "dark" else -scene.evidence
+    return towards < CLOSE
 
 
 def touches(mask: BoolGrid, points: list[Point]) -> bool:

@@ -20,7 +20,7 @@ from tdac_envs.image import check_size, load_image, read_bytes
 from tdac_envs.intake import printable, read_array
 from tdac_envs.maps import BundledMap, bundled_map, bundled_maps
 from tdac_envs.metric import Point, resolution_of, to_pixels
-from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.params import UNSAID, MapParams, RobotParams, Said
 from tdac_envs.score import nearest_free
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
@@ -51,6 +51,7 @@ def prepare(
     heading: float | None = None,
     robot_radius: float | None = None,
     snap: bool = False,
+    said: Said = UNSAID,
 ) -> Prepared:
     """Reads a map and settles start, goal, heading and body radius on it.
 
@@ -63,6 +64,7 @@ def prepare(
         heading: rad; wins over `start[2]`.
         robot_radius: px; default from the params, else 15.
         snap: Move start and goal to the nearest place that holds the body.
+        said: Of an image, what is not to be found out.
 
     Raises:
         MapError: The map cannot be read or used.
@@ -70,8 +72,9 @@ def prepare(
     """
     if robot_radius is not None:
         robot_radius = positive("robot_radius", robot_radius)
-    given = _Given.of(start, goal, heading, robot_radius, snap)
+    given = _Given.of(start, goal, heading, robot_radius, snap, said)
     if not isinstance(source, str | Path):
+        _refuse(said, "a grid")
         return _settled(_from_cells(_as_cells(source), "array"), given)
     # A folder that happens to have a bundled map's name is `./maze`.
     if isinstance(source, str) and source in bundled_maps():
@@ -80,8 +83,10 @@ def prepare(
     path = Path(source)
     if path.is_dir():
         _check_is_map_folder(path)
+        _refuse(said, str(path))
         return _settled(_from_folder(path), given)
     if path.suffix == ".npy":
+        _refuse(said, str(path))
         return _settled(_from_npy(path), given)
     check_exists(path)
     return _from_image(path, given)
@@ -96,6 +101,7 @@ class _Given:
     heading: float | None
     robot_radius: float | None
     snap: bool
+    said: Said
 
     @classmethod
     def of(
@@ -105,6 +111,7 @@ class _Given:
         heading: float | None,
         robot_radius: float | None,
         snap: bool,
+        said: Said,
     ) -> _Given:
         at = end = None
         if start is not None:
@@ -116,7 +123,7 @@ class _Given:
             end = finite_point("goal", goal)
         if heading is not None:
             heading = finite("heading", heading)
-        return cls(at, end, heading, robot_radius, snap)
+        return cls(at, end, heading, robot_radius, snap, said)
 
     def or_else(self, bundled: BundledMap) -> _Given:
         """The same with a bundled map's own task where nothing was given."""
@@ -126,6 +133,7 @@ class _Given:
             bundled.heading if self.heading is None else self.heading,
             self.robot_radius or bundled.robot_radius,
             self.snap,
+            self.said,
         )
 
 
@@ -195,10 +203,11 @@ def _from_image(image: Path, given: _Given) -> Prepared:
     # Of a ROS map, the picture is in another file than the one that is named.
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
     radius = given.robot_radius or RobotParams().radius
-    prepared = read(image, _digest(image), given.start, given.goal, radius, given.snap)
+    ends = given.start, given.goal
+    prepared = read(image, _digest(image), *ends, radius, given.snap, given.said)
     # A point that was snapped stays where preprocessing put it.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
-    return _settled(prepared, _Given(start, goal, given.heading, radius, False))
+    return _settled(prepared, _Given(start, goal, given.heading, radius, False, UNSAID))
 
 
 # Preprocessing takes most of the time of `gym.make`; a grid has one byte a pixel.
@@ -210,12 +219,23 @@ def _read_image(
     goal: Point | None,
     radius: float,
     snap: bool,
+    said: Said,
 ) -> Prepared:
     # A grid that is ready needs none of it.
     from tdac_envs.preprocessing import preprocess
 
-    grid, params = preprocess(image, start, goal, robot_radius=radius, snap=snap)
+    how: Any = {"snap": snap, "polarity": said.polarity, "threshold": said.threshold}
+    grid, params = preprocess(image, start, goal, robot_radius=radius, **how)
     return Prepared(grid, params, image)
+
+
+def _refuse(said: Said, what: str) -> None:
+    """Refuses words on how to read a picture where there is none."""
+    if said != UNSAID:
+        raise TaskError(
+            f"{what} says itself which cells are obstacles; leave out polarity and "
+            "threshold"
+        )
 
 
 def _digest(path: Path) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -22,8 +23,12 @@ from tdac_envs.source2d import check_exists
 Point = tuple[float, float]
 SAID_BY_A_TASK = (
     *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
+    *("polarity", "threshold"),
 )
-MEANT_FOR_MAPS = ("map_image", "robot_radius", "robot_image", "snap", "metres")
+MEANT_FOR_MAPS = (
+    *("map_image", "robot_radius", "robot_image", "snap", "metres"),
+    *("polarity", "threshold"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +46,8 @@ class TaskFlags:
     robot_image: Path | None = None
     snap: bool = False
     metres: bool = False
+    polarity: Literal["dark", "light"] | None = None
+    threshold: float | None = None
     instructions: str | None = None
 
     def given(self) -> bool:
@@ -129,6 +136,8 @@ class TaskFlags:
             "start": start,
             "goal": goal,
             "snap": self.snap,
+            "polarity": self.polarity,
+            "threshold": self.threshold,
             "robot": {"radius": radius, "image": self.robot_image},
             "instructions": _text(self.instructions),
         }

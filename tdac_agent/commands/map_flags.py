@@ -7,7 +7,15 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.commands.options import Goal, Json, Metres, Radius, Snap
+from tdac_agent.commands.options import (
+    Goal,
+    Json,
+    Metres,
+    Polarity,
+    Radius,
+    Snap,
+    Threshold,
+)
 
 app = typer.Typer()
 
@@ -23,6 +31,8 @@ def map_command(
     robot_radius: Radius = None,
     snap: Snap = False,
     metres: Metres = False,
+    polarity: Polarity = None,
+    threshold: Threshold = None,
     preset: Annotated[
         Literal["default", "paper"],
         typer.Option(help="`default`, or `paper` for the literal grid search."),
@@ -38,8 +48,10 @@ def map_command(
     Without start and goal it writes a preview with rulers to read pixels off.
     """
     from tdac_agent.commands import maps
+    from tdac_envs.params import Said
 
-    maps.run(image, start, goal, robot_radius, snap, metres, preset, out, as_json)
+    said = Said(polarity, threshold)
+    maps.run(image, start, goal, robot_radius, snap, metres, said, preset, out, as_json)
 
 
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")

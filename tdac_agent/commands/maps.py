@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from rich.console import Group
 from rich.markup import escape
@@ -14,11 +15,11 @@ from rich.text import Text
 from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import check_finite, in_pixels
 from tdac_envs.candidates import Candidate, Preset
-from tdac_envs.errors import TaskError
+from tdac_envs.errors import PolarityError, TaskError
 from tdac_envs.image import load_image
 from tdac_envs.map_folder import write_map
 from tdac_envs.maps import bundled_map, bundled_maps
-from tdac_envs.params import MapParams, RobotParams
+from tdac_envs.params import MapParams, RobotParams, Said
 from tdac_envs.preprocessing import examine
 
 SHOWN = 8
@@ -32,6 +33,7 @@ def run(
     robot_radius: float | None,
     snap: bool,
     metres: bool,
+    said: Said,
     preset: Preset,
     out: Path | None,
     as_json: bool,
@@ -50,10 +52,13 @@ def run(
         start, goal, robot_radius = in_pixels(path, start, goal, robot_radius)
     radius = RobotParams().radius if robot_radius is None else robot_radius
     source = load_image(path)
-    grid, params, ranked = examine(
-        source, start, goal, radius, preset=preset, snap=snap, heading=heading
-    )
     folder = out if out is not None else Path(f"{path.stem}-map")
+    how: Any = {"preset": preset, "snap": snap, "heading": heading, "said": said}
+    try:
+        grid, params, ranked = examine(source, start, goal, radius, **how)
+    except PolarityError as error:
+        error.folder = folder
+        raise
     files = write_map(folder, grid, params, source)
     if as_json:
         rows = [_row(candidate) for candidate in ranked]

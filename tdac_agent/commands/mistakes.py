@@ -9,7 +9,10 @@ import textwrap
 import traceback
 from collections.abc import Generator
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from tdac_envs.errors import PolarityError
 
 from tdac_agent.commands.terminal import unfiltered
 
@@ -19,10 +22,12 @@ LONGEST_LINE = 1000
 def explain(error: Exception) -> NoReturn:
     """Ends the process with one line on what was wrong; a traceback only for a bug."""
     from tdac_agent.errors import Fault
-    from tdac_envs.errors import LONGEST, TdacError
+    from tdac_envs.errors import LONGEST, PolarityError, TdacError
 
     if hasattr(error, "format_message"):  # usage, as typer found it
         _explain_usage(error)
+    if isinstance(error, PolarityError):
+        fail(f"error: {error}{_shown(error)}", 2)
     if isinstance(error, TdacError):
         *others, last = getattr(error, "lines", (str(error),))
         for line in others:
@@ -36,6 +41,18 @@ def explain(error: Exception) -> NoReturn:
         fail(f"error: {str(error.filename)[:LONGEST]}: {error.strerror}", code)
     traceback.print_exception(error)
     fail("internal error: please report the lines above", 3)
+
+
+def _shown(error: PolarityError) -> str:
+    """Draws both readings of a map; says where, or nothing where that fails."""
+    from tdac_envs.errors import MapError
+    from tdac_envs.map_folder import write_previews
+
+    try:
+        files = write_previews(error)
+    except MapError:
+        return ""
+    return f"; look at {' and '.join(map(str, files))}"
 
 
 def fail(message: str, code: int) -> NoReturn:

@@ -80,6 +80,20 @@ Metres = Annotated[
     bool,
     typer.Option("--metres", help="Lengths are metres in the map's frame (map.yaml)."),
 ]
+Polarity = Annotated[
+    Optional[Literal["dark", "light"]],  # noqa: UP045
+    typer.Option(
+        help="Which pixels of the map image are obstacles.  [default: found out]"
+    ),
+]
+Threshold = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        metavar="LUMINANCE",
+        help="Above it a pixel of the map image is light, 0 to 255.  "
+        "[default: found out]",
+    ),
+]
 Instructions = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
@@ -255,6 +269,8 @@ def task_flags(
     robot_image: RobotImage = None,
     snap: Snap = False,
     metres: Metres = False,
+    polarity: Polarity = None,
+    threshold: Threshold = None,
     instructions: Instructions = None,
 ) -> TaskFlags:
     """The task that these flags of a command name."""
@@ -272,6 +288,8 @@ def task_flags(
         robot_image=robot_image,
         snap=snap,
         metres=metres,
+        polarity=polarity,
+        threshold=threshold,
         instructions=instructions,
     )
 
