@@ -57,7 +57,7 @@ def wait_for(file: Path) -> Generator[None]:
 def is_held(file: Path) -> bool:
     """Whether a process holds the lock of a file."""
     try:
-        handle = os.open(file, os.O_RDONLY | os.O_NOFOLLOW)
+        handle = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
         return False
     try:

@@ -22,6 +22,7 @@ from tdac_agent.records import PROMPT_FILE, Run
 from tdac_agent.tariff import MAX_COST
 from tdac_agent.task import Task
 from tdac_envs.errors import TdacError
+from tdac_envs.intake import RECORD_BYTES, read_file
 
 OWN_SUITE = "suite"
 """Folder of a run's tests, beside the shipped ones."""
@@ -203,7 +204,7 @@ def _facts(run: Run, suite: Path | None) -> bytes | None:
 
 def file_sha256(path: Path) -> str:
     """Hash of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_file(path, RECORD_BYTES)).hexdigest()
 
 
 def tree_sha256(folder: Path) -> str | None:

@@ -248,7 +248,7 @@ def _hash(suites: dict[str, Path]) -> str:
 
 def _suite_hash(folder: Path) -> dict[str, str]:
     return {
-        str(path.relative_to(folder)): sha256_of(path.read_bytes())
+        str(path.relative_to(folder)): sha256_of(read_file(path, RECORD_BYTES))
         for path in sorted(folder.rglob("*.py"))
     }
 

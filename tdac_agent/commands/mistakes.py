@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 from tdac_agent.commands.terminal import unfiltered
 
 LONGEST_LINE = 1000
+# No machine would take such a name or such a file.
+_OF_THE_FILE = {errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL, errno.EFBIG}
 
 
 def explain(error: Exception) -> NoReturn:
@@ -36,8 +38,7 @@ def explain(error: Exception) -> NoReturn:
     if isinstance(error, Fault):
         fail(f"infrastructure fault: {error}", 3)
     if isinstance(error, OSError) and error.filename:
-        # No machine would take such a name.
-        code = 2 if error.errno in (errno.ENAMETOOLONG, errno.ELOOP) else 3
+        code = 2 if error.errno in _OF_THE_FILE else 3
         fail(f"error: {str(error.filename)[:LONGEST]}: {error.strerror}", code)
     traceback.print_exception(error)
     fail("internal error: please report the lines above", 3)
