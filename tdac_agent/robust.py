@@ -10,6 +10,7 @@ from pathlib import Path
 from tdac_agent.contenders import Contender
 from tdac_agent.disturbance import Disturbance
 from tdac_agent.files import write_atomic
+from tdac_agent.installation import seed_of
 from tdac_agent.provenance import origin
 from tdac_agent.robust_report import RobustProvenance, RobustReport, summarise
 from tdac_agent.sandbox import Limits
@@ -30,7 +31,7 @@ def verify_robust(
     episodes: int = EPISODES,
     *,
     disturbance: Disturbance | None = None,
-    first_seed: int = 0,
+    first_seed: int | None = None,
     accept_at: float | None = None,
     margin: float = MARGIN,
     tier: str = "auto",
@@ -49,7 +50,8 @@ def verify_robust(
         task: What it must do.
         episodes: How many; with `accept_at`, how many at most.
         disturbance: Of the environment.
-        first_seed: The episodes have this seed and the following ones.
+        first_seed: The episodes have this seed and the following ones; by default one
+            that no author can know, as for `verify`.
         accept_at: Stop as soon as a sequential test decides whether the success rate
             is at least this, or at most `margin` less; then there is no interval.
         margin: See `accept_at`.
@@ -66,9 +68,11 @@ def verify_robust(
     """
     began = time.monotonic()
     whole_number("episodes", episodes, 1)
-    whole_number("first seed", first_seed, 0)
+    if first_seed is not None:
+        whole_number("first seed", first_seed, 0)
     test = None if accept_at is None else SequentialTest(accept_at, episodes, margin)
     source = read_source(controller)
+    first = seed_of(source, task) if first_seed is None else first_seed
     with tempfile.TemporaryDirectory(prefix="tdac-robust-") as name:
         folder = Path(name)
         controller_file = folder / "controller.py"
@@ -78,7 +82,7 @@ def verify_robust(
             contender=Contender("controller", controller_file),
             disturbance=disturbance or Disturbance(),
             variation="jitter",
-            seeds=tuple(range(first_seed, first_seed + episodes)),
+            seeds=tuple(range(first, first + episodes)),
             test=test,
             measured=False,
             tier=tier,
@@ -89,7 +93,7 @@ def verify_robust(
         provenance = RobustProvenance(
             **origin(task, source, job.task, ending.tier, job.limits),
             disturbance=job.disturbance,
-            first_seed=first_seed,
+            first_seed=first,
         )
     report = summarise(provenance, ended, test, time.monotonic() - began)
     if out is not None:

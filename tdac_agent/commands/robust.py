@@ -54,7 +54,7 @@ def measure(
                 task,
                 wanted.robust,
                 disturbance=wanted.disturbed.disturbance(),
-                first_seed=wanted.first_seed or 0,
+                first_seed=wanted.first_seed,
                 accept_at=wanted.accept_at,
                 margin=MARGIN if wanted.margin is None else wanted.margin,
                 tier=tier,

@@ -68,7 +68,7 @@ def verify(
         Optional[int],  # noqa: UP045
         typer.Option(
             min=0,
-            help="Seed of the first disturbed episode.  [default: 0]",
+            help="Seed of the first disturbed episode.  [default: as of --seed]",
             rich_help_panel="Robustness",
         ),
     ] = None,

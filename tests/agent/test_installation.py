@@ -10,6 +10,7 @@ import pytest
 
 from tdac_agent.installation import lasting_secret, seed_of
 from tdac_agent.judge import JITTERS
+from tdac_agent.robust import verify_robust
 from tdac_agent.starts import spread_starts
 from tdac_agent.synthesis import synthesize
 from tdac_agent.verification import verify
@@ -129,6 +130,15 @@ def test_another_installation_has_other_starts(good, tmp_path):
     other, _ = said(python(tmp_path / "two", script, good))
     assert first != other
     assert said(python(tmp_path / "two", script, good, first.split()[0]))[0] == first
+
+
+def test_disturbed_episodes_begin_where_nobody_can_know(small_task, good_source, warm):
+    """The seed of the first one is that of the controller, unless it is given."""
+    report = verify_robust(good_source, small_task, 1, judge=warm)
+    own = seed_of(good_source.encode(), small_task)
+    assert report.provenance.first_seed == own
+    given = verify_robust(good_source, small_task, 1, first_seed=0, judge=warm)
+    assert given.provenance.first_seed == 0
 
 
 def test_a_run_tells_the_seeds_and_not_the_secret(small_task, tmp_path, warm):

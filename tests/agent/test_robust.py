@@ -70,7 +70,7 @@ def expected_outcome(task, seed):
 @pytest.fixture(scope="module")
 def moody(small_task, good_source, warm):
     """The report of a controller that fails in each way."""
-    return verify_robust(good_source + MOODS, small_task, 16, judge=warm)
+    return verify_robust(good_source + MOODS, small_task, 16, first_seed=0, judge=warm)
 
 
 def test_an_episode_is_what_the_environment_draws(
@@ -180,7 +180,13 @@ def test_a_sequential_test_sees_the_seeds_in_order(
         if test.decide(*counts) != "undecided":
             break
     report = verify_robust(
-        good_source + MOODS, small_task, 16, accept_at=0.9, margin=0.4, judge=warm
+        good_source + MOODS,
+        small_task,
+        16,
+        first_seed=0,
+        accept_at=0.9,
+        margin=0.4,
+        judge=warm,
     )
     assert report.episodes == sum(counts) < 16
     assert report.successes == counts[0]
@@ -363,7 +369,7 @@ def test_a_contact_is_no_success():
 @pytest.mark.slow
 def test_a_hundred_episodes(small_task, good_source, warm):
     """The built-in controller is not disturbed by what is usual."""
-    report = verify_robust(good_source, small_task, 100, judge=warm)
+    report = verify_robust(good_source, small_task, 100, first_seed=0, judge=warm)
     assert report.episodes == 100
     assert report.successes >= 95
     assert report.interval.low < report.rate <= report.interval.high
