@@ -20,7 +20,7 @@ from tdac_agent.locks import LOCK_FILE, hold
 from tdac_agent.past import read_past
 from tdac_agent.prompt import PromptTemplate, generate_prompt
 from tdac_agent.provenance import sha256_of
-from tdac_agent.provider import Provider, served_at
+from tdac_agent.provider import Provider, recorded_seed, served_at
 from tdac_agent.recorder import Event, Recorder
 from tdac_agent.records import JOURNAL, Run
 from tdac_agent.resume import run_there
@@ -111,13 +111,14 @@ def describe(
     )
 
 
-def settled_seed(given: int | None, out: Path) -> int | None:
+def settled_seed(given: int | None, learner: Provider, out: Path) -> int | None:
     """The seed of a run; None where each of its candidates has its own.
 
     Where no secret can be kept, a run is given one at its beginning.
     """
-    if given is not None or lasting_secret() is not None:
-        return given
+    known = recorded_seed(learner) if given is None else given
+    if known is not None or lasting_secret() is not None:
+        return known
     before = run_there(out)
     return drawn_seed() if before is None else before.seed
 

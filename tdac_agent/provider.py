@@ -94,8 +94,8 @@ class Provider(Protocol):
             call of a run the suite has to prove itself.
 
     One may also have `served_at`, the address of its server if that is not the
-    vendor's own, without anything secret; and `missing`, what has to be had before it
-    can be asked, a line each.
+    vendor's own, without anything secret; `missing`, what has to be had before it
+    can be asked, a line each; and `recorded_seed`, with which its answers were judged.
     """
 
     name: str
@@ -118,6 +118,12 @@ def served_at(model: Provider) -> str | None:
     """Address of a model's server; None for the vendor's own, or without one."""
     address: str | None = getattr(model, "served_at", None)
     return address
+
+
+def recorded_seed(model: Provider) -> int | None:
+    """Seed with which a recorded run was judged; None for models that are asked."""
+    seed: int | None = getattr(model, "recorded_seed", None)
+    return seed
 
 
 def missing_for(model: Provider) -> tuple[str, ...]:

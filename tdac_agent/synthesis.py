@@ -73,7 +73,7 @@ def synthesize(
         iterations: K.
         patience: J, edits per iteration.
         seed: Of the jittered starts of all candidates; by default each has its own, as
-            for `verify`.
+            for `verify`; those of a recorded run have its seed.
         start_from: Source of a controller to begin with instead of a generated one.
         base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
         key_over_http: Whether a key may go to such a server unencrypted, where it is
@@ -118,7 +118,7 @@ def synthesize(
         iterations=iterations,
         patience=patience,
         refine=refine,
-        seed=settled_seed(seed, out),
+        seed=settled_seed(seed, models[0], out),
     )
     account = account_of(models, run_there(out), max_cost, max_tokens, budget)
     with hold_folder(out):

@@ -18,6 +18,7 @@ from tdac_agent.provenance import sha256_of
 from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.records import JOURNAL, load_run
+from tdac_agent.trust import is_own_folder
 from tdac_envs.intake import RECORD_BYTES, read_file
 
 DEMO = Path(__file__).parents[1] / "demo"
@@ -35,13 +36,15 @@ def make(words: str, options: Options) -> Replay:
         raise ProviderError("which run? As in replay:runs/maze-1")
     folder = DEMO if words == "demo" else Path(words)
     try:
-        load_run(folder)
+        recorded = load_run(folder)
         records = read_records(folder / JOURNAL)
     except RunError as error:
         raise ProviderError(f"cannot replay: {error}") from error
     except OSError as error:
         raise ProviderError(f"cannot replay {folder}: {error.strerror}") from error
-    return Replay(words, folder, records, reworded=folder == DEMO)
+    shipped = folder == DEMO
+    seed = recorded.seed if shipped or is_own_folder(recorded) else None
+    return Replay(words, folder, records, reworded=shipped, seed=seed)
 
 
 class Replay:
@@ -53,6 +56,7 @@ class Replay:
         journal: Its records.
         reworded: Whether what follows on the task, as how failures are told, may be
             worded otherwise by now; it is noted where it is.
+        seed: Of the run's moved starts, where it had one and nobody else chose it.
     """
 
     paid = False
@@ -64,10 +68,12 @@ class Replay:
         journal: list[JournalRecord],
         *,
         reworded: bool = False,
+        seed: int | None = None,
     ) -> None:
         self.name = f"replay:{words}"
         self._folder = folder
         self._reworded = reworded
+        self.recorded_seed = seed
         self._replies = [r for r in journal if r.get("event") == "call.reply"]
 
     def answers_sha256(self) -> str:

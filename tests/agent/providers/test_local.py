@@ -1,15 +1,23 @@
 """Providers without a vendor: a program, a person, a recorded run."""
 
+import json
 import shutil
 import sys
 import threading
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from small import write_small_task
 
 from tdac_agent.errors import Fault, ProviderError
-from tdac_agent.provider import PermanentFault, ProviderFault, Reply, Request
+from tdac_agent.provider import (
+    PermanentFault,
+    ProviderFault,
+    Reply,
+    Request,
+    recorded_seed,
+)
 from tdac_agent.providers import Options, choose_model, choose_models
 from tdac_agent.providers.manual import Manual
 from tdac_agent.records import load_run
@@ -185,6 +193,19 @@ def test_a_run_is_replayed(policy_task, recorded, tmp_path, warm):
     for name in ("generate.reply.md", "generate.reply-2.md"):
         old, new = (x / "iterations/k01/j0" / name for x in (recorded, out))
         assert old.read_bytes() == new.read_bytes()
+
+
+def test_a_replay_has_the_seed_on_record(recorded, tmp_path, good, tdac):
+    """Of a run that was begun here; the author of another may have aimed at it."""
+    words = ["--task", good, "--seed", 5, "-K", 1, "-J", 0]
+    assert tdac("synth", *words, "--out", "first")[0] == 0
+    options = Options(load_task(good).setting)
+    assert recorded_seed(choose_model("replay:first", options)) == 5
+    record = json.loads(Path("first/run.json").read_text())
+    Path("first/run.json").write_text(json.dumps({**record, "seed": 0}))
+    assert recorded_seed(choose_model("replay:first", options)) is None
+    assert recorded_seed(choose_model("replay:demo", options)) == 0
+    assert recorded_seed(choose_model(f"replay:{recorded}", options)) is None
 
 
 def test_a_miss_is_an_error(policy_task, recorded, tmp_path, small_task, warm):
