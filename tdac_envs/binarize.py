@@ -27,6 +27,21 @@ def otsu(luminance: GreyImage) -> float:
     return (low + high) / 2
 
 
+def saved_level(luminance: GreyImage) -> int | None:
+    """The "unknown" grey of a picture with a map saver's levels and no other, or None.
+
+    ROS `map_saver` writes 254 free, 205 unknown, 0 occupied; a negative has 1, 50, 255.
+    That holds however little of it has been seen.
+    """
+    share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
+    for unknown, free, occupied in ((205, (254, 255), 0), (50, (1, 0), 255)):
+        seen = share[list(free)].sum()
+        known = seen + share[occupied]
+        if seen > 0 and share[unknown] > 0.01 and known + share[unknown] > 0.98:
+            return unknown if share[occupied] > 0 or share[free[0]] > 0 else None
+    return None
+
+
 def unknown_level(luminance: GreyImage) -> int | None:
     """The grey that a mapping tool wrote for "not seen", or None.
 
@@ -34,6 +49,9 @@ def unknown_level(luminance: GreyImage) -> int | None:
     negative has 50 or 127. It counts only as one large, flat level between the two.
     """
     share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
+    written = saved_level(luminance)
+    if written is not None:
+        return written
     if min(share[:20].sum(), share[-20:].sum()) < 0.001:
         return None
     # Grey walls are often about 128, so that level must fill an area.

@@ -7,7 +7,7 @@ import math
 import cv2
 import numpy as np
 
-from tdac_envs.binarize import unknown_level
+from tdac_envs.binarize import saved_level, unknown_level
 from tdac_envs.grid import BoolGrid
 from tdac_envs.image import GreyImage
 
@@ -16,6 +16,8 @@ from tdac_envs.image import GreyImage
 # its negative are decided alike.
 _W_CONNECTED, _W_BORDER, _W_WIDTH, _W_PIECES = 1.5, -1.7, 1.1, -1.5
 _W_THIN, _W_OUTSIDE, _W_EXTREMES, _W_SAVER = 1.0, 1.0, 4.0, 3.0
+_W_SAVED = 15.0
+"""More than all other evidence: the file's own levels say what is free."""
 _TOO_THIN = 2.5
 """Mean distance to the other side, px, below which no robot fits."""
 _WIDE = 0.01
@@ -54,6 +56,9 @@ def light_free_evidence(
 
 def _levels(luminance: GreyImage) -> float:
     """What single grey levels tell of a file that a mapping tool wrote."""
+    written = saved_level(luminance)
+    if written is not None:
+        return _W_SAVED if written > 127 else -_W_SAVED
     return _W_EXTREMES * _extremes(luminance) + _W_SAVER * _map_saver(luminance)
 
 

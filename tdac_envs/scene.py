@@ -20,9 +20,9 @@ Polarity = Shade | Literal["mixed", "given"]
 
 # Start and goal of a real task are free with the body's disc around them, so two
 # clean discs outweigh a doubtful picture but not a clear one.
-_W_TASK = 2.0
+_W_TASK = 2.5
 CLOSE = 0.5
-"""Log-odds below which the user is asked; public maps with a task are above 4."""
+"""Log-odds below which the user is asked; public maps with a task are above 5."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
