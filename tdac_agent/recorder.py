@@ -34,7 +34,10 @@ from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, portable_task_file, write_workdir
 from tdac_agent.task_file import TASK_FILE
 from tdac_agent.trust import OWN_SUITE, sign
+from tdac_envs.map_folder import png
 
+PREVIEW_FILE = "preview.png"
+"""How map or world was read, for people."""
 Event = Callable[[dict[str, Any]], None]
 
 
@@ -73,6 +76,7 @@ class Recorder:
         folder = self.run.folder
         self.save()
         write_workdir(folder, task)
+        write_atomic(folder / PREVIEW_FILE, png(task.setting.preview()))
         if task.suite is not None:
             ignored = shutil.ignore_patterns("__pycache__")
             own = folder / OWN_SUITE

@@ -10,6 +10,7 @@ from gymnasium import Space
 from numpy.typing import NDArray
 
 from tdac_agent.units import Units
+from tdac_envs.canvas import Image
 from tdac_envs.driven import Observation
 from tdac_envs.plan import Path as Way
 from tdac_envs.task2d import Pose
@@ -167,6 +168,9 @@ class Setting(Protocol):
 
     def write_files(self, folder: Path) -> None:
         """Writes what a controller may read, but for `sensors.py`."""
+
+    def preview(self) -> Image:
+        """How map or world was read, as a picture for people, uint8 RGB."""
 
     def portable(self) -> dict[str, Any]:
         """Keys of a `task.yaml` beside these files that say the same."""

@@ -14,6 +14,7 @@ from tdac_agent.flat_world import flat_world
 from tdac_agent.setting import Original
 from tdac_agent.task_file import TaskFile
 from tdac_agent.units import METRES, Units
+from tdac_envs.canvas import Image
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import TABLE
@@ -105,6 +106,12 @@ class EPuckSetting:
         params = json.dumps(self.params.model_dump(mode="json"), indent=2)
         (folder / "params.json").write_text(f"{params}\n", encoding="utf-8")
         (folder / WORLD_FILE).write_text(self.text, encoding="utf-8")
+
+    def preview(self) -> Image:
+        """The world from above."""
+        from tdac_envs.world_picture import draw_world
+
+        return draw_world(self.nominal.ground.world)
 
     def portable(self) -> dict[str, Any]:
         """The world is the folder's flat one, in which nothing is left to ignore."""

@@ -11,13 +11,15 @@ import cv2
 from tdac_agent.setting import Original, Setting
 from tdac_agent.task_file import RobotSpec, TaskFile
 from tdac_agent.units import PIXELS, Units
+from tdac_envs.canvas import Image
 from tdac_envs.errors import MapError, TaskError
 from tdac_envs.grid import OccupancyGrid
 from tdac_envs.image import picture_size, read_bytes
 from tdac_envs.map2d import Map2DEnv
-from tdac_envs.map_folder import write_grid
+from tdac_envs.map_folder import preview_of, write_grid
 from tdac_envs.maps import bundled_maps
 from tdac_envs.params import MapParams, RobotParams, Said
+from tdac_envs.preprocessing import as_image
 from tdac_envs.render import ROBOT_IMAGE
 from tdac_envs.source2d import prepare
 from tdac_envs.task2d import Map2DTask, Pose, Terrain, make_task
@@ -110,6 +112,12 @@ class Map2DSetting:
         """Writes `params.json`, `occupancy.npy`, `occupancy.png` and `robot.png`."""
         write_grid(folder, self.nominal.terrain.grid, self.params)
         (folder / "robot.png").write_bytes(read_bytes(self.robot_image))
+
+    def preview(self) -> Image:
+        """The map image, what of it is free, start, goal and the way."""
+        grid = self.nominal.terrain.grid
+        shown = grid.cells if self.image is None else self.image
+        return preview_of(as_image(shown).colour, grid, self.params)
 
     def portable(self) -> dict[str, Any]:
         """The map is the folder's own grid."""

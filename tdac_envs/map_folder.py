@@ -17,6 +17,8 @@ from tdac_envs.params import MapParams
 from tdac_envs.plan import plan_path
 
 if TYPE_CHECKING:
+    from tdac_envs.canvas import Image
+    from tdac_envs.image import ColourImage
     from tdac_envs.preprocessing import Source
 
 FILES = ("occupancy.npy", "occupancy.png", "params.json", "preview.png")
@@ -44,18 +46,14 @@ def write_map(
     """
     # A task that writes a grid alone has no use for what reads and draws images.
     from tdac_envs.preprocessing import as_image
-    from tdac_envs.preview import draw_preview
 
     folder = Path(folder)
-    preview = draw_preview(
-        as_image(image).colour, grid.cells, params, shortest_path(grid, params)
-    )
+    preview = preview_of(as_image(image).colour, grid, params)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".map-", dir=folder) as work:
             write_grid(Path(work), grid, params)
-            picture = cv2.cvtColor(preview, cv2.COLOR_RGB2BGR)
-            _save_png(Path(work) / "preview.png", picture)
+            (Path(work) / "preview.png").write_bytes(png(preview))
             for name in FILES:
                 os.replace(Path(work) / name, folder / name)
     except OSError as error:
@@ -74,22 +72,37 @@ def write_previews(error: PolarityError) -> list[Path]:
     Raises:
         MapError: The folder cannot be written.
     """
-    from tdac_envs.preview import draw_preview
-
     folder = error.folder or Path(f"{Path(error.name).stem}-map")
     files = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for polarity, (colour, grid, params) in error.pictures.items():
-            way = shortest_path(grid, params)
-            preview = draw_preview(colour, grid.cells, params, way)
             files.append(folder / f"preview-{polarity}.png")
-            _save_png(files[-1], cv2.cvtColor(preview, cv2.COLOR_RGB2BGR))
+            files[-1].write_bytes(png(preview_of(colour, grid, params)))
     except OSError as fault:
         raise MapError(
             f"{folder}: cannot be written: {fault.strerror}; choose another folder"
         ) from fault
     return files
+
+
+def preview_of(colour: ColourImage, grid: OccupancyGrid, params: MapParams) -> Image:
+    """A picture of how a map was read, its task and the way, uint8 RGB.
+
+    Args:
+        colour: Shape (height, width, 3), uint8 RGB, the map's picture.
+        grid: From `preprocess`.
+        params: From `preprocess`.
+    """
+    from tdac_envs.preview import draw_preview
+
+    return draw_preview(colour, grid.cells, params, shortest_path(grid, params))
+
+
+def png(picture: Image) -> bytes:
+    """A uint8 RGB picture as a PNG file's bytes."""
+    shown = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
+    return cv2.imencode(".png", shown)[1].tobytes()
 
 
 def write_grid(folder: Path, grid: OccupancyGrid, params: MapParams) -> None:
