@@ -33,7 +33,7 @@ from tdac_agent.provenance import VERSIONED, sha256_of
 from tdac_agent.sandbox import Limits
 from tdac_agent.seeded import CALLS_FILE, POSES_FILE, SeededJob
 from tdac_agent.seeded_run import run_seeds
-from tdac_agent.task import Task, lay_out, load_task
+from tdac_agent.task import Task, called, lay_out, load_task
 from tdac_agent.warm import WarmJudge
 from tdac_envs.arguments import one_of, whole_number
 from tdac_envs.errors import TaskError
@@ -221,6 +221,7 @@ def _compete(
 def _about_task(task: Task) -> EvaluatedTask:
     return EvaluatedTask(
         name=task.name,
+        called=called(task),
         task_sha256=task.sha256(),
         map_sha256=task.setting.world_sha256(),
         unit=task.setting.units.place,

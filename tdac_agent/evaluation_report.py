@@ -35,6 +35,7 @@ class EvaluatedTask(_Record):
     """What was to be done."""
 
     name: str
+    called: str = Field("", description="In words, not by its name alone.")
     task_sha256: str
     map_sha256: str
     unit: Place = Field(description="Of lengths.")

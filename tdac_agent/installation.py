@@ -18,6 +18,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.task import Task
 from tdac_envs.private import user_state
 
@@ -33,6 +34,9 @@ def lasting_secret() -> bytes | None:
     if path is None:
         _tell("there is no home")
         return None
+    if any(path.is_relative_to(shown) for shown in _shown()):
+        _tell(f"{path} is where controllers may read")
+        return None
     try:
         if not path.exists():
             _make(path)
@@ -45,7 +49,13 @@ def lasting_secret() -> bytes | None:
 def secret_file() -> Path | None:
     """Where the secret lies; None for a user without a home."""
     folder = user_state()
-    return None if folder is None else folder / "tdac" / "secret"
+    return None if folder is None else folder.resolve() / "tdac" / "secret"
+
+
+def _shown() -> tuple[str, ...]:
+    """Folders that every sandbox shows."""
+    seen = exposure()
+    return (*seen.system, *seen.packages)
 
 
 @functools.cache

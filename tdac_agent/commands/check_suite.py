@@ -14,6 +14,7 @@ from tdac_agent.commands.sentences import tell
 from tdac_agent.privileged import REFERENCE
 from tdac_agent.suite_check import check_suite
 from tdac_agent.suite_proof import Row, SuiteCheck
+from tdac_agent.task import called
 from tdac_agent.task_file import Profile
 from tdac_agent.trust import allowed
 from tdac_agent.warm import WarmJudge
@@ -48,11 +49,11 @@ def run(
     if as_json:
         sys.stdout.write(check.model_dump_json(indent=2) + "\n")
     else:
-        _show(check, console)
+        _show(check, called(task), console)
     return 0 if check.proven else 1
 
 
-def _show(check: SuiteCheck, console: Console) -> None:
+def _show(check: SuiteCheck, task: str, console: Console) -> None:
     for note in check.notes:
         tell(console, f"note: {note}", "yellow")
     for problem in check.problems:
@@ -60,7 +61,7 @@ def _show(check: SuiteCheck, console: Console) -> None:
     console.print(_table(check))
     colour, word = ("green", "proven") if check.proven else ("red", "not proven")
     console.print(
-        f"[bold {colour}]{word}[/]: {escape(check.suite)} on {escape(check.task)}, "
+        f"[bold {colour}]{word}[/]: {escape(check.suite)} on {escape(task)}, "
         f"profile {check.profile}, seed {check.seed}, sandbox {check.sandbox}, "
         f"{check.seconds:.0f} s"
     )

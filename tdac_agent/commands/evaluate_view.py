@@ -68,7 +68,7 @@ def _table(
         "random": "random starts and goals",
     }
     title = (
-        f"{task.name}: {found.episodes} episodes each, "
+        f"{task.called or task.name}: {found.episodes} episodes each, "
         f"{starts.get(found.variation, 'the nominal start')}, seed {found.seed}"
     )
     table = _plain_table(title)

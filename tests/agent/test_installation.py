@@ -5,18 +5,21 @@ import stat
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from tdac_agent.installation import lasting_secret, seed_of
 from tdac_agent.judge import JITTERS
 from tdac_agent.robust import verify_robust
+from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.starts import spread_starts
 from tdac_agent.synthesis import synthesize
 from tdac_agent.verification import verify
 
 KEYED = "from tdac_agent.installation import keyed; print(keyed(b'x').hex())"
 LINE = "tdac: no secret can be kept ("
+END = ": moved starts are drawn for this run alone; its report has their seed"
 VERIFY = """
 import sys
 from tdac_agent.task import load_task
@@ -88,6 +91,15 @@ def test_no_place_for_a_secret_is_said(kind, tmp_path):
         assert err.startswith(f"{LINE}{file}: ")
         assert err.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("shown", exposure().packages + exposure().system[:1])
+def test_a_secret_is_kept_from_the_sandbox(shown):
+    """A folder that controllers can read is no place for it: said, not made."""
+    state = Path(shown) / "state"
+    _, err = said(python(state, "-c", KEYED))
+    assert err == f"{LINE}{state}/tdac/secret is where controllers may read){END}\n"
+    assert not state.exists()
 
 
 def test_a_seed_follows_from_controller_task_and_secret(small_task, tmp_path):
