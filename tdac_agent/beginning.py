@@ -17,6 +17,7 @@ from tdac_agent.files import clear_unfinished
 from tdac_agent.installation import drawn_seed, lasting_secret
 from tdac_agent.journal import mend, read_records
 from tdac_agent.locks import LOCK_FILE, hold
+from tdac_agent.ownership import OWN_SUITE, is_own_folder, sign
 from tdac_agent.past import read_past
 from tdac_agent.prompt import PromptTemplate, generate_prompt
 from tdac_agent.provenance import sha256_of
@@ -26,7 +27,6 @@ from tdac_agent.records import JOURNAL, Run
 from tdac_agent.resume import run_there
 from tdac_agent.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.task import Task
-from tdac_agent.trust import OWN_SUITE, is_own_folder, sign
 from tdac_agent.verification import suite_sha256
 
 

@@ -15,6 +15,7 @@ from tdac_agent.blobs import Blobs
 from tdac_agent.budget import Amount
 from tdac_agent.files import keep, write_atomic
 from tdac_agent.journal import append_record
+from tdac_agent.ownership import OWN_SUITE, sign
 from tdac_agent.past import REPEATED, Past, reply_of
 from tdac_agent.prompt import PromptTemplate
 from tdac_agent.provider import Reply, Request
@@ -33,7 +34,6 @@ from tdac_agent.retry import Missed
 from tdac_agent.rules import RuleBook
 from tdac_agent.task import Task, portable_task_file, write_workdir
 from tdac_agent.task_file import TASK_FILE
-from tdac_agent.trust import OWN_SUITE, sign
 from tdac_envs.map_folder import png
 
 PREVIEW_FILE = "preview.png"

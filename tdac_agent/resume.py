@@ -10,11 +10,12 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.files import UNFINISHED
 from tdac_agent.locks import LOCK_FILE
+from tdac_agent.ownership import is_own, is_own_folder, wishes_of
 from tdac_agent.prompt import VARIANTS
 from tdac_agent.records import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
 from tdac_agent.task import Task, load_task
 from tdac_agent.task_file import TASK_FILE
-from tdac_agent.trust import is_own, is_own_folder, permit, wishes_of
+from tdac_agent.trust import permit
 from tdac_envs.errors import why
 from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 

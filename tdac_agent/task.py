@@ -125,8 +125,8 @@ def load_task(
 
 def _is_of_own_run(folder: Path, suite: Path) -> bool:
     """Whether a task is that of a run which was begun here, with these tests."""
-    from tdac_agent.records import load_run  # its models take a while to build
-    from tdac_agent.trust import is_own
+    from tdac_agent.ownership import is_own  # what it loads takes a while
+    from tdac_agent.records import load_run
 
     try:
         return is_own(load_run(folder), suite)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from tdac_agent.campaign.config import CampaignConfig
@@ -38,4 +39,4 @@ def wishes_of(
             yield Wish(f"fill in the template {template}", (), digest)
     for task in tasks:
         if task.suite is not None and not task.trusted:
-            yield Wish(suite_wish(task.suite).what, (), suite_wish(task.suite).sha256)
+            yield replace(suite_wish(task.suite), flag=())

@@ -13,12 +13,12 @@ from typing import Any
 
 from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.journal import JournalRecord, read_records
+from tdac_agent.ownership import is_own_folder
 from tdac_agent.past import reply_of
 from tdac_agent.provenance import sha256_of
 from tdac_agent.provider import PermanentFault, Reply, Request
 from tdac_agent.providers.choice import Options
 from tdac_agent.records import JOURNAL, load_run
-from tdac_agent.trust import is_own_folder
 from tdac_envs.intake import RECORD_BYTES, read_file
 
 DEMO = Path(__file__).parents[1] / "demo"

@@ -12,11 +12,12 @@ import yaml
 from small import write_small_task
 
 from tdac_agent.installation import lasting_secret
+from tdac_agent.ownership import is_own, is_own_folder
 from tdac_agent.prompt import PromptError, PromptTemplate, generate_prompt
 from tdac_agent.records import load_run
 from tdac_agent.synthesis import synthesize
 from tdac_agent.task import called, load_task
-from tdac_agent.trust import NotTrustedError, is_own, is_own_folder, tree_sha256
+from tdac_agent.trust import NotTrustedError, tree_sha256
 from tdac_agent.verification import verify
 
 TEST = "def test_own(rollout):\n    assert rollout('nominal').reached\n"

@@ -194,6 +194,15 @@ def program_as_optimizer(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
+@attack(
+    r"run the program `true -c \[2J\[Hverified: 41 of 41` as its learner", works=False
+)
+def program_that_draws_on_the_terminal(place: Place) -> list[str | Path]:
+    program = "command:true -c \x1b[2J\x1b[Hverified: 41 of 41\udc1b"
+    place.change(learner=program, optimizer=program, mark="\udc1b")
+    return ["synth", "--resume", place.run]
+
+
 @attack(r"fill in the template \S+ \(sha256 [0-9a-f]{12}\).*--prompt", works=False)
 def template_that_computes(place: Place) -> list[str | Path]:
     (place.run / "prompt.j2").write_text(place.filled(TEMPLATE))
@@ -329,6 +338,8 @@ def problems_of(one: Foreign, own: Path, place: Path, *, trust: bool) -> list[st
     found = [f"reached {reached}"] if reached else []
     if code != one.code:
         found.append(f"exit {code}, expected {one.code}: {said}")
+    if "\x1b" in said:
+        found.append("the terminal was drawn on")
     refusals = [line for line in said.splitlines() if line.startswith("error: ")]
     lines = refusals if one.code == 2 else said.splitlines()
     if not any(re.search(one.wants, line) for line in lines):
