@@ -16,7 +16,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tdac_agent.providers.secrets import one_line
 from tdac_agent.task import Task
 from tdac_envs.errors import TdacError
 from tdac_envs.intake import RECORD_BYTES, read_file
@@ -80,6 +79,8 @@ def permit(whose: str | Path, wishes: Iterable[Wish], *, trust: bool) -> None:
 
 def _line(text: str) -> str:
     """Words of somebody else's, which may hold anything, to be shown."""
+    from tdac_agent.providers.secrets import one_line  # seldom needed, slow to load
+
     return one_line(text, LONGEST_LINE)
 
 

@@ -16,6 +16,7 @@ from tdac_agent.provider import (
     ProviderFault,
     Reply,
     Request,
+    missing_for,
     recorded_seed,
 )
 from tdac_agent.providers import Options, choose_model, choose_models
@@ -335,3 +336,48 @@ def test_learner_and_optimizer_are_one_where_they_are_named_so(small_task, tmp_p
     other, third = choose_models(name, "builtin", small_task.setting)
     assert other is not third
     shutil.rmtree(tmp_path / "mail")
+
+
+@pytest.mark.parametrize(
+    ("url", "safe"),
+    [
+        ("http://gpu.lan:8000/v1", False),
+        ("http://localhost.evil.org/v1", False),
+        ("http://127.0.0.1.evil.org/v1", False),
+        ("http://10.0.0.7/v1", False),
+        ("http://[2001:db8::1]:8000/v1", False),
+        ("https://gpu.lan:8000/v1", True),
+        ("http://localhost:11434/v1", True),
+        ("http://127.0.0.1:8000/v1", True),
+        ("http://[::1]:8000/v1", True),
+    ],
+)
+@pytest.mark.parametrize("kind", ["openai", "anthropic"])
+def test_a_key_goes_nowhere_unencrypted(kind, url, safe, options, monkeypatch):
+    """But to this machine, or where it is said; before anything is begun."""
+    variable = f"{kind.upper()}_API_KEY"
+    told = f"the key in {variable} would go unencrypted to {url}: use https"
+    served = replace(options, base_url=url)
+    monkeypatch.delenv(variable, raising=False)
+    assert told not in " ".join(missing_for(choose_model(f"{kind}:m", served)))
+    monkeypatch.setenv(variable, "key-12345678")
+    lines = missing_for(choose_model(f"{kind}:m", served))
+    assert any(line.startswith(told) for line in lines) != safe
+    allowed = replace(served, key_over_http=True)
+    assert missing_for(choose_model(f"{kind}:m", allowed)) == ()
+    if not safe:
+        with pytest.raises(ProviderError, match="--key-over-http"):
+            choose_model(f"{kind}:m", served).complete(QUESTION)
+
+
+def test_the_command_says_that_a_key_would_be_read(tdac, good, monkeypatch):
+    """Exit 2, one line, nothing sent; with the flag it goes on."""
+    monkeypatch.setenv("OPENAI_API_KEY", "key-12345678")
+    words = ["synth", "--task", good, "--learner", "openai:m", "--max-tokens", 0]
+    words += ["--base-url", "http://gpu.invalid/v1", "--out", "run"]
+    code, _, err = tdac(*words)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "would go unencrypted to http://gpu.invalid/v1: use https, unset" in err
+    assert not Path("run").exists()
+    code, _, err = tdac(*words, "--key-over-http")
+    assert (code, err) == (4, "")
