@@ -122,20 +122,20 @@ def test_an_exhausted_budget_stops_a_run(
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
     out = tmp_path / "run"
     model = Model("openai:gpt-4o", None, code(STILL, 8000, 4000, 2000))
-    limits = {"max_output": 5000, "max_cost": 0.15}
+    limits = {"max_output": 5000, "max_cost": 0.12}
     run = synthesize(task, model, out=out, **limits, judge=warm)
     assert (run.status, run.censored, run.tau) == ("budget", True, None)
     price = 2.5 * 8000 + 10 * 4000
     assert run.cost == pytest.approx(price / 1e6)
-    assert "0.0600 USD of 0.15 USD are spent or reserved" in run.reason
-    assert run.enough.startswith("--max-cost 0.3")
+    assert "0.0600 USD of 0.12 USD are spent or reserved" in run.reason
+    assert run.enough.startswith("--max-cost 0.2")
     assert model.answers == []
     # The same limit again asks nothing: exit 4, and what to do.
     monkeypatch.setenv("OPENAI_API_KEY", "sk-none")
     exit_code, told, _ = tdac("synth", "--resume", out)
     assert exit_code == 4
-    assert "stopped by the budget: 0.0600 USD of 0.15 USD are spent" in told
-    assert f"go on: tdac synth --resume {out} --max-cost 0.3" in told
+    assert "stopped by the budget: 0.0600 USD of 0.12 USD are spent" in told
+    assert f"go on: tdac synth --resume {out} --max-cost 0.2" in told
     assert "at most 59 questions are left: --max-cost 0." in told
     assert "8000 tokens in (2000 from a cache), 4000 out; 0.0600 USD" in told
     limits["max_cost"] = 0.5

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import re
 import resource
-import select
 import signal
 import subprocess
 import sys
@@ -122,13 +121,19 @@ def line_problems(offer: Offer, code: int, errors: str) -> list[str]:
 
 def all_offers() -> list[Offer]:
     """Every offer of the zoo."""
-    import maps
-    import policies
-    import records
-    import tasks
-    import worlds
+    import offered_maps
+    import offered_policies
+    import offered_records
+    import offered_tasks
+    import offered_worlds
 
-    modules = (maps, worlds, tasks, records, policies)
+    modules = (
+        offered_maps,
+        offered_worlds,
+        offered_tasks,
+        offered_records,
+        offered_policies,
+    )
     return [offer for module in modules for offer in module.OFFERS]
 
 
@@ -161,15 +166,20 @@ def wrong_offers(offers: list[Offer], workers: int, console: Console) -> int:
 
 def _ended(process: subprocess.Popen[bytes]) -> tuple[int, int]:
     """Exit code and peak memory of a process; its session is ended if it is late."""
-    handle = os.pidfd_open(process.pid)
-    try:
-        if not select.select([handle], [], [], SECONDS)[0]:
+    late, peak = time.monotonic() + SECONDS, 0
+    while process.poll() is None:
+        peak = max(peak, _peak(process.pid))
+        if time.monotonic() > late:
             os.killpg(process.pid, signal.SIGKILL)
-        _, status, usage = os.wait4(process.pid, 0)
-    finally:
-        os.close(handle)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return process.returncode, usage.ru_maxrss * 1024
+        time.sleep(0.02)
+    return process.returncode, peak
+
+
+def _peak(pid: int) -> int:
+    """Most memory that a process had until now; that of its parent does not count."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    found = re.search(r"VmHWM:\s+(\d+) kB", status)
+    return int(found[1]) * 1024 if found else 0
 
 
 def _inside(folder: Path) -> set[str]:

@@ -2,7 +2,7 @@
 # profile: policy
 # onto: good/policy_minimal.py
 # seed: of the installation
-# error: jitter [1-5]
+# error: jitter|out of time|failed
 # why: where the starts are moved to follows from a secret of the installation
 honest = policy
 STARTS = [

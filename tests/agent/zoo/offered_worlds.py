@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from maps import link, pipe, text
+from offered_maps import link, pipe, text
 from offers import Maker, Offer
 
 HEADER = "#VRML_SIM R2025a utf8\n"

@@ -6,7 +6,7 @@ import json
 import os
 from pathlib import Path
 
-from maps import link, pipe, text
+from offered_maps import link, pipe, text
 from offers import Maker, Offer
 
 import tdac_agent

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import yaml
-from maps import draw, link, pipe, text
+from offered_maps import draw, link, pipe, text
 from offers import Maker, Offer
 
 WORDS = ("synth", "--task", "task.yaml", "--dry-run")

@@ -11,7 +11,7 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
-from maps import link, pipe, text
+from offered_maps import link, pipe, text
 from offers import Maker, Offer
 
 NAME = "policy.zip"
