@@ -338,6 +338,34 @@ def _light(shape: tuple[int, ...], rng: np.random.Generator) -> tuple[Field, str
     return light, " + ".join(names)
 
 
+def seven(drawing: Drawing) -> Iterator[Photo]:
+    """A light page with dark walls, 80 and more grey levels darker somewhere.
+
+    Gradients in four directions, two vignettes and a gradient that is taken off instead
+    of multiplied; some with noise, none blurred or compressed.
+    """
+    shape, page = drawing.truth.shape, np.array([240.0, 238.0, 232.0])
+    ink = np.array([35.0, 33.0, 38.0])
+    across, down = gradient(shape, 0.0), gradient(shape, np.pi / 2)
+    cases = [
+        (across, 80, 0.0),
+        (down, 100, 0.0),
+        (1 - across, 120, 3.0),
+        (gradient(shape, 2.2), 150, 6.0),
+        (vignette(shape), 110, 0.0),
+        (vignette(shape), 140, 4.0),
+    ]
+    drawn = printed(drawing.truth, "dark", page, ink)
+    for number, (field, drop, noise) in enumerate(cases):
+        light = 1 - drop / page.max() * (1 - field)
+        rng = np.random.default_rng(number)
+        picture = developed(lit(drawn, light), rng, 0.0, noise, 100)
+        yield Photo(drawing, picture, "dark", f"{drop} levels, noise {noise:g}")
+    taken_off = drawn - 90 * (1 - gradient(shape, 0.8))[..., None]
+    picture = developed(taken_off, np.random.default_rng(6), 0.0, 0.0, 100)
+    yield Photo(drawing, picture, "dark", "90 levels taken off")
+
+
 def photos(made: list[Drawing], count: int, seed: int) -> Iterator[Photo]:
     """Photographs of the drawings in turn, both polarities of each."""
     rng = np.random.default_rng(seed)

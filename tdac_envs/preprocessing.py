@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tdac_envs.candidates import Candidate, Preset, ranked
 from tdac_envs.errors import PolarityError, TaskError
 from tdac_envs.grid import OccupancyGrid, body_free, clearance
-from tdac_envs.image import MapImage, from_array, load_image
+from tdac_envs.image import ColourImage, MapImage, from_array, load_image
 from tdac_envs.params import UNSAID, MapParams, RobotParams, Said, Shade
 from tdac_envs.readings import readings
 from tdac_envs.scene import Reading, Scene, unclear
@@ -56,13 +56,12 @@ def preprocess(
         PolarityError: There is a task, and both polarities are likely.
         TaskError: No reading of it makes the task feasible; says why.
     """
-    scene, notes = _scene(
-        image, start, goal, robot_radius, snap, Said(polarity, threshold)
-    )
+    source, said = as_image(image), Said(polarity, threshold)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, said)
     candidates = ranked(scene, preset)
     if unclear(scene, candidates[0].reading.polarity):
         if scene.trip is not None:
-            raise _close_call(scene, preset, heading)
+            raise _close_call(scene, source.colour, preset, heading)
         notes.append(f"{_CLOSE_CALL}; give polarity='dark' or 'light'")
     return _result(scene, candidates[0], preset, heading, notes)
 
@@ -85,16 +84,17 @@ def examine(
         PolarityError: Both polarities are likely, also without a task.
         TaskError: As `preprocess` does.
     """
-    scene, notes = _scene(image, start, goal, robot_radius, snap, said)
+    source = as_image(image)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, said)
     candidates = ranked(scene, preset)
     if unclear(scene, candidates[0].reading.polarity):
-        raise _close_call(scene, preset, heading)
+        raise _close_call(scene, source.colour, preset, heading)
     grid, params = _result(scene, candidates[0], preset, heading, notes)
     return grid, params, candidates
 
 
 def _scene(
-    image: Source,
+    source: MapImage,
     start: tuple[float, float] | None,
     goal: tuple[float, float] | None,
     robot_radius: float,
@@ -102,7 +102,6 @@ def _scene(
     said: Said,
 ) -> tuple[Scene, list[str]]:
     """The picture and what is asked of it, and notes on what was moved."""
-    source = as_image(image)
     if source.occupied is not None and said != UNSAID:
         raise TaskError(
             f"{source.name} says itself which cells are obstacles; leave out polarity "
@@ -138,8 +137,17 @@ def _grid(scene: Scene, best: Candidate) -> OccupancyGrid:
     return OccupancyGrid(best.reading.cells, image.resolution, image.origin)
 
 
-def _close_call(scene: Scene, preset: Preset, heading: float) -> PolarityError:
-    """The error that names both readings of a picture, and has what shows them."""
+def _close_call(
+    scene: Scene, colour: ColourImage, preset: Preset, heading: float
+) -> PolarityError:
+    """The error that names both readings of a picture, and has what shows them.
+
+    Args:
+        scene: The picture as it was judged.
+        colour: The picture as it came.
+        preset: As for `preprocess`.
+        heading: As for `preprocess`.
+    """
     told: list[str] = []
     pictures: dict[str, Any] = {}
     for polarity in scene.polarities:
@@ -148,7 +156,7 @@ def _close_call(scene: Scene, preset: Preset, heading: float) -> PolarityError:
         free = float(1 - best.reading.cells.mean())
         told.append(f"{polarity} obstacles leave {free:.0%} free{_way(best)}")
         params = _params(one, best, heading, [])
-        pictures[polarity] = (scene.image.colour, _grid(one, best), params)
+        pictures[polarity] = (colour, _grid(one, best), params)
     message = f"{scene.image.name}: {_CLOSE_CALL}: {', '.join(told)}"
     advice = "give polarity='dark' or 'light' (--polarity dark or --polarity light)"
     return PolarityError(f"{message}; {advice}", scene.image.name, pictures)

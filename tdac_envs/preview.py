@@ -177,7 +177,8 @@ def _lines(params: MapParams) -> list[str]:
     size = f"{params.source}: {params.width} x {params.height} px"
     if params.resolution is not None:
         size += f", {params.resolution:g} m per px"
-    return [size, f"obstacles: {params.polarity}, by {params.method}"]
+    shade = "" if params.polarity == "given" else f"{params.polarity} "
+    return [size, f"{shade}obstacles: {params.method}"]
 
 
 def _text(point: tuple[float, float]) -> str:

@@ -7,10 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
 from tdac_agent.commands.console import Console
 from tdac_agent.commands.flags import check_finite, in_pixels
@@ -22,7 +20,7 @@ from tdac_envs.maps import bundled_map, bundled_maps
 from tdac_envs.params import MapParams, RobotParams, Said
 from tdac_envs.preprocessing import examine
 
-SHOWN = 8
+SHOWN, EXPLAINED = 8, 2
 Point = tuple[float, float]
 
 
@@ -69,12 +67,11 @@ def run(
         }
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
         return
-    console = Console()
-    if start is None:  # no candidate has a figure, nor a place in an order
-        console.print(f"reading: {escape(_describe(ranked[0]))}", highlight=False)
-    else:
-        console.print(_table(ranked))
-    _print_choice(console, params, folder)
+    console = Console(highlight=False)
+    _print_reading(console, params, ranked[0])
+    if start is not None:  # without a task no candidate has figures, nor a place
+        _print_candidates(console, ranked)
+    _print_files(console, params, folder)
 
 
 def _row(candidate: Candidate) -> dict[str, object]:
@@ -91,55 +88,69 @@ def _row(candidate: Candidate) -> dict[str, object]:
     }
 
 
-def _table(ranked: list[Candidate]) -> Group:
-    """The best candidates; long descriptions of readings stand below, by number."""
-    readings = list(dict.fromkeys(_describe(candidate) for candidate in ranked[:SHOWN]))
+def _print_reading(console: Console, params: MapParams, chosen: Candidate) -> None:
+    """What the map is, and how it was read."""
+    size = f"{params.width} x {params.height} px"
+    console.print(f"{escape(params.source)}, {size}: {escape(_describe(chosen))}")
+    for note in params.notes:
+        console.print(f"[yellow]note:[/] {escape(note)}")
+
+
+def _print_candidates(console: Console, ranked: list[Candidate]) -> None:
+    """The best candidates, and why the others are none."""
+    feasible = [c for c in ranked if c.terms is not None]
+    readings = list(dict.fromkeys(_describe(c) for c in feasible[:SHOWN]))
+    console.print(_table(feasible[:SHOWN], readings))
+    for number, reading in enumerate(readings, 1):
+        if len(readings) > 1:
+            console.print(f"reading {number}: {escape(reading)}")
+    failed = [c for c in ranked if c.terms is None]
+    for candidate in failed[:EXPLAINED]:
+        what = _describe(candidate)
+        if candidate.inflation:
+            what += f", margin {candidate.inflation} px"
+        console.print(f"[dim]not {escape(what)}: {escape(candidate.failure or '')}[/]")
+    hidden = max(len(feasible) - SHOWN, 0) + max(len(failed) - EXPLAINED, 0)
+    if hidden:
+        console.print(f"and {hidden} more candidates (--json lists all)")
+
+
+def _table(candidates: list[Candidate], readings: list[str]) -> Table:
+    """Figures of feasible candidates; readings by number, if there are several."""
     table = Table(title="Candidates, the chosen one first", title_justify="left")
-    names = ("reading", "margin", "score", "clearance", "path", "sharpness")
-    for name in names:
+    names = ["margin, px", "clearance, px", "path, px", "sharpness", "score"]
+    for name in names if len(readings) == 1 else ["reading", *names]:
         table.add_column(name, justify="right", no_wrap=True)
-    for number, candidate in enumerate(ranked[:SHOWN]):
-        terms = candidate.terms
-        figures = ["–"] * 4
-        if terms is not None:
-            figures = [
-                f"{candidate.score:.2f}",
-                f"{terms.min_clearance:.1f}",
-                f"{terms.path_length:.0f}",
-                f"{terms.sharpness:.3f}",
-            ]
-        table.add_row(
-            str(1 + readings.index(_describe(candidate))),
+    for place, candidate in enumerate(candidates):
+        assert candidate.terms is not None
+        figures = [
             str(candidate.inflation),
-            *figures,
-            style="bold green" if number == 0 else None,
-        )
-    lines = [f"reading {n}: {text}" for n, text in enumerate(readings, 1)]
-    if len(ranked) > SHOWN:
-        lines.append(f"and {len(ranked) - SHOWN} more candidates (--json lists all)")
-    return Group(table, Text("\n".join(lines)))
+            f"{candidate.terms.min_clearance:.1f}",
+            f"{candidate.terms.path_length:.0f}",
+            f"{candidate.terms.sharpness:.3f}",
+            f"{candidate.score:.2f}",
+        ]
+        if len(readings) > 1:
+            figures.insert(0, str(1 + readings.index(_describe(candidate))))
+        table.add_row(*figures, style="bold green" if place == 0 else None)
+    return table
 
 
 def _describe(candidate: Candidate) -> str:
+    """How a candidate's picture is read."""
     reading = candidate.reading
+    if reading.polarity == "given":
+        return f"obstacles as the file says, {reading.method}"
     text = f"{reading.polarity} obstacles, {reading.method}"
-    if reading.cleanup:
+    if reading.cleanup and "specks" not in reading.method:
         text += f", cleanup {reading.cleanup}"
-    if reading.opening:
-        text += f", opening {reading.opening}"
-    return text + (f" — {candidate.failure}" if candidate.failure else "")
+    return text
 
 
-def _print_choice(console: Console, params: MapParams, folder: Path) -> None:
-    for note in params.notes:
-        console.print(f"[yellow]note:[/] {escape(note)}")
-    shade = {"dark": "dark", "light": "light", "mixed": "all but the floor"}
-    what = shade.get(params.polarity, "as the file says")
-    console.print(f"obstacles: [bold]{what}[/]; wrote {escape(str(folder))}")
+def _print_files(console: Console, params: MapParams, folder: Path) -> None:
+    preview = escape(str(folder / "preview.png"))
+    console.print(f"wrote {escape(str(folder))}; look at {preview}")
     if params.start is None:
         console.print(
-            "read start and goal off the rulers of "
-            f"{escape(str(folder / 'preview.png'))}, then give --start X Y --goal X Y"
+            "read start and goal off its rulers, then give --start X Y --goal X Y"
         )
-    else:
-        console.print(f"look at {escape(str(folder / 'preview.png'))}")

@@ -482,6 +482,58 @@ def test_map_without_places(tdac, image):
     assert Path("plan-map/preview.png").is_file()
 
 
+def test_map_says_its_reading_once(tdac, image):
+    """With a task and without: how the picture was read, and where the files are."""
+    for ends in (ENDS, []):
+        code, out, _ = tdac("map", image, *ends)
+        assert code == 0
+        assert out.count("dark obstacles") == 1
+        assert " ".join(out.split()).count("look at plan-map/preview.png") == 1
+
+
+@pytest.fixture
+def chessboard(tmp_path):
+    """A picture that may be meant either way."""
+    odd = (np.indices((320, 320)) // 40).sum(axis=0) % 2
+    path = tmp_path / "board.png"
+    cv2.imwrite(str(path), np.where(odd, 30, 230).astype(np.uint8))
+    return path
+
+
+@pytest.mark.parametrize("command", ["map", "synth"])
+def test_a_close_call_shows_both_readings(tdac, chessboard, command):
+    """Exit 2 with one line that names them, the flag that settles it, the previews."""
+    where = [chessboard] if command == "map" else ["--map", chessboard]
+    ends = ["--start", 20, 20, "--goal", 60, 20, "--robot-radius", 5]
+    code, _, err = tdac(command, *where, *ends)
+    assert code == 2
+    (line,) = err.splitlines()
+    assert "dark obstacles leave" in line
+    assert "light obstacles leave" in line
+    assert "--polarity dark or --polarity light" in line
+    for polarity in ("dark", "light"):
+        assert f"preview-{polarity}.png" in line
+        assert Path(f"board-map/preview-{polarity}.png").is_file()
+
+
+def test_polarity_and_threshold_are_flags_and_keys(tdac, image, chessboard, tmp_path):
+    """What was said is in the parameters; a task file says it, too."""
+    code, out, _ = tdac("map", chessboard, "--polarity", "light", "--json")
+    assert code == 0
+    assert json.loads(out)["params"]["polarity"] == "light"
+    code, out, _ = tdac("map", image, *ENDS, "--threshold", 100, "--json")
+    assert code == 0
+    assert json.loads(out)["params"]["threshold"] == 100
+    task = f"map: {image}\nstart: [30, 30]\ngoal: [130, 30]\nrobot: {{radius: 6}}\n"
+    (tmp_path / "task.yaml").write_text(f"{task}polarity: light\n")
+    code, _, err = tdac("synth", "--task", tmp_path / "task.yaml", "--dry-run")
+    assert code == 2
+    assert "lies in an obstacle" in err
+    code, _, err = tdac("synth", "--task", "maze", "--polarity", "dark")
+    assert code == 2
+    assert "leave out --polarity" in err
+
+
 @pytest.mark.parametrize("suffix", ["mp4", "gif"])
 def test_play_writes_a_film(tdac, good, suffix):
     """Exit 0 where the goal was reached."""

@@ -75,7 +75,7 @@ def check_folder(folder, source):
     """The folder is complete: evidence, working files, and every step on record."""
     assert (folder / "controller.py").read_text() == source
     names = "task.yaml run.json journal.jsonl report.json trajectory.png params.json"
-    names += " occupancy.npy occupancy.png robot.png sensors.py"
+    names += " occupancy.npy occupancy.png robot.png sensors.py preview.png"
     for name in names.split():
         assert (folder / name).stat().st_size > 0, name
     assert len(list((folder / "trajectories").glob("*.npz"))) == 6
