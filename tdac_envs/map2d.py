@@ -15,6 +15,7 @@ from tdac_envs.addresses import Addresses
 from tdac_envs.arguments import not_negative, one_of
 from tdac_envs.driven import DrivenEnv, Observation
 from tdac_envs.kernels import begin, drive
+from tdac_envs.params import Said, Shade
 from tdac_envs.render import Scene, Status
 from tdac_envs.robot2d import Robot
 from tdac_envs.setup2d import Setup, override
@@ -96,6 +97,8 @@ class Map2DEnv(DrivenEnv):
         reward_weights: Those of the reward that are to differ, by the names of
             `RewardWeights`; who compares rewards leaves them.
         snap: Move start and goal to the nearest place that holds the body.
+        polarity: Which pixels of a map image are obstacles: `"dark"`, `"light"`, or
+            None to find out.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -133,11 +136,18 @@ class Map2DEnv(DrivenEnv):
         delay: int = 0,
         reward_weights: Mapping[str, float] | None = None,
         snap: bool = False,
+        polarity: Shade | None = None,
         render_mode: str | None = None,
     ) -> None:
         one_of("variation", variation, VARIATIONS)
         prepared = prepare(
-            map, start, goal, heading=heading, robot_radius=robot_radius, snap=snap
+            map,
+            start,
+            goal,
+            heading=heading,
+            robot_radius=robot_radius,
+            snap=snap,
+            said=Said(polarity),
         )
         params = prepared.params
         robot = override(
