@@ -70,6 +70,7 @@ class Judge:
     Attributes:
         tier: Name of the tier that was used.
         cpu_seconds: CPU time of all children so far.
+        seed: Of what is drawn for this run.
         fault: Why the sandbox failed, where it did.
     """
 
@@ -92,7 +93,7 @@ class Judge:
         self.tier = tier
         self.cpu_seconds = 0.0
         self.fault: str | None = None
-        self._seed = seed
+        self.seed = seed
         self._limits = limits or Limits()
         self._deadline = time.monotonic() + wall_seconds
         self._too_long = f"the verification took longer than {wall_seconds:g} s"
@@ -241,7 +242,7 @@ class Judge:
 
     @cached_property
     def _starts(self) -> dict[str, Pose]:
-        starts = spread_starts(self.task.nominal, self._seed, JITTERS)
+        starts = spread_starts(self.task.nominal, self.seed, JITTERS)
         return dict(zip(NAMES[1:], starts, strict=True))
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:

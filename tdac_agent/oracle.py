@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from tdac_envs.world import World
 
 Point = tuple[int, int]
+
+# Of `walks`: how many, from how many starts at most, and the legs of each.
+WALKS, MOST_STARTS, LEGS = 3, 200, 5
 
 # Random grids on which a search whose heuristic counts a diagonal step as two finds a
 # path that is more than 1.15 times the shortest.
@@ -103,6 +107,43 @@ class Oracle:
         random = np.random.default_rng(seed)
         return np.asarray(random.random((height, width)) < density)
 
+    def walks(
+        self, occ: BoolGrid, cell: int, random: np.random.Generator
+    ) -> Iterator[tuple[Point, Point]]:
+        """Pairs of free pixels that some steps of `cell` px join, not far apart.
+
+        Args:
+            occ: Shape (height, width), bool `[y, x]`, True = occupied.
+            cell: Length of a straight step, px.
+            random: Draws them.
+        """
+        height, width = occ.shape
+        found = 0
+        for _ in range(MOST_STARTS):
+            start = int(random.integers(width)), int(random.integers(height))
+            goal = self._walk(occ, start, cell, random)
+            if goal != start:
+                found += 1
+                yield start, goal
+            if found == WALKS:
+                return
+
+    def _walk(
+        self, occ: BoolGrid, start: Point, cell: int, random: np.random.Generator
+    ) -> Point:
+        """Where some legs in any of the eight directions end; the start if nowhere."""
+        here = start
+        for dx, dy, steps in random.integers((-1, -1, 1), (2, 2, 7), (LEGS, 3)):
+            for _ in range(steps):
+                way = [
+                    (here[0] + k * int(dx), here[1] + k * int(dy))
+                    for k in range(cell + 1)
+                ]
+                if self.path_error(occ, way) is not None:
+                    break
+                here = way[-1]
+        return here
+
     def plan_cases(self) -> list[PlanCase]:
         """Fixed grids with traps, and seeded random ones."""
         cases = [self._case(*question) for question in _fixed_grids()]
@@ -112,11 +153,18 @@ class Oracle:
         detours = (self._random_case(s, self.grid(s, 30, 22, 0.3)) for s in DETOURS)
         return [*cases, *detours]
 
-    def world_cases(self, world: World) -> list[WorldCase]:
-        """The file of a world, and of copies that are moved, turned and fuller."""
+    def world_cases(
+        self, world: World, random: np.random.Generator | None = None
+    ) -> list[WorldCase]:
+        """The file of a world, and of copies that are moved, turned and fuller.
+
+        Args:
+            world: Of a task.
+            random: Draws one of the copies, and the points to be looked at.
+        """
         from tdac_agent.world_copies import world_cases
 
-        return world_cases(world)
+        return world_cases(world, random)
 
     def _random_case(
         self, seed: int, occ: BoolGrid, *, free_ends: bool = True

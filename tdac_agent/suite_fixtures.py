@@ -8,6 +8,7 @@ from collections.abc import Callable
 from importlib.util import decode_source
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tdac_agent.contract import MAX_SOURCE_BYTES
@@ -86,6 +87,17 @@ def controller(pytestconfig: pytest.Config) -> Controller:
 def oracle() -> Oracle:
     """Exact answers to planning questions."""
     return Oracle()
+
+
+@pytest.fixture(scope="session")
+def generator(pytestconfig: pytest.Config) -> Callable[[str], np.random.Generator]:
+    """`generator(name)`: random numbers that follow from the run's seed and a name.
+
+    A controller that is right in cases which are always the same may have them by
+    heart.
+    """
+    seed = pytestconfig.stash[JUDGE].seed
+    return lambda name: np.random.default_rng([seed, *name.encode()])
 
 
 @pytest.fixture

@@ -21,21 +21,31 @@ _APART, _KEEP_OFF = 0.05, 0.12
 _TRIES = 400
 
 
-def world_cases(world: World) -> list[WorldCase]:
+def world_cases(
+    world: World, random: np.random.Generator | None = None
+) -> list[WorldCase]:
     """A world as it is, and copies: moved, turned, renamed, reordered, with more in it.
 
     Args:
         world: Of a task, flat.
+        random: Draws a further copy, and the points of this world.
     """
     cases = [WorldCase("this world", write_world(world), world)]
+    if random is not None:
+        cases[0] = replace(cases[0], seed=int(random.integers(1 << 32)))
+        angle = round(float(random.uniform(-math.pi, math.pi)), 3)
+        cases.append(_copy(world, angle, random))
     for number, angle in enumerate(ANGLES):
-        random = np.random.default_rng(100 + number)
-        shift = random.uniform(-1.5, 1.5, 2).tolist()
-        copy = Motion(angle, *shift).world(_renamed(_fuller(world, random)))
-        turned = turned_groups(write_world(copy), random.uniform(0.4, 2.4))
-        text = reordered(turned, random)
-        cases.append(WorldCase(f"a copy turned by {angle} rad", text, copy))
+        cases.append(_copy(world, angle, np.random.default_rng(100 + number)))
     return cases
+
+
+def _copy(world: World, angle: float, random: np.random.Generator) -> WorldCase:
+    shift = random.uniform(-1.5, 1.5, 2).tolist()
+    copy = Motion(angle, *shift).world(_renamed(_fuller(world, random)))
+    turned = turned_groups(write_world(copy), random.uniform(0.4, 2.4))
+    text = reordered(turned, random)
+    return WorldCase(f"a copy turned by {angle} rad", text, copy)
 
 
 def _renamed(world: World) -> World:

@@ -28,11 +28,13 @@ class WorldCase:
         name: For messages.
         text: The file.
         world: The same.
+        seed: Draws the points of `samples`.
     """
 
     name: str
     text: str
     world: World
+    seed: int = 7
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -81,7 +83,7 @@ class WorldCase:
     def _points(self, solid: Prisms) -> list[Point]:
         """Seeded points all over the world, and some in each thing."""
         left, low, right, high = self._bounds()
-        random = np.random.default_rng(7)
+        random = np.random.default_rng(self.seed)
         corners = (left - _AROUND, low - _AROUND), (right + _AROUND, high + _AROUND)
         spread = random.uniform(*corners, (POINTS, 2))
         return [(x, y) for x, y in (*spread.tolist(), *solid.extent[:, :2].tolist())]

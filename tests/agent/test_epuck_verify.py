@@ -163,7 +163,7 @@ def test_command_line_verifies_in_a_world(tdac, controller, tmp_path):
     code, out, _ = tdac("verify", controller, "--task", "epuck-crates")
     assert code == 0
     assert "Episodes as the environment recorded them (mm)" in out
-    assert "verified: 44 of 44" in out
+    assert "verified: 46 of 46" in out
     words = ("verify", controller, "--world", "crates", "--profile", "policy")
     code, out, _ = tdac(*words, "--start", "-0.6", "0.1", "0.2", "--json")
     report = json.loads(out)

@@ -17,9 +17,18 @@ INFLATIONS = (0.0, 0.04)
 
 
 @pytest.fixture(scope="module")
-def cases(oracle, task):
-    """This task's world, and copies of it that are not the same."""
-    return oracle.world_cases(task.nominal.ground.world)
+def cases(oracle, task, generator):
+    """This task's world, and copies of it that are not the same; one copy is drawn."""
+    return oracle.world_cases(task.nominal.ground.world, generator("world"))
+
+
+@pytest.fixture(scope="module")
+def places(task, generator):
+    """Poses: fixed ones, the start, and some in this world that are drawn."""
+    x, y, yaw = task.nominal.start
+    drawn = generator("places").uniform((-0.5, -0.5, -3.0), (0.5, 0.5, 3.0), (3, 3))
+    others = [(x + dx, y + dy, turned) for dx, dy, turned in drawn.tolist()]
+    return [*PLACES, (x, y, yaw), *others]
 
 
 def numbers(value, count, name):
@@ -87,18 +96,30 @@ def test_parse_world(controller, cases):
 def test_build_grid(controller, cases, inflation):
     """At sampled points, clear of boundaries: occupied, or free."""
     for case in cases:
-        world = controller.call("parse_world", case.text)
-        size = case.resolution()
-        grid = controller.call("build_grid", world, size, inflation)
-        occ, origin = checked_grid(grid, case.name)
-        # What counts is a cell's centre, which may be half a diagonal away.
-        margin = 0.75 * size + 1e-3
-        wrong = [
-            (point, occupied)
-            for point, occupied in case.samples(inflation, margin)
-            if occupied_at(occ, origin, size, point) != occupied
-        ]
-        assert not wrong, f"{case.name}: {told(wrong, size, inflation)}"
+        check_grid(controller, case, case.resolution(), inflation)
+
+
+def test_build_grid_of_this_world(controller, cases, generator):
+    """The same with cells and inflations that are drawn."""
+    random, case = generator("grids"), cases[0]
+    for _ in range(2):
+        size = case.resolution() * float(random.uniform(1.0, 1.5))
+        check_grid(controller, case, size, float(random.uniform(0.01, 0.07)))
+
+
+def check_grid(controller, case, size, inflation):
+    """A grid at the points of a world, of which it is known what is there."""
+    world = controller.call("parse_world", case.text)
+    grid = controller.call("build_grid", world, size, inflation)
+    occ, origin = checked_grid(grid, case.name)
+    # What counts is a cell's centre, which may be half a diagonal away.
+    margin = 0.75 * size + 1e-3
+    wrong = [
+        (point, occupied)
+        for point, occupied in case.samples(inflation, margin)
+        if occupied_at(occ, origin, size, point) != occupied
+    ]
+    assert not wrong, f"{case.name}: {told(wrong, size, inflation)}"
 
 
 def checked_grid(grid, name):
@@ -131,30 +152,40 @@ def test_astar(controller, oracle):
         check_path(oracle, case, path, is_whole_pair)
 
 
-def test_astar_on_this_world(controller, oracle, cases):
-    """From start to goal on the grid of each world, every cell free."""
-    for case in cases[:1]:
-        size, room = 0.01, 0.04
-        world = controller.call("parse_world", case.text)
-        grid = controller.call("build_grid", world, size, room)
-        occ, (x0, y0) = checked_grid(grid, case.name)
-        ends = [
-            (math.floor((x - x0) / size), math.floor((y - y0) / size))
-            for x, y in (case.start[:2], case.goal)
-        ]
-        inside = all(0 <= x < occ.shape[1] and 0 <= y < occ.shape[0] for x, y in ends)
-        assert inside, f"start and goal are cells {ends} of {occ.shape[::-1]}"
-        best = oracle.shortest_length(occ, *ends)
-        path = controller.call("astar", occ, *ends)
-        assert isinstance(path, list), f"a {type(path).__name__}, not a list"
-        if math.isinf(best):
-            assert path == [], f"{len(path)} cells, but there is no path"
-            continue
-        assert path, f"[], but a path of {best:.1f} cells exists"
-        cells = [tuple(map(int, cell)) for cell in path]
-        error = oracle.path_error(occ, cells)
-        assert error is None, error
-        assert (cells[0], cells[-1]) == tuple(ends), f"runs from {cells[0]}"
+def test_astar_on_this_world(controller, oracle, cases, generator):
+    """On its grid: from start to goal, and between cells that are drawn."""
+    case, size = cases[0], 0.01
+    world = controller.call("parse_world", case.text)
+    grid = controller.call("build_grid", world, size, 0.04)
+    occ, (x0, y0) = checked_grid(grid, case.name)
+    ends = [
+        (math.floor((x - x0) / size), math.floor((y - y0) / size))
+        for x, y in (case.start[:2], case.goal)
+    ]
+    inside = all(0 <= x < occ.shape[1] and 0 <= y < occ.shape[0] for x, y in ends)
+    assert inside, f"start and goal are cells {ends} of {occ.shape[::-1]}"
+    for start, goal in (ends, *oracle.walks(occ, 1, generator("walks"))):
+        check_cells(controller, oracle, occ, start, goal)
+
+
+def check_cells(controller, oracle, occ, start, goal):
+    """A path of free cells from start to goal, or [] where there is none."""
+    best = oracle.shortest_length(occ, start, goal)
+    path = controller.call("astar", occ, start, goal)
+    assert isinstance(path, list), f"a {type(path).__name__}, not a list"
+    if math.isinf(best):
+        assert path == [], f"{len(path)} cells, but there is no path"
+        return
+    assert path, f"[], but a path of {best:.1f} cells exists"
+    cells = [tuple(map(int, cell)) for cell in path]
+    error = oracle.path_error(occ, cells)
+    assert error is None, error
+    runs = cells[0], cells[-1]
+    assert runs == (start, goal), f"runs {runs}, not {start} to {goal}"
+    length = oracle.path_length(cells)
+    assert length <= 1.1 * best + 1e-6, (
+        f"{length:.1f} cells long, the shortest from {start} to {goal} is {best:.1f}"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -181,9 +212,9 @@ def ahead(pose, forward, left):
 
 
 @pytest.mark.parametrize("prox", [None, [FREE] * 8], ids=["blind", "nothing near"])
-def test_drives_forward(wheels, prox):
+def test_drives_forward(wheels, places, prox):
     """Straight ahead: both wheels forward, and about equally fast."""
-    for pose in PLACES:
+    for pose in places:
         left, right = wheels(pose, ahead(pose, 0.3, 0.0), prox)
         assert min(left, right) > 0.0, f"({left:.2f}, {right:.2f}) straight ahead"
         assert abs(left - right) <= 0.05 * max(left, right), (
@@ -191,51 +222,61 @@ def test_drives_forward(wheels, prox):
         )
 
 
-def test_turns_to_the_side(wheels):
+def test_turns_to_the_side(wheels, places, generator):
     """Left of the heading: the right wheel is faster; on the right, the left one."""
-    for pose in PLACES:
-        for angle in (0.35, 0.8, 1.6, 2.4):
-            forward, side = 0.3 * math.cos(angle), 0.3 * math.sin(angle)
-            left, right = wheels(pose, ahead(pose, forward, side))
-            assert right > left, f"({left:.2f}, {right:.2f}), {angle} rad to the left"
-            left, right = wheels(pose, ahead(pose, forward, -side))
-            assert left > right, f"({left:.2f}, {right:.2f}), {angle} rad to the right"
+    drawn = generator("side").uniform(0.35, 2.4, 4)
+    for pose, angle in with_angles(places, (0.35, 0.8, 1.6, 2.4), drawn):
+        forward, side = 0.3 * math.cos(angle), 0.3 * math.sin(angle)
+        left, right = wheels(pose, ahead(pose, forward, side))
+        assert right > left, f"({left:.2f}, {right:.2f}), {angle} rad to the left"
+        left, right = wheels(pose, ahead(pose, forward, -side))
+        assert left > right, f"({left:.2f}, {right:.2f}), {angle} rad to the right"
 
 
-def test_mirrored_waypoint(wheels):
+def with_angles(places, usual, drawn):
+    """The usual angles at the usual places, and at all others those that are drawn.
+
+    A round angle may be where a controller's rule changes: there the place matters.
+    """
+    known = [(pose, angle) for pose in PLACES for angle in usual]
+    others = places[len(PLACES) :]
+    return known + [(pose, angle) for pose in others for angle in drawn.tolist()]
+
+
+def test_mirrored_waypoint(wheels, places, generator):
     """A waypoint mirrored at the heading swaps the wheels."""
-    for pose in PLACES:
-        for angle in (0.1, 0.5, 1.3, 2.2):
-            forward, side = 0.25 * math.cos(angle), 0.25 * math.sin(angle)
-            one = wheels(pose, ahead(pose, forward, side), [FREE] * 8)
-            other = wheels(pose, ahead(pose, forward, -side), [FREE] * 8)
-            assert np.allclose(one, other[::-1], atol=1e-2), (
-                f"{one} and {other}, {angle} rad to the left and to the right"
-            )
+    drawn = generator("mirror").uniform(0.1, 2.2, 4)
+    for pose, angle in with_angles(places, (0.1, 0.5, 1.3, 2.2), drawn):
+        forward, side = 0.25 * math.cos(angle), 0.25 * math.sin(angle)
+        one = wheels(pose, ahead(pose, forward, side), [FREE] * 8)
+        other = wheels(pose, ahead(pose, forward, -side), [FREE] * 8)
+        assert np.allclose(one, other[::-1], atol=1e-2), (
+            f"{one} and {other}, {angle} rad to the left and to the right"
+        )
 
 
-def test_turns_around(wheels):
+def test_turns_around(wheels, places):
     """Behind: it turns."""
-    for pose in PLACES:
+    for pose in places:
         left, right = wheels(pose, ahead(pose, -0.3, 0.001))
         assert abs(left - right) >= 0.5, f"({left:.2f}, {right:.2f}), right behind"
 
 
-def test_same_wherever_it_is(wheels):
+def test_same_wherever_it_is(wheels, places):
     """Moved and turned together, robot and waypoint give the same speeds."""
     for forward, side in ((0.3, 0.02), (0.2, 0.1), (0.05, -0.2)):
-        pairs = [wheels(pose, ahead(pose, forward, side)) for pose in PLACES]
-        for pose, found in zip(PLACES[1:], pairs[1:], strict=True):
+        pairs = [wheels(pose, ahead(pose, forward, side)) for pose in places]
+        for pose, found in zip(places[1:], pairs[1:], strict=True):
             assert np.allclose(found, pairs[0], atol=1e-2), (
-                f"{found} at {pose}, {pairs[0]} at {PLACES[0]}"
+                f"{found} at {pose}, {pairs[0]} at {places[0]}"
             )
 
 
-def test_blocked(wheels, task):
+def test_blocked(wheels, places, task):
     """With something right ahead it stands, creeps, backs or turns."""
     limit = task.params.robot.max_wheel_speed
     prox = [NEAR, *[FREE] * 6, NEAR]
-    for pose in PLACES:
+    for pose in places:
         left, right = wheels(pose, ahead(pose, 0.3, 0.0), prox)
         forward, turn = (left + right) / 2, abs(right - left) / 2
         assert forward <= 0.15 * limit or turn >= forward, (
@@ -243,10 +284,12 @@ def test_blocked(wheels, task):
         )
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.6, -1.5, 3.0])
-def test_tracks_a_waypoint(wheels, task, angle):
+@pytest.mark.parametrize("angle", [0.0, 0.6, -1.5, 3.0, "drawn"])
+def test_tracks_a_waypoint(wheels, places, task, generator, angle):
     """On the exact unicycle its speeds lead to the waypoint."""
     pose, far = (0.3, -0.2, 2.8), 0.3
+    if angle == "drawn":
+        pose, angle = places[-1], float(generator("track").uniform(-3.0, 3.0))
     target = ahead(pose, far * math.cos(angle), far * math.sin(angle))
     nearest, steps = far, round(20.0 / task.nominal.dt)
     for _ in range(steps):

@@ -11,6 +11,8 @@ from tdac_agent.suites.every_task import check_path
 
 pytestmark = pytest.mark.paper
 
+REACH, MOST_PIXELS = 30, 20_000
+
 
 @pytest.fixture
 def small_map(controller, oracle):
@@ -63,10 +65,32 @@ def test_file_constants(controller, name):
     assert base in known, f"{name} = {shown(value)}, expected one of {', '.join(known)}"
 
 
-def test_is_occupied_inside(small_map):
-    """Every pixel of the map is answered as it is, indexed [y, x]."""
+@pytest.fixture
+def this_map(controller, task):
+    """The controller's map object over the map of the task."""
+    occ = task.nominal.terrain.grid.cells
+    return occ, controller.call("OccMap2D", occ)
+
+
+def test_is_occupied_inside(small_map, this_map, generator):
+    """Every pixel of a small map is answered as it is, indexed [y, x].
+
+    So are pixels, rows and columns of the task's own map that are drawn.
+    """
     occ, own = small_map
-    pixels = [(x, y) for y, x in np.ndindex(occ.shape)]
+    check_pixels(occ, own, [(x, y) for y, x in np.ndindex(occ.shape)])
+    occ, own = this_map
+    random, (height, width) = generator("pixels"), occ.shape
+    pixels = random.integers((width, height), size=(200, 2)).tolist()
+    for _ in range(2):
+        row, column = int(random.integers(height)), int(random.integers(width))
+        pixels += [(x, row) for x in range(width)]
+        pixels += [(column, y) for y in range(height)]
+    check_pixels(occ, own, [(x, y) for x, y in pixels])
+
+
+def check_pixels(occ, own, pixels):
+    """What the controller's map says of pixels (x, y)."""
     answers = own.call_each("is_occupied", pixels)
     assert len(answers) == len(pixels), f"{len(answers)} answers to {len(pixels)}"
     for (x, y), found in zip(pixels, answers, strict=True):
@@ -102,22 +126,38 @@ def test_nearest_free_of_a_free_pixel(controller, small_map):
             assert found == (x, y), f"nearest_free({x}, {y}, {reach}) is {found}: free"
 
 
-def test_nearest_free_is_nearest(controller, oracle):
-    """From an occupied pixel: free, and as near as any, up to max_rad itself."""
+def test_nearest_free_is_nearest(controller, oracle, this_map, generator):
+    """From an occupied pixel: free, and as near as any, up to max_rad itself.
+
+    The same on the task's own map, from pixels that are drawn.
+    """
     occ = oracle.grid(seed=11, width=40, height=30, density=0.85)
     own = controller.call("OccMap2D", occ)
     for y, x in np.argwhere(occ)[::60].tolist():
         best = oracle.nearest_free_distance(occ, x, y)
-        found = controller.call("nearest_free", own, x, y, math.ceil(best))
-        assert is_int_pair(found), f"nearest_free is {shown(found)}, not (int, int)"
-        fx, fy = found
-        inside = 0 <= fx < 40 and 0 <= fy < 30
-        assert inside, f"nearest_free({x}, {y}) is {found}: outside the map"
-        assert not occ[fy, fx], f"nearest_free({x}, {y}) is {found}: occupied"
-        got = math.dist((x, y), found)
-        assert got <= best + 1e-9, (
-            f"nearest_free({x}, {y}) is {found}, {got:.2f} px away, not {best:.2f}"
-        )
+        check_nearest_free(controller, occ, own, (x, y), best)
+    occ, own = this_map
+    height, width = occ.shape
+    for x, y in generator("nearest").integers((width, height), size=(24, 2)).tolist():
+        left, low = max(0, x - REACH), max(0, y - REACH)
+        around = occ[low : y + REACH + 1, left : x + REACH + 1]
+        best = oracle.nearest_free_distance(around, x - left, y - low)
+        if best <= REACH:
+            check_nearest_free(controller, occ, own, (x, y), best)
+
+
+def check_nearest_free(controller, occ, own, pixel, best):
+    """The pixel that is free and nearest, which is `best` px away."""
+    asked = f"nearest_free({pixel[0]}, {pixel[1]})"
+    found = controller.call("nearest_free", own, *pixel, math.ceil(best))
+    assert is_int_pair(found), f"{asked} is {shown(found)}, not (int, int)"
+    x, y = found
+    height, width = occ.shape
+    inside = 0 <= x < width and 0 <= y < height
+    assert inside, f"{asked} is {found}: outside the map"
+    assert not occ[y, x], f"{asked} is {found}: occupied"
+    got = math.dist(pixel, found)
+    assert got <= best + 1e-9, f"{asked} is {found}, {got:.2f} px away, not {best:.2f}"
 
 
 def test_nearest_free_at_the_end_of_its_reach(controller):
@@ -144,14 +184,18 @@ def test_nearest_free_raises(controller):
         assert error.type_name == "ValueError", f"{message} raised {error.type_name}"
 
 
-def test_plan_path(controller, oracle):
-    """Int pixels, both ends, free, connected; cell 1: <= 1.1 x optimum, or []."""
+def test_plan_path(controller, oracle, task, this_map, generator):
+    """Int pixels, both ends, free, connected; cell 1: <= 1.1 x optimum, or [].
+
+    On fixed and random grids, and on the task's own map between pixels that are drawn.
+    """
     for case in oracle.plan_cases():
         own = controller.call("OccMap2D", case.occ)
         path = controller.call("plan_path", own, case.start, case.goal, 1)
         check_path(oracle, case, path, is_int_pair)
     for cell in (2, 3):
         check_larger_steps(controller, oracle, cell)
+    check_walks(controller, oracle, task, this_map, generator("walks"))
 
 
 def check_larger_steps(controller, oracle, cell):
@@ -159,10 +203,35 @@ def check_larger_steps(controller, oracle, cell):
     occ = np.zeros((40, 60), np.bool_)
     occ[12:, 28:32] = True
     occ[6:9, 20] = occ[13, 40:44] = True
-    own, start, goal = controller.call("OccMap2D", occ), (4, 17), (52, 23)
+    own = controller.call("OccMap2D", occ)
+    check_steps(controller, oracle, (occ, own), (4, 17), (52, 23), cell)
+
+
+def check_walks(controller, oracle, task, this_map, random):
+    """Paths on the task's own map, between pixels that are drawn."""
+    occ, _ = this_map
+    # A search over all pixels of a large map may take longer than a call. Only steps
+    # of one pixel have to be found wherever there is room for a point.
+    room = task.nominal.terrain.clear
+    cell = math.ceil(math.sqrt(occ.size / MOST_PIXELS))
+    while cell > 1 and room.max() <= 2 * cell:
+        cell //= 2
+    tight = occ if cell == 1 else room <= 2 * cell
+    for start, goal in oracle.walks(tight, cell, random):
+        path = check_steps(controller, oracle, this_map, start, goal, cell)
+        best = oracle.shortest_length(occ, start, goal) if cell == 1 else math.inf
+        length = oracle.path_length(path)
+        assert length <= 1.1 * best + 1e-6, (
+            f"{start} to {goal}: {length:.1f} px long, the shortest is {best:.1f} px"
+        )
+
+
+def check_steps(controller, oracle, map_and_own, start, goal, cell):
+    """A path from start to goal in steps of `cell` px; returns it."""
+    occ, own = map_and_own
     path = controller.call("plan_path", own, start, goal, cell)
     assert isinstance(path, list), f"cell {cell}: a {type(path).__name__}, not a list"
-    assert path, f"cell {cell}: [], but there is a path"
+    assert path, f"cell {cell}: [], but there is a path from {start} to {goal}"
     assert all(map(is_int_pair, path)), f"cell {cell}: points must be (int, int)"
     ends = (path[0], path[-1])
     assert ends == (start, goal), f"cell {cell}: runs {ends}"
@@ -174,3 +243,4 @@ def check_larger_steps(controller, oracle, cell):
         passed = [(x0 + k * dx, y0 + k * dy) for k in range(cell + 1)]
         error = oracle.path_error(occ, passed)
         assert error is None, f"{step}: {error}"
+    return path
