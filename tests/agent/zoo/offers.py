@@ -65,6 +65,7 @@ class Outcome:
     seconds: float
     memory: int
     left: tuple[str, ...]
+    made: tuple[str, ...]
 
 
 def take(offer: Offer) -> Outcome:
@@ -91,13 +92,21 @@ def take(offer: Offer) -> Outcome:
             seconds = time.monotonic() - began
             errors.seek(0)
             told = errors.read().decode("utf-8", "backslashreplace")
-        left = (*sorted(_inside(here) - before), *sorted(_inside(temporary)))
-        return Outcome(code, told, seconds, memory, left)
+        left, made = sorted(_inside(temporary)), sorted(_inside(here) - before)
+        return Outcome(code, told, seconds, memory, tuple(left), tuple(made))
 
 
 def differences(offer: Offer, outcome: Outcome) -> list[str]:
-    """How an outcome differs from what every offer must come to."""
-    found = line_problems(offer, outcome.code, outcome.errors)
+    """How an outcome differs from what the offer must come to."""
+    found = line_problems(offer, outcome.code, outcome.errors) + excesses(outcome)
+    if outcome.made:
+        found.append(f"made {', '.join(outcome.made)}")
+    return found
+
+
+def excesses(outcome: Outcome) -> list[str]:
+    """What a command took or left that none may."""
+    found = []
     if outcome.seconds >= SECONDS:
         found.append(f"took {outcome.seconds:.0f} s")
     if outcome.memory > MEMORY:
