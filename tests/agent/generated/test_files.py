@@ -15,7 +15,8 @@ from hypothesis import HealthCheck, given, settings
 
 from tdac_envs.errors import TdacError
 
-LONGEST = 2000
+LONGEST = 20_000
+"""Characters of a message, which may quote a name; the command line cuts it."""
 SECONDS = 120
 LEAST_SHARE = 0.5
 

@@ -11,7 +11,7 @@ from hostile_files import KINDS, MAP_TASK, draw
 from hostile_values import altered
 from hostile_wire import conversations
 from hostile_words import ALL, furnish, lines
-from hypothesis import HealthCheck, given, seed, settings
+from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from test_words import problem_of
 
@@ -47,6 +47,7 @@ few = settings(
     max_examples=EXAMPLES,
     deadline=None,
     database=None,
+    phases=[Phase.generate],  # a smaller example would take as long again
     suppress_health_check=list(HealthCheck),
     phases=settings.get_profile("default").phases[:3],
 )
@@ -63,7 +64,7 @@ def check(words: list[str] | tuple[str, ...], make) -> None:
 @seed(SEED)
 @few
 @given(st.sampled_from(READ).flatmap(lambda k: st.tuples(st.just(k), altered(k.whole))))
-def test_files(found):
+def test_files_as_processes_read_them(found):
     """Of each kind of file that a command reads."""
     kind, value = found
 
@@ -80,7 +81,7 @@ def test_files(found):
 @seed(SEED)
 @few
 @given(st.sampled_from(sorted(ALL)).flatmap(lambda name: lines(ALL[name])))
-def test_words(words):
+def test_lines_given_to_processes(words):
     """Of each command."""
     check(words, furnish)
 
@@ -89,7 +90,7 @@ def test_words(words):
 @seed(SEED)
 @few
 @given(conversations())
-def test_wire(conversation):
+def test_answers_of_a_sandboxed_child(conversation):
     """A controller that writes to the judge's channel what a child would not."""
     _, script, at = conversation
 
