@@ -35,7 +35,10 @@ class _Record(PrintableRecord):
 class RepairRule(_Record):
     """One rule, and its life."""
 
-    id: str = Field(description="`R1`, `R2` ..., never used twice in a run.")
+    id: str = Field(
+        pattern=r"^R[0-9]{1,9}$",
+        description="`R1`, `R2` ..., never used twice in a run.",
+    )
     text: str = Field(max_length=MAX_RULE_CHARS)
     scope: Scope = Field("task", description="Where it holds.")
     born: int = Field(description="Iteration k that it comes from.")

@@ -49,7 +49,6 @@ few = settings(
     database=None,
     phases=[Phase.generate],  # a smaller example would take as long again
     suppress_health_check=list(HealthCheck),
-    phases=settings.get_profile("default").phases[:3],
 )
 
 
