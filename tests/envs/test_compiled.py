@@ -93,6 +93,7 @@ def test_the_first_run_of_all_compiles_before_the_judge_starts(tmp_path):
     assert not list(tmp_path.rglob("tdac-*/tdac_envs_*/kernels.drive-*.nbi"))
 
 
+@pytest.mark.slow
 def test_an_edited_callee_in_another_module_takes_effect(copied_package):
     """numba looks at the file of the kernel that is called, and at no other."""
     script = (
@@ -226,6 +227,7 @@ def test_another_user_s_code_is_not_believed(what, tmp_path):
     assert not is_private(folder)
 
 
+@pytest.mark.slow
 @as_root
 @pytest.mark.parametrize("home", ["own", "none"])
 def test_an_unprivileged_user_reads_a_warm_package(home, cold_start, copied_package):
