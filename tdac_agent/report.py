@@ -113,7 +113,7 @@ class Provenance(_Record):
     controller_sha256: str
     suite: str
     suite_sha256: str
-    own_suite: str = Field("", description="Tests beside the shipped ones, in words.")
+    own_suite: str = Field("", description="Short hash of tests that are not shipped.")
     profile: Literal["policy", "paper"]
     paper: bool = Field(description="Nominal start only.")
     seed: int

@@ -231,9 +231,9 @@ def _provenance(
 
 
 def _own(suites: dict[str, Path]) -> str:
-    """Name and hash of tests that are not shipped; empty without."""
+    """Short hash of tests that are not shipped; empty without."""
     own = suites.get(OWN)
-    return f"{own.name} {_hash_of(own)[:8]}" if own else ""
+    return _hash_of(own)[:8] if own else ""
 
 
 def _hash_of(folder: Path) -> str:

@@ -57,7 +57,8 @@ def show_report(
     task = about.called or about.task
     # Anybody's task may have any name.
     task += f" of {folder}" if folder is not None and task != about.task else ""
-    own = f" with the tests of {about.own_suite}" if about.own_suite else ""
+    _, _, name = about.suite.partition(" + ")
+    own = f" with the tests {name} ({about.own_suite})" if about.own_suite else ""
     console.print(
         f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
         f"passed in {report.seconds:.1f} s  (task {escape(task)}, profile "
