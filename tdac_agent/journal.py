@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.files import sync_folder
-from tdac_envs.intake import read_file
+from tdac_envs.intake import check, read_file
 
 JournalRecord = dict[str, Any]
 JOURNAL_BYTES = 256_000_000
@@ -107,6 +107,7 @@ def mend(path: Path) -> None:
 def _record(line: bytes) -> JournalRecord | None:
     try:
         record = json.loads(line.decode("utf-8"))
+        check(record, any_text=True)
     except (ValueError, RecursionError):
         return None
     return record if isinstance(record, dict) else None

@@ -200,8 +200,12 @@ def printable(name: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in name[:LONGEST])
 
 
-def check(value: Any) -> None:
+def check(value: Any, *, any_text: bool = False) -> None:
     """Refuses what no file of ours has, wherever it is in a value.
+
+    Args:
+        value: As YAML or JSON has it.
+        any_text: Whether a text may have lone surrogates, as an answer of a model.
 
     Raises:
         ValueError: A number is not finite or has more than 64 bits, a text has a lone
@@ -211,11 +215,11 @@ def check(value: Any) -> None:
     for _ in range(_DEEPEST):
         if not level:
             return
-        level = [part for whole in level for part in _parts(whole)]
+        level = [part for whole in level for part in _parts(whole, any_text)]
     raise ValueError(f"nested deeper than {_DEEPEST} levels")
 
 
-def _parts(value: Any) -> Iterator[Any]:
+def _parts(value: Any, any_text: bool) -> Iterator[Any]:
     """What a value is made of, unless there is something wrong with it itself."""
     if isinstance(value, dict):
         yield from value.keys()
@@ -226,7 +230,7 @@ def _parts(value: Any) -> Iterator[Any]:
         raise ValueError(f"{value} is not a finite number")
     elif isinstance(value, int) and value.bit_length() > _LONGEST_INTEGER:
         raise ValueError("a whole number has more than 64 bits")
-    elif isinstance(value, str) and not _is_unicode(value):
+    elif isinstance(value, str) and not any_text and not _is_unicode(value):
         raise ValueError("a text has half of a surrogate pair, which is no character")
 
 
