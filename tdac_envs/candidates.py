@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from tdac_envs.arguments import positive
 from tdac_envs.astar import Guide
 from tdac_envs.cleanup import cleanings
 from tdac_envs.errors import TaskError
@@ -73,6 +74,7 @@ def ranked(scene: Scene, preset: Preset) -> list[Candidate]:
         )
     if not scene.radius > 0:
         raise TaskError(f"expected a robot radius above 0 px, got {scene.radius:g}")
+    positive("robot_radius", scene.radius)  # nor too large to compute with
     search = _paper_grid if preset == "paper" else _staged_search
     tried = list(search(scene))
     # The plainest reading's failure comes first: the others only explain more away.

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from tdac_envs.arguments import LARGEST, SMALLEST
+from tdac_envs.arguments import LARGEST, SMALLEST, positive
 from tdac_envs.errors import MapError, TaskError, first_problem
 from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
 
@@ -59,7 +59,13 @@ class RobotParams(_Record):
     """The differential-drive robot: a disc with a fan of ultrasonic rays."""
 
     radius: Length = Field(15.0, description="Body radius, px.")
-    axle_length: Length = Field(30.0, description="Distance of the wheels, px.")
+    axle_length: float = Field(
+        30.0,
+        gt=0,
+        ge=SMALLEST,
+        le=2 * LARGEST,
+        description="Distance of the wheels, px; that of a disc is its diameter.",
+    )
     max_wheel_speed: Length = Field(75.59, description="Wheel limit, px/s.")
     n_rays: int = Field(18, ge=1, le=MOST_RAYS, description="Number of range rays.")
     field_of_view_deg: float = Field(
@@ -69,7 +75,12 @@ class RobotParams(_Record):
 
     @classmethod
     def disc(cls, radius: float) -> RobotParams:
-        """The default robot with another body radius and its axle 2 x radius."""
+        """The default robot with another body radius and its axle 2 x radius.
+
+        Raises:
+            TaskError: The radius is not usable.
+        """
+        radius = positive("robot_radius", radius)
         return cls(radius=radius, axle_length=2 * radius)
 
 
