@@ -34,6 +34,7 @@ from tdac_agent.synthesis import synthesize
 from tdac_agent.task import load_task
 
 MOST_SECONDS = 300
+KEYS = dict.fromkeys((KEY, "OPENAI_API_KEY"), "key-12345678")
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 FORGED_TEST = """
 from pathlib import Path
@@ -130,6 +131,18 @@ def attack(wants: str, **expected: object) -> Callable[[Build], Build]:
 
 
 SUITE = r"run the tests in \S+ \(sha256 [0-9a-f]{12}\).* --suite \S+suite, or .*--trust"
+
+
+@attack(
+    r"task maze, not the bundled one \(map \w{8}, goal within 8 px\) of /",
+    code=0,
+    works=None,
+)
+def task_that_calls_itself_maze(place: Place) -> list[str | Path]:
+    file = place.run / "task.yaml"
+    task = yaml.safe_load(file.read_text())
+    file.write_text(yaml.safe_dump({**task, "name": "maze"}))
+    return ["verify", place.run]
 
 
 @attack(SUITE)
@@ -357,7 +370,7 @@ def tdac(
     process = subprocess.Popen(
         [sys.executable, "-m", "tdac_agent", *map(str, words)],
         cwd=place,
-        env={**os.environ, KEY: "key-12345678", "OPENAI_API_KEY": "key-12345678"},
+        env={**os.environ, **KEYS, "COLUMNS": "1000"},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
