@@ -104,7 +104,7 @@ def test_build_grid_of_this_world(controller, cases, generator):
     random, case = generator("grids"), cases[0]
     for _ in range(2):
         size = case.resolution() * float(random.uniform(1.0, 1.5))
-        check_grid(controller, case, size, float(random.uniform(0.01, 0.07)))
+        check_grid(controller, case, size, float(random.uniform(0.03, 0.07)))
 
 
 def check_grid(controller, case, size, inflation):

@@ -116,10 +116,22 @@ def test_is_occupied_outside(small_map):
         assert found, f"is_occupied({x}, {y}) outside a 37 x 23 map is {shown(found)}"
 
 
-def test_nearest_free_of_a_free_pixel(controller, small_map):
-    """A free pixel is its own nearest free pixel, as Python ints."""
+def test_nearest_free_of_a_free_pixel(controller, small_map, this_map, generator):
+    """A free pixel is its own nearest free pixel, as Python ints.
+
+    On a small map, and on the task's own map where pixels are drawn.
+    """
     occ, own = small_map
-    for y, x in np.argwhere(~occ)[::40].tolist():
+    check_free_pixels(controller, own, np.argwhere(~occ)[::40].tolist())
+    occ, own = this_map
+    drawn = generator("free").integers(occ.shape, size=(24, 2))
+    free = drawn[~occ[drawn[:, 0], drawn[:, 1]]]
+    check_free_pixels(controller, own, free.tolist())
+
+
+def check_free_pixels(controller, own, pixels):
+    """Free pixels [y, x], which are their own nearest ones."""
+    for y, x in pixels:
         for reach in (10, 0):
             found = controller.call("nearest_free", own, x, y, reach)
             assert is_int_pair(found), f"nearest_free is {shown(found)}, not (int, int)"
@@ -142,7 +154,7 @@ def test_nearest_free_is_nearest(controller, oracle, this_map, generator):
         left, low = max(0, x - REACH), max(0, y - REACH)
         around = occ[low : y + REACH + 1, left : x + REACH + 1]
         best = oracle.nearest_free_distance(around, x - left, y - low)
-        if best <= REACH:
+        if 0 < best <= REACH:
             check_nearest_free(controller, occ, own, (x, y), best)
 
 

@@ -1,7 +1,7 @@
 # idea: a map that is right on all grids but the task's own, and there while it drives
 # profile: paper
 # onto: good/astar_pursuit.py
-# fails: only test_is_occupied_inside, test_nearest_free_is_nearest
+# fails: test_is_occupied_inside
 # why: the functions are tested on the task's own map, too
 DRIVES = []
 honest_reset = reset
