@@ -19,7 +19,7 @@ from tdac_envs.image import ColourImage, GreyImage, luminance
 LEVEL = 127.5
 """Where an evened picture is to be cut, luminance."""
 _FEW_LEVELS, _DRAWN = 8, 0.7
-"""A drawing has this share of its light side in so many levels; a photograph not."""
+"""A drawing has this share of its pixels in so many levels; a photograph has not."""
 _CELL = 8
 """Side of the squares in which edges are summed up, px."""
 _WINDOW = np.ones((7, 7), np.uint8)
@@ -44,10 +44,19 @@ class Evened:
 
 
 def photographed(grey: GreyImage) -> bool:
-    """Whether the lighter side has many levels, as uneven light makes them."""
-    counts = np.bincount(grey.ravel(), minlength=256)[int(otsu(grey)) + 1 :]
-    most = np.sort(counts)[-_FEW_LEVELS:]
-    return bool(most.sum() < _DRAWN * counts.sum())
+    """Whether the picture or its lighter side has many levels, as a camera makes them.
+
+    A drawing has most of its pixels in a few, also where its lines are smoothed; the
+    darker side of a photograph may have few as well.
+    """
+    counts = np.bincount(grey.ravel(), minlength=256)
+    lighter = counts[int(otsu(grey)) + 1 :]
+    return _in_few(counts) < _DRAWN or _in_few(lighter) < _DRAWN
+
+
+def _in_few(counts: NDArray[np.intp]) -> float:
+    """Share of the pixels that are in the fullest levels."""
+    return float(np.sort(counts)[-_FEW_LEVELS:].sum() / max(counts.sum(), 1))
 
 
 def evened(colour: ColourImage, grey: GreyImage) -> Evened | None:
