@@ -256,3 +256,17 @@ def test_range_noise_is_the_mean_of_the_published_one():
     assert spread.mean() == pytest.approx(0.05)
     assert env.variation == "jitter"
     assert (env.wheel_slip, env.delay) == (0.03, 1)
+
+
+@pytest.mark.parametrize("name", ["maze", "epuck"])
+def test_a_preview_is_a_picture_of_the_task(name):
+    """Start and goal are on it: it is another one where they are elsewhere."""
+    task = load_task(name)
+    picture = task.setting.preview()
+    assert picture.dtype == np.uint8
+    assert picture.shape[2] == 3
+    spec = task.spec.model_copy(update={"goal": task.nominal.start[:2]})
+    x, y = task.nominal.goal
+    moved = load_task(spec.model_copy(update={"start": (x, y, 0.0)}))
+    other = moved.setting.preview()
+    assert other.shape != picture.shape or (other != picture).any()
