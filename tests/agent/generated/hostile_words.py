@@ -142,4 +142,4 @@ def _like(words: list[str], at: int) -> st.SearchStrategy[str]:
         float(words[at])
     except ValueError:
         return odd
-    return st.sampled_from([*NUMBERS * 3, *WORDS])
+    return st.sampled_from([*NUMBERS * 8, *WORDS])
