@@ -339,13 +339,13 @@ def _light(shape: tuple[int, ...], rng: np.random.Generator) -> tuple[Field, str
 
 
 def seven(drawing: Drawing) -> Iterator[Photo]:
-    """A light page with dark walls, 80 and more grey levels darker somewhere.
+    """A light page with darker walls, 80 and more grey levels darker somewhere.
 
     Gradients in four directions, two vignettes and a gradient that is taken off instead
     of multiplied; some with noise, none blurred or compressed.
     """
     shape, page = drawing.truth.shape, np.array([240.0, 238.0, 232.0])
-    ink = np.array([35.0, 33.0, 38.0])
+    ink = np.array([130.0, 128.0, 133.0])  # so pale that the light outweighs it
     across, down = gradient(shape, 0.0), gradient(shape, np.pi / 2)
     cases = [
         (across, 80, 0.0),

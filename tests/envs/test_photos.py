@@ -26,14 +26,14 @@ from tdac_envs.source2d import prepare
 
 REAL_MAPS = Path(__file__).parents[3] / "shared" / "data" / "maps"
 DRAWINGS = {drawing.name: drawing for drawing in drawings()}
-MAZE = DRAWINGS["maze 7 px"]
+ROOMS = DRAWINGS["rooms 6 px"]
 EACH_OF_SEVEN = pytest.mark.parametrize("number", range(7))
 
 
 @pytest.fixture(scope="module")
 def pages() -> list[Photo]:
     """A light page with dark walls, in the light of seven places."""
-    return list(seven(MAZE))
+    return list(seven(ROOMS))
 
 
 def read(photo: Photo, **how: str) -> tuple:
@@ -49,7 +49,7 @@ def test_a_page_in_uneven_light(number: int, preset: str, pages: list) -> None:
     grid, params = read(pages[number], preset=preset)
     assert params.polarity == "dark"
     assert "light evened" in params.method
-    assert not crosses(grid, params, MAZE.truth)
+    assert not crosses(grid, params, ROOMS.truth)
 
 
 @EACH_OF_SEVEN
