@@ -79,11 +79,12 @@ NUMBERS = (
     *("1e300", "-1e300", "1e-300", "9" * 30, "9" * 5000, "4294967296", "0x10", "1_0"),
     *("\N{ARABIC-INDIC DIGIT ONE}", "\N{SUPERSCRIPT TWO}", "1e400"),
 )
-INTEGERS = ("0", "1", "2", "3", "7", "100", "4096", "4097", "100000", "9" * 18)
+INTEGERS = ("1", "2", "3", "7", "100", "4096", "4097", "100000", "9" * 18)
 COUNTS = {
     *("--iterations", "--patience", "--max-tokens", "--max-output", "--seed"),
     *("--robust", "--first-seed", "--delay", "--workers", "--episodes"),
 }
+COSTS = ("0", "1", "0.5", "1e9", "1e300", "1e-300", "nan", "inf")
 CHOICES = {
     "--preset": ["default", "paper"],
     "--profile": ["policy", "paper"],
@@ -115,7 +116,7 @@ def furnish(folder: Path) -> None:
 def lines(draw: st.DrawFn, usual: tuple[str, ...]) -> list[str]:
     """A line in which one word is another, gone, doubled, or one more."""
     words = list(usual)
-    kind = draw(st.integers(0, 19))
+    kind = draw(st.integers(0, 24))
     # Without it a campaign would be carried out.
     others = [at for at, word in enumerate(words) if at and word != "--dry-run"]
     at = draw(st.sampled_from(others))
@@ -135,7 +136,9 @@ def _like(words: list[str], at: int) -> st.SearchStrategy[str]:
     """Hostile words for one of a line, mostly such as its flag understands."""
     odd = st.sampled_from([*FILES, *WORDS, *NUMBERS])
     if words[at - 1] in COUNTS:
-        return st.sampled_from([*INTEGERS * 3, *NUMBERS])
+        return st.sampled_from([*INTEGERS * 12, *NUMBERS])
+    if words[at - 1] == "--max-cost":
+        return st.sampled_from([*COSTS * 12, *NUMBERS])
     if words[at - 1] in CHOICES:
         return st.sampled_from(CHOICES[words[at - 1]] * 12) | odd
     try:
