@@ -11,9 +11,9 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.baseline_trainings import PPO_TASKS, TRAININGS, trained
-from tdac_agent.entrants import entrants_of
-from tdac_agent.evaluation import evaluate, write_evaluation
-from tdac_agent.warm import WarmJudge
+from tdac_agent.evaluation.entrants import entrants_of
+from tdac_agent.evaluation.evaluate import evaluate, write_evaluation
+from tdac_agent.verification.judge.warm import WarmJudge
 
 SEED = 0
 RECORDED = Path(__file__).parent.parent / "results" / "genuine"

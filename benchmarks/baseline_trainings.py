@@ -15,7 +15,7 @@ from tdac_agent.training.hyperparameters import Algo
 from tdac_agent.training.plan import make_plan, read_plan
 from tdac_agent.training.policy_files import FACTS, POLICY
 from tdac_agent.training.train import train
-from tdac_envs.rewards import RewardWeights
+from tdac_envs.drive.rewards import RewardWeights
 
 SEEDS = (0, 1, 2)
 PPO_TASKS = ("maze", "epuck", "office", "cave", "rooms", "epuck-maze")

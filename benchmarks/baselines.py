@@ -20,9 +20,9 @@ import pandas as pd
 from benchmarks import baseline_evaluation as evaluation
 from benchmarks import baseline_generalisation as generalisation
 from benchmarks import baseline_trainings as trainings
-from tdac_agent.files import write_atomic
 from tdac_agent.plots import baselines as plots
 from tdac_agent.plots import save_figure
+from tdac_agent.storage.files import write_atomic
 
 RESULTS = Path(__file__).parent.parent / "results" / "baselines"
 STAGES = ("train", "evaluate", "generalise", "collect")

@@ -22,7 +22,7 @@ from benchmarks.independent_oracles import (
     step_fault,
 )
 from tdac_agent.sandbox import Child
-from tdac_agent.task import Task
+from tdac_agent.tasks.task import Task
 
 SEED = 20_250_112
 WHEEL, AXLE = 0.02, 0.052

@@ -27,8 +27,8 @@ from benchmarks.env_step import (
 )
 from benchmarks.timing import Bench, Effort
 from tdac_envs import World
-from tdac_envs.footprint import Rectangle
-from tdac_envs.world import EPuck, Obstacle, Part
+from tdac_envs.worlds.footprint import Rectangle
+from tdac_envs.worlds.world import EPuck, Obstacle, Part
 
 NAME = "TDAC-EPuck-v0"
 PARTS = (4, 64, 1024)

@@ -10,7 +10,7 @@ from benchmarks.ground_epuck import good_drivers, small_world
 from benchmarks.ground_map2d import good_controllers, small_task
 from benchmarks.mutants import Original
 from tdac_agent.sandbox import Child
-from tdac_agent.task import Task
+from tdac_agent.tasks.task import Task
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from benchmarks.mutants import Original, originals_in
 from tdac_agent.builtin import EPuckParameters, render_epuck
-from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import EPUCK, TaskFile
 from tdac_envs.epuck.task import EPuckTask
 
 ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "epuck"

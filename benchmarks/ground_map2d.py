@@ -10,8 +10,8 @@ import yaml
 
 from benchmarks.mutants import Original, originals_in
 from tdac_agent.builtin import Parameters, render_controller
-from tdac_agent.task import Task, load_task
-from tdac_envs.grid import BoolGrid
+from tdac_agent.tasks.task import Task, load_task
+from tdac_envs.grid.grid import BoolGrid
 
 ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "map2d" / "good"
 

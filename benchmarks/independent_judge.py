@@ -16,10 +16,10 @@ import numpy as np
 
 from benchmarks.ground import Ground
 from benchmarks.witness import Witness
-from tdac_agent.nursery import Nursery
 from tdac_agent.sandbox import Child, ControllerFault, Limits
-from tdac_agent.setting import JudgedEnv
-from tdac_agent.task import Task, write_workdir
+from tdac_agent.tasks.setting import JudgedEnv
+from tdac_agent.tasks.task import Task, write_workdir
+from tdac_agent.verification.judge.children import Nursery
 
 Loop = dict[str, Any]
 

@@ -14,7 +14,7 @@ import numpy as np
 from skimage.measure import label
 
 from tdac_agent.sandbox import Child, ControllerError
-from tdac_agent.task import Task
+from tdac_agent.tasks.task import Task
 
 Point = tuple[int, int]
 Cells = list[list[bool]]

@@ -16,7 +16,7 @@ from benchmarks.domain_mutations import DOMAIN
 from benchmarks.epuck_mutations import DOMAIN_EPUCK
 from benchmarks.mutation_rules import Rule
 from benchmarks.source import Source
-from tdac_agent.task_file import Profile
+from tdac_agent.tasks.task_file import Profile
 
 RULES: dict[str, dict[str, Rule]] = {"map2d": DOMAIN, "epuck": DOMAIN_EPUCK}
 """The domain's mistakes, by kind of task."""

@@ -33,11 +33,11 @@ from benchmarks.independent_judge import IndependentJudge
 from benchmarks.journal import Journal
 from benchmarks.mutants import Mutant, Original, choose
 from benchmarks.mutation_tables import write_csv, write_markdown
-from tdac_agent.report import Report
 from tdac_agent.sandbox import Limits
-from tdac_agent.task import Task
-from tdac_agent.verification import verify
-from tdac_agent.warm import WarmJudge
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.verify import verify
 
 LIMITS = Limits(import_seconds=4.0, reset_seconds=4.0, call_seconds=4.0, cpu_seconds=40)
 RESULTS = Path(__file__).parent.parent / "results"

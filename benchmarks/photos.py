@@ -29,13 +29,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.errors import TdacError
-from tdac_envs.grid import BoolGrid, OccupancyGrid, body_free, clearance
-from tdac_envs.image import ColourImage, load_image, luminance
-from tdac_envs.map_folder import shortest_path
-from tdac_envs.params import MapParams
-from tdac_envs.preprocessing import preprocess
-from tdac_envs.score import connected
+from tdac_envs.core.errors import TdacError
+from tdac_envs.grid.grid import BoolGrid, OccupancyGrid, body_free, clearance
+from tdac_envs.mapping.image import ColourImage, load_image, luminance
+from tdac_envs.mapping.map_folder import shortest_path
+from tdac_envs.mapping.params import MapParams
+from tdac_envs.mapping.preprocessing import preprocess
+from tdac_envs.mapping.score import connected
 
 Point = tuple[int, int]
 Field = NDArray[np.float64]

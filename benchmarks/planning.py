@@ -24,9 +24,9 @@ from skimage.graph import MCP_Geometric
 
 from benchmarks.preprocessing import floor_plan
 from benchmarks.timing import Bench, Call, Effort, compared, in_turn
-from tdac_envs.grid import BoolGrid
-from tdac_envs.map_files import read_movingai
-from tdac_envs.plan import distance_field, path_length, plan_path
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.grid.plan import distance_field, path_length, plan_path
+from tdac_envs.mapping.map_files import read_movingai
 
 Point = tuple[int, int]
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.timing import Bench, Call, Effort, compared, in_turn
-from tdac_envs.preprocessing import preprocess
+from tdac_envs.mapping.preprocessing import preprocess
 
 Picture = NDArray[np.uint8]
 Point = tuple[int, int]

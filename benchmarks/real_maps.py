@@ -30,12 +30,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.binarize import disc, otsu
-from tdac_envs.errors import TdacError
-from tdac_envs.grid import BoolGrid, body_free, clearance
-from tdac_envs.image import ColourImage, load_image, luminance
-from tdac_envs.plan import path_length, plan_path
-from tdac_envs.preprocessing import preprocess, rank_candidates
+from tdac_envs.core.errors import TdacError
+from tdac_envs.grid.grid import BoolGrid, body_free, clearance
+from tdac_envs.grid.plan import path_length, plan_path
+from tdac_envs.mapping.binarize import disc, otsu
+from tdac_envs.mapping.image import ColourImage, load_image, luminance
+from tdac_envs.mapping.preprocessing import preprocess, rank_candidates
 
 Point = tuple[int, int]
 Entry = dict[str, Any]
@@ -73,7 +73,7 @@ class Row:
 def verify_builtin(image: ColourImage, start: Point, goal: Point, radius: int) -> bool:
     """Whether the builtin learner's controller is verified on the map."""
     from tdac_agent import load_task, synthesize
-    from tdac_agent.task_file import RobotSpec, TaskFile
+    from tdac_agent.tasks.task_file import RobotSpec, TaskFile
 
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "map.png"

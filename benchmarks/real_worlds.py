@@ -33,10 +33,10 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from tdac_envs.errors import TdacError
-from tdac_envs.footprint import Disc, Footprint, Polygon, Rectangle
-from tdac_envs.wbt.reader import load_world
-from tdac_envs.world import Arena, EPuck, Obstacle, World
+from tdac_envs.core.errors import TdacError
+from tdac_envs.worlds.footprint import Disc, Footprint, Polygon, Rectangle
+from tdac_envs.worlds.wbt.reader import load_world
+from tdac_envs.worlds.world import Arena, EPuck, Obstacle, World
 
 Points = NDArray[np.float64]
 Record = dict[str, Any]

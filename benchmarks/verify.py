@@ -41,14 +41,14 @@ from rich.table import Table
 
 from benchmarks.timing import WIDTH, duration, in_turn, whole_from_one
 from tdac_agent import load_task, synthesize, verify
-from tdac_agent.privileged import (
+from tdac_agent.tasks.task import Task, lay_out
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.suite.privileged import (
     DO_NOTHING,
     REFERENCE,
     privileged_controller,
     reference_ways,
 )
-from tdac_agent.task import Task, lay_out
-from tdac_agent.warm import WarmJudge
 from tdac_envs import TdacError
 
 READY_SECONDS = 2.0

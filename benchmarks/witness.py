@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.sandbox import EnvRefusalError
-from tdac_agent.setting import JudgedEnv
-from tdac_agent.units import Units
+from tdac_agent.tasks.setting import JudgedEnv
+from tdac_agent.tasks.units import Units
 
 SEED = 7_000_001
 

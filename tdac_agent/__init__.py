@@ -6,17 +6,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tdac_agent.disturbance import Disturbance
-    from tdac_agent.evaluation import evaluate
-    from tdac_agent.evaluation_report import Evaluation
-    from tdac_agent.history import Told, gather_run
-    from tdac_agent.policy import Policy, load_controller
-    from tdac_agent.records import Run, load_run
-    from tdac_agent.report import Report
-    from tdac_agent.robust import verify_robust
-    from tdac_agent.synthesis import synthesize
-    from tdac_agent.task import Task, load_task
-    from tdac_agent.verification import verify
+    from tdac_agent.evaluation.evaluate import evaluate
+    from tdac_agent.evaluation.evaluation_report import Evaluation
+    from tdac_agent.evaluation.policy import Policy, load_controller
+    from tdac_agent.evaluation.robust import verify_robust
+    from tdac_agent.runs.history import Told, gather_run
+    from tdac_agent.runs.records import Run, load_run
+    from tdac_agent.synthesis.loop import synthesize
+    from tdac_agent.tasks.disturbance import Disturbance
+    from tdac_agent.tasks.task import Task, load_task
+    from tdac_agent.verification.diagnosis.report import Report
+    from tdac_agent.verification.verify import verify
 
 __all__ = [
     "Disturbance",
@@ -37,21 +37,21 @@ __all__ = [
 ]
 
 _HOME = {
-    "Disturbance": "disturbance",
-    "Evaluation": "evaluation_report",
-    "Policy": "policy",
-    "Report": "report",
-    "Run": "records",
-    "Task": "task",
-    "Told": "history",
-    "evaluate": "evaluation",
-    "gather_run": "history",
-    "load_controller": "policy",
-    "load_run": "records",
-    "load_task": "task",
-    "synthesize": "synthesis",
-    "verify": "verification",
-    "verify_robust": "robust",
+    "Disturbance": "tasks.disturbance",
+    "Evaluation": "evaluation.evaluation_report",
+    "Policy": "evaluation.policy",
+    "Report": "verification.diagnosis.report",
+    "Run": "runs.records",
+    "Task": "tasks.task",
+    "Told": "runs.history",
+    "evaluate": "evaluation.evaluate",
+    "gather_run": "runs.history",
+    "load_controller": "evaluation.policy",
+    "load_run": "runs.records",
+    "load_task": "tasks.task",
+    "synthesize": "synthesis.loop",
+    "verify": "verification.verify",
+    "verify_robust": "evaluation.robust",
 }
 
 

@@ -9,7 +9,7 @@ def main() -> None:
     try:
         # What is loaded stays: nothing of it is worth collecting.
         gc.disable()
-        from tdac_agent.cli import main as command_line
+        from tdac_agent.cli.main import main as command_line
 
         gc.freeze()
         gc.enable()

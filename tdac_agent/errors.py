@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tdac_envs.errors import TdacError
+from tdac_envs.core.errors import TdacError
 
 
 class RunError(TdacError):

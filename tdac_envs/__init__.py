@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
-from tdac_envs.errors import MapError, TaskError, TdacError, WorldError
+from tdac_envs.core.errors import MapError, TaskError, TdacError, WorldError
 
 if TYPE_CHECKING:
-    from tdac_envs.grid import OccupancyGrid
-    from tdac_envs.maps import bundled_map, bundled_maps
-    from tdac_envs.params import MapParams, RobotParams
-    from tdac_envs.preprocessing import preprocess
-    from tdac_envs.wbt.reader import load_world, read_world
-    from tdac_envs.wbt.writer import write_world
-    from tdac_envs.world import World
-    from tdac_envs.worlds import bundled_worlds
+    from tdac_envs.grid.grid import OccupancyGrid
+    from tdac_envs.mapping.bundled import bundled_map, bundled_maps
+    from tdac_envs.mapping.params import MapParams, RobotParams
+    from tdac_envs.mapping.preprocessing import preprocess
+    from tdac_envs.worlds.bundled import bundled_worlds
+    from tdac_envs.worlds.wbt.reader import load_world, read_world
+    from tdac_envs.worlds.wbt.writer import write_world
+    from tdac_envs.worlds.world import World
 
 __all__ = [
     "MapError",
@@ -41,17 +41,17 @@ __all__ = [
 ]
 
 _HOME = {
-    "MapParams": "tdac_envs.params",
-    "OccupancyGrid": "tdac_envs.grid",
-    "RobotParams": "tdac_envs.params",
-    "World": "tdac_envs.world",
-    "bundled_map": "tdac_envs.maps",
-    "bundled_maps": "tdac_envs.maps",
-    "bundled_worlds": "tdac_envs.worlds",
-    "load_world": "tdac_envs.wbt.reader",
-    "preprocess": "tdac_envs.preprocessing",
-    "read_world": "tdac_envs.wbt.reader",
-    "write_world": "tdac_envs.wbt.writer",
+    "MapParams": "tdac_envs.mapping.params",
+    "OccupancyGrid": "tdac_envs.grid.grid",
+    "RobotParams": "tdac_envs.mapping.params",
+    "World": "tdac_envs.worlds.world",
+    "bundled_map": "tdac_envs.mapping.bundled",
+    "bundled_maps": "tdac_envs.mapping.bundled",
+    "bundled_worlds": "tdac_envs.worlds.bundled",
+    "load_world": "tdac_envs.worlds.wbt.reader",
+    "preprocess": "tdac_envs.mapping.preprocessing",
+    "read_world": "tdac_envs.worlds.wbt.reader",
+    "write_world": "tdac_envs.worlds.wbt.writer",
 }
 
 
@@ -70,8 +70,8 @@ def __dir__() -> list[str]:
 # The horizon depends on the task, so the envs truncate themselves: no TimeLimit here.
 gym.register(
     "TDAC-Map2D-v0",
-    entry_point="tdac_envs.map2d:Map2DEnv",
-    vector_entry_point="tdac_envs.map2d_vector:Map2DVectorEnv",
+    entry_point="tdac_envs.map2d.env:Map2DEnv",
+    vector_entry_point="tdac_envs.map2d.vector:Map2DVectorEnv",
 )
 gym.register(
     "TDAC-EPuck-v0",

@@ -66,7 +66,7 @@ def real_data() -> Path:
 def one_set_of_types() -> Iterator[None]:
     """No kernel is compiled for two: numba's cache mixes them up between processes."""
     yield
-    compiled = sys.modules.get("tdac_envs.compiled")
+    compiled = sys.modules.get("tdac_envs.core.compiled")
     kernels = compiled.KERNELS if compiled else []
     several = [each for each in kernels if len(getattr(each, "signatures", ())) > 1]
     assert not several, [(each.py_func, each.signatures) for each in several]

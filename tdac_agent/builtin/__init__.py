@@ -20,8 +20,8 @@ from tdac_agent.builtin.repair import (
     write_rules,
 )
 from tdac_agent.builtin.templates import render_controller, render_epuck
-from tdac_agent.provider import Provider, Reply, Request
-from tdac_agent.setting import Setting
+from tdac_agent.models.provider import Provider, Reply, Request
+from tdac_agent.tasks.setting import Setting
 
 __all__ = [
     "Builtin",
@@ -37,11 +37,11 @@ __all__ = [
 def builtin_for(setting: Setting) -> Provider:
     """The provider for a task's setting."""
     if setting.suite == "epuck":
-        from tdac_agent.task_epuck import EPuckSetting
+        from tdac_agent.environments.epuck.task import EPuckSetting
 
         assert isinstance(setting, EPuckSetting)
         return Builtin(EPuckParameters, partial(render_epuck, task=setting.nominal))
-    from tdac_agent.task_map2d import map_setting
+    from tdac_agent.environments.map2d.task import map_setting
 
     own = map_setting(setting)
     robot, dt = own.params.robot, own.nominal.dt

@@ -16,7 +16,7 @@ from tdac_agent.builtin.parameters import (
     about,
     changed,
 )
-from tdac_agent.report import Cause
+from tdac_agent.verification.diagnosis.report import Cause
 
 MARGIN = "inflation_margin"
 # The search for a margin ends within this share of its step.

@@ -11,8 +11,8 @@ import numpy as np
 
 from tdac_agent.builtin.parameters import P, Tuned, about, changed, names_of
 from tdac_agent.builtin.remedies import MARGIN, Bounds, remedies_for
-from tdac_agent.report import Cause, Report
-from tdac_agent.rules import MAX_RULE_CHARS
+from tdac_agent.prompting.rules import MAX_RULE_CHARS
+from tdac_agent.verification.diagnosis.report import Cause, Report
 
 
 @dataclass(frozen=True, slots=True)

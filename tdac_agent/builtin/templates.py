@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 
 from tdac_agent.builtin.parameters import EPuckParameters, Parameters, Tuned
-from tdac_agent.contract import time_step
-from tdac_envs.params import RobotParams
+from tdac_agent.verification.suite.contract import time_step
+from tdac_envs.mapping.params import RobotParams
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.task import EPuckTask

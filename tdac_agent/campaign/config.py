@@ -8,11 +8,11 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tdac_agent.errors import ProviderError, RunError
-from tdac_agent.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.providers.choice import OFFLINE, check_name
-from tdac_agent.records import Setting
-from tdac_agent.shipped import shipped, shipped_names
-from tdac_agent.yaml_file import read_yaml
+from tdac_agent.models.choice import OFFLINE, check_name
+from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
+from tdac_agent.runs.records import Setting
+from tdac_agent.storage.shipped import shipped, shipped_names
+from tdac_agent.storage.yaml_file import read_yaml
 
 SAME = "same"
 """As an optimizer: the learner itself."""

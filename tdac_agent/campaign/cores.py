@@ -17,7 +17,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from tdac_agent.errors import Fault
-from tdac_agent.locks import open_lock
+from tdac_agent.storage.locks import open_lock
 
 
 @contextmanager

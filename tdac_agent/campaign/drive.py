@@ -13,8 +13,8 @@ from tdac_agent.campaign.executor import Ended, Executor, Update
 from tdac_agent.campaign.perform import RUNS, Outcome, Terms, read_outcome
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
 from tdac_agent.campaign.progress import Progress
-from tdac_agent.files import write_atomic
-from tdac_agent.locks import hold
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.locks import hold
 
 CONFIG_FILE = "campaign.yaml"
 Watch = Callable[[Update], None]

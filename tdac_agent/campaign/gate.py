@@ -17,9 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tdac_agent.campaign.plan import slug
-from tdac_agent.files import write_atomic
-from tdac_agent.locks import wait_for
-from tdac_agent.provider import (
+from tdac_agent.models.provider import (
     Provider,
     RateLimited,
     Reply,
@@ -27,7 +25,9 @@ from tdac_agent.provider import (
     missing_for,
     served_at,
 )
-from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.locks import wait_for
+from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
 FIRST = 8.0
 """Places in the beginning."""

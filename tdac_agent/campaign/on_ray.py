@@ -16,8 +16,8 @@ from tdac_agent.campaign.executor import Begun, Bereaved, Ended, Next, Update
 from tdac_agent.campaign.perform import Outcome, Terms, perform
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import Fault, ProviderError
-from tdac_agent.warm import WarmJudge
-from tdac_envs.extras import install_command
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.extras import install_command
 
 STORE_BYTES = 96 << 20
 """Of a cluster that is started here: runs pass through folders, not through Ray."""

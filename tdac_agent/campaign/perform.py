@@ -11,21 +11,21 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.budget import Budget
 from tdac_agent.campaign.gate import gated
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import Fault
-from tdac_agent.installation import seed_of
-from tdac_agent.providers import choose_models
-from tdac_agent.records import JOURNAL, RUN_FILE, Run
-from tdac_agent.resume import run_there
-from tdac_agent.retry import RetryPolicy
-from tdac_agent.synthesis import synthesize
-from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import TASK_FILE
-from tdac_agent.warm import WarmJudge
-from tdac_envs.errors import TdacError
-from tdac_envs.intake import RECORD_BYTES, parse_json, read_file
+from tdac_agent.models.budget import Budget
+from tdac_agent.models.choice import choose_models
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.runs.records import JOURNAL, RUN_FILE, Run
+from tdac_agent.runs.resume import run_there
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.tasks.installation import seed_of
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import TASK_FILE
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.errors import TdacError
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
 """Nobody waits for a single answer of a campaign."""

@@ -14,14 +14,14 @@ from typing import Any
 
 from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
 from tdac_agent.campaign.wishes import wishes_of
-from tdac_agent.prices import FREE
-from tdac_agent.prompt import VARIANTS, generate_prompt, load_template
-from tdac_agent.providers.choice import Options, answers_sha256
-from tdac_agent.records import Setting
-from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import bundled_task
-from tdac_agent.trust import permit
-from tdac_agent.verification import suite_sha256
+from tdac_agent.models.choice import Options, answers_sha256
+from tdac_agent.models.prices import FREE
+from tdac_agent.prompting.prompt import VARIANTS, generate_prompt, load_template
+from tdac_agent.runs.records import Setting
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import bundled_task
+from tdac_agent.tasks.trust import permit
+from tdac_agent.verification.verify import suite_sha256
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from tdac_agent.campaign.config import CampaignConfig
-from tdac_agent.prompt import VARIANTS
-from tdac_agent.shipped import shipped
-from tdac_agent.task import Task
-from tdac_agent.trust import Wish, asking, file_sha256, suite_wish
+from tdac_agent.prompting.prompt import VARIANTS
+from tdac_agent.storage.shipped import shipped
+from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish
 
 
 def wishes_of(

@@ -17,8 +17,8 @@ from typing import Any, BinaryIO
 from tdac_agent.campaign.cores import own_core
 from tdac_agent.campaign.perform import Terms, perform
 from tdac_agent.campaign.plan import PlannedRun
-from tdac_agent.crew import end_with_parent
-from tdac_agent.warm import WarmJudge
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.judge.workers import end_with_parent
 
 TOLD = frozenset({"call.intent", "call.fault", "verify.start"})
 FACTS = ("event", "kind", "k", "j", "fault")

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.figures import contact_of
-from tdac_agent.history import Told, Tried
+from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report.scene import Scene
-from tdac_agent.report import Episode
-from tdac_agent.task import Task
-from tdac_agent.trajectory import Trajectory
+from tdac_agent.runs.history import Told, Tried
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.figures import contact_of
+from tdac_agent.verification.diagnosis.report import Episode
 
 Rows = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from tdac_agent.history import Told
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.metrics import (
     ASSUMPTIONS,
@@ -23,6 +22,7 @@ from tdac_agent.metrics import (
 )
 from tdac_agent.metrics.table import KIND
 from tdac_agent.plots import figure_bytes, plot_cumulative_success, plot_success_rates
+from tdac_agent.runs.history import Told
 
 MOST_CURVES = 8
 

@@ -12,13 +12,13 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from tdac_agent.budget import told_usd
 from tdac_agent.errors import RunError
-from tdac_agent.history import Told, gather_run, learner_named, run_folders
 from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
 from tdac_agent.html_report.overview import overview_of, told_seconds
 from tdac_agent.html_report.scene import Scene, scene_of
 from tdac_agent.html_report.section import broken, section_of
+from tdac_agent.models.budget import told_usd
+from tdac_agent.runs.history import Told, gather_run, learner_named, run_folders
 
 MOST_BYTES = 24 << 20
 """Of the details of all runs; those beyond it are only listed."""

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from tdac_agent.pictures import pictures_of
-from tdac_agent.task import Task
-from tdac_envs.backdrop import Chart
-from tdac_envs.canvas import Image as Picture
+from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.tasks.task import Task
+from tdac_envs.drawing.backdrop import Chart
+from tdac_envs.drawing.canvas import Image as Picture
 
 LARGEST = 880
 COLOURS = 48

@@ -8,16 +8,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from tdac_agent.budget import told_usd
 from tdac_agent.errors import RunError
-from tdac_agent.history import Told, Tried, learner_named
 from tdac_agent.html_report.animation import animations
 from tdac_agent.html_report.overview import drawn, told_seconds
 from tdac_agent.html_report.scene import Scene
+from tdac_agent.models.budget import told_usd
 from tdac_agent.plots import plot_breakdown
-from tdac_agent.records import GIVEN_FILE, PROMPT_FILE
-from tdac_agent.report import Diagnosis, Report
-from tdac_agent.units import UNITS
+from tdac_agent.runs.history import Told, Tried, learner_named
+from tdac_agent.runs.records import GIVEN_FILE, PROMPT_FILE
+from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 
 DIFF_LINES = (100, 600)
 ALL_DIFF_LINES = 20_000

@@ -4,7 +4,6 @@ Everything goes in and out as pandas frames with one row per thing (`RUN_COLUMNS
 `CANDIDATE_COLUMNS`); each interval says what it assumes in `ASSUMPTIONS`.
 """
 
-from tdac_agent.exact import exact_interval
 from tdac_agent.metrics.compare import (
     Comparison,
     best_of_n,
@@ -12,6 +11,7 @@ from tdac_agent.metrics.compare import (
     pass_at_n,
 )
 from tdac_agent.metrics.cumulative import cumulative_success
+from tdac_agent.metrics.exact import exact_interval
 from tdac_agent.metrics.frames import (
     CANDIDATE_COLUMNS,
     RUN_COLUMNS,

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from tdac_agent.errors import RunError
-from tdac_agent.exact import sign_test
+from tdac_agent.metrics.exact import sign_test
 from tdac_agent.metrics.frames import Frames
 from tdac_agent.metrics.rates import solved
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import CensoredData, ecdf
 
-from tdac_agent.exact import CONFIDENCE, exact_interval
+from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.rates import solved
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from tdac_agent.errors import RunError
-from tdac_agent.records import Attempt, Run, load_run
+from tdac_agent.runs.records import Attempt, Run, load_run
 
 RUN_COLUMNS = {
     "run": "Its folder, or another name that no other run has.",
@@ -19,7 +19,7 @@ RUN_COLUMNS = {
     "prompt": "Template of the first question.",
     "K": "Most iterations.",
     "J": "Edits per iteration.",
-    "setting": "What of the loop was in use, as in `tdac_agent.records.Setting`.",
+    "setting": "What of the loop was in use, as in `tdac_agent.runs.records.Setting`.",
     "seed": "Of the jittered starts where it was given, else the number of the run.",
     "status": "As in `run.json`.",
     "tau": "Iteration of the first success; missing where there was none.",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from tdac_agent.exact import exact_interval
+from tdac_agent.metrics.exact import exact_interval
 from tdac_agent.metrics.frames import Frames
 from tdac_agent.metrics.rates import (
     Rate,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
-from tdac_agent.exact import exact_interval
+from tdac_agent.metrics.exact import exact_interval
 from tdac_agent.plots.style import (
     COLOURS,
     LINES,

@@ -8,11 +8,11 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, dress, new_plot
-from tdac_envs.grid import BoolGrid, OccupancyGrid, body_free, clearance
-from tdac_envs.image import luminance
-from tdac_envs.map_folder import shortest_path
-from tdac_envs.params import MapParams
-from tdac_envs.preprocessing import Source, as_image
+from tdac_envs.grid.grid import BoolGrid, OccupancyGrid, body_free, clearance
+from tdac_envs.mapping.image import luminance
+from tdac_envs.mapping.map_folder import shortest_path
+from tdac_envs.mapping.params import MapParams
+from tdac_envs.mapping.preprocessing import Source, as_image
 
 SIDE = 3.7
 """Width of a panel, inches."""

@@ -10,8 +10,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import StrMethodFormatter
 
 from tdac_agent.errors import RunError
-from tdac_agent.history import learner_named
-from tdac_agent.journal import JournalRecord, read_records
 from tdac_agent.plots.style import (
     COLOURS,
     FAILED,
@@ -24,7 +22,9 @@ from tdac_agent.plots.style import (
     new_plot,
     title,
 )
-from tdac_agent.records import JOURNAL, Attempt, Run
+from tdac_agent.runs.history import learner_named
+from tdac_agent.runs.records import JOURNAL, Attempt, Run
+from tdac_agent.storage.journal import JournalRecord, read_records
 
 MOST_TESTS = 40
 CELL, NARROW = 0.36, 0.21

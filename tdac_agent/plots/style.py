@@ -10,7 +10,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tdac_agent.files import write_atomic
+from tdac_agent.storage.files import write_atomic
 
 # Okabe and Ito (2008): told apart with any colour vision, and in this order in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -11,12 +11,12 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tdac_agent.feedback import Group, group_failures
-from tdac_agent.history import Told, Tried, gather_run, learner_named
-from tdac_agent.journal import JournalRecord
 from tdac_agent.plots.runs import journal_of, short_name
 from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, new_figure, title
-from tdac_agent.records import Run
+from tdac_agent.prompting.feedback import Group, group_failures
+from tdac_agent.runs.history import Told, Tried, gather_run, learner_named
+from tdac_agent.runs.records import Run
+from tdac_agent.storage.journal import JournalRecord
 
 COLUMNS, MOST_LINES, MOST_CAUSES = 106, 3, 4
 LINE, GAP = 0.165, 0.6

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
+from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
-from tdac_agent.pictures import pictures_of
 from tdac_agent.plots.style import (
     COLOURS,
     FAILED,
@@ -22,9 +23,8 @@ from tdac_agent.plots.style import (
     new_plot,
     title,
 )
-from tdac_agent.task import Task
-from tdac_agent.trajectory import Trajectory
-from tdac_envs.backdrop import Chart
+from tdac_agent.tasks.task import Task
+from tdac_envs.drawing.backdrop import Chart
 
 WIDTH = 7.0
 """Of the map, inches; less where it is higher than wide."""

@@ -6,9 +6,9 @@ import re
 import signal
 from pathlib import Path
 
-from tdac_agent.plain import printable
 from tdac_agent.sandbox.errors import ControllerError
 from tdac_agent.sandbox.inner.wire import RemoteError
+from tdac_agent.storage.plain import printable
 
 MAX_TEXT = 2000
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+|0x[0-9a-fA-F]{6,}")

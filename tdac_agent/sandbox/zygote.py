@@ -24,9 +24,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_agent.counters import shared_counters
 from tdac_agent.sandbox.bubblewrap import bubblewrap_command
 from tdac_agent.sandbox.channel import Channel
+from tdac_agent.sandbox.counters import shared_counters
 from tdac_agent.sandbox.errors import SandboxError
 from tdac_agent.sandbox.exposure import INNER, exposure, numpy_folders
 from tdac_agent.sandbox.folder import PrivateFolder

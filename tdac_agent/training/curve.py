@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from tdac_agent.errors import RunError
-from tdac_agent.files import write_atomic
-from tdac_envs.errors import why
-from tdac_envs.intake import RECORD_BYTES, read_file
+from tdac_agent.storage.files import write_atomic
+from tdac_envs.core.errors import why
+from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 CURVE_FILE = "learning_curve.csv"
 PLAN_FILE = "training.json"

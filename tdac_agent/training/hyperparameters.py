@@ -9,10 +9,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tdac_agent.shipped import shipped
-from tdac_envs.errors import TaskError, why
-from tdac_envs.intake import TEXT_BYTES, parse_yaml, read_file
-from tdac_envs.wrappers import WRAPPERS
+from tdac_agent.storage.shipped import shipped
+from tdac_envs.core.errors import TaskError, why
+from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
+from tdac_envs.learning.wrappers import WRAPPERS
 
 Algo = Literal["ppo", "sac", "td3"]
 _LINEAR = "lin_"
@@ -99,11 +99,10 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
 
 def _names(paths: list[str] | str) -> tuple[str, ...]:
     known = {f"{w.__module__}.{w.__qualname__}": name for name, w in WRAPPERS.items()}
-    # Gymnasium offers its wrappers in one place, and has them in another.
+    # Packages offer their wrappers in one place, and have them in another.
     known |= {
-        f"gymnasium.wrappers.{w.__qualname__}": name
+        f"{w.__module__.partition('.')[0]}.wrappers.{w.__qualname__}": name
         for name, w in WRAPPERS.items()
-        if w.__module__.startswith("gymnasium.wrappers.")
     }
     wanted = [paths] if isinstance(paths, str) else paths
     wrong = [path for path in wanted if path not in known]

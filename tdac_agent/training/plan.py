@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from tdac_agent.disturbance import Disturbance
 from tdac_agent.errors import RunError
-from tdac_agent.files import write_atomic
-from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import EPUCK, bundled_task
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import EPUCK, bundled_task
 from tdac_agent.training.curve import PLAN_FILE
 from tdac_agent.training.hyperparameters import (
     Algo,
@@ -19,9 +19,9 @@ from tdac_agent.training.hyperparameters import (
     config_file,
     read_hyperparameters,
 )
-from tdac_envs.errors import TaskError, why
-from tdac_envs.intake import TEXT_BYTES, parse_json, read_file
-from tdac_envs.wrappers import check_wrappers
+from tdac_envs.core.errors import TaskError, why
+from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+from tdac_envs.learning.wrappers import check_wrappers
 
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
@@ -161,8 +161,8 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
     Raises:
         TaskError: A task has changed since the plan was made, or cannot be used.
     """
-    from tdac_envs.sb3 import SB3VecEnv
-    from tdac_envs.wrapped_vector import WrappedVectorEnv
+    from tdac_envs.learning.sb3 import SB3VecEnv
+    from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 
     each = []
     tasks = tasks_of(plan)
@@ -199,7 +199,7 @@ def _batch_class(task: Task) -> Any:
         from tdac_envs.epuck.vector import EPuckVectorEnv
 
         return EPuckVectorEnv
-    from tdac_envs.map2d_vector import Map2DVectorEnv
+    from tdac_envs.map2d.vector import Map2DVectorEnv
 
     return Map2DVectorEnv
 

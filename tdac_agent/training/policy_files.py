@@ -10,9 +10,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.files import write_atomic
-from tdac_agent.provenance import versions
-from tdac_agent.sb3_file import SavedPolicy, write_metadata
+from tdac_agent.episodes.sb3_file import SavedPolicy, write_metadata
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import TrainingPlan
 

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tdac_agent.errors import RunError
-from tdac_agent.locks import LOCK_FILE, hold
+from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.training.curve import PLAN_FILE, Point
 from tdac_agent.training.plan import TrainingPlan, read_plan, write_plan
 from tdac_agent.training.vouched import check
-from tdac_envs.errors import TaskError
-from tdac_envs.extras import install_command
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.extras import install_command
 
 if TYPE_CHECKING:
     from tdac_agent.training.learning import Watch

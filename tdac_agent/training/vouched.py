@@ -6,9 +6,9 @@ import hmac
 import os
 from pathlib import Path
 
-from tdac_agent.files import sync_folder, write_atomic
-from tdac_agent.installation import keyed, lasting_secret
-from tdac_agent.trust import Wish, file_sha256, permit
+from tdac_agent.storage.files import sync_folder, write_atomic
+from tdac_agent.tasks.installation import keyed, lasting_secret
+from tdac_agent.tasks.trust import Wish, file_sha256, permit
 
 CHECKPOINT, REPLAY = "checkpoint.zip", "replay.pkl"
 MARKS = "checkpoint.mark"

@@ -11,13 +11,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel, subkernel
-from tdac_envs.contact import free_way, move, wrap_angle
+from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, Array, Index
+from tdac_envs.map2d.contact import free_way, move, wrap_angle
 
-# As in `tdac_envs.contact`, but in metres: a disc in touch may get this much deeper
-# in a step, and no deeper than that in all; a search ends this near.
+# As in `tdac_envs.map2d.contact`, but in metres: a disc in touch may get this much
+# deeper  in a step, and no deeper than that in all; a search ends this near.
 SINK = 1e-11
 DEEPEST = 1e-10
 _CLOSE = 1e-12
@@ -152,7 +152,7 @@ def _travel(
     """Way along the arc until the disc's gap to a part falls to `floor`.
 
     The distance to a convex body is convex along a straight line, and an arc leaves
-    its tangent by at most k h^2 / 2; see `tdac_envs.contact` for the search.
+    its tangent by at most k h^2 / 2; see `tdac_envs.map2d.contact` for the search.
 
     Returns:
         At most `limit`, where there is no contact before it.

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.addresses import Addresses
-from tdac_envs.arguments import not_negative, one_of
-from tdac_envs.bodies import BODY_RADIUS
-from tdac_envs.driven import DrivenEnv, Observation
+from tdac_envs.core.addresses import Addresses
+from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.drive.env import DrivenEnv, Observation
+from tdac_envs.drive.stepping import TOUCHED, info_of
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.nearby import surroundings
@@ -28,8 +28,8 @@ from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.setup import Setup
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
-from tdac_envs.render import Status
-from tdac_envs.stepping import TOUCHED, info_of
+from tdac_envs.map2d.picture import Status
+from tdac_envs.worlds.bodies import BODY_RADIUS
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
@@ -74,9 +74,9 @@ class EPuckEnv(DrivenEnv):
 
     ## Rewards
     Progress along the shortest path for the body (in full-speed steps) x 0.1, goal
-    +10, collision -10, each step -0.01; see `tdac_envs.rewards.RewardWeights`. Paths
-    lie on a grid of 5 mm (wider above 25 m²) in eight directions, so a length is at
-    most 8.3 % above the true one.
+    +10, collision -10, each step -0.01; see `tdac_envs.drive.rewards.RewardWeights`.
+    Paths lie on a grid of 5 mm (wider above 25 m²) in eight directions, so a length is
+    at most 8.3 % above the true one.
 
     ## Starting State
     `variation="nominal"`: the given start. `"jitter"`: within one body radius of it,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from tdac_envs.compiled import kernel, subkernel
+from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, ROUND, Array, Index
 
 

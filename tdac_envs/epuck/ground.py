@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.bodies import at_body_height, bodies, floor_under
 from tdac_envs.epuck.gaps import clear_grid, nearest_gap
 from tdac_envs.epuck.prisms import FIXED, Owned, Prisms
-from tdac_envs.footprint import Rectangle, frame
-from tdac_envs.world import Obstacle, Part, World
+from tdac_envs.worlds.bodies import at_body_height, bodies, floor_under
+from tdac_envs.worlds.footprint import Rectangle, frame
+from tdac_envs.worlds.world import Obstacle, Part, World
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]

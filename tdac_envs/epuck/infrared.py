@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel, subkernel
+from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.epuck.prisms import (
     FACTOR,
     HIGH,

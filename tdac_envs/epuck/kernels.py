@@ -11,15 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.addresses import Words, line, plane
-from tdac_envs.compiled import kernel, subkernel
-from tdac_envs.contact import move, wrap_angle
-from tdac_envs.epuck.contact import advance
-from tdac_envs.epuck.gaps import nearest_of
-from tdac_envs.epuck.infrared import in_sight, sense
-from tdac_envs.epuck.nearby import listed_at
-from tdac_envs.epuck.prisms import Array, Index
-from tdac_envs.stepping import (
+from tdac_envs.core.addresses import Words, line, plane
+from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.drive.stepping import (
     AXLE,
     DT,
     GAP,
@@ -45,13 +39,20 @@ from tdac_envs.stepping import (
     settle,
     within,
 )
+from tdac_envs.epuck.contact import advance
+from tdac_envs.epuck.gaps import nearest_of
+from tdac_envs.epuck.infrared import in_sight, sense
+from tdac_envs.epuck.nearby import listed_at
+from tdac_envs.epuck.prisms import Array, Index
+from tdac_envs.map2d.contact import move, wrap_angle
 
 WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
 """Of an e-puck, m."""
 MOST_TURNED = 1e4
 """Limit of the wheels' angles, as observed, rad."""
 
-# Entries of `constants`, `state` and `outcome` beyond those of `tdac_envs.stepping`.
+# Entries of `constants`, `state` and `outcome` beyond those of
+# `tdac_envs.drive.stepping`.
 FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(17, 22)
 N_CONSTANTS = 22
 LEFT_TURNED, RIGHT_TURNED = range(8, 10)
@@ -329,7 +330,7 @@ def begin(words: Words) -> None:
     """Begins an episode where the robot's `state` says, from `outcome[REMAINING]`.
 
     Args:
-        words: Shape (20, 4), of a `tdac_envs.addresses.Addresses`: of the world as
+        words: Shape (20, 4), of a `tdac_envs.core.addresses.Addresses`: of the world as
             `Setup.world` has it, and of the robot.
     """
     _begin(*_arrays_at(words))
@@ -367,9 +368,9 @@ def step_rows(batch: Words, rows: Words) -> None:
     of the core that steps them.
 
     Args:
-        batch: Shape (9, 4): where the arrays of `tdac_envs.stepping.batch_at` are,
-            with `words` of shape (n, 20, 4), and what is overwritten, with a row for
-            each robot: outcome, pose, wheel speeds, wheel angles and readings.
+        batch: Shape (9, 4): where the arrays of `tdac_envs.drive.stepping.batch_at`
+            are, with `words` of shape (n, 20, 4), and what is overwritten, with a row
+            for each robot: outcome, pose, wheel speeds, wheel angles and readings.
         rows: Numbers of the robots, shape (k,).
     """
     over, commands, starts, words = batch_at(batch)

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import kernel, subkernel
+from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import FARTHEST, at_ray_height

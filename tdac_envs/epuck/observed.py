@@ -12,13 +12,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.drive.stepping import HEADING
 from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, sense_ground
 from tdac_envs.epuck.kernels import MOST_TURNED
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.stepping import HEADING
+from tdac_envs.worlds.bodies import BODY_RADIUS
 
 Array = NDArray[np.float64]
 Observed = NDArray[np.float32]

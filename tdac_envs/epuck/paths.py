@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.bodies import BODY_RADIUS
-from tdac_envs.compiled import constant, kernel
+from tdac_envs.core.compiled import constant, kernel
+from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.infrared import sees
-from tdac_envs.errors import TaskError
-from tdac_envs.plan import Path, descend, distance_field
+from tdac_envs.grid.plan import Path, descend, distance_field
+from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
 def at_goal(ground: Ground, goal: Point, tolerance: float, x: float, y: float) -> bool:

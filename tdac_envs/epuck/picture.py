@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_envs.bodies import BODY_RADIUS
-from tdac_envs.canvas import (
+from tdac_envs.drawing.canvas import (
     AMBER,
     FREE,
     GREEN,
@@ -21,14 +20,15 @@ from tdac_envs.canvas import (
     Colour,
     Image,
 )
+from tdac_envs.drawing.marks import OUTCOMES, draw_outcome
 from tdac_envs.epuck.infrared import ELEVATION, N_SENSORS, PLACES
 from tdac_envs.epuck.prisms import FIXED, Array, Prisms
 from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.footprint import Disc
-from tdac_envs.marks import OUTCOMES, draw_outcome
-from tdac_envs.render import Status
-from tdac_envs.world import EPuck
-from tdac_envs.world_picture import View, colour_of, draw_things
+from tdac_envs.map2d.picture import Status
+from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.footprint import Disc
+from tdac_envs.worlds.picture import View, colour_of, draw_things
+from tdac_envs.worlds.world import EPuck
 
 SMALLEST_BODY = 6.0
 NOTHING, CONTACT = 67.19, 2080.0

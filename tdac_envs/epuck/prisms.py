@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.compiled import constant
-from tdac_envs.footprint import Disc
-from tdac_envs.world import Part
+from tdac_envs.core.compiled import constant
+from tdac_envs.worlds.footprint import Disc
+from tdac_envs.worlds.world import Part
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -15,8 +15,8 @@ import numpy as np
 import pymunk
 from numpy.typing import NDArray
 
-from tdac_envs.bodies import BODY_RADIUS
 from tdac_envs.epuck.prisms import FIXED, MID_X, MID_Y, REACH, Array, Prisms
+from tdac_envs.worlds.bodies import BODY_RADIUS
 
 ROBOT_MASS = 0.16
 """An e-puck with its two wheels, kg."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs import stepping
+from tdac_envs.drive import stepping
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.infrared import N_SENSORS
 from tdac_envs.epuck.task import EPuckTask

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_envs.backdrop import CLOSE_UP, Window
-from tdac_envs.bodies import BODY_RADIUS
-from tdac_envs.canvas import Canvas, Image
+from tdac_envs.drawing.backdrop import CLOSE_UP, Window
+from tdac_envs.drawing.canvas import Canvas, Image
 from tdac_envs.epuck.ground import Bounds
 from tdac_envs.epuck.picture import SMALLEST_BODY, draw_wish
 from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.render import Legend, draw_runs
-from tdac_envs.world_picture import SIDE, View, draw_things
+from tdac_envs.map2d.picture import Legend, draw_runs
+from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.picture import SIDE, View, draw_things
 
 Points = NDArray[np.float64]
 # Columns on the right of the strip that the scale takes.
@@ -74,7 +74,7 @@ def task_view(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldChart:
-    """A view as a chart; see `tdac_envs.backdrop.Chart`."""
+    """A view as a chart; see `tdac_envs.drawing.backdrop.Chart`."""
 
     view: View
 
@@ -103,7 +103,7 @@ class WorldChart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldBackground:
-    """The backdrop of runs in a world; see `tdac_envs.backdrop.Backdrop`."""
+    """The backdrop of runs in a world; see `tdac_envs.drawing.backdrop.Backdrop`."""
 
     task: EPuckTask
     view: View

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.arguments import check_reset_options, finite_numbers
-from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.core.arguments import check_reset_options, finite_numbers
+from tdac_envs.drive.rewards import RewardWeights
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH
 from tdac_envs.epuck.nearby import Surroundings
@@ -23,7 +23,7 @@ from tdac_envs.epuck.task import (
     mixed_start,
     random_task,
 )
-from tdac_envs.rewards import RewardWeights
+from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
 @dataclass(frozen=True, slots=True, eq=False)

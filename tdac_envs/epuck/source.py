@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from tdac_envs.arguments import finite_numbers, finite_point
-from tdac_envs.errors import TaskError
-from tdac_envs.task2d import Pose
-from tdac_envs.wbt.reader import load_world
-from tdac_envs.world import EPuck, World, check_modelled
-from tdac_envs.worlds import world_file
+from tdac_envs.core.arguments import finite_numbers, finite_point
+from tdac_envs.core.errors import TaskError
+from tdac_envs.map2d.task import Pose
+from tdac_envs.worlds.bundled import world_file
+from tdac_envs.worlds.wbt.reader import load_world
+from tdac_envs.worlds.world import EPuck, World, check_modelled
 
 WorldSource = str | Path | World
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.arguments import finite_numbers, finite_point, positive, steps_of
-from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.core.arguments import finite_numbers, finite_point, positive, steps_of
+from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.epuck.paths import (
@@ -22,15 +22,15 @@ from tdac_envs.epuck.paths import (
     path_down,
     route,
 )
-from tdac_envs.errors import TaskError
-from tdac_envs.plan import Path
-from tdac_envs.task2d import (
+from tdac_envs.grid.plan import Path
+from tdac_envs.map2d.task import (
     MAX_DRAWS,
     Pose,
     generous_horizon,
     jittered_pose,
     wrapped,
 )
+from tdac_envs.worlds.bodies import BODY_RADIUS
 
 TOLERANCE = 0.02
 """m, as the paper has it."""

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from tdac_envs.arguments import whole_number
-from tdac_envs.batching import no_pictures, several
-from tdac_envs.driven_vector import DrivenVectorEnv, Observations
+from tdac_envs.core.arguments import whole_number
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.batching import no_pictures, several
+from tdac_envs.drive.vector import DrivenVectorEnv, Observations
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import step_rows
 from tdac_envs.epuck.observed import Observed, ground_readings, noisy, north, position
-from tdac_envs.errors import TaskError
 
 
 class EPuckVectorEnv(DrivenVectorEnv):

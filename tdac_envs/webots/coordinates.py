@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tdac_envs.errors import WorldError
-from tdac_envs.wbt.fields import children
-from tdac_envs.wbt.frames import Frame, Matrix, axis_angle
-from tdac_envs.wbt.geometry import GROUPS
-from tdac_envs.wbt.placing import placed
-from tdac_envs.wbt.robots import is_epuck
-from tdac_envs.wbt.tree import Node
+from tdac_envs.core.errors import WorldError
+from tdac_envs.worlds.wbt.fields import children
+from tdac_envs.worlds.wbt.frames import Frame, Matrix, axis_angle
+from tdac_envs.worlds.wbt.geometry import GROUPS
+from tdac_envs.worlds.wbt.placing import placed
+from tdac_envs.worlds.wbt.robots import is_epuck
+from tdac_envs.worlds.wbt.tree import Node
 
 Found = tuple[Node, Frame]
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from tdac_envs.epuck.infrared import TABLE
-from tdac_envs.wbt.fields import children, numbers, text
-from tdac_envs.wbt.robots import inside
-from tdac_envs.wbt.tree import Node
+from tdac_envs.worlds.wbt.fields import children, numbers, text
+from tdac_envs.worlds.wbt.robots import inside
+from tdac_envs.worlds.wbt.tree import Node
 
 Offset = tuple[float, float, float]
 

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from tdac_envs.epuck.ground import Ground
-from tdac_envs.wbt.found import name_of
-from tdac_envs.wbt.frames import Frame
-from tdac_envs.wbt.tree import Node
 from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
+from tdac_envs.worlds.wbt.found import name_of
+from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.tree import Node
 
 Point = tuple[float, float]
 Place = tuple[list[float], list[float]]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.driven import Observation
+from tdac_envs.drive.env import Observation
 from tdac_envs.webots.devices import DARK, ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
 from tdac_envs.webots.log import Pose, turn_rate, velocity
 from tdac_envs.webots.stage import Stage

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from tdac_envs.wbt.robots import ROBOTS, is_epuck
-from tdac_envs.wbt.tree import Field, Item, Node
+from tdac_envs.worlds.wbt.robots import ROBOTS, is_epuck
+from tdac_envs.worlds.wbt.tree import Field, Item, Node
 
 SF_BOOL, SF_INT32, SF_FLOAT, SF_VEC2F, SF_VEC3F = 1, 2, 3, 4, 5
 SF_ROTATION, SF_COLOR, SF_STRING, SF_NODE, MF = 6, 7, 8, 9, 16

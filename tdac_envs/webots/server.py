@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.driven import Observation
+from tdac_envs.drive.env import Observation
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.devices import DARK, WHEELS
 from tdac_envs.webots.log import Log, turn_rate, velocity

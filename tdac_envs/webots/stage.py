@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.arguments import finite_point
-from tdac_envs.bodies import BODY_RADIUS
+from tdac_envs.core.arguments import finite_point
+from tdac_envs.core.errors import WorldError
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.paths import entry, field_to, open_field
 from tdac_envs.epuck.source import started
-from tdac_envs.errors import WorldError
-from tdac_envs.wbt.fields import flag, text
-from tdac_envs.wbt.frames import Frame
-from tdac_envs.wbt.reader import frame_of, read_text, read_world, with_goal
-from tdac_envs.wbt.robots import is_epuck
-from tdac_envs.wbt.tree import Node, parse
 from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
 from tdac_envs.webots.devices import DeviceFacts, find_devices
 from tdac_envs.webots.movable import Movable, find_movables
 from tdac_envs.webots.scene import Scene
-from tdac_envs.world import World, check_modelled
+from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.wbt.fields import flag, text
+from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.reader import frame_of, read_text, read_world, with_goal
+from tdac_envs.worlds.wbt.robots import is_epuck
+from tdac_envs.worlds.wbt.tree import Node, parse
+from tdac_envs.worlds.world import World, check_modelled
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,9 +9,9 @@ import pytest
 from small import QUICK, write_small_task
 
 from tdac_agent.builtin import Parameters, render_controller
-from tdac_agent.cli import main
-from tdac_agent.task import load_task
-from tdac_agent.warm import WarmJudge
+from tdac_agent.cli.main import main
+from tdac_agent.tasks.task import load_task
+from tdac_agent.verification.judge.warm import WarmJudge
 
 
 @pytest.fixture(scope="session")

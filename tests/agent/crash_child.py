@@ -13,12 +13,12 @@ import sys
 import threading
 from pathlib import Path
 
-from tdac_agent.budget import Budget
-from tdac_agent.providers.openai_api import OpenAIModel
-from tdac_agent.records import JOURNAL
-from tdac_agent.retry import RetryPolicy
-from tdac_agent.synthesis import synthesize
-from tdac_agent.task import load_task
+from tdac_agent.models.budget import Budget
+from tdac_agent.models.openai_api import OpenAIModel
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.runs.records import JOURNAL
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.tasks.task import load_task
 
 
 def killing_write(write, kill_at, share):

@@ -7,14 +7,14 @@ import sys
 
 import numpy as np
 
-import tdac_envs.sensors
-from tdac_agent.episode import Record
-from tdac_agent.trajectory import Rollout
-from tdac_envs.errors import TaskError
-from tdac_envs.grid import clearance
-from tdac_envs.map2d import Map2DEnv
-from tdac_envs.params import MapParams
-from tdac_envs.task2d import widest_connected_radius
+import tdac_envs.controller_kit.sensors
+from tdac_agent.episodes.episode import Record
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_envs.core.errors import TaskError
+from tdac_envs.grid.grid import clearance
+from tdac_envs.map2d.env import Map2DEnv
+from tdac_envs.map2d.task import widest_connected_radius
+from tdac_envs.mapping.params import MapParams
 
 
 def random_env(random) -> Map2DEnv:
@@ -82,7 +82,7 @@ def import_controller(source, env, folder, monkeypatch):
         polarity="given",
         method="given",
     ).save(folder / "params.json")
-    shutil.copy(tdac_envs.sensors.__file__, folder / "sensors.py")
+    shutil.copy(tdac_envs.controller_kit.sensors.__file__, folder / "sensors.py")
     return import_from(folder, source, monkeypatch)
 
 

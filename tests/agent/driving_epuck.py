@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from driving import drive, import_from
 
-from tdac_agent.task import Task, load_task, write_workdir
-from tdac_agent.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task import Task, load_task, write_workdir
+from tdac_agent.tasks.task_file import EPUCK, TaskFile
 from tdac_envs import bundled_worlds, write_world
-from tdac_envs.errors import TdacError
-from tdac_envs.footprint import Disc, Polygon, Rectangle
-from tdac_envs.world import Arena, EPuck, Obstacle, Part, World
+from tdac_envs.core.errors import TdacError
+from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle
+from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, World
 
 PAPER_WORLD = (
     Path(__file__).parents[3] / "shared" / "data" / "worlds" / "00_paper_empty.wbt"

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.grid import clearance
-from tdac_envs.plan import plan_path
-from tdac_envs.task2d import Map2DTask
+from tdac_envs.grid.grid import clearance
+from tdac_envs.grid.plan import plan_path
+from tdac_envs.map2d.task import Map2DTask
 
 Act = Callable[[dict[str, Any]], tuple[float, float]]
 Fault = Callable[[Map2DTask], Act]

@@ -32,12 +32,12 @@ from faulty import (
 from rich.console import Console
 from rich.table import Table
 
-from tdac_agent.diagnosis import diagnose
-from tdac_agent.report import Cause, Diagnosis
-from tdac_agent.starts import spread_starts
-from tdac_agent.trajectory import Rollout
-from tdac_envs.map2d import Map2DEnv
-from tdac_envs.task2d import Pose
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.report import Cause, Diagnosis
+from tdac_agent.verification.suite.starts import spread_starts
+from tdac_envs.map2d.env import Map2DEnv
+from tdac_envs.map2d.task import Pose
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """A provider with prepared answers, for tests of the loop."""
 
-from tdac_agent.provider import Reply
+from tdac_agent.models.provider import Reply
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 NO_RULES = Reply("```json\n[]\n```")

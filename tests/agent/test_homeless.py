@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tdac_agent.prices import SHIPPED
+from tdac_agent.models.prices import SHIPPED
 
 # A user namespace makes one of whoever runs the tests; else root can become one.
 WAYS = (
@@ -37,7 +37,7 @@ def call(way, *words, **options):
 
 def works(way):
     """Whether this way leads to a user without a home, who can use the package."""
-    code = "import pathlib, tdac_agent.prices; pathlib.Path.home()"
+    code = "import pathlib, tdac_agent.models.prices; pathlib.Path.home()"
     try:
         return "Could not determine home" in call(way, "-c", code).stderr
     except OSError:
@@ -62,7 +62,7 @@ def place():
 
 def test_prices_are_the_shipped_ones(homeless):
     """No home, no file of the user's, no error."""
-    done = homeless("-c", "from tdac_agent.prices import *; print(price_file())")
+    done = homeless("-c", "from tdac_agent.models.prices import *; print(price_file())")
     assert (done.stdout, done.stderr) == (f"{SHIPPED}\n", "")
 
 

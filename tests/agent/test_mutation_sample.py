@@ -9,9 +9,9 @@ from benchmarks.drawn_worlds import Drawn, points_in, room_at
 from benchmarks.ground import GROUNDS
 from benchmarks.mutants import Mutant, choose, domain_mutants, normal
 from benchmarks.mutation import Row, examine
-from tdac_agent.world_oracle import gap_to, prisms_of
+from tdac_agent.environments.epuck.oracle import gap_to, prisms_of
 from tdac_envs import read_world
-from tdac_envs.bodies import bodies
+from tdac_envs.worlds.bodies import bodies
 
 SAMPLE = 12
 

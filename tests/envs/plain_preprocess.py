@@ -9,13 +9,13 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from tdac_envs.grid import body_free, clearance
-from tdac_envs.image import from_array, luminance
-from tdac_envs.params import ScoreTerms
-from tdac_envs.plan import descend, distance_field, path_length
-from tdac_envs.readings import plain_reading
-from tdac_envs.scene import Scene
-from tdac_envs.score import nearest_free
+from tdac_envs.grid.grid import body_free, clearance
+from tdac_envs.grid.plan import descend, distance_field, path_length
+from tdac_envs.mapping.image import from_array, luminance
+from tdac_envs.mapping.params import ScoreTerms
+from tdac_envs.mapping.readings import plain_reading
+from tdac_envs.mapping.scene import Scene
+from tdac_envs.mapping.score import nearest_free
 
 SQUARE = np.ones((3, 3), np.uint8)
 

@@ -5,7 +5,7 @@ import pytest
 from benchmarks.plain_grid import best_score
 from benchmarks.preprocessing import RADIUS, floor_plan
 from benchmarks.timing import Row, compared, duration, in_turn
-from tdac_envs.preprocessing import rank_candidates
+from tdac_envs.mapping.preprocessing import rank_candidates
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from gymnasium.error import DependencyNotInstalled
 from gymnasium.utils.env_checker import check_env
 
 import tdac_envs  # noqa: F401 - registers the envs
-from tdac_envs.extras import install_command
+from tdac_envs.core.extras import install_command
 
 IDS = sorted(name for name in gym.registry if name.startswith("TDAC-"))
 VARIANTS = [

@@ -13,7 +13,7 @@ from walls import hidden
 
 BUSY_LOOPS = 4
 # Of each kind of compiled function a few tests, for without compilation all are slow.
-KERNELS = "tests/envs/test_kernels.py"
+KERNELS = "tests/envs/map2d/test_kernels.py"
 
 
 def temporary(place: Place) -> str:

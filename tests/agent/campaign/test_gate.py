@@ -8,8 +8,8 @@ import threading
 import pytest
 
 from tdac_agent.campaign.gate import FIRST, Gate, Gated, gated
-from tdac_agent.provider import RateLimited, Reply, Request
-from tdac_agent.retry import RetryPolicy, answer
+from tdac_agent.models.provider import RateLimited, Reply, Request
+from tdac_agent.models.retry import RetryPolicy, answer
 
 ASKED = Request("generate", "?")
 

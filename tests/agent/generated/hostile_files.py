@@ -20,29 +20,29 @@ import cv2
 import numpy as np
 import yaml
 
+from tdac_agent.builtin.scripted import Script
 from tdac_agent.campaign.config import read_config
-from tdac_agent.commands import runs as runs_command
-from tdac_agent.commands.console import Console
-from tdac_agent.commands.rules import _lives
-from tdac_agent.commands.run_view import show_run
-from tdac_agent.history import gather_run
-from tdac_agent.journal import read_records
-from tdac_agent.past import read_past
-from tdac_agent.prices import load_prices
-from tdac_agent.providers.choice import Options
-from tdac_agent.providers.replay import make as make_replay
-from tdac_agent.providers.scripted import Script
-from tdac_agent.records import JOURNAL, RUN_FILE, load_rules, load_run
-from tdac_agent.resume import asked_for
-from tdac_agent.task import Task, lay_out, load_task
+from tdac_agent.cli import runs as runs_command
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.rules import _lives
+from tdac_agent.cli.run_view import show_run
+from tdac_agent.models.choice import Options
+from tdac_agent.models.prices import load_prices
+from tdac_agent.runs.history import gather_run
+from tdac_agent.runs.past import read_past
+from tdac_agent.runs.records import JOURNAL, RUN_FILE, load_rules, load_run
+from tdac_agent.runs.replay import make as make_replay
+from tdac_agent.runs.resume import asked_for
+from tdac_agent.storage.journal import read_records
+from tdac_agent.storage.yaml_file import read_yaml
+from tdac_agent.tasks.task import Task, lay_out, load_task
 from tdac_agent.training.curve import read_curve
 from tdac_agent.training.hyperparameters import read_hyperparameters
 from tdac_agent.training.plan import read_plan
-from tdac_agent.yaml_file import read_yaml
-from tdac_envs.errors import TdacError
-from tdac_envs.image import load_image
-from tdac_envs.intake import check, parse_json, parse_yaml
-from tdac_envs.source2d import prepare
+from tdac_envs.core.errors import TdacError
+from tdac_envs.core.intake import check, parse_json, parse_yaml
+from tdac_envs.map2d.source import prepare
+from tdac_envs.mapping.image import load_image
 
 Reader = Callable[[Path], object]
 

@@ -254,6 +254,6 @@ def _read(descriptor: int, size: int) -> bytes:
 
 def told(result: Any) -> str:
     """What a report may quote of a value."""
-    from tdac_agent.episode import wrong_action
+    from tdac_agent.episodes.episode import wrong_action
 
     return wrong_action(result)

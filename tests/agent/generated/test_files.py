@@ -13,7 +13,7 @@ from hostile_files import KINDS, Kind
 from hostile_values import altered
 from hypothesis import HealthCheck, given, settings
 
-from tdac_envs.errors import TdacError
+from tdac_envs.core.errors import TdacError
 
 LONGEST = 20_000
 """Characters of a message, which may quote a name; the command line cuts it."""

@@ -21,7 +21,7 @@ import pytest
 from hostile_words import JUDGED, READING, furnish, lines
 from hypothesis import HealthCheck, given, settings
 
-from tdac_agent.cli import main
+from tdac_agent.cli.main import main
 
 LEAST_SHARE = 0.5
 ENOUGH = 20

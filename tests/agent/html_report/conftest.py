@@ -7,12 +7,12 @@ import pytest
 from hostile_model import CRASHES, CRASHES_LATER, EVIL, HITS, SUITE, Model
 from small import write_small_task
 
+from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report import make_page
-from tdac_agent.records import load_run
-from tdac_agent.report import Report
-from tdac_agent.synthesis import synthesize
-from tdac_agent.task import load_task
-from tdac_agent.trajectory import Trajectory
+from tdac_agent.runs.records import load_run
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.tasks.task import load_task
+from tdac_agent.verification.diagnosis.report import Report
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,7 @@
 
 import json
 
-from tdac_agent.provider import Reply
+from tdac_agent.models.provider import Reply
 
 EVIL = "</script><script>window.hacked = 1</script><img src=x onerror='hacked=1'>"
 SUITE = f"""import pytest

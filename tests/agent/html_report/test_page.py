@@ -11,12 +11,12 @@ import pytest
 from hostile_model import EVIL
 
 from tdac_agent.errors import RunError
-from tdac_agent.history import gather_run
 from tdac_agent.html_report import make_page
 from tdac_agent.html_report.page import shortened
-from tdac_agent.locks import LOCK_FILE, hold
-from tdac_agent.records import load_rules, load_run, status_now
-from tdac_agent.report import Report
+from tdac_agent.runs.history import gather_run
+from tdac_agent.runs.records import load_rules, load_run, status_now
+from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.verification.diagnosis.report import Report
 
 VOID = {"meta", "link", "input", "br", "img"}
 

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tdac_agent.exact import exact_interval
+from tdac_agent.metrics.exact import exact_interval
 from tdac_agent.plots.baselines import (
     plot_generalisation,
     plot_learning_curves,
     plot_success_by_policy,
 )
-from tdac_agent.task_file import bundled_tasks
+from tdac_agent.tasks.task_file import bundled_tasks
 
 RESULTS = Path(__file__).parents[3] / "results" / "baselines"
 

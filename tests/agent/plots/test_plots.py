@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.metrics import (
     cumulative_success,
@@ -24,12 +25,11 @@ from tdac_agent.plots import (
     plot_trajectories,
     save_figure,
 )
-from tdac_agent.records import Attempt, Run
-from tdac_agent.task import load_task
-from tdac_agent.trajectory import Trajectory
-from tdac_agent.verification import verify
+from tdac_agent.runs.records import Attempt, Run
+from tdac_agent.tasks.task import load_task
+from tdac_agent.verification.verify import verify
 from tdac_envs import preprocess
-from tdac_envs.errors import TdacError
+from tdac_envs.core.errors import TdacError
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from small import SHORT, write_small_task
 
-from tdac_agent.episode import Record, run_policy
+from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.sandbox import ControllerTimeout, Limits
-from tdac_agent.task import load_task
+from tdac_agent.tasks.task import load_task
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/schedstat").exists(), reason="the kernel does not tell"

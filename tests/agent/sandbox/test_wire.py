@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from tdac_agent.episode import as_wheels, wrong_action
+from tdac_agent.episodes.episode import as_wheels, wrong_action
 from tdac_agent.sandbox.inner import wire
 from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.describe import FILE_NAME, describe

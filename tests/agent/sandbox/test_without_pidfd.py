@@ -34,9 +34,9 @@ SCRIPT = """
     else:
         raise AssertionError("not refused")
 
-    from tdac_agent.task import load_task
-    from tdac_agent.verification import verify
-    from tdac_agent.warm import WarmJudge
+    from tdac_agent.tasks.task import load_task
+    from tdac_agent.verification.verify import verify
+    from tdac_agent.verification.judge.warm import WarmJudge
 
     task, sources = load_task(sys.argv[2]), json.loads(sys.stdin.read())
     with WarmJudge() as judge:

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from tdac_agent.crew import Crew
-from tdac_agent.nursery import Nursery
 from tdac_agent.sandbox import (
     ControllerError,
     Limits,
@@ -18,6 +16,8 @@ from tdac_agent.sandbox import (
     start_zygote,
 )
 from tdac_agent.sandbox.zygote import SLOTS
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.workers import Crew
 
 WRITER = """
 import os

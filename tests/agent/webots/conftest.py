@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tdac_agent.webots_run import LIMITS, run_controller
+from tdac_agent.webots.run import LIMITS, run_controller
 from tdac_envs.webots.stage import open_stage
 
 CONTROLLERS = Path(__file__).parent / "controllers"

@@ -13,11 +13,11 @@ import yaml
 from worlds_for_controllers import OPEN
 
 from tdac_agent.builtin import EPuckParameters, render_epuck
-from tdac_agent.deploy.webots import POLICY, export_webots, project_name
-from tdac_agent.policy import load_controller
-from tdac_agent.records import Run
-from tdac_agent.task import load_task, portable_task_file, write_workdir
-from tdac_agent.webots_run import run_controller
+from tdac_agent.environments.epuck.export import POLICY, export_webots, project_name
+from tdac_agent.evaluation.policy import load_controller
+from tdac_agent.runs.records import Run
+from tdac_agent.tasks.task import load_task, portable_task_file, write_workdir
+from tdac_agent.webots.run import run_controller
 from tdac_envs import load_world
 from tdac_envs.webots.stage import open_stage
 

@@ -19,12 +19,12 @@ from grounds import zoo_task
 
 import tdac_agent
 from tdac_agent.errors import Fault
-from tdac_agent.feedback import render_feedback
-from tdac_agent.installation import lasting_secret, secret_file
-from tdac_agent.report import Report
+from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.sandbox import Limits
-from tdac_agent.verification import verify
-from tdac_agent.warm import WarmJudge
+from tdac_agent.tasks.installation import lasting_secret, secret_file
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.verify import verify
 
 PACKAGE = Path(tdac_agent.__file__).parent
 LIMITS = Limits(import_seconds=4.0, reset_seconds=4.0, call_seconds=4.0, cpu_seconds=60)

@@ -28,10 +28,10 @@ from enclosure import KEY, Canaries
 from grounds import write_map_task
 from rich.console import Console
 
-from tdac_agent.records import load_run
-from tdac_agent.report import Report
-from tdac_agent.synthesis import synthesize
-from tdac_agent.task import load_task
+from tdac_agent.runs.records import load_run
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.tasks.task import load_task
+from tdac_agent.verification.diagnosis.report import Report
 
 MOST_SECONDS = 300
 KEYS = dict.fromkeys((KEY, "OPENAI_API_KEY"), "key-12345678")

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import yaml
 
-from tdac_agent.task import Task, load_task
-from tdac_agent.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import EPUCK, TaskFile
 
 WORLD = Path(__file__).parent / "epuck" / "world.wbt"
 

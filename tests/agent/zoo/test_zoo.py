@@ -8,7 +8,7 @@ from cases import all_cases, tiers_of, working_tiers
 from enclosure import Enclosure, differences
 from grounds import KINDS, zoo_task
 
-from tdac_agent.verification import verify
+from tdac_agent.verification.verify import verify
 
 CASES = all_cases()
 ALWAYS = {"astar_pursuit", "forged_positions", "proc_walk", "tapes_of_known_starts"}

@@ -12,10 +12,10 @@ sys.path[:0] = ["@PACKAGE@/.."]
 
 
 def world():
-    import tdac_envs.world as world
+    import tdac_envs.worlds.world as world
 
     return world.__name__
 
 
 attempt("world", world)
-attempt("file", lambda: open("@PACKAGE@/../tdac_envs/worlds/arena.wbt").read(40))
+attempt("file", lambda: open("@PACKAGE@/../tdac_envs/worlds/files/arena.wbt").read(40))

@@ -4,7 +4,7 @@
 # tiers: every
 # fails: test_imports, test_reaches_goal
 # error: got nothing
-# error rlimits: got reference -> 'tdac_agent.contract'; suite
+# error rlimits: got reference -> 'tdac_agent.verification.suite.contract'; suite
 # why: the child sees numpy and the standard library only
 import sys
 
@@ -12,7 +12,7 @@ sys.path[:0] = ["@PACKAGE@/..", "@PACKAGE@", "/usr/lib/python3/dist-packages"]
 
 
 def answer():
-    import tdac_agent.contract as reference
+    import tdac_agent.verification.suite.contract as reference
 
     return reference.__name__
 

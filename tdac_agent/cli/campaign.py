@@ -1,0 +1,227 @@
+"""`tdac campaign`: a live table, then the metrics, and what did not come to its end."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+
+from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
+from tdac_agent.campaign.drive import campaign_folder, carry_out, foreign, look
+from tdac_agent.campaign.executor import Executor
+from tdac_agent.campaign.perform import Terms
+from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
+from tdac_agent.campaign.progress import Progress
+from tdac_agent.cli.campaign_live import LiveView
+from tdac_agent.cli.campaign_table import make_console, told_counts
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import tell
+from tdac_agent.models.choice import choose_models
+from tdac_agent.models.lifecycle import model_warnings
+from tdac_agent.models.provider import Provider
+from tdac_agent.models.tariff import bounds_of, tariffs_of
+from tdac_envs.core.intake import TEXT_BYTES, read_file
+
+FOLDER = Path("campaigns")
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the command was asked for.
+
+    Attributes:
+        given: The campaign's file, or the name of a shipped one.
+        limits: `max_cost` and `max_tokens`, where they are not the file's.
+        executor: `local` or `ray`.
+        workers: Runs at a time.
+        shard: Part of all runs, `i/n`.
+        out: The campaign's folder.
+        trust: Whether the file may run, and reach, what it names.
+        key_over_http: Whether a key may go to another machine unencrypted.
+    """
+
+    given: str
+    limits: dict[str, Any]
+    executor: str
+    workers: int | None
+    shard: str
+    out: Path | None
+    trust: bool = False
+    key_over_http: bool = False
+
+    def folder(self, config: CampaignConfig) -> Path:
+        """The campaign's folder, by default one of its name."""
+        return self.out or FOLDER / config.name
+
+    def command(self) -> str:
+        """The words that go on with it."""
+        words = ["tdac", "campaign", self.given]
+        flags = {"--workers": self.workers, "--out": self.out}
+        flags |= {f"--{name.replace('_', '-')}": v for name, v in self.limits.items()}
+        for flag, value in flags.items():
+            words += [] if value is None else [flag, str(value)]
+        words += [] if self.executor == "local" else ["--executor", self.executor]
+        words += ["--trust"] if self.trust else []
+        words += ["--key-over-http"] if self.key_over_http else []
+        words += [] if self.shard == "1/1" else ["--shard", self.shard]
+        return shlex.join(words)
+
+
+def run(wanted: Wanted, as_json: bool) -> int:
+    """Carries out a campaign and prints; returns the exit code."""
+    console = make_console(stderr=as_json)
+    shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
+    config = with_limits(read_config(file), wanted.limits)
+    with console.status("reading the tasks …"):
+        plan = make_plan(config, file.parent, trust=wanted.trust)
+    folder = wanted.folder(config)
+    with campaign_folder(folder, shard, read_file(file, TEXT_BYTES).decode("utf-8")):
+        terms = Terms(
+            folder=str(folder.resolve()),
+            workers=wanted.workers or len(os.sched_getaffinity(0)),
+            max_cost=config.max_cost,
+            max_tokens=config.max_tokens,
+            keep=config.keep,
+            key_over_http=wanted.key_over_http,
+        )
+        progress, left = look(plan, shard, terms.runs)
+        check_models(plan, left, config, key_over_http=wanted.key_over_http)
+        _tell_heading(console, config, progress, folder)
+        _tell_remarks(console, plan, terms)
+        try:
+            if left:
+                _make(progress, left, terms, wanted.executor, console)
+        finally:
+            # With pandas and scipy, which take seconds: a refusal does without.
+            from tdac_agent.campaign.collect import collect, write_tables
+            from tdac_agent.cli.campaign_summary import show_summary
+
+            summary = write_tables(collect(plan, terms.runs), folder)
+            show_summary(summary, console)
+            _tell_ending(console, progress, folder, wanted)
+    if as_json:
+        sys.stdout.write(json.dumps(_as_json(progress, folder), indent=2) + "\n")
+    return _exit_code(progress)
+
+
+def with_limits(config: CampaignConfig, limits: dict[str, Any]) -> CampaignConfig:
+    """A campaign with the limits of the command line."""
+    return config.model_copy(update=limits)
+
+
+def check_models(
+    plan: Plan,
+    left: Iterable[PlannedRun],
+    config: CampaignConfig,
+    *,
+    key_over_http: bool = False,
+) -> None:
+    """Makes each model once, so that a missing key is known before the night.
+
+    Raises:
+        ProviderError: With all that is missing.
+    """
+    models: list[Provider] = []
+    for cell in dict.fromkeys(planned.cell for planned in left):
+        setting = plan.tasks[cell.task].setting
+        models += choose_models(
+            cell.learner,
+            cell.optimizer,
+            setting,
+            cell.base_url,
+            key_over_http=key_over_http,
+        )
+    bounds_of(models, tariffs_of(models), config.max_cost, config.max_tokens)
+
+
+def _make(
+    progress: Progress,
+    left: list[PlannedRun],
+    terms: Terms,
+    executor: str,
+    console: Console,
+) -> None:
+    with LiveView(console, progress, terms) as view:
+        carry_out(progress, left, terms, _executor(executor), view.saw)
+
+
+def _executor(name: str) -> Executor:
+    if name == "ray":
+        from tdac_agent.campaign.on_ray import run_on_ray
+
+        return run_on_ray
+    from tdac_agent.campaign.local import run_locally
+
+    return run_locally
+
+
+def _tell_heading(
+    console: Console, config: CampaignConfig, progress: Progress, folder: Path
+) -> None:
+    kinds = len(progress.tallies)
+    console.print(
+        f"campaign [bold]{escape(config.name)}[/]: {progress.planned} runs of {kinds} "
+        f"kind{'' if kinds == 1 else 's'}, R = {config.runs}; {escape(str(folder))}",
+        soft_wrap=True,
+    )
+    if progress.before == progress.planned:
+        console.print("all of them have come to their end before; nothing was done")
+    elif progress.before:
+        console.print(f"going on: {progress.before} have come to their end before")
+
+
+def _tell_remarks(console: Console, plan: Plan, terms: Terms) -> None:
+    for line in model_warnings(models_of(plan.cells)):
+        tell(console, f"note: {line}", "yellow")
+    others = foreign(plan, terms.runs)
+    if others:
+        told = f"{len(others)} other kinds of run are in {terms.runs}: of an earlier "
+        told += "file, task, suite or version; they are left alone"
+        tell(console, f"note: {told}", "yellow")
+
+
+def _tell_ending(
+    console: Console, progress: Progress, folder: Path, wanted: Wanted
+) -> None:
+    for problem, count in progress.problems.most_common():
+        tell(console, f"{count} × {problem}", "yellow")
+    console.print(told_counts(progress), soft_wrap=True)
+    console.print(
+        f"  tables: {folder}/runs.csv, candidates.csv, summary.csv\n"
+        f"  look: tdac report {shlex.quote(str(folder))}",
+        soft_wrap=True,
+    )
+    if progress.finished < progress.planned:
+        more = " with a greater --max-cost" if progress.exhausted else ""
+        console.print(f"  go on{more}: {escape(wanted.command())}", soft_wrap=True)
+
+
+def _as_json(progress: Progress, folder: Path) -> dict[str, Any]:
+    return {
+        "folder": str(folder),
+        "planned": progress.planned,
+        "finished": progress.finished,
+        "before": progress.before,
+        "deaths": progress.deaths,
+        "problems": dict(progress.problems),
+        "cost": progress.cost,
+        "tokens": progress.tokens,
+        "seconds": round(progress.seconds, 3),
+        "kinds": [
+            {"kind": name, "planned": tally.planned, **tally.ended}
+            for name, tally in progress.tallies.items()
+        ],
+    }
+
+
+def _exit_code(progress: Progress) -> int:
+    if progress.finished == progress.planned:
+        return 0
+    return 4 if progress.exhausted else 3

@@ -1,0 +1,149 @@
+"""A campaign while it goes on: a table on a terminal, lines in a file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+
+from rich.console import Group, RenderableType
+from rich.live import Live
+from rich.markup import escape
+from rich.padding import Padding
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+
+from tdac_agent.campaign.executor import Died, Ended, Update
+from tdac_agent.campaign.perform import Outcome, Terms
+from tdac_agent.campaign.progress import Doing, Progress, Tally
+from tdac_agent.cli.campaign_table import (
+    COLOURS,
+    labels_of,
+    make_table,
+    told_counts,
+    told_time,
+)
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import tell
+
+FRAME_LINES = 10
+"""Around the rows of the table."""
+BAR_WIDTH = 60
+
+
+class LiveView:
+    """What a campaign shows of itself. A context manager.
+
+    Args:
+        console: Where to.
+        progress: Of the campaign.
+        terms: What its runs share.
+    """
+
+    def __init__(self, console: Console, progress: Progress, terms: Terms) -> None:
+        self._console = console
+        self._progress = progress
+        self._terms = terms
+        cells = [tally.cell for tally in progress.tallies.values()]
+        self._labels = labels_of(cells)
+        self._paid = any(cell.asks_models for cell in cells)
+        self._live = Live(
+            get_renderable=self._render,
+            console=console,
+            refresh_per_second=2,
+            transient=True,
+        )
+
+    def __enter__(self) -> LiveView:
+        if self._console.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._console.is_terminal:
+            self._live.stop()
+
+    def saw(self, update: Update) -> None:
+        """Tells what stays on the screen."""
+        match update:
+            case Died():
+                told = f"the process of {update.planned.name} died: {update.reason}"
+                tell(self._console, f"{told}; it goes on", "yellow")
+            case Ended() if not self._console.is_terminal:
+                self._console.print(self._line(update.outcome), soft_wrap=True)
+            case Ended() if not update.outcome.finished:
+                self._console.print(self._line(update.outcome), soft_wrap=True)
+
+    def _line(self, outcome: Outcome) -> str:
+        at = "" if outcome.tau is None else f" in iteration {outcome.tau}"
+        why = f": {outcome.reason}" if outcome.reason else ""
+        done = f"[{self._progress.finished}/{self._progress.planned}]"
+        colour = COLOURS.get(outcome.status, "yellow")
+        told = f"{outcome.status}{at}, {told_time(outcome.seconds)}{why}"
+        return f"{escape(done)} {escape(outcome.name)} [{colour}]{escape(told)}[/]"
+
+    def _render(self) -> RenderableType:
+        doing = sorted(self._progress.doing.values(), key=lambda one: one.since)
+        room = max(3, self._console.height - FRAME_LINES - len(doing))
+        tallies = list(self._progress.tallies.values())
+        shown = sorted(tallies, key=self._interest)[:room]
+        table = self._table(tally for tally in tallies if tally in shown)
+        more = len(tallies) - len(shown)
+        others = [f"[dim]and {more} more kinds of run[/]"] if more else []
+        counts = told_counts(self._progress, going=True)
+        return Group(table, *others, self._doing(doing), self._bar(), counts)
+
+    def _interest(self, tally: Tally) -> tuple[bool, bool, bool]:
+        """Kinds under way first, then those with something wrong, then unfinished."""
+        at_work = {one.planned.cell.folder for one in self._progress.doing.values()}
+        unfinished = tally.finished < tally.planned
+        return tally.cell.folder not in at_work, not tally.halted, not unfinished
+
+    def _table(self, tallies: Iterable[Tally]) -> Table:
+        spent = ("tokens", "USD") if self._paid else ()
+        table = make_table(
+            self._labels.names,
+            ("ended", "verified", "not verified", "halted", *spent),
+        )
+        for tally in tallies:
+            figures = [*_counts(tally), *(_spent(tally) if self._paid else [])]
+            table.add_row(*map(escape, self._labels.of(tally.cell)), *figures)
+        return table
+
+    def _doing(self, doing: Iterable[Doing]) -> Table:
+        """What is under way: which run, for how long, and what it is at."""
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(overflow="fold")
+        grid.add_column(justify="right", no_wrap=True)
+        grid.add_column(no_wrap=True)
+        for one in doing:
+            labels = " ".join(self._labels.of(one.planned.cell))
+            name = f"[cyan]▸[/] {escape(labels)} [dim]r{one.planned.index:04d}[/]"
+            grid.add_row(name, told_time(time.monotonic() - one.since), one.said)
+        return grid
+
+    def _bar(self) -> Padding:
+        progress = self._progress
+        bar = ProgressBar(progress.planned, progress.finished, BAR_WIDTH)
+        return Padding(bar, (1, 0, 0, 0))  # which ends the bar's line, too
+
+
+def _counts(tally: Tally) -> list[str]:
+    ended = tally.ended
+    return [
+        f"{tally.finished}/{tally.planned}",
+        _number(ended["verified"], "green"),
+        _number(ended["not verified"], "red"),
+        _number(tally.halted, "yellow"),
+    ]
+
+
+def _spent(tally: Tally) -> list[str]:
+    cost = tally.cost
+    return [
+        f"{tally.tokens:,}" if tally.tokens else "",
+        "?" if cost is None else f"{cost:.2f}" if cost else "",
+    ]
+
+
+def _number(count: int, colour: str) -> str:
+    return f"[{colour}]{count}[/]" if count else "[dim]–[/]"

@@ -1,0 +1,69 @@
+"""The metrics of a campaign as a table."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.markup import escape
+
+from tdac_agent.cli.campaign_table import ALWAYS, SOMETIMES, make_table
+from tdac_agent.cli.console import Console
+from tdac_agent.metrics import Rate
+
+WIDE = 110
+"""Columns in which a rate and its interval are beside each other."""
+
+
+def show_summary(summary: pd.DataFrame, console: Console) -> None:
+    """Prints the metrics of each kind of run that there is."""
+    if summary.empty:
+        return
+    names = [*ALWAYS]
+    names += [n for n in SOMETIMES[1:] if summary[n].nunique() > 1]
+    if (summary["optimizer"] != summary["learner"]).any():
+        names.insert(2, "optimizer")
+    between = " " if console.width >= WIDE else "\n"
+    rows = summary.to_dict("records")
+    figures = [_figures(row, between) for row in rows]
+    # A column in which nobody has anything is left out.
+    told = [name for name in figures[0] if any(one[name] for one in figures)]
+    table = make_table(names, told)
+    for row, known in zip(rows, figures, strict=True):
+        labels = [Path(str(row[n])).name if n == "prompt" else row[n] for n in names]
+        table.add_row(*(escape(str(n)) for n in labels), *(known[n] for n in told))
+    console.print(table)
+    remark = "95 % intervals, and τ, the mean iteration of success: docs/metrics.md"
+    if "tokens" in told:
+        remark += "\ntokens and USD: each verified run's share of all"
+    console.print(f"[dim]{remark}[/]", soft_wrap=True)
+
+
+def _figures(row: dict[Any, Any], between: str) -> dict[str, str]:
+    """What the table says of a kind, by column; nothing where there is nothing."""
+    done, halted = row["verified"], int(row["censored"])
+    cost = row["cost_per_verified"] if row["tokens_per_verified"] > 0 else math.nan
+    verified = f"[{'green' if done else 'red'}]{done}[/]/{row['R']}"
+    if halted:
+        verified += f"{between}[yellow]{halted} halted[/]"
+    return {
+        "verified": verified,
+        "SR": _rate(row, "sr", between),
+        "CS(K)": _rate(row, "cs_K", between),
+        "first pass": _rate(row, "first_pass", between),
+        "τ": _number(row["tau_mean"], ".1f"),
+        "tokens": _number(row["tokens_per_verified"], ",.0f"),
+        "USD": _number(cost, ".3f"),
+    }
+
+
+def _number(value: float, form: str) -> str:
+    return "" if pd.isna(value) else format(value, form)
+
+
+def _rate(row: dict[Any, Any], name: str, between: str) -> str:
+    low, high = row[f"{name}_low"], row[f"{name}_high"]
+    told = str(Rate(row[name], 0, 0, low, high, "")).replace(" ", between, 1)
+    return escape(told)

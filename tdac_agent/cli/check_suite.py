@@ -1,0 +1,100 @@
+"""`tdac check-suite`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.sentences import tell
+from tdac_agent.tasks.task import called
+from tdac_agent.tasks.task_file import Profile
+from tdac_agent.tasks.trust import allowed
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.suite.privileged import REFERENCE
+from tdac_agent.verification.suite.proof import Row, SuiteCheck
+from tdac_agent.verification.suite_check import check_suite
+
+
+def run(
+    flags: TaskFlags,
+    profile: Profile | None,
+    suite: Path | None,
+    trust: bool,
+    tier: str,
+    seed: int | None,
+    repeats: int,
+    as_json: bool,
+) -> int:
+    """Checks a suite and prints; returns the exit code."""
+    check_tier(tier)
+    console = Console(stderr=as_json)
+    with WarmJudge() as judge, console.status("preparing the task …") as status:
+        task = allowed(flags.load(), suite, trust=trust)
+        check = check_suite(
+            task,
+            profile=profile,
+            tier=tier,
+            seed=seed,
+            repeats=repeats,
+            judge=judge,
+            on_progress=lambda doing: status.update(
+                f"checking the suite on {escape(task.name)}: {doing} …"
+            ),
+        )
+    if as_json:
+        sys.stdout.write(check.model_dump_json(indent=2) + "\n")
+    else:
+        _show(check, called(task), console)
+    return 0 if check.proven else 1
+
+
+def _show(check: SuiteCheck, task: str, console: Console) -> None:
+    for note in check.notes:
+        tell(console, f"note: {note}", "yellow")
+    for problem in check.problems:
+        tell(console, problem, "red")
+    console.print(_table(check))
+    colour, word = ("green", "proven") if check.proven else ("red", "not proven")
+    console.print(
+        f"[bold {colour}]{word}[/]: {escape(check.suite)} on {escape(task)}, "
+        f"profile {check.profile}, seed {check.seed}, sandbox {check.sandbox}, "
+        f"{check.seconds:.0f} s"
+    )
+
+
+def _table(check: SuiteCheck) -> Table:
+    """The controllers, a row each."""
+    table = Table(title="Controllers that put the suite to the proof")
+    table.title_justify = "left"
+    for name in ("controller", "must", "did"):
+        table.add_column(name)
+    table.add_column("repeats agree", justify="right")
+    table.add_column("fails")
+    for row in check.rows:
+        good = row.controller == REFERENCE
+        right = row.passed == (row.repeats if good else 0)
+        colour = "green" if right else "red"
+        table.add_row(
+            row.controller,
+            "pass" if good else "fail",
+            f"[{colour}]{_did(row)}[/]",
+            "[red]no[/]" if row.disagreements else f"{row.repeats}",
+            escape(_shown(row)),
+        )
+    return table
+
+
+def _did(row: Row) -> str:
+    if 0 < row.passed < row.repeats:
+        return f"pass {row.passed} of {row.repeats}"
+    return "pass" if row.passed else "fail"
+
+
+def _shown(row: Row) -> str:
+    names = [test.partition("::")[2] for test in row.failures]
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")

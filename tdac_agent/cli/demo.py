@@ -1,0 +1,46 @@
+"""`tdac demo`: a recorded run of a language model again, with the tests made live."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.synth import next_folder, synthesise_and_show
+from tdac_agent.runs.records import load_run
+from tdac_agent.runs.replay import DEMO
+from tdac_agent.tasks.task import load_task
+
+_ABOUT = (
+    "A language model's answers to the [bold]{prompt}[/] prompt for the task "
+    "[bold]{task}[/], recorded {date}: unedited, each from a fresh conversation that "
+    "held the printed prompt alone. The controllers run, and every test is made, here "
+    "and now; where that makes a question other than it was then, a line says so. By "
+    "hand:\n"
+    "  tdac synth --task {task} --prompt {prompt} --learner replay:demo\n"
+)
+
+
+def run(out: Path | None, as_json: bool) -> int:
+    """Replays the shipped run; returns the exit code.
+
+    Args:
+        out: Run folder; the next free one by default.
+        as_json: Whether to print the record.
+    """
+    console = Console(stderr=as_json)
+    recorded = load_run(DEMO)
+    about = {"prompt": recorded.prompt, "task": recorded.task}
+    console.print(_ABOUT.format(date=recorded.started[:10], **about))
+    with console.status("preparing the task …"):
+        task = load_task(recorded.task)
+    wanted = {
+        "task": task,
+        "learner": "replay:demo",
+        "optimizer": None,
+        "out": out if out is not None else next_folder("demo"),
+        "iterations": recorded.iterations,
+        "patience": recorded.patience,
+        "seed": recorded.seed,
+        "prompt": recorded.prompt,
+    }
+    return synthesise_and_show(wanted, console)

@@ -1,0 +1,141 @@
+"""`tdac synth --dry-run`: the first prompt, and what the run can cost at most."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.cli.sentences import tell
+from tdac_agent.models.budget import told_usd
+from tdac_agent.models.choice import Options, check_name, missing_before
+from tdac_agent.models.prices import SHIPPED, load_prices, price_file
+from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
+from tdac_agent.prompting.prompt import load_template
+from tdac_agent.synthesis.outlook import Outlook, foresee
+
+
+def run(
+    flags: TaskFlags,
+    models: dict[str, Any],
+    k: int,
+    j: int,
+    refine: bool,
+    as_json: bool,
+) -> int:
+    """Prints the prompt, and nothing else, to stdout, the rest to stderr.
+
+    Args:
+        flags: That name the task.
+        models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
+            `max_output`, `max_cost` and `max_tokens`, as for `synthesize`.
+        k: Iterations.
+        j: Edits per iteration.
+        refine: Whether failures become rules.
+        as_json: Whether to print the outlook.
+    """
+    learner = models["learner"]
+    optimizer = models["optimizer"] or learner
+    for name in (learner, optimizer):
+        check_name(name)
+    template, prices = load_template(models["prompt"]), load_prices()
+    task = flags.load()
+    over_http = models["key_over_http"]
+    options = Options(task.setting, models["base_url"], over_http)
+    missing = [
+        m for name in (learner, optimizer) for m in missing_before(name, options)
+    ]
+    outlook = foresee(
+        task,
+        learner,
+        optimizer,
+        prices,
+        iterations=k,
+        patience=j,
+        refine=refine,
+        template=template,
+        base_url=models["base_url"],
+        max_output=models["max_output"],
+        max_cost=models["max_cost"],
+        max_tokens=models["max_tokens"],
+    )
+    if as_json:
+        sys.stdout.write(outlook.model_dump_json(indent=2) + "\n")
+        return 0
+    sys.stdout.write(outlook.prompt)
+    sys.stdout.flush()
+    console = Console(stderr=True, highlight=False)
+    unbounded = _unbounded(outlook) if models["base_url"] is None else []
+    for line in [*_lines(outlook), *_needed([*missing, *unbounded])]:
+        tell(console, line)
+    return 0
+
+
+def _lines(outlook: Outlook) -> list[str]:
+    k, j = outlook.iterations, outlook.patience
+    lines = [
+        f"prompt: about {outlook.prompt_tokens} tokens (an estimate: a third of its "
+        "bytes; models count differently)",
+        f"answer: at most {outlook.answer_tokens} tokens",
+    ]
+    if outlook.cost_most == 0.0:
+        return [*lines, "cost: none, no model is asked"]
+    if outlook.first_cost is not None:
+        told = told_usd(outlook.first_cost)
+        lines.append(f"first question: at most {told}, which are reserved for it")
+    asked = f"whole run: {outlook.questions} questions (K={k}, J={j}) if nothing passes"
+    if outlook.cost_once is not None and outlook.cost_most is not None:
+        asked += (
+            f": at most {told_usd(outlook.cost_once)}, or "
+            f"{told_usd(outlook.cost_most)} if every answer is asked for three times"
+        )
+    return [*lines, asked, *_budget(outlook), *_prices(outlook)]
+
+
+def _budget(outlook: Outlook) -> list[str]:
+    """What bounds a run, and whether its first question is within that."""
+    limits = []
+    if outlook.max_cost is not None:
+        default = ", by default" if outlook.max_cost == MAX_COST else ""
+        limits.append(f"{told_usd(outlook.max_cost)} (--max-cost{default})")
+    if outlook.max_tokens is not None:
+        limits.append(f"{outlook.max_tokens} tokens (--max-tokens)")
+    if not limits:
+        return []
+    told = "enough for the first question; it stops before one that does not fit in"
+    if outlook.first_needs:
+        told = f"not enough for the first question: give {outlook.first_needs} or more"
+    return [f"budget: {' and '.join(limits)}: {told}"]
+
+
+def _unbounded(outlook: Outlook) -> list[str]:
+    """Of models of vendors without a price; other servers have a limit of tokens."""
+    if outlook.max_tokens is not None:
+        return []
+    return [
+        f"--max-tokens N, since no price of {name} is known to bound the run by"
+        for name in outlook.unknown_prices
+        if name.partition(":")[0] in BY_VENDOR
+    ]
+
+
+def _prices(outlook: Outlook) -> list[str]:
+    """Where the prices are from, and what has none."""
+    lines = []
+    if outlook.uncounted:
+        names = " and ".join(outlook.uncounted)
+        lines.append(f"cost of {names}: not counted, a matter of your own")
+    if outlook.unknown_prices:
+        names = " and ".join(outlook.unknown_prices)
+        lines.append(
+            f"price of {names}: unknown; enter it in a copy of {SHIPPED} at "
+            "~/.config/tdac/prices.yaml (or where $TDAC_PRICES says) to see the cost"
+        )
+    if outlook.unknown_prices or outlook.first_cost is not None:
+        lines.append(f"prices of {outlook.prices_dated}: {price_file()}")
+    return lines
+
+
+def _needed(missing: list[str]) -> list[str]:
+    return [f"still needed: {line}" for line in dict.fromkeys(missing)]

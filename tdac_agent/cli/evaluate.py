@@ -1,0 +1,128 @@
+"""`tdac evaluate`: policies of any kind on the same tasks, from the same seeds."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Literal
+
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.evaluate_view import show_evaluation
+from tdac_agent.cli.flags import check_tier
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.evaluation.entrants import entrants_of
+from tdac_agent.evaluation.evaluate import evaluate, load_tasks
+from tdac_agent.evaluation.evaluation_report import Evaluation
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.errors import TaskError
+
+NO_WRAPPERS = "none"
+
+
+def run(
+    policies: list[str],
+    tasks: list[str],
+    episodes: int,
+    seed: int,
+    variation: Literal["nominal", "jitter", "mixed", "random"],
+    wrappers: list[str] | None,
+    csv: Path | None,
+    out: Path | None,
+    tier: str,
+    as_json: bool,
+) -> int:
+    """Evaluates and prints; returns the exit code."""
+    check_tier(tier)
+    names = None if wrappers is None else wrapper_names(wrappers)
+    entrants_of(policies, names)  # before anything is started
+    _check_places(csv, out)
+    console = Console(stderr=as_json)
+    columns = (
+        TextColumn("{task.fields[doing]}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[successes]} reached"),
+    )
+    # Drawn where there is something new, and not ten times a second.
+    bar = Progress(
+        *columns,
+        console=console,
+        transient=True,
+        auto_refresh=False,
+        disable=not console.is_terminal,
+    )
+    row = bar.add_task("", total=episodes, successes=0, doing="preparing")
+
+    def watch(task: str, policy: str, count: int, successes: int) -> None:
+        doing = escape(f"{task}: {policy}")
+        bar.update(row, completed=count, successes=successes, doing=doing, refresh=True)
+
+    with Nursery() as nursery:
+        loaded = load_tasks(tasks)
+        with WarmJudge(nursery) as judge, bar:
+            found = evaluate(
+                policies,
+                loaded,
+                episodes,
+                seed=seed,
+                variation=variation,
+                wrappers=names,
+                tier=tier,
+                out=out,
+                judge=judge,
+                watch=watch,
+            )
+    if csv is not None:
+        _write(found, csv)
+    if as_json:
+        sys.stdout.write(found.model_dump_json(indent=2) + "\n")
+    else:
+        show_evaluation(found, console)
+        if out is not None:
+            pictures = ", ".join(f"{task.name}.png" for task in found.tasks)
+            files = f"evaluation.json, episodes.csv, timing.csv, {pictures}"
+            console.print(escape(f"wrote {files} to {out}"), soft_wrap=True)
+    return 0
+
+
+def wrapper_names(words: list[str]) -> list[str]:
+    """The names that are given; `none` stands for no wrapper.
+
+    Raises:
+        TaskError: It is given beside others.
+    """
+    if words == [NO_WRAPPERS]:
+        return []
+    if NO_WRAPPERS in words:
+        raise TaskError("--wrapper none and another --wrapper contradict each other")
+    return words
+
+
+def _check_places(csv: Path | None, out: Path | None) -> None:
+    """Refuses places that cannot be written to before the work is done.
+
+    Raises:
+        ControllerFileError: There is one.
+    """
+    if csv is not None and not csv.absolute().parent.is_dir():
+        raise ControllerFileError(f"cannot write {csv}: no such folder")
+    if csv is not None and csv.is_dir():
+        raise ControllerFileError(f"cannot write {csv}: it is a folder")
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            reason = error.strerror
+            raise ControllerFileError(f"cannot write to {out}: {reason}") from error
+
+
+def _write(found: Evaluation, csv: Path) -> None:
+    try:
+        write_atomic(csv, found.to_frame().to_csv(index=False))
+    except OSError as error:
+        raise ControllerFileError(f"cannot write {csv}: {error.strerror}") from error

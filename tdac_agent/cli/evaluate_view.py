@@ -1,0 +1,165 @@
+"""An evaluation on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import tell
+from tdac_agent.evaluation.evaluation_report import (
+    Comparison,
+    EvaluatedTask,
+    Evaluation,
+    Row,
+    Timing,
+)
+from tdac_agent.tasks.units import UNITS
+
+NONE = "–"
+# Of the policies' names, where a table has to fit into 80 columns.
+WIDEST = 12
+LEGEND = (
+    "95 %: exact interval of the rate (Clopper-Pearson). hit: episodes with a contact. "
+    "time, path: in those of the shortest way at full speed; SPARC: smoothness, "
+    "spectral arc length of the speed (0 is smoothest); medians of the successes. gap: "
+    "beside the body, least / mean. ms/step: median / 99th percentile, as the judge "
+    "sees it."
+)
+PAIRED = (
+    ">: reaches more often, ~: no difference shown, by McNemar's exact test, not "
+    "corrected for the number of pairs. only one: episodes in which just one of them "
+    "reaches the goal."
+)
+# Below this a difference would be rare among equals; not corrected for many tests.
+SIGNIFICANT = 0.05
+
+
+def show_evaluation(found: Evaluation, console: Console) -> None:
+    """Prints a table for each task, what went wrong, and who beats whom."""
+    timings = {(t.task, t.policy): t for t in found.timings}
+    for task in found.tasks:
+        rows = [row for row in found.rows if row.task == task.name]
+        console.print(_table(found, task, rows, timings))
+        console.print()
+        for line in _remarks(rows):
+            tell(console, line, indent=2)
+    console.print(LEGEND, style="dim", highlight=False)
+    if found.comparisons:
+        console.print()
+        console.print(comparison_table(found.comparisons, several=len(found.tasks) > 1))
+        console.print(PAIRED, style="dim", highlight=False)
+
+
+def _table(
+    found: Evaluation,
+    task: EvaluatedTask,
+    rows: Sequence[Row],
+    timings: dict[tuple[str, str], Timing],
+) -> Table:
+    units = UNITS[task.unit]
+    places = 0 if task.unit == "m" else 1
+    starts = {
+        "jitter": "moved starts",
+        "mixed": "moved starts and any",
+        "random": "random starts and goals",
+    }
+    title = (
+        f"{task.called or task.name}: {found.episodes} episodes each, "
+        f"{starts.get(found.variation, 'the nominal start')}, seed {found.seed}"
+    )
+    table = _plain_table(title)
+    longest = max(len(row.policy) for row in rows)
+    table.add_column("policy", overflow="fold", min_width=min(longest, WIDEST))
+    table.add_column("knows", no_wrap=True)
+    names = ("reached", "95 %", "hit", "time", "path", "SPARC")
+    for name in (*names, f"gap {units.length}", "ms/step"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        timing = timings[row.task, row.policy]
+        gaps = [units.scale * gap for gap in (row.clearance_min, row.clearance_mean)]
+        colour = "green" if row.rate == 1.0 else "red" if row.rate == 0.0 else "yellow"
+        table.add_row(
+            escape(row.policy),
+            row.knows,
+            f"[{colour}]{row.successes}/{row.episodes}[/]",
+            f"{100 * row.interval.low:.0f}–{100 * row.interval.high:.0f}",
+            str(row.collided),
+            _figure(row.time_ratio, 2),
+            _figure(row.path_ratio, 2),
+            _figure(row.smoothness, 1),
+            f"{gaps[0]:.{places}f}/{gaps[1]:.0f}",
+            f"{timing.median_ms:.2f}/{timing.p99_ms:.1f}",
+        )
+    return table
+
+
+def _plain_table(title: str) -> Table:
+    return Table(
+        title=escape(title),
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=0,
+        show_edge=False,
+    )
+
+
+def _remarks(rows: Sequence[Row]) -> list[str]:
+    """What the policies did wrong, and what is to be known about them."""
+    lines = []
+    for row in rows:
+        if row.note is not None:
+            lines.append(f"{row.policy}: {row.note}")
+        for reason, count in row.reasons.items():
+            lines.append(f"{row.policy}, {count} of {row.episodes}: {reason}")
+    return lines
+
+
+def comparison_table(pairs: Sequence[Comparison], *, several: bool) -> Table:
+    """Who beats whom on the same seeds; at equal information first.
+
+    Args:
+        pairs: The comparisons.
+        several: Whether they are of several tasks.
+    """
+    table = _plain_table("The same episodes, paired")
+    for name in (*(("task",) if several else ()), "policies"):
+        table.add_column(name, overflow="fold")
+    table.add_column("only one", justify="right")
+    table.add_column("p", justify="right")
+    table.add_column("both know")
+    for pair in pairs:
+        table.add_row(
+            *((escape(pair.task),) if several else ()),
+            escape(_pair(pair)),
+            _counts(pair),
+            f"{pair.p:.2g}",
+            pair.equal_information or "",
+        )
+    return table
+
+
+def _pair(pair: Comparison) -> str:
+    """Who reaches the goal more often, if that can be said."""
+    better, worse = _ordered(pair)
+    return f"{better} {'>' if pair.p < SIGNIFICANT else '~'} {worse}"
+
+
+def _ordered(pair: Comparison) -> tuple[str, str]:
+    """The names, first the one that reaches the goal more often."""
+    if pair.only_other > pair.only_one:
+        return pair.other, pair.one
+    return pair.one, pair.other
+
+
+def _counts(pair: Comparison) -> str:
+    few, many = sorted((pair.only_one, pair.only_other))
+    return f"{many}:{few}"
+
+
+def _figure(value: float | None, decimals: int) -> str:
+    return NONE if value is None else f"{value:.{decimals}f}"

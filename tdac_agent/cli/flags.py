@@ -1,0 +1,211 @@
+"""A task from the command line's flags."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from tdac_agent.sandbox import TIERS
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import EPUCK, TaskFile, checked
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.intake import TEXT_BYTES, read_file
+from tdac_envs.grid.grid import OccupancyGrid
+from tdac_envs.grid.metric import resolution_of, to_pixels
+from tdac_envs.map2d.source import check_exists
+from tdac_envs.mapping.bundled import bundled_map, bundled_maps
+from tdac_envs.mapping.image import load_image
+
+Point = tuple[float, float]
+SAID_BY_A_TASK = (
+    *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
+    *("polarity", "threshold"),
+)
+MEANT_FOR_MAPS = (
+    *("map_image", "robot_radius", "robot_image", "snap", "metres"),
+    *("polarity", "threshold"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFlags:
+    """The flags that name a task; see `tdac synth --help`."""
+
+    task: str | None = None
+    map_image: str | None = None
+    world: str | None = None
+    ignore: tuple[str, ...] = ()
+    start: tuple[float, float] | None = None
+    goal: tuple[float, float] | None = None
+    heading: float | None = None
+    robot_radius: float | None = None
+    robot_image: Path | None = None
+    snap: bool = False
+    metres: bool = False
+    polarity: Literal["dark", "light"] | None = None
+    threshold: float | None = None
+    instructions: str | None = None
+
+    def given(self) -> bool:
+        """Whether any flag names or changes a task."""
+        return self != TaskFlags()
+
+    def words(self) -> list[str]:
+        """The part of a command line that gives the same flags again."""
+        words = []
+        for name in (f.name for f in fields(self)):
+            value = getattr(self, name)
+            if value is None or value is False or name == "ignore":
+                continue
+            values = value if isinstance(value, tuple) else (value,)
+            given = [] if value is True else map(as_word, values)
+            words += [flag("map" if name == "map_image" else name), *given]
+        return words + [word for name in self.ignore for word in ("--ignore", name)]
+
+    def load(self, default: str = "maze") -> Task:
+        """The task that the flags ask for.
+
+        Raises:
+            TaskError: They contradict each other, or the task cannot be used.
+            MapError: There is no such map.
+        """
+        heading = None if self.heading is None else (self.heading,)
+        check_finite(start=self.start, goal=self.goal, heading=heading)
+        if self.task is not None:
+            self._refuse("--task already says it all", SAID_BY_A_TASK)
+            return load_task(self.task)
+        if self.world is not None:
+            self._refuse("--world is for an e-puck", MEANT_FOR_MAPS)
+            return load_task(self._world_spec(self.world), base=Path())
+        self._refuse("only a --world has nodes to ignore", ("ignore",))
+        source = self.map_image or default
+        own = source not in bundled_maps()
+        if own:
+            check_exists(Path(source))
+        if own and (self.start is None or self.goal is None):
+            raise TaskError(
+                f"give --start X Y and --goal X Y for {source!r} "
+                "(`tdac map IMAGE` draws rulers to read them off)"
+            )
+        return load_task(self._spec(source), base=Path())
+
+    def _refuse(self, why: str, names: tuple[str, ...]) -> None:
+        """Refuses flags that mean nothing here.
+
+        Raises:
+            TaskError: One of them is given.
+        """
+        given = [name for name in names if getattr(self, name) not in (None, (), False)]
+        if given:
+            flags = ", ".join(flag(name.replace("_image", "")) for name in given)
+            raise TaskError(f"{why}: leave out {flags}")
+
+    def _world_spec(self, world: str) -> TaskFile:
+        start: tuple[float, ...] | None = self.start
+        if self.heading is not None:
+            if start is None:
+                raise TaskError("--heading needs --start X Y")
+            start = (*start, self.heading)
+        given = {
+            "env": EPUCK,
+            "world": world,
+            "ignore": self.ignore,
+            "start": start,
+            "goal": self.goal,
+            "instructions": _text(self.instructions),
+        }
+        return checked(given, "the flags")
+
+    def _spec(self, source: str) -> TaskFile:
+        start: tuple[float, ...] | None = self.start
+        goal, radius = self.goal, self.robot_radius
+        if self.metres and source in bundled_maps():
+            raise TaskError("--metres needs --map with a map.yaml that has a scale")
+        if self.metres:
+            start, goal, radius = in_pixels(Path(source), self.start, goal, radius)
+        if source in bundled_maps() and start is None:
+            start = bundled_map(source).start
+        if start is not None and self.heading is not None:
+            start = (*start, self.heading)
+        given = {
+            "map": source,
+            "start": start,
+            "goal": goal,
+            "snap": self.snap,
+            "polarity": self.polarity,
+            "threshold": self.threshold,
+            "robot": {"radius": radius, "image": self.robot_image},
+            "instructions": _text(self.instructions),
+        }
+        return checked(given, "the flags")
+
+
+def flag(field: str) -> str:
+    """The flag of a field: `--robot-radius`."""
+    return f"--{field.replace('_', '-')}"
+
+
+def as_word(value: object) -> str:
+    """A flag's value as it may be typed; a number keeps all of its digits."""
+    return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
+
+
+def check_tier(name: str) -> None:
+    """Refuses the name of a sandbox tier that does not exist.
+
+    Raises:
+        TaskError: It is none.
+    """
+    names = ("auto", *(tier.name for tier in TIERS))
+    if name not in names:
+        known = ", ".join(names)
+        raise TaskError(f"unknown sandbox tier {name!r}; expected one of {known}")
+
+
+def check_finite(**points: tuple[float, ...] | None) -> None:
+    """Refuses `nan` and `inf`, which count as numbers on the command line.
+
+    Raises:
+        TaskError: A point has such a coordinate.
+    """
+    for name, point in points.items():
+        if point is not None and not all(map(math.isfinite, point)):
+            given = " ".join(map(str, point))
+            raise TaskError(f"expected --{name} to be finite, got {given}")
+
+
+def in_pixels(
+    path: Path, start: Point | None, goal: Point | None, radius: float | None
+) -> tuple[Point | None, Point | None, float | None]:
+    """Start, goal and body radius given in metres of the map's frame, in pixels.
+
+    Raises:
+        MapError: The map has no resolution.
+    """
+    image = load_image(path)
+    frame = OccupancyGrid(
+        np.zeros(image.colour.shape[:2], np.bool_), image.resolution, image.origin
+    )
+    resolution = resolution_of(frame)
+    return (
+        None if start is None else to_pixels(frame, *start),
+        None if goal is None else to_pixels(frame, *goal),
+        None if radius is None else radius / resolution,
+    )
+
+
+def _text(given: str | None) -> str:
+    """The user's instructions: the text itself, or the contents of a file."""
+    if given is None:
+        return ""
+    path = Path(given)
+    if len(given) < 250 and "\n" not in given and path.is_file():
+        try:
+            return read_file(path, TEXT_BYTES).decode("utf-8", "replace")
+        except OSError as error:
+            raise TaskError(f"cannot read {given}: {error.strerror}") from error
+    return given

@@ -1,0 +1,115 @@
+"""`tdac play`: one episode in a window or a video."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from tdac_agent.cli.display import has_display
+from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.robust_flags import DisturbanceFlags, refuse_without
+from tdac_agent.cli.verify import controller_and_task
+from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.errors import Fault
+from tdac_agent.sandbox import Limits, SandboxError
+from tdac_agent.storage.plain import one_line
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.installation import seed_of
+from tdac_agent.tasks.task import Task, write_workdir
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.contenders import Contender
+from tdac_agent.verification.judge.driving import Driven, Stage, drive_seed
+from tdac_agent.verification.judge.judge import JITTERS, Judge
+from tdac_agent.verification.verify import read_source
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drawing.video import write_video
+from tdac_envs.drawing.window import Window
+
+SUFFIXES = (".mp4", ".gif")
+STRIDE = 2
+
+
+def run(
+    controller: str,
+    flags: TaskFlags,
+    video: Path | None,
+    episode: str | None,
+    seed: int | None,
+    disturbed: DisturbanceFlags,
+    tier: str,
+) -> int:
+    """Plays one episode; returns 0 if the goal was reached."""
+    check_tier(tier)
+    if seed is None:
+        refuse_without("--seed N", list(disturbed.given()))
+    elif episode is not None:
+        raise TaskError("give --episode or --seed, not both")
+    name, disturbance = _checked(episode), disturbed.disturbance()
+    if video is None and not has_display():
+        raise TaskError("there is no display here: give --video FILE.mp4 (or .gif)")
+    if video is not None and video.suffix not in SUFFIXES:
+        raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
+    file, task = controller_and_task(controller, flags)
+    if seed is None:
+        rollout = drive(task, read_source(file), name, tier)
+    else:
+        driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
+        rollout = driven.rollout
+    picked = pictures_of(task.setting).frames(rollout, STRIDE)
+    rate = 1.0 / (task.nominal.dt * STRIDE)
+    if video is not None:
+        write_video(picked, video, fps=2 * rate)
+        print(f"wrote {video} (twice real time)")
+    else:
+        window = Window(f"tdac: {task.name}", rate)
+        for frame in picked:
+            window.show(frame)
+        window.close()
+    steps = rollout.trajectory.steps
+    print(f"{rollout.name}: {rollout.outcome} after {steps} steps" + _because(rollout))
+    return 0 if rollout.reached else 1
+
+
+def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
+    """One judged episode of the suite, as its report names it."""
+    with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
+        work = Path(folder)
+        write_workdir(work, task)
+        seed = seed_of(source, task)
+        judge = Judge(task, source, work, tier=tier, seed=seed, at_a_time=1)
+        try:
+            return judge.drive(name)
+        finally:
+            judge.close()
+
+
+def drive_disturbed(
+    task: Task, source: bytes, seed: int, disturbance: Disturbance, tier: str
+) -> Driven:
+    """The judged episode of a seed, as a robust verification runs it."""
+    with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
+        work, nursery = Path(folder) / "work", Nursery(ahead=False)
+        write_workdir(work, task)
+        controller = Path(folder) / "controller.py"
+        controller.write_bytes(source)
+        driver = Contender("controller", controller)
+        stage = Stage(task, driver, work, disturbance, tier, Limits(), nursery)
+        try:
+            return drive_seed(stage, seed)
+        except SandboxError as error:
+            raise Fault(f"the sandbox failed: {error}") from error
+        finally:
+            nursery.close()
+
+
+def _checked(episode: str | None) -> str:
+    names = ["nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1))]
+    if episode is not None and episode not in names:
+        known = ", ".join(names)
+        raise TaskError(f"no episode {episode!r}; expected one of {known}")
+    return episode or "nominal"
+
+
+def _because(rollout: Rollout) -> str:
+    return f": {one_line(rollout.error)}" if rollout.error else ""

@@ -1,0 +1,62 @@
+"""The command `tdac play`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from tdac_agent.cli.options import (
+    Delay,
+    MotorLag,
+    NamedTask,
+    RangeNoise,
+    Tier,
+    WheelSlip,
+    takes_task,
+)
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Examples: `tdac play runs/maze-1 --video maze.mp4`; "
+    "`tdac play runs/maze-1 --seed 17`"
+)
+@takes_task()
+def play(
+    controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
+    named_task: NamedTask,
+    video: Annotated[
+        Optional[Path],  # noqa: UP045 - typer reads it at run time
+        typer.Option(help="Write .mp4 or .gif instead of opening a window."),
+    ] = None,
+    episode: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            help="Episode of `tdac verify` without --seed: `nominal`, `jitter 1` …  "
+            "[default: nominal]"
+        ),
+    ] = None,
+    seed: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(min=0, help="The disturbed episode of this seed instead."),
+    ] = None,
+    tier: Tier = "auto",
+    range_noise: RangeNoise = None,
+    wheel_slip: WheelSlip = None,
+    motor_lag: MotorLag = None,
+    delay: Delay = None,
+) -> None:
+    """Show one episode of a controller, run in the sandbox.
+
+    It is one of those of `tdac verify`: of the suite, or with --seed of --robust.
+    """
+    from tdac_agent.cli import play as command
+    from tdac_agent.cli.robust_flags import DisturbanceFlags
+
+    disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+    raise typer.Exit(
+        command.run(controller, named_task(), video, episode, seed, disturbed, tier)
+    )

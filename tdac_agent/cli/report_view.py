@@ -1,0 +1,133 @@
+"""A report on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import tell
+from tdac_agent.episodes.trajectory import nominal_first
+from tdac_agent.prompting.feedback import group_failures
+from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.diagnosis.report import Failure, Report
+
+MOST_NAMES, SOME_NAMES = 6, 3
+"""Of tests that fail for one reason: how many are named, and how many of more."""
+
+
+def show_report(
+    report: Report,
+    console: Console,
+    out: Path | None = None,
+    folder: Path | None = None,
+) -> None:
+    """Prints the verdict, the failures with their diagnosis, and the episodes.
+
+    Args:
+        report: What to show.
+        console: Where to.
+        out: Folder to which the report and its pictures were written.
+        folder: Of the task's file, where it is not a bundled one.
+    """
+    verdict, about = report.verdict, report.provenance
+    for warning in about.warnings:
+        console.print(f"[yellow]warning: {escape(warning)}[/]")
+    for node in about.left_out:
+        console.print(f"[yellow]left out of the world: {escape(node)}[/]")
+    groups, not_run = group_failures(report)
+    for group in groups:
+        _show_failed(console, group.members)
+        for message in group.messages:
+            tell(console, message, indent=2)
+        for text in group.happened:
+            tell(console, f"what happened: {text}", indent=2)
+    if not_run:
+        _show_failed(console, not_run)
+        tell(console, not_run[0].message, indent=2)
+    console.print(episode_table(report))
+    if out is not None:
+        _show_files(out, console)
+    colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
+    task = about.called or about.task
+    # Anybody's task may have any name.
+    task += f" of {folder}" if folder is not None and task != about.task else ""
+    _, _, name = about.suite.partition(" + ")
+    own = f" with the tests {name} ({about.own_suite})" if about.own_suite else ""
+    console.print(
+        f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
+        f"passed in {report.seconds:.1f} s  (task {escape(task)}, profile "
+        f"{about.profile}{escape(own)}, sandbox {escape(about.sandbox)}, "
+        f"seed {about.seed})"
+    )
+    if _lacks_names(report):
+        console.print(
+            "the profile paper asks for all these functions and constants; "
+            "--profile policy asks for policy(obs) alone"
+        )
+
+
+def _show_failed(console: Console, failures: Sequence[Failure]) -> None:
+    """Names of tests that fail for one reason, their file once; of many, the first."""
+    names = [failure.test for failure in failures]
+    if len(names) > MOST_NAMES:
+        names = names[:SOME_NAMES]
+    more = len(failures) - len(names)
+    files: dict[str, list[str]] = {}
+    for name in names:
+        file, _, test = name.partition("::")
+        files.setdefault(file, []).append(test)
+    told = "; ".join(f"{file}::{', '.join(tests)}" for file, tests in files.items())
+    told += f" and {more} more tests" if more else ""
+    console.print(f"[red]failed[/] [bold]{escape(told)}[/]")
+
+
+def _lacks_names(report: Report) -> bool:
+    """Whether what the profile `paper` asks for by name is not there."""
+    failed = {failure.test.rpartition("::")[2] for failure in report.failures}
+    parses = "test_source_parses" not in failed
+    return parses and bool(failed & {"test_constants", "test_entry_points"})
+
+
+def _show_files(out: Path, console: Console) -> None:
+    for path in sorted((out / "trajectories").glob("*.png"), key=nominal_first):
+        console.print(Text(f"picture: {path}"), soft_wrap=True)
+    console.print(Text(f"report: {out / 'report.json'}"), soft_wrap=True)
+
+
+def episode_table(report: Report) -> Table:
+    """The judged episodes, a row each."""
+    units = UNITS[report.provenance.unit]
+    table = Table(
+        title=f"Episodes as the environment recorded them ({units.length})",
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("start", no_wrap=True)
+    table.add_column("outcome", no_wrap=True)
+    figures = ("steps", "contacts", "path\nleft", "straight\nleft", "ms a\ncall")
+    for name in figures:
+        table.add_column(name, justify="right", no_wrap=True)
+    for episode in (e for e in report.episodes if e.outcome != "not run"):
+        colour = "green" if episode.outcome == "reached" else "red"
+        table.add_row(
+            escape(episode.name),
+            f"[{colour}]{escape(episode.outcome)}[/]",
+            str(episode.steps),
+            str(episode.collisions),
+            _of(units.scale, episode.d_min, episode.d0),
+            _of(units.scale, episode.d_min_euclidean, episode.d0_euclidean),
+            f"{episode.call_ms_mean:.2f}" if episode.call_ms_p99 else "–",
+        )
+    return table
+
+
+def _of(scale: float, left: float, whole: float) -> str:
+    return f"{scale * left:.0f} of {scale * whole:.0f}"

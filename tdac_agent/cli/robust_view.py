@@ -1,0 +1,138 @@
+"""A robust verification on the terminal."""
+
+from __future__ import annotations
+
+import shlex
+from functools import partial
+
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import tell
+from tdac_agent.evaluation.robust_report import Interval, RobustReport, SequentialResult
+from tdac_agent.tasks.units import UNITS, Units
+from tdac_agent.verification.judge.seeded import SeededEpisode
+
+LEAST, MOST, ERRORS = 5, 10, 3
+REACHED = "reached"
+
+
+def show_robust(report: RobustReport, console: Console, play: list[str]) -> None:
+    """Prints the worst episodes, the count, and what follows from it.
+
+    Args:
+        report: The report.
+        console: Where to.
+        play: Command line that plays an episode, but for its seed.
+    """
+    say = partial(console.print, highlight=False)
+    say(worst_table(report))
+    for error in _errors(report):
+        tell(console, error, indent=2)
+    replay = shlex.join([*play, "--seed", str(report.worst[0].seed)])
+    # A command is for copying: it is not wrapped.
+    told = f"  replay the first of them: [bold]{escape(replay)}[/]"
+    console.print(told, soft_wrap=True, highlight=False)
+    say(f"  disturbance: {report.provenance.disturbance}")
+    outcomes = report.outcomes.items()
+    others = ", ".join(f"{count} {name}" for name, count in outcomes if name != REACHED)
+    say(
+        f"{report.successes} of {report.episodes} episodes reached the goal without a "
+        f"contact{f' ({others})' if others else ''}; they took {report.seconds:.0f} s"
+    )
+    if report.time_outs:
+        say(
+            f"[yellow]warning: {report.time_outs} of them timed out, also when tried "
+            "again alone; if this machine was busy, count again when it is not[/]"
+        )
+    if report.interval is not None and report.rate is not None:
+        say(_rate(report.rate, report.interval))
+    if report.sequential is not None:
+        result = report.sequential
+        colour = "green" if report.accepted else "red"
+        say(
+            f"[bold {colour}]{_decision(result)}[/] after {report.episodes} of at most "
+            f"{result.test.limit} episodes"
+        )
+        say(_error_rates(result))
+
+
+def worst_table(report: RobustReport) -> Table:
+    """The worst seeds: every failure up to a number, then the slowest successes."""
+    first, failures = report.provenance.first_seed, len(report.failed_seeds)
+    units = UNITS[report.provenance.unit]
+    seeds = f"the seeds {first} to {first + report.episodes - 1} ({units.length})"
+    title = f"Worst of {seeds}" if failures else f"No failure; the slowest of {seeds}"
+    if failures > MOST:
+        title += f", {failures - MOST} further failures"
+    table = Table(title=title, title_justify="left")
+    table.add_column("seed", justify="right")
+    table.add_column("outcome")
+    for name in ("steps", "path left", *(("from step", "at") if failures else ())):
+        table.add_column(name, justify="right")
+    for episode in report.worst[: max(LEAST, min(failures, MOST))]:
+        table.add_row(*_row(episode, units)[: len(table.columns)])
+    return table
+
+
+def _row(episode: SeededEpisode, units: Units) -> list[str]:
+    cause = episode.side if episode.outcome == "collision" else episode.cause
+    more = "" if cause in (None, episode.outcome) else f", {cause}"
+    return [
+        str(episode.seed),
+        f"[{'green' if episode.success else 'red'}]{episode.outcome}{more}[/]",
+        str(episode.steps),
+        f"{units.scale * episode.d_min:.0f} of {units.scale * episode.d0:.0f}",
+        "" if episode.step is None else str(episode.step),
+        _place(episode, units),
+    ]
+
+
+def _place(episode: SeededEpisode, units: Units) -> str:
+    if episode.x is None or episode.y is None:
+        return ""
+    return units.told_place(episode.x, episode.y)
+
+
+def _errors(report: RobustReport) -> list[str]:
+    """What the controllers of the worst episodes did wrong, each thing once."""
+    first: dict[str, int] = {}
+    for episode in report.worst:
+        if episode.error is not None:
+            first.setdefault(episode.error, episode.seed)
+    return [f"seed {seed}: {error}" for error, seed in first.items()][:ERRORS]
+
+
+def _rate(rate: float, interval: Interval) -> str:
+    return (
+        f"[bold]success rate {_percent(rate)}[/], "
+        f"{100 * interval.confidence:.0f} % interval {_percent(interval.low)} to "
+        f"{_percent(interval.high)} ({interval.method})"
+    )
+
+
+def _decision(result: SequentialResult) -> str:
+    if result.decision == "accepted":
+        return f"accepted at {_percent(result.test.accept_at)}"
+    if result.decision == "rejected":
+        return f"rejected at {_percent(result.test.accept_at)}"
+    return "undecided, and so not accepted,"
+
+
+def _error_rates(result: SequentialResult) -> str:
+    low, high = result.at_refused_rate, result.at_accepted_rate
+    return (
+        f"  a controller of {_percent(low.rate)} is accepted with probability "
+        f"{_percent(low.accepted)}\n"
+        f"  a controller of {_percent(high.rate)} is rejected with probability "
+        f"{_percent(high.rejected)}, undecided with {_percent(high.undecided)}"
+    )
+
+
+def _percent(share: float) -> str:
+    """One decimal; three where one would make nearly all of it all."""
+    rounded = f"{100 * share:.1f}"
+    if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
+        rounded = f"{100 * share:.3f}"
+    return f"{rounded} %"

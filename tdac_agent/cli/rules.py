@@ -1,0 +1,86 @@
+"""`tdac rules RUN`: the life of each repair rule of a run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.run_view import told_tests
+from tdac_agent.prompting.rules import RepairRule, RuleBook
+from tdac_agent.runs.records import Run, load_rules, load_run
+
+_COLOURS = {"in force": "green", "dropped": "red", "made room": "yellow"}
+
+
+def run(folder: Path, as_json: bool) -> int:
+    """Prints the rules; returns the exit code."""
+    record, book = load_run(folder), load_rules(folder)
+    if as_json:
+        sys.stdout.write(book.model_dump_json(indent=2) + "\n")
+        return 0
+    console = Console()
+    title = f"{record.task}: rules by {record.optimizer}, {record.status}"
+    if book.rules:
+        console.print(f"[bold]{escape(title)}[/]\n")
+        console.print(_lives(book))
+    else:
+        console.print(escape(f"{title}; no rules: {_why_none(record)}"))
+    return 0
+
+
+def _lives(book: RuleBook) -> Table:
+    """A paragraph for each rule: its text, then what became of it."""
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    grid.add_column(no_wrap=True, style="bold")
+    grid.add_column(overflow="fold")
+    for rule in book.rules:
+        state = f"[{_COLOURS[rule.status]}]{_state(rule)}[/]"
+        lines = [
+            f"[bold]{escape(rule.text)}[/]",
+            *(f"[dim]{escape(edit)}[/]" for edit in rule.edits),
+            f"{state} · {rule.scope} · since k={rule.born}",
+            f"failed before it: {escape(told_tests(rule.evidence, 4))}",
+            f"effect: {escape(_effect(rule))}",
+            "",
+        ]
+        grid.add_row(rule.id, "\n".join(lines))
+    return grid
+
+
+def _why_none(run: Run) -> str:
+    """What has to be known where there are no rules."""
+    if not run.refine:
+        return "this run leaves its prompt as it is (--no-refine)"
+    failed = [attempt for attempt in run.attempts if not attempt.passed]
+    if failed and not any(attempt.valid for attempt in run.attempts):
+        number = len({attempt.k for attempt in failed})
+        return f"no answer of {number} iteration{'s' * (number > 1)} could be used"
+    if any(attempt.j == run.patience and attempt.valid for attempt in failed):
+        return "the optimizer had none to add"
+    return "no iteration has failed as a whole"
+
+
+def _effect(rule: RepairRule) -> str:
+    """What came of it; where it did not cure all tests, those that it did by name."""
+    pairs = list(zip(rule.evidence, rule.passes_each, strict=True))
+    cured = [test for test, count in pairs if count == rule.tried]
+    some = [test for test, count in pairs if 0 < count < rule.tried]
+    told = rule.effect_told
+    if not rule.tried or len(cured) == len(pairs):
+        return told
+    if cured:
+        told += f"; cured: {told_tests(cured, 4)}"
+    if some:
+        told += f"; cured in some: {told_tests(some, 4)}"
+    return told
+
+
+def _state(rule: RepairRule) -> str:
+    if rule.in_force:
+        return rule.status
+    why = f": {rule.reason}" if rule.reason else ""
+    return escape(f"{rule.status} in k={rule.ended}{why}")

@@ -1,0 +1,209 @@
+"""`tdac runs [DIR]`: the runs and trainings in a folder, and how to go on with them."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.run_view import way_on
+from tdac_agent.cli.sentences import tell
+from tdac_agent.errors import RunError
+from tdac_agent.models.budget import told_usd
+from tdac_agent.runs.records import JOURNAL, RUN_FILE, at_work, load_run, status_now
+from tdac_agent.training.curve import PLAN_FILE, read_curve
+
+USUAL = Path("runs")
+"""Where runs are written to; before the first one it is not there."""
+WIDE = 100
+"""Characters, with which there is room for all columns."""
+_COLOURS = {
+    "verified": "green",
+    "trained": "green",
+    "not verified": "red",
+    "running": "cyan",
+    "unreadable": "red",
+}
+
+
+def run(folder: Path, as_json: bool) -> int:
+    """Prints the runs, the newest last; returns the exit code.
+
+    Raises:
+        RunError: There is no such folder.
+    """
+    try:
+        rows = sorted(map(_row, _folders(folder)), key=_age)
+    except OSError as error:
+        if folder != USUAL or folder.exists():
+            raise RunError(f"cannot read {folder}: {error.strerror}") from error
+        rows = []
+    if as_json:
+        sys.stdout.write(json.dumps(rows, indent=2) + "\n")
+        return 0
+    console = Console()
+    if rows:
+        console.print(_table(rows, console.width))
+        for row in rows:
+            if row["status"] == "unreadable":
+                tell(console, f"{row['run']}: {row['reason']}", "red")
+                continue
+            if "steps" in row:
+                tell(console, _learnt(row))
+            if row["go_on"]:
+                console.print(f"go on: {escape(row['go_on'])}", soft_wrap=True)
+    else:
+        console.print(f"no runs in {folder}; `tdac synth` makes one", soft_wrap=True)
+    return 0
+
+
+def _folders(folder: Path) -> list[Path]:
+    """A run folder itself, or those in a folder; other things are not ours."""
+    places = [folder, *(path for path in folder.iterdir() if path.is_dir())]
+    return [place for place in places if _is_run(place)]
+
+
+def _is_run(place: Path) -> bool:
+    try:
+        return any((place / name).is_file() for name in (RUN_FILE, JOURNAL, PLAN_FILE))
+    except OSError:
+        return False
+
+
+def _training(folder: Path) -> dict[str, Any]:
+    from tdac_agent.training.plan import read_plan  # with all of Gymnasium
+
+    try:
+        plan, points = read_plan(folder), read_curve(folder)
+    except RunError as error:
+        return {"run": str(folder), "status": "unreadable", "reason": str(error)}
+    last = max((point.steps for point in points), default=0)
+    best = max(points, key=lambda point: point.worth, default=None)
+    over = last >= plan.steps
+    return {
+        "run": str(folder),
+        "task": ", ".join(plan.tasks),
+        "learner": plan.algo,
+        "status": "trained" if over else "not at its end",
+        "steps": last,
+        "of_steps": plan.steps,
+        "success_rate": None if best is None else best.success_rate,
+        "started": datetime.fromtimestamp(
+            (folder / PLAN_FILE).stat().st_mtime, UTC
+        ).isoformat(),
+        "go_on": "" if over else shlex.join(["tdac", "train", "--resume", str(folder)]),
+    }
+
+
+def _learnt(row: dict[str, Any]) -> str:
+    """How far a training is, and what its best policy does."""
+    rate = row["success_rate"]
+    best = "" if rate is None else f", the best policy reached {rate:.0%} of the goals"
+    return f"{row['run']}: {row['steps']:,} of {row['of_steps']:,} steps{best}"
+
+
+def _row(folder: Path) -> dict[str, Any]:
+    """What there is to say of a folder, also of a torn one."""
+    if (folder / PLAN_FILE).is_file():
+        return _training(folder)
+    before = at_work(folder)
+    try:
+        run = load_run(folder)
+    except RunError as error:
+        reason = str(error).removeprefix(f"{folder} is not a run folder: ")
+        return {"run": str(folder), "status": "unreadable", "reason": reason}
+    status = status_now(run, before=before)
+    return {
+        "run": str(folder),
+        "task": run.task,
+        "learner": run.learner,
+        "optimizer": run.optimizer,
+        "status": status,
+        "k": max((attempt.k for attempt in run.attempts), default=0),
+        "iterations": run.iterations,
+        "tau": run.tau,
+        "tokens_in": run.tokens_in,
+        "tokens_out": run.tokens_out,
+        "cost": run.cost,
+        "cost_lost": run.cost_lost,
+        "started": run.started,
+        "seconds": run.seconds,
+        "censored": run.censored,
+        "reason": run.reason,
+        "go_on": "" if status == "running" else way_on(run),
+    }
+
+
+def _age(row: dict[str, Any]) -> tuple[str, str]:
+    return row.get("started", ""), row["run"]
+
+
+def _table(rows: list[dict[str, Any]], width: int) -> Table:
+    """A line for each run: a long learner is cut, a narrow table has fewer columns."""
+    wide = width >= WIDE
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    table.add_column("run", no_wrap=True)
+    if wide:
+        table.add_column("task", no_wrap=True)
+    table.add_column("learner", overflow="ellipsis", min_width=8)
+    table.add_column("status", no_wrap=True)
+    figures = _figures(rows)
+    for name in figures:
+        table.add_column(name, justify="right", no_wrap=True)
+    if wide:
+        table.add_column("started", no_wrap=True)
+    if any("–" in column for column in figures.values()):
+        table.caption = "–: no model was asked, or it reports none"
+        table.caption_justify = "left"
+    for number, row in enumerate(rows):
+        status = row["status"]
+        task, started = row.get("task", ""), _when(row.get("started", ""))
+        table.add_row(
+            escape(row["run"]),
+            *([escape(task)] if wide else []),
+            # One word, so that it is not wrapped where it is cut.
+            escape(row.get("learner", "").replace(" ", "\N{NO-BREAK SPACE}")),
+            f"[{_COLOURS.get(status, 'yellow')}]{status}[/]",
+            *(column[number] for column in figures.values()),
+            *([started] if wide else []),
+        )
+    return table
+
+
+def _figures(rows: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Columns of figures by their names; without those that say nothing at all."""
+    lines = [_figures_of(row) for row in rows]
+    columns = {
+        name: [line[at] for line in lines]
+        for at, name in enumerate(("k", "tokens", "cost"))
+    }
+    return {name: told for name, told in columns.items() if set(told) - {"–", ""}}
+
+
+def _figures_of(row: dict[str, Any]) -> tuple[str, str, str]:
+    """How far a run came, its tokens and its cost; a dash where none are reported."""
+    if "k" not in row:
+        return "", "", ""
+    tokens = row["tokens_in"] + row["tokens_out"]
+    cost = "unknown" if row["cost"] is None else told_usd(row["cost"])
+    asked = tokens or row["cost"] != 0.0
+    return (
+        f"{row['k']}/{row['iterations']}",
+        str(tokens) if tokens else "–",
+        cost if asked else "–",
+    )
+
+
+def _when(started: str) -> str:
+    try:
+        return f"{datetime.fromisoformat(started).astimezone():%m-%d %H:%M}"
+    except ValueError:
+        return started[:11]

@@ -1,0 +1,157 @@
+"""The command `tdac synth`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from tdac_agent.cli.mistakes import begun
+from tdac_agent.cli.options import (
+    BaseUrl,
+    JitterSeed,
+    Json,
+    KeyOverHttp,
+    Learner,
+    MaxCost,
+    MaxOutput,
+    MaxTokens,
+    NamedTask,
+    Optimizer,
+    Suite,
+    Trust,
+    takes_task,
+)
+
+app = typer.Typer()
+ALLOWED = (
+    *("learner", "optimizer", "base_url", "key_over_http"),
+    *("prompt", "suite", "seed"),
+)
+"""Flags that allow what a run of somebody else's wants, beside --resume."""
+WITH_RESUME = frozenset(
+    {"resume", "max_cost", "max_tokens", "as_json", "trust", *ALLOWED}
+)
+
+
+@app.command(
+    epilog="Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 "
+    "--goal 178 386 --robot-radius 12`; "
+    "`tdac synth --learner anthropic:claude-sonnet-5-5`; "
+    "`tdac synth --resume runs/maze-1`"
+)
+@takes_task(but=())
+def synth(
+    context: typer.Context,
+    named_task: NamedTask,
+    from_: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--from", help="Controller to begin with."),
+    ] = None,
+    k: Annotated[
+        int, typer.Option("-K", "--iterations", min=1, help="Iterations at most.")
+    ] = 20,
+    j: Annotated[
+        int, typer.Option("-J", "--patience", min=0, help="Edits per iteration.")
+    ] = 1,
+    suite: Suite = None,
+    learner: Learner = "builtin",
+    optimizer: Optimizer = None,
+    base_url: BaseUrl = None,
+    key_over_http: KeyOverHttp = False,
+    max_output: MaxOutput = None,
+    max_cost: MaxCost = None,
+    max_tokens: MaxTokens = None,
+    prompt: Annotated[
+        str,
+        typer.Option(
+            help="What is asked: `full`, `underspecified`, or your own template file."
+        ),
+    ] = "full",
+    refine: Annotated[
+        bool,
+        typer.Option(
+            "--refine/--no-refine",
+            help="Turn failures into rules of the prompt, or leave it as it is.",
+        ),
+    ] = True,
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Print the first prompt and the cost at most; asks nobody.",
+        ),
+    ] = False,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--out",
+            help="Run folder; one with an unfinished run of the same goes on.  "
+            "[default: runs/TASK-N]",
+        ),
+    ] = None,
+    resume: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--resume", metavar="RUN", help="Go on with a run, as it was begun."
+        ),
+    ] = None,
+    seed: JitterSeed = None,
+    trust: Trust = False,
+    as_json: Json = False,
+) -> None:
+    """Write, test and repair a controller until it is verified."""
+    with begun():
+        from tdac_agent.cli import synth as command
+    from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
+
+    limits = {"max_cost": max_cost, "max_tokens": max_tokens}
+    if resume is not None:
+        _refuse_others(context)
+        given = {name: context.params[name] for name in ALLOWED}
+        given = {
+            name: value for name, value in given.items() if _is_typed(context, name)
+        }
+        raise typer.Exit(command.resume(resume, given, limits, trust, as_json))
+    models = {
+        "learner": learner,
+        "optimizer": optimizer,
+        "base_url": base_url,
+        "key_over_http": key_over_http,
+        "prompt": prompt,
+        "max_output": MAX_OUTPUT_TOKENS if max_output is None else max_output,
+    }
+    if dry_run:
+        from tdac_agent.cli import dry_run as dry
+
+        raise typer.Exit(
+            dry.run(named_task(), {**models, **limits}, k, j, refine, as_json)
+        )
+    loop = {"iterations": k, "patience": j, "refine": refine, "seed": seed}
+    wanted = {**models, **limits, **loop}
+    raise typer.Exit(
+        command.run(named_task(), wanted, out, from_, suite, trust, as_json)
+    )
+
+
+def _refuse_others(context: typer.Context) -> None:
+    """Refuses flags beside --resume that the run folder answers already.
+
+    Raises:
+        RunError: It names them.
+    """
+    from tdac_agent.errors import RunError
+
+    others = [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name not in WITH_RESUME and _is_typed(context, str(parameter.name))
+    ]
+    if others:
+        raise RunError(f"a run goes on as it was begun: leave out {', '.join(others)}")
+
+
+def _is_typed(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"

@@ -1,0 +1,195 @@
+"""`tdac train`: live progress, a line for each evaluation, and the best policy."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.evaluate import wrapper_names
+from tdac_agent.cli.flags import flag
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.training.curve import Point
+from tdac_agent.training.plan import (
+    EVALUATIONS,
+    TrainingPlan,
+    make_plan,
+    read_plan,
+)
+from tdac_agent.training.policy_files import POLICY
+from tdac_agent.training.train import check_extra, train
+from tdac_envs.core.errors import TaskError
+
+NOISES = ("range_noise", "wheel_slip", "motor_lag", "delay")
+ALMOST = 0.95
+"""Success rate from which a policy counts as having learnt its task."""
+
+
+def run(
+    given: dict[str, Any],
+    steps: int | None,
+    out: Path | None,
+    resume: Path | None,
+    trust: bool,
+    as_json: bool,
+) -> int:
+    """Trains and prints; returns the exit code: 1 where nothing was learnt.
+
+    Args:
+        given: Flags that were given, but for the next ones.
+        steps: Of training.
+        out: Folder; the next free one by default.
+        resume: Folder of a training to go on with.
+        trust: Whether its checkpoint may be loaded, whoever wrote it.
+        as_json: Whether to print JSON.
+    """
+    console = Console(stderr=as_json)
+    with console.status("preparing the tasks …"):
+        plan, folder = _asked_for(given, steps, out, resume)
+        check_extra()
+    console.print(_heading(plan, folder), soft_wrap=True, highlight=False)
+    columns = (
+        TextColumn("{task.completed:,.0f} steps"),
+        BarColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[best]}"),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        watch = _Watch(bar, console, plan)
+        try:
+            points = train(plan, folder, watch, trust=trust)
+        except KeyboardInterrupt:
+            told = f"go on: tdac train --resume {shlex.quote(str(folder))}"
+            console.print(escape(told), soft_wrap=True)
+            raise
+    best = max(points, key=lambda point: point.worth)
+    if as_json:
+        found = {"folder": str(folder), "best": _json(best)}
+        sys.stdout.write(json.dumps(found, indent=2) + "\n")
+    else:
+        _show(plan, folder, best, points[-1], console)
+    return 0 if best.success_rate >= ALMOST else 1
+
+
+class _Watch:
+    """Turns what a training tells into a bar and lines."""
+
+    def __init__(self, bar: Progress, console: Console, plan: TrainingPlan) -> None:
+        self._bar, self._console = bar, console
+        self._row = bar.add_task("", total=plan.steps, rate="", best="")
+        self._first: int | None = None
+
+    def __call__(self, steps: int, point: Point | None, best: Point | None) -> None:
+        self._first = steps if self._first is None else self._first
+        elapsed = self._bar.tasks[self._row].elapsed
+        rate = (steps - self._first) / elapsed if elapsed else 0.0
+        told = "" if best is None else f"best {best.success_rate:.0%}"
+        self._bar.update(
+            self._row, completed=steps, rate=f"{rate:,.0f} steps/s", best=told
+        )
+        if point is not None:
+            self._console.print(_line(point, point is best), highlight=False)
+
+
+def _asked_for(
+    given: dict[str, Any], steps: int | None, out: Path | None, resume: Path | None
+) -> tuple[TrainingPlan, Path]:
+    """Plan and folder.
+
+    Raises:
+        TaskError: Flags contradict each other, or make no sense.
+    """
+    if resume is not None:
+        refused = [flag(name) for name in given] + ["--out"] * (out is not None)
+        if refused:
+            raise TaskError(
+                f"--resume goes on as it was begun: leave out {', '.join(refused)}"
+            )
+        plan = read_plan(resume)
+        if steps is not None:
+            often = max(steps // EVALUATIONS, 1)
+            update = {"steps": steps, "evaluate_every": often}
+            plan = plan.model_copy(update=update)
+        return plan, resume
+    wanted = {name: v for name, v in given.items() if name not in NOISES}
+    tasks = tuple(wanted.pop("task", ("maze",)))
+    names = wanted.pop("wrapper", None)
+    noise: dict[str, Any] = dict.fromkeys(NOISES, 0)
+    noise |= {name: given[name] for name in NOISES if name in given}
+    plan = make_plan(
+        tasks,
+        steps=steps,
+        disturbance=Disturbance(**noise),
+        wrappers=None if names is None else tuple(wrapper_names(names)),
+        **wanted,
+    )
+    return plan, out or _next_folder(plan)
+
+
+def _next_folder(plan: TrainingPlan) -> Path:
+    name = f"{plan.algo}-{Path(plan.tasks[0]).stem}"
+    folders = (Path("runs") / f"{name}-{number}" for number in itertools.count(1))
+    return next(folder for folder in folders if not folder.exists())
+
+
+def _heading(plan: TrainingPlan, folder: Path) -> str:
+    sees = ", ".join(plan.wrappers) or "the environment's own observations"
+    return (
+        f"[bold]{plan.algo.upper()}[/] on [bold]{escape(', '.join(plan.tasks))}[/]: "
+        f"{plan.steps:,} steps of {plan.n_envs} robots, {_starts(plan)}, seed "
+        f"{plan.seed}; sees {sees}; {escape(str(folder))}"
+    )
+
+
+def _starts(plan: TrainingPlan) -> str:
+    trained = plan.env_kwargs.get("variation", plan.variation)
+    if trained == plan.variation:
+        return f"{trained} starts"
+    return f"{trained} starts ({plan.variation} to evaluate)"
+
+
+def _line(point: Point, best: bool) -> str:
+    return (
+        f"{point.steps:>10,} steps {point.seconds:>5.0f} s  "
+        f"reached {point.success_rate:>4.0%}  hit {point.collision_rate:>4.0%}  "
+        f"return {point.mean_return:>6.2f}" + ("  [green]best[/]" if best else "")
+    )
+
+
+def _show(
+    plan: TrainingPlan, folder: Path, best: Point, last: Point, console: Console
+) -> None:
+    mark = "[green]✔[/]" if best.success_rate >= ALMOST else "[red]✘ not learnt:[/]"
+    file = folder / POLICY
+    console.print(
+        f"{mark} {best.success_rate:.0%} of {plan.episodes} evaluation episodes "
+        "reached, "
+        f"{best.collision_rate:.0%} hit something, after {best.steps:,} of "
+        f"{last.steps:,} steps and {best.seconds:.0f} of {last.seconds:.0f} s",
+        highlight=False,
+        soft_wrap=True,
+    )
+    if last.steps != best.steps:
+        console.print(
+            f"at the end: {last.success_rate:.0%} reached, "
+            f"{last.collision_rate:.0%} hit something; the best one is kept",
+            highlight=False,
+            soft_wrap=True,
+        )
+    tasks = " ".join(f"--task {shlex.quote(name)}" for name in plan.tasks)
+    words = f"tdac evaluate {shlex.quote(str(file))} follow-guidance reference {tasks}"
+    console.print(f"compare: {escape(words)}", soft_wrap=True, highlight=False)
+
+
+def _json(point: Point) -> dict[str, float | None]:
+    return {k: None if math.isnan(v) else v for k, v in asdict(point).items()}

@@ -1,0 +1,191 @@
+"""`tdac verify`."""
+
+from __future__ import annotations
+
+import gc
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.robust_flags import RobustFlags
+from tdac_agent.cli.spinner import Spinner
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import TASK_FILE, Profile
+from tdac_agent.tasks.trust import allowed
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.warm import WarmJudge
+
+if TYPE_CHECKING:
+    from tdac_agent.evaluation.robust_report import RobustReport
+
+
+def run(
+    controller: str,
+    flags: TaskFlags,
+    profile: Profile | None,
+    paper: bool,
+    suite: Path | None,
+    trust: bool,
+    tier: str,
+    seed: int | None,
+    junit: Path | None,
+    out: Path | None,
+    as_json: bool,
+    robust: RobustFlags,
+    nursery: Nursery,
+) -> int:
+    """Verifies and prints; returns the exit code."""
+    check_tier(tier)
+    robust.check()
+    if out is not None:
+        _check_folder(out)
+    file, task = _prepared(controller, flags)
+    task = allowed(task, suite, trust=trust)
+    gc.freeze()
+    gc.enable()
+    with WarmJudge(nursery) as judge:
+        # Loaded while the judge gets ready.
+        from tdac_agent.verification.verify import verify
+
+        with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
+            report = verify(
+                file,
+                task,
+                profile=profile,
+                paper=paper,
+                tier=tier,
+                seed=seed,
+                out=out,
+                judge=judge,
+                meanwhile=spinner,
+            )
+        if junit is not None:
+            write_junit(report, junit)
+        if not as_json:
+            _show(report, out, task.folder)
+        measured = None
+        if robust.robust is not None and report.passed:
+            from tdac_agent.cli.robust import measure
+
+            measured = measure(
+                file, task, robust, tier=tier, out=out, judge=judge, as_json=as_json
+            )
+    if as_json:
+        sys.stdout.write(_json(report, robust, measured) + "\n")
+    elif robust.robust is not None:
+        _show_robust(measured, _replay(controller, flags, robust, tier))
+    accepted = measured is None or measured.accepted
+    return 0 if report.passed and accepted else 1
+
+
+def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
+    """The file and its task, which takes a while where it is not a run folder's own."""
+    if not flags.given():
+        return controller_and_task(controller, flags)
+    from tdac_agent.cli.console import Console
+
+    with Console(stderr=True).status("preparing the task …"):
+        return controller_and_task(controller, flags)
+
+
+def _show(report: Report, out: Path | None, folder: Path | None) -> None:
+    from tdac_agent.cli.console import Console
+    from tdac_agent.cli.report_view import show_report
+
+    show_report(report, Console(), out, folder)
+
+
+def _show_robust(measured: RobustReport | None, replay: list[str]) -> None:
+    from tdac_agent.cli.console import Console
+    from tdac_agent.cli.robust_view import show_robust
+
+    console = Console()
+    if measured is None:
+        console.print("robustness not measured: the controller is not verified")
+    else:
+        show_robust(measured, console, replay)
+
+
+def _json(report: Report, robust: RobustFlags, measured: RobustReport | None) -> str:
+    """The report; with `--robust`, a part of that name, null where it was not run."""
+    if robust.robust is None:
+        return report.model_dump_json(indent=2)
+    content = report.model_dump(mode="json")
+    part = None if measured is None else measured.model_dump(mode="json")
+    return json.dumps({**content, "robust": part}, indent=2, ensure_ascii=False)
+
+
+def _replay(
+    controller: str, flags: TaskFlags, robust: RobustFlags, tier: str
+) -> list[str]:
+    """The command line that plays an episode of the same, but for its seed."""
+    words = ["tdac", "play", controller, *flags.words(), *robust.disturbed.words()]
+    return words if tier == "auto" else [*words, "--tier", tier]
+
+
+def _check_folder(out: Path) -> None:
+    """Says why the folder cannot be written to, before the work is done."""
+    folder = out / "trajectories"
+    missing = [each for each in (folder, out) if not each.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for each in missing:
+            each.rmdir()
+    except OSError as error:
+        raise ControllerFileError(f"cannot write to {out}: {error.strerror}") from error
+
+
+def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
+    """The file and its task; a run folder brings its own."""
+    path = Path(controller)
+    if path.is_dir():
+        file = path / "controller.py"
+        if not file.is_file():
+            raise ControllerFileError(_without_controller(path))
+        return file, flags.load() if flags.given() else load_task(path)
+    if not path.is_file():
+        raise ControllerFileError(f"no controller {controller!r}: no such file")
+    if path.suffix != ".py":
+        raise ControllerFileError(f"{controller!r} is no controller: expected a .py")
+    if not flags.given() and (path.parent / TASK_FILE).is_file():
+        return path, load_task(path.parent)
+    return path, flags.load()
+
+
+def _without_controller(folder: Path) -> str:
+    """Why a folder has no controller, and what to do."""
+    from tdac_agent.runs.records import RUN_FILE  # its models take a while to build
+
+    if (folder / RUN_FILE).is_file():
+        words = f"tdac synth --resume {shlex.quote(str(folder))}"
+        return f"the run {folder} has no controller yet; go on with it: {words}"
+    return f"{folder} is a folder without a controller.py"
+
+
+def write_junit(report: Report, path: Path) -> None:
+    """Writes a JUnit XML file, a test case for each expected test."""
+    from xml.etree import ElementTree
+
+    messages = {failure.test: failure.message for failure in report.failures}
+    suite = ElementTree.Element(
+        "testsuite",
+        name=f"tdac {report.provenance.task}",
+        tests=str(report.verdict.expected),
+        failures=str(report.verdict.failed_tests),
+        time=str(report.seconds),
+    )
+    for name in report.tests:
+        file, _, test = name.partition("::")
+        case = ElementTree.SubElement(suite, "testcase", classname=file, name=test)
+        if name in messages:
+            ElementTree.SubElement(case, "failure", message=messages[name])
+    try:
+        write_atomic(path, ElementTree.tostring(suite, encoding="utf-8"))
+    except OSError as error:
+        raise ControllerFileError(f"cannot write {path}: {error.strerror}") from error

@@ -1,0 +1,122 @@
+"""The command `tdac verify`."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from tdac_agent.cli.options import (
+    Delay,
+    JitterSeed,
+    Json,
+    MotorLag,
+    NamedTask,
+    Profile,
+    RangeNoise,
+    Suite,
+    Tier,
+    Trust,
+    WheelSlip,
+    takes_task,
+)
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Examples: `tdac verify controller.py --task maze`; "
+    "`tdac verify runs/maze-1`; `tdac verify runs/maze-1 --robust 200`"
+)
+@takes_task()
+def verify(
+    controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
+    named_task: NamedTask,
+    profile: Profile = None,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="Nominal start only, as in the paper.")
+    ] = False,
+    suite: Suite = None,
+    trust: Trust = False,
+    tier: Tier = "auto",
+    seed: JitterSeed = None,
+    junit: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(help="Write a JUnit XML report."),
+    ] = None,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--out",
+            help="Folder for report.json (and robust.json), the trajectories, and a "
+            "picture of each episode that failed.",
+        ),
+    ] = None,
+    as_json: Json = False,
+    robust: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Once verified, run N disturbed episodes and give the success rate.",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    first_seed: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            min=0,
+            help="Seed of the first disturbed episode.  [default: as of --seed]",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    accept_at: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            metavar="RATE",
+            help="Stop as soon as a sequential test tells this success rate from one "
+            "that is --margin lower; exit 0 only if accepted.",
+            rich_help_panel="Robustness",
+        ),
+    ] = None,
+    margin: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(
+            help="See --accept-at.  [default: 0.05]", rich_help_panel="Robustness"
+        ),
+    ] = None,
+    range_noise: RangeNoise = None,
+    wheel_slip: WheelSlip = None,
+    motor_lag: MotorLag = None,
+    delay: Delay = None,
+) -> None:
+    """Test a controller in the sandbox; exit 0 only if every test passed."""
+    # What is loaded now stays: nothing of it is worth collecting.
+    gc.disable()
+    from tdac_agent.verification.judge.children import Nursery
+
+    # Its first process starts while the rest is loaded.
+    with Nursery() as nursery:
+        from tdac_agent.cli import verify as command
+        from tdac_agent.cli.robust_flags import DisturbanceFlags, RobustFlags
+
+        disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+        wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
+        code = command.run(
+            controller,
+            named_task(),
+            profile,
+            paper,
+            suite,
+            trust,
+            tier,
+            seed,
+            junit,
+            out,
+            as_json,
+            wanted,
+            nursery,
+        )
+    raise typer.Exit(code)

@@ -1,0 +1,177 @@
+"""`tdac webots run`."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.flags import check_finite, check_tier
+from tdac_agent.storage.plain import printable
+from tdac_agent.webots.report import WebotsReport
+from tdac_agent.webots.run import WebotsRun, frames, run_controller
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drawing.video import SUFFIXES, write_video
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.epuck.task import TOLERANCE
+from tdac_envs.webots.stage import open_stage
+from tdac_envs.worlds.bundled import world_file
+
+STRIDE = 2
+# A line that a controller prints more often is shown once.
+REPEATS = 5
+_STEERING = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
+
+
+def run(
+    controller: Path,
+    world: str,
+    steps: int | None,
+    start: tuple[float, ...] | None,
+    heading: float | None,
+    goal: tuple[float, float] | None,
+    tolerance: float | None,
+    ignore: tuple[str, ...],
+    webots_sensors: bool,
+    video: Path | None,
+    tier: str,
+    as_json: bool,
+) -> int:
+    """Runs a controller and prints what it did; 0 if it passed."""
+    check_tier(tier)
+    if heading is not None:
+        if start is None:
+            raise TaskError("--heading needs --start X Y")
+        start = (*start, heading)
+    check_finite(start=start, goal=goal)
+    if video is not None and video.suffix.lower() not in SUFFIXES:
+        raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
+    stage = open_stage(world_file(world), goal, ignore, start)
+    options: dict[str, Any] = {
+        "steps": steps,
+        "goal_tolerance": TOLERANCE if tolerance is None else tolerance,
+        "webots_sensors": webots_sensors,
+    }
+    console = Console(stderr=as_json)
+    env = stage.make_env(**options)
+    with _bar(console) as bar:
+        watch = _watcher(bar, controller.name, env.nominal.horizon)
+        done = run_controller(controller, stage, env, tier=tier, watch=watch)
+    if as_json:
+        record = {"schema_version": 1, **asdict(done.report)}
+        sys.stdout.write(json.dumps(record, indent=2) + "\n")
+    else:
+        _show(done.report, console)
+    if video is not None:
+        with console.status(f"drawing {escape(video.name)} …"):
+            _film(done, stage.make_env(**options, render_mode="rgb_array"), video)
+        if not as_json:
+            print(f"wrote {video} (twice real time)")
+    return 0 if done.report.passed else 1
+
+
+def _bar(console: Console) -> Progress:
+    """For whoever watches; drawn where there is something new."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    off = not console.is_terminal
+    return Progress(
+        *columns, console=console, transient=True, auto_refresh=False, disable=off
+    )
+
+
+def _watcher(bar: Progress, name: str, most: int) -> Callable[[int], None]:
+    """What moves a bar over the steps of a run, each hundredth of them."""
+    row, told = bar.add_task(escape(name), total=most), 0
+
+    def watch(steps: int) -> None:
+        nonlocal told
+        if 100 * (steps - told) >= most:
+            told = steps
+            bar.update(row, completed=steps, refresh=True)
+
+    return watch
+
+
+def _film(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
+    """The same run again, with a picture of every second step."""
+    write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
+
+
+def _once(text: str) -> str:
+    """A text in which lines that repeat say how often, where they are first."""
+    lines = text.rstrip().splitlines()
+    counts = Counter(lines)
+    kept: list[str] = []
+    seen: set[str] = set()
+    for line in lines:
+        if counts[line] <= REPEATS or not line.strip():
+            kept.append(line)
+        elif line not in seen:
+            kept.append(f"{line}  (×{counts[line]})")
+        seen.add(line)
+    return "\n".join(kept)
+
+
+def _show(report: WebotsReport, console: Console) -> None:
+    if report.sandbox == "rlimits":
+        console.print(
+            "[yellow]warning: sandbox tier rlimits: files and network are not closed "
+            "to the controller[/]"
+        )
+    if report.output.strip():
+        console.print("[cyan]the controller printed[/]")
+        console.print(
+            Text(_once(printable(_STEERING.sub("", report.output)))), soft_wrap=True
+        )
+    if report.error is not None:
+        console.print("[red]the controller failed[/]")
+        console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)
+    console.print(_table(report))
+    colour, word = ("green", "passed") if report.passed else ("red", "not passed")
+    why = f": {escape(report.why_not)}" if report.why_not else ""
+    console.print(
+        f"[bold {colour}]{word}[/]{why}  ({escape(report.controller)} in "
+        f"{escape(report.world)}, sandbox {report.sandbox}; not run in Webots itself)",
+        soft_wrap=True,
+    )
+
+
+def _table(report: WebotsReport) -> Table:
+    table = Table(
+        title="The run as the environment recorded it", title_justify="left",
+        show_header=False,
+    )  # fmt: skip
+    ended = report.goal is None and report.outcome == "out of time"
+    table.add_row("outcome", "drove to the end" if ended else report.outcome)
+    table.add_row("steps", f"{report.steps} ({report.time:.2f} s)")
+    contact = report.first_contact
+    where = "" if contact is None else f", the first at {_at(*contact[1:])}"
+    step = "" if contact is None else f" in step {contact[0]}"
+    table.add_row("steps with a contact", f"{report.collisions}{where}{step}")
+    if report.goal is None:
+        table.add_row("goal", "none in this world")
+    else:
+        table.add_row("goal", _at(*report.goal))
+        table.add_row("path left", f"{report.d_min:.3f} m of {report.d0:.3f} m")
+        table.add_row("straight left", f"{report.d_min_euclidean:.3f} m")
+    table.add_row("driven", f"{report.way:.3f} m")
+    for name, (x, y, heading) in (("start", report.start), ("end", report.end)):
+        table.add_row(name, f"{_at(x, y)}, heading {heading:.3f} rad")
+    if report.left_out:
+        table.add_row("ignored", ", ".join(map(escape, report.left_out)))
+    return table
+
+
+def _at(x: float, y: float) -> str:
+    return f"({x:.3f}, {y:.3f})"

@@ -1,1 +1,0 @@
-"""Verified controllers where they are to run: a project of Webots."""

@@ -1,0 +1,1 @@
+"""What differs between the environments: a room for each."""

@@ -1,0 +1,1 @@
+"""TDAC-EPuck-v0: its tasks, pictures, worlds and export."""

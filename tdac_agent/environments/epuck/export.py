@@ -1,0 +1,151 @@
+"""A verified e-puck controller as a project of Webots."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tdac_agent.environments.epuck.task import WORLD_FILE
+from tdac_agent.errors import RunError
+from tdac_agent.runs.records import load_run
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import EPUCK
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.worlds.wbt.writer import write_world
+
+POLICY = "tdac_policy.py"
+WORKING_FILES = ("params.json", "sensors.py", WORLD_FILE)
+SPARE = 2
+"""Steps that the adapter takes beside those of the controller."""
+ADAPTER = Path(__file__).with_name("adapter.py")
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """Files of an exported project.
+
+    Attributes:
+        folder: Of all of it.
+        world: The `.wbt` file.
+        controller: What Webots starts.
+        tolerance: How near to the goal is at the goal, m.
+        horizon: Steps that the controller has.
+        verified_steps: Steps to the goal when it was verified, if a report says so.
+    """
+
+    folder: Path
+    world: Path
+    controller: Path
+    tolerance: float
+    horizon: int
+    verified_steps: int | None
+
+
+def export_webots(run_folder: Path, out: Path) -> Project:
+    """Writes a project: the world, and a controller folder with the verified file.
+
+    Args:
+        run_folder: Of a run with a verified controller for the e-puck.
+        out: A new or an empty folder.
+
+    Raises:
+        RunError: There is no such run, or the folder is in use.
+        TaskError: The run's task cannot be read.
+    """
+    run = load_run(run_folder)
+    if not run.verified:
+        raise RunError(
+            f"{run_folder} has no verified controller ({run.status}); only these are "
+            "exported"
+        )
+    task = load_task(run_folder)
+    if task.spec.env != EPUCK or not isinstance(task.nominal, EPuckTask):
+        raise RunError(f"{run_folder} is about {task.spec.env}; Webots needs {EPUCK}")
+    source = _read(run.controller)
+    beside = {file: _read(run_folder / file) for file in WORKING_FILES}
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise RunError(f"{out} is in use; give a new or an empty folder")
+    name = project_name(task.name)
+    project = Project(
+        out,
+        out / "worlds" / f"{name}.wbt",
+        out / "controllers" / name / f"{name}.py",
+        task.nominal.goal_tolerance,
+        task.nominal.horizon,
+        _verified_steps(run_folder),
+    )
+    folder = project.controller.parent
+    for new in (folder, project.world.parent):
+        new.mkdir(parents=True)
+    write_atomic(folder / POLICY, source)
+    for file, content in beside.items():
+        write_atomic(folder / file, content)
+    write_atomic(project.controller, ADAPTER.read_bytes())
+    write_atomic(project.world, _world(task.nominal, name))
+    write_atomic(out / "README.md", _readme(task, name, source, project))
+    return project
+
+
+def project_name(task: str) -> str:
+    """Name of world and controller; never one that a module of Webots has."""
+    return "tdac_" + (re.sub(r"\W+", "_", task, flags=re.ASCII).strip("_") or "task")
+
+
+def _world(task: EPuckTask, name: str) -> str:
+    """The world that the task was verified in, with this controller in its robot."""
+    world = task.ground.world
+    robot = replace(world.robot, controller=name)
+    return write_world(
+        replace(world, robots=(robot, *world.robots[1:])), supervisor=True
+    )
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return read_file(path, RECORD_BYTES)
+    except OSError as error:
+        raise RunError(f"cannot read {path}: {error.strerror}") from error
+
+
+def _verified_steps(run_folder: Path) -> int | None:
+    """Steps of the nominal episode, as the run's report has them."""
+    try:
+        raw = read_file(run_folder / "report.json", RECORD_BYTES)
+        report = Report.model_validate(parse_json(raw))
+    except (OSError, ValueError):
+        return None
+    steps = [e.steps for e in report.episodes if e.name == "nominal"]
+    return steps[0] if steps else None
+
+
+def _readme(task: Task, name: str, source: bytes, project: Project) -> str:
+    digest = hashlib.sha256(source).hexdigest()
+    steps = project.verified_steps
+    verified = "" if steps is None else f"\nThere it took {steps} steps to the goal."
+    return f"""\
+# {task.name}: an e-puck controller for Webots
+
+**Not run in Webots itself.** The controller was verified in tdac's own model of this
+world (`TDAC-EPuck-v0`).{verified}
+In Webots the sensors have noise and see a mark of the goal that stands up, boxes of
+wood are darker than in the model, and the physics is another: watch it before you rely
+on it.
+
+- `worlds/{name}.wbt`: open it in Webots R2025a. The robot is a supervisor, so that it
+  can ask where it is.
+- `controllers/{name}/{name}.py`: the adapter.
+  Webots starts it; the Python that Webots uses needs numpy.
+- `controllers/{name}/{POLICY}`: the verified file, byte for byte.
+  SHA-256 `{digest}`
+- The other files there are those that it was verified with.
+
+Without Webots:
+
+    tdac webots run controllers/{name}/{name}.py worlds/{name}.wbt \\
+        --tolerance {project.tolerance:g} --steps {project.horizon + SPARE}
+"""

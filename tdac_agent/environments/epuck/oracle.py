@@ -1,0 +1,156 @@
+"""Answers about worlds that suites compare a controller's own functions with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.epuck.gaps import nearest_gap
+from tdac_envs.epuck.prisms import Owned, Prisms
+from tdac_envs.worlds.bodies import at_body_height, bodies, floor_under
+from tdac_envs.worlds.footprint import Disc, Rectangle
+from tdac_envs.worlds.world import Arena, Part, World
+
+Point = tuple[float, float]
+POINTS = 400
+_AROUND = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldCase:
+    """A world file, and what a controller must find in it.
+
+    Attributes:
+        name: For messages.
+        text: The file.
+        world: The same.
+        seed: Draws the points of `samples`.
+    """
+
+    name: str
+    text: str
+    world: World
+    seed: int = 7
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """Pose of the e-puck: x, y (m), yaw (rad)."""
+        return self.world.robot.pose
+
+    @property
+    def goal(self) -> Point:
+        """Point (x, y), m."""
+        assert self.world.goal is not None
+        return self.world.goal
+
+    def resolution(self) -> float:
+        """Of a grid that is quick to make, m."""
+        left, low, right, high = self._bounds()
+        return max(0.01, round(max(right - left, high - low) / 150, 3))
+
+    def samples(self, inflation: float, margin: float) -> Iterator[tuple[Point, bool]]:
+        """Points (x, y) with whether they must be occupied; sure cases only.
+
+        Occupied is what is in something solid at the height of the body, or nearer to
+        it than `inflation`, and what is outside the arena.
+
+        Args:
+            inflation: By how much things have grown, m.
+            margin: Points this near to a boundary are left out, m.
+        """
+        floor, things = floor_under(self.world), bodies(self.world)
+        solid = prisms_of(p for t in things for p in at_body_height(t.solid, floor))
+        # Marks of the goal are not there; other things of other heights may be.
+        all_of = [t for t in things if not t.is_goal]
+        unsure = prisms_of(part for t in all_of for part in (*t.solid, *t.visible))
+        arena = self._walled()
+        beyond = None if arena is None else _with_wall(arena, margin)
+        for x, y in self._points(solid):
+            outside = beyond is not None and not beyond.contains(x, y)
+            if outside or gap_to(solid, x, y) <= inflation - margin:
+                yield (x, y), True
+            elif arena is not None and not _well_inside(
+                arena, x, y, inflation + margin
+            ):
+                continue
+            elif gap_to(unsure, x, y) >= inflation + margin:
+                yield (x, y), False
+
+    def _points(self, solid: Prisms) -> list[Point]:
+        """Seeded points all over the world, and some in each thing."""
+        left, low, right, high = self._bounds()
+        random = np.random.default_rng(self.seed)
+        corners = (left - _AROUND, low - _AROUND), (right + _AROUND, high + _AROUND)
+        spread = random.uniform(*corners, (POINTS, 2))
+        return [(x, y) for x, y in (*spread.tolist(), *solid.extent[:, :2].tolist())]
+
+    def _walled(self) -> Arena | None:
+        """The arena around the robot and the goal, if it has a wall."""
+        arena = self.world.arena
+        both = arena is not None and arena.inside.contains(*self.goal)
+        return arena if both else None
+
+    def _bounds(self) -> tuple[float, float, float, float]:
+        """Of everything, m."""
+        world = self.world
+        edges = [arena.inside.bounds for arena in world.arenas]
+        edges += [p.shape.bounds for t in world.obstacles for p in t.solid]
+        edges += [(x, y, x, y) for x, y in (world.robot.pose[:2], self.goal)]
+        box = np.array(edges)
+        (left, low), (right, high) = box[:, :2].min(axis=0), box[:, 2:].max(axis=0)
+        return float(left), float(low), float(right), float(high)
+
+
+def _with_wall(arena: Arena, margin: float) -> Disc | Rectangle:
+    """The floor of an arena, its wall and a margin."""
+    shape, edge = arena.inside, arena.wall_thickness + margin
+    if isinstance(shape, Disc):
+        # The wall has flat pieces.
+        reach = shape.radius / math.cos(math.pi / arena.facets) + edge
+        return replace(shape, radius=reach)
+    length, width = shape.length + 2 * edge, shape.width + 2 * edge
+    return replace(shape, length=length, width=width)
+
+
+def _well_inside(arena: Arena, x: float, y: float, room: float) -> bool:
+    """Whether a point is on the floor, and in a round one so far from its circle.
+
+    The flat pieces of a round wall lie outside the circle: who takes the circle for the
+    wall is right, too.
+    """
+    shape = arena.inside
+    if isinstance(shape, Disc):
+        return math.hypot(x - shape.x, y - shape.y) <= shape.radius - room
+    return shape.contains(x, y)
+
+
+def prisms_of(parts: Iterable[Part]) -> Prisms:
+    """Parts as arrays."""
+    return Prisms.of(map(Owned, parts))
+
+
+def gap_to(prisms: Prisms, x: float, y: float) -> float:
+    """Distance from a point to the nearest part, m; negative within one."""
+    return float(nearest_gap(*prisms.arrays(), float(x), float(y)))
+
+
+def occupied_at(
+    occ: NDArray[np.bool_], origin: Point, resolution: float, point: Point
+) -> bool:
+    """Whether the cell at a point is occupied; outside the grid it is.
+
+    Args:
+        occ: Shape (height, width), `[y, x]`.
+        origin: Corner (x0, y0) of the first cell, m.
+        resolution: Side of a cell, m.
+        point: (x, y), m.
+    """
+    column = math.floor((point[0] - origin[0]) / resolution)
+    row = math.floor((point[1] - origin[1]) / resolution)
+    height, width = occ.shape
+    inside = 0 <= row < height and 0 <= column < width
+    return bool(occ[row, column]) if inside else True

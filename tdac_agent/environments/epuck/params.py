@@ -1,0 +1,72 @@
+"""`params.json` of an e-puck's task."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_envs.epuck.infrared import PLACES, RANGE
+from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.worlds.bodies import BODY_RADIUS
+
+_AZIMUTHS: tuple[float, ...] = tuple(PLACES[:, 2].tolist())
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class EPuckRobot(_Record):
+    """The e-puck's measures."""
+
+    radius: float = Field(BODY_RADIUS, description="Of the body, m.")
+    wheel_radius: float = Field(WHEEL_RADIUS, description="m")
+    axle_length: float = Field(AXLE_LENGTH, description="m")
+    max_wheel_speed: float = Field(description="rad/s")
+    sensor_range: float = Field(RANGE, description="Of ps0 to ps7, m.")
+    sensor_azimuths: tuple[float, ...] = Field(
+        _AZIMUTHS, description="Of ps0 to ps7 from the heading, rad, left positive."
+    )
+
+
+class EPuckParams(_Record):
+    """Contents of `params.json`; metres, headings counter-clockwise from +x, rad."""
+
+    schema_version: Literal[1] = 1
+    source: str = Field(description="File name of the world.")
+    source_sha256: str = Field(description="Of the flat world file.")
+    start: tuple[float, float]
+    heading: float
+    goal: tuple[float, float]
+    goal_tolerance: float
+    dt: float = Field(description="Duration of a step, s.")
+    horizon: int = Field(description="Steps.")
+    robot: EPuckRobot
+    notes: tuple[str, ...] = Field((), description="What the reader supposed.")
+
+
+def params_of(
+    task: EPuckTask, source: str, digest: str, notes: tuple[str, ...]
+) -> EPuckParams:
+    """Contents of the file for a task.
+
+    Args:
+        task: In the flat world.
+        source: File name of the world.
+        digest: Of the flat world file.
+        notes: What the reader supposed.
+    """
+    return EPuckParams(
+        source=source,
+        source_sha256=digest,
+        start=task.start[:2],
+        heading=task.start.heading,
+        goal=task.goal,
+        goal_tolerance=task.goal_tolerance,
+        dt=task.dt,
+        horizon=task.horizon,
+        robot=EPuckRobot(max_wheel_speed=task.max_wheel_speed),
+        notes=notes,
+    )

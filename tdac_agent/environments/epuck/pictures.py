@@ -1,0 +1,68 @@
+"""Pictures of an e-puck's episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_agent.environments.epuck.task import EPuckSetting
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.tasks.setting import Setting
+from tdac_agent.tasks.units import Points
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.epuck.infrared import TABLE
+from tdac_envs.epuck.picture import EPuckScene
+from tdac_envs.epuck.run_picture import WorldBackground, trajectory_picture
+from tdac_envs.map2d.picture import Status
+
+
+def world_pictures(setting: Setting) -> WorldPictures:
+    """The pictures of an e-puck's setting."""
+    if not isinstance(setting, EPuckSetting):
+        raise TypeError(f"expected an EPuckSetting, got {type(setting).__name__}")
+    return WorldPictures(setting)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldPictures:
+    """See `Pictures`."""
+
+    setting: EPuckSetting
+
+    def backdrop(self) -> WorldBackground:
+        """The world."""
+        return WorldBackground.of(self.setting.nominal)
+
+    def trajectories(
+        self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
+    ) -> Image:
+        """The world with each trajectory."""
+        nominal = self.setting.nominal
+        return trajectory_picture(nominal, runs, outcomes=outcomes, labels=labels)
+
+    def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
+        """Frames of the e-puck with its sensors."""
+        nominal, trajectory = self.setting.nominal, rollout.trajectory
+        scene = EPuckScene(nominal, movable=False)
+        gaps, last = rollout.distances("euclidean"), trajectory.steps
+        for step in rollout.trajectory.every(stride):
+            outcome = rollout.outcome if step == last else ""
+            readings = trajectory.ranges[step]
+            yield scene.frame(
+                trajectory.poses[step].tolist(),
+                readings=readings,
+                reaches=reaches(readings),
+                trail=trajectory.poses[: step + 1, :2],
+                solid=nominal.ground.solid,
+                status=Status(step, nominal.horizon, float(gaps[step]), outcome),
+            )
+
+
+def reaches(readings: NDArray[np.float32]) -> Points:
+    """How far the rays of ps0 to ps7 got, by what they read, m."""
+    distances, values = TABLE[:, 0], TABLE[:, 1]
+    # From the largest distance on: values must increase.
+    return np.asarray(np.interp(readings, values[::-1], distances[::-1]))

@@ -1,0 +1,77 @@
+"""The privileged reference for the e-puck: the oracle's path in the exact world.
+
+As `tdac_agent.verification.suite.reference` for maps, in metres.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tdac_agent.verification.suite.reference import Point, taut
+from tdac_envs.epuck.contact import first_touch
+from tdac_envs.epuck.paths import entry, open_field
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.grid.plan import Path, descend, distance_field
+from tdac_envs.worlds.bodies import BODY_RADIUS
+
+# Room beyond the body that is tried for the path, m, widest first.
+MARGINS = (0.02, 0.01, 0.005, 0.002, 0.0005, 0.0)
+# Room kept beyond the body on a shortcut, m: many times what float32 rounds away.
+_SAFE = 1e-4
+
+
+def oracle_path(task: EPuckTask, x: float, y: float) -> Path:
+    """Path from (x, y) to the goal at the widest margin that still connects them.
+
+    Returns:
+        Shape (n, 2), m; both ends included; only the ends where nothing connects.
+    """
+    ground = task.ground
+    ends = np.array([[x, y], task.goal])
+    for margin in MARGINS:
+        free = _roomy(task, (x, y), margin)
+        last = entry(ground, open_field(free), task.goal)
+        if last is None:
+            continue
+        field = distance_field(free, last)
+        first = entry(ground, field.astype(np.float32), (x, y))
+        if first is not None:
+            path = descend(free, field, first) * ground.spacing + ground.bounds[:2]
+            return np.vstack([ends[:1], path, ends[1:]])
+    return ends
+
+
+def epuck_way(task: EPuckTask, x: float, y: float) -> list[Point]:
+    """The oracle's path from (x, y), after every shortcut that keeps the body clear."""
+    path = oracle_path(task, x, y)
+    return taut(path, lambda begin, end: _free(task, begin, end))
+
+
+def _free(task: EPuckTask, begin: Point, end: Point) -> bool:
+    """Whether the body, and a little more, gets straight from one point to another."""
+    solid = task.ground.solid
+    heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
+    pose, length = (float(begin[0]), float(begin[1]), heading), math.dist(begin, end)
+    touch = first_touch(*solid.arrays(), *pose, length, 0.0, BODY_RADIUS + _SAFE)
+    return touch > 1.0
+
+
+def _roomy(task: EPuckTask, start: Point, margin: float) -> BoolGrid:
+    """Grid points with room for the body and a margin, less of it near both ends."""
+    ground = task.ground
+    free = ground.free(BODY_RADIUS + margin).copy()
+    tight = ground.free(BODY_RADIUS + min(margin, MARGINS[-2]))
+    reach = math.ceil((BODY_RADIUS + margin) / ground.spacing) + 2
+    left, low, _, _ = ground.bounds
+    for x, y in (start, task.goal):
+        column = round((x - left) / ground.spacing)
+        row = round((y - low) / ground.spacing)
+        window = np.s_[
+            max(row - reach, 0) : row + reach + 1,
+            max(column - reach, 0) : column + reach + 1,
+        ]
+        free[window] = tight[window]
+    return free

@@ -1,0 +1,193 @@
+"""A Webots world as a diagnosis asks about it; mm, on the screen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.tasks.setting import Nominal
+from tdac_agent.tasks.units import METRES, Points, Units
+from tdac_agent.verification.diagnosis.touch import Touch
+from tdac_agent.verification.suite.reference import taut
+from tdac_envs.epuck.contact import first_touch
+from tdac_envs.epuck.gaps import part_gap
+from tdac_envs.epuck.infrared import PLACES
+from tdac_envs.epuck.prisms import Owned, Prisms
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.grid.plan import Path, first_beyond
+from tdac_envs.map2d.task import Pose
+from tdac_envs.worlds.bodies import BODY_RADIUS, at_body_height
+from tdac_envs.worlds.world import Obstacle
+
+Point = tuple[float, float]
+
+FENCE = "fence around the world"
+# A sensor that is farther off the bearing than this does not look there, rad.
+_OFF = 0.3
+# A blunter corner is none to the body.
+BLUNTEST = math.radians(135.0)
+
+
+def world_surroundings(task: Nominal) -> WorldSurroundings:
+    """The surroundings of an e-puck's task."""
+    if not isinstance(task, EPuckTask):
+        raise TypeError(f"expected an EPuckTask, got {type(task).__name__}")
+    return WorldSurroundings(task)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorldSurroundings:
+    """The world of a task; see `Surroundings`."""
+
+    task: EPuckTask
+
+    @property
+    def units(self) -> Units:
+        """Metres, told in mm."""
+        return METRES
+
+    @property
+    def radius(self) -> float:
+        """Of the body."""
+        return BODY_RADIUS * METRES.scale
+
+    @property
+    def full_speed(self) -> float:
+        """Of the body, mm/s."""
+        return self.task.full_step / self.task.dt * METRES.scale
+
+    def touch(self, pose: Pose, reach: float) -> Touch | None:
+        """The nearest thing, by its name."""
+        x, y = METRES.place_of(pose.x, pose.y)
+        near = _nearest(self.task, x, y)
+        gap, (away_x, away_y) = near.gap, near.away
+        if gap * METRES.scale > reach:
+            return None
+        wall = (x - gap * away_x, y - gap * away_y)
+        bearing = math.atan2(away_y, -away_x) - pose.heading
+        corner = _nearest_corner(near.outline, wall)
+        return Touch(
+            wall=_on_screen(wall),
+            bearing=math.remainder(bearing, 2.0 * math.pi),
+            gap=max(gap * METRES.scale - self.radius, 0.0),
+            border=near.name == FENCE,
+            corner=None if corner is None else _on_screen(corner),
+            thing=near.name,
+        )
+
+    def seen(self, touch: Touch, trajectory: Trajectory) -> str:
+        """Which infra-red sensor looks there, and what it read."""
+        off = np.abs(np.angle(np.exp(1j * (PLACES[:, 2] + touch.bearing))))
+        sensor, before = int(off.argmin()), max(trajectory.steps - 10, 0)
+        reading = f"ps{sensor} read {trajectory.ranges[before, sensor]:.0f}"
+        if off[sensor] > _OFF:
+            angle = math.degrees(float(off[sensor]))
+            return (
+                f"No sensor looks there: the nearest is {angle:.0f}° off; in step "
+                f"{before} {reading}."
+            )
+        return (
+            f"In step {before} {reading}, the sensor on that side (67: nothing near)."
+        )
+
+    def path_from(self, pose: Pose) -> Path:
+        """Shortest path to the goal."""
+        start = Pose(*METRES.place_of(pose.x, pose.y), 0.0)
+        return METRES.on_screen(self.task.path_from(start))
+
+    def pull(self, path: Path) -> list[Point]:
+        """Corners of a path after every shortcut that the body can take."""
+        return taut(path, self._free)
+
+    def _free(self, begin: Point, end: Point) -> bool:
+        """Whether the body gets straight from one place to another."""
+        (x, y), (to_x, to_y) = METRES.place_of(*begin), METRES.place_of(*end)
+        solid, heading = self.task.ground.solid, math.atan2(to_y - y, to_x - x)
+        length = math.hypot(to_x - x, to_y - y)
+        touch = first_touch(*solid.arrays(), x, y, heading, length, 0.0, BODY_RADIUS)
+        return touch > 1.0
+
+    def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
+        """Where the shortest path from each place first is so far away, or ends."""
+        for x, y in places.tolist():
+            path = self.path_from(Pose(x, y, 0.0))
+            yield first_beyond(path, x, y, far) if len(path) else None
+
+    def mistaken_goals(self) -> dict[str, Point]:
+        """X and y swapped, or a wrong sign."""
+        x, y = self.task.goal
+        places = {
+            "x and y swapped": (y, x),
+            "the sign of y wrong": (x, -y),
+            "the sign of x wrong": (-x, y),
+        }
+        screen = METRES.on_screen(list(places.values())).tolist()
+        return {name: (u, v) for name, (u, v) in zip(places, screen, strict=True)}
+
+
+class _Near(NamedTuple):
+    """What is nearest to a point.
+
+    Attributes:
+        name: Of the thing.
+        gap: Distance to it, m.
+        away: Unit vector that leads away from it.
+        outline: Its vertices, shape (n, 2), counter-clockwise; empty where they are
+            not those of the thing, which has several parts, or it has none.
+    """
+
+    name: str
+    gap: float
+    away: Point
+    outline: Points
+
+
+def _nearest(task: EPuckTask, x: float, y: float) -> _Near:
+    ground, none = task.ground, np.empty((0, 2))
+    found = []
+    for thing in ground.things:
+        parts = at_body_height(thing.solid, ground.floor)
+        prisms = Prisms.of(map(Owned, parts))
+        for part in range(len(parts)):
+            gap, *away = part_gap(*prisms.arrays(), part, x, y)
+            outline = prisms.outline(part) if len(parts) == 1 else none
+            way = (float(away[0]), float(away[1]))
+            found.append(_Near(_name(thing), float(gap), way, outline))
+    left, low, right, high = ground.bounds
+    found += [
+        _Near(FENCE, x - left, (1.0, 0.0), none),
+        _Near(FENCE, right - x, (-1.0, 0.0), none),
+        _Near(FENCE, y - low, (0.0, 1.0), none),
+        _Near(FENCE, high - y, (0.0, -1.0), none),
+    ]
+    return min(found, key=lambda near: near.gap)
+
+
+def _nearest_corner(outline: Points, point: Point) -> Point | None:
+    """The nearest sharp corner of an outline within a body radius of a point."""
+    if len(outline) < 3:
+        return None
+    back, ahead = np.roll(outline, 1, axis=0) - outline, np.roll(outline, -1, axis=0)
+    ahead = ahead - outline
+    cosine = (back * ahead).sum(axis=1) / np.hypot(*back.T) / np.hypot(*ahead.T)
+    sharp = outline[cosine > math.cos(BLUNTEST)].tolist()
+    near = [(math.dist(at, point), (at[0], at[1])) for at in sharp]
+    distance, corner = min(near, default=(math.inf, (0.0, 0.0)))
+    return corner if distance <= BODY_RADIUS else None
+
+
+def _on_screen(place: Point) -> Point:
+    x, y = METRES.on_screen([place])[0].tolist()
+    return x, y
+
+
+def _name(thing: Obstacle) -> str:
+    """`WoodenBox 'box 3'`, `wall of the arena`, `Rock`."""
+    if thing.kind in ("CircleArena", "RectangleArena"):
+        return "wall of the arena"
+    return f"{thing.kind} {thing.name!r}" if thing.name else thing.kind

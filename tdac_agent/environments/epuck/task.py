@@ -1,0 +1,178 @@
+"""Tasks in Webots worlds: what is theirs alone of a task file and a working folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.environments.epuck.flat_world import flat_world
+from tdac_agent.environments.epuck.params import EPuckParams, params_of
+from tdac_agent.tasks.setting import Original
+from tdac_agent.tasks.task_file import TaskFile
+from tdac_agent.tasks.units import METRES, Units
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.epuck.ground import Ground
+from tdac_envs.epuck.infrared import TABLE
+from tdac_envs.epuck.source import open_world
+from tdac_envs.epuck.task import TOLERANCE, EPuckTask, make_task
+from tdac_envs.worlds.bundled import bundled_worlds, world_file
+from tdac_envs.worlds.wbt.reader import load_world
+from tdac_envs.worlds.wbt.writer import write_world
+from tdac_envs.worlds.world import Unmodelled, World, check_modelled
+
+WORLD_FILE = "world.wbt"
+_MEAN_NOISE = float(TABLE[:, 2].mean())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EPuckSetting:
+    """A Webots world with a start and a goal.
+
+    Attributes:
+        params: Contents of `params.json`.
+        nominal: The feasible task, in the flat world.
+        text: The flat world file.
+        file: The world's own file.
+        left_out: Nodes that may be solid and are ignored, in words.
+    """
+
+    params: EPuckParams
+    nominal: EPuckTask
+    text: str
+    file: Path
+    left_out: tuple[str, ...]
+
+    @property
+    def original(self) -> Original | None:
+        """The world as it was given."""
+        return Original(f"original{self.file.suffix}", self.file)
+
+    @property
+    def units(self) -> Units:
+        """Metres."""
+        return METRES
+
+    @property
+    def suite(self) -> str:
+        """Table II."""
+        return "epuck"
+
+    def remarks(self) -> list[str]:
+        """What stands in the world."""
+        world = self.nominal.ground.world
+        kinds = Counter(t.kind for t in world.obstacles if t.solid)
+        counted = [f"{count} {kind}" for kind, count in kinds.most_common()]
+        floors = [arena.kind for arena in world.arenas]
+        return [f"world {self.file.name}: {', '.join(floors + counted)}"]
+
+    def env_kwargs(self) -> dict[str, Any]:
+        """Arguments that make this task's environment; see `EPuckEnv`."""
+        nominal = self.nominal
+        return {
+            "world": nominal.ground.world,
+            "start": tuple(nominal.start),
+            "goal": nominal.goal,
+            "goal_tolerance": nominal.goal_tolerance,
+            "dt": nominal.dt,
+            "horizon": nominal.horizon,
+            "max_wheel_speed": nominal.max_wheel_speed,
+        }
+
+    def make_env(self, **options: Any) -> EPuckEnv:
+        """The environment of this task; options as for `EPuckEnv`."""
+        return EPuckEnv(**{**self.env_kwargs(), **options})
+
+    def noise(self, relative: float) -> dict[str, float]:
+        """The published noise, which depends on the distance, with this mean."""
+        return {"sensor_noise": relative / _MEAN_NOISE}
+
+    def facts(self) -> dict[str, Any]:
+        """The arguments, the world by its hash, and what is missing in it."""
+        own = {"world": self.world_sha256(), "left_out": self.left_out}
+        return {**self.env_kwargs(), **own}
+
+    def world_sha256(self) -> str:
+        """Hash of the flat world file."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    def write_files(self, folder: Path) -> None:
+        """Writes `params.json` and `world.wbt`."""
+        params = json.dumps(self.params.model_dump(mode="json"), indent=2)
+        (folder / "params.json").write_text(f"{params}\n", encoding="utf-8")
+        (folder / WORLD_FILE).write_text(self.text, encoding="utf-8")
+
+    def preview(self) -> Image:
+        """The world from above."""
+        from tdac_envs.worlds.picture import draw_world
+
+        return draw_world(self.nominal.ground.world)
+
+    def portable(self) -> dict[str, Any]:
+        """The world is the folder's flat one, in which nothing is left to ignore."""
+        own: dict[str, Any] = {"world": WORLD_FILE}
+        if self.left_out:
+            own["left_out"] = list(self.left_out)
+        return own
+
+
+def open_epuck(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
+    """The world's name, and the feasible task in it.
+
+    Args:
+        spec: Contents of the task file.
+        base: Folder that relative paths refer to.
+
+    Raises:
+        WorldError: The world cannot be read, or has nodes that are not modelled.
+        TaskError: The task cannot be done, or there is no goal or no start.
+    """
+    bundled = spec.world in bundled_worlds()
+    file = world_file(spec.world if bundled else str(base / spec.world))
+    world = load_world(file)
+    ignored = check_modelled(world, spec.ignore)
+    if spec.goal is None and world.goal is None:
+        raise TaskError(
+            f"{world.source} names no goal: give one, --goal X Y in metres "
+            "(`goal: [X, Y]` in a task.yaml)"
+        )
+    if spec.start is None and not world.robots:
+        raise TaskError(
+            f"{world.source} has no e-puck in it: give its place, --start X Y YAW in "
+            "metres and rad (`start: [X, Y, YAW]` in a task.yaml)"
+        )
+    left_out = spec.left_out or tuple(map(_in_words, ignored))
+    setting = _setting(world, file, spec, left_out)
+    return file.stem, setting
+
+
+def _setting(
+    world: World, file: Path, spec: TaskFile, left_out: tuple[str, ...]
+) -> EPuckSetting:
+    dt = world.time_step / 1e3 if spec.dt is None else spec.dt
+    opened = open_world(world, spec.start, spec.goal, spec.ignore)
+    flat = flat_world(opened, dt)
+    assert flat.goal is not None
+    nominal = make_task(
+        Ground.of(flat),
+        flat.robot.pose,
+        flat.goal,
+        max_wheel_speed=flat.robot.max_wheel_speed,
+        dt=dt,
+        goal_tolerance=TOLERANCE if spec.tolerance is None else spec.tolerance,
+        horizon=spec.horizon,
+    )
+    text = write_world(flat)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    params = params_of(nominal, file.name, digest, world.notes)
+    return EPuckSetting(params, nominal, text, file, left_out)
+
+
+def _in_words(node: Unmodelled) -> str:
+    name = f"{node.kind} {node.name!r}" if node.name else node.kind
+    return f"{name} at ({node.x:g}, {node.y:g})"

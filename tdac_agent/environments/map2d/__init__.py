@@ -1,0 +1,1 @@
+"""TDAC-Map2D-v0: its tasks, pictures and surroundings."""

@@ -1,0 +1,61 @@
+"""Pictures of episodes on a map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from tdac_agent.environments.map2d.task import Map2DSetting
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.tasks.units import Points
+from tdac_envs.drawing.backdrop import Background
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.map2d.picture import Scene, Status, trajectory_picture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapPictures:
+    """See `Pictures`."""
+
+    setting: Map2DSetting
+
+    def backdrop(self) -> Background:
+        """The map."""
+        return Background.of(self.setting.nominal)
+
+    def trajectories(
+        self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
+    ) -> Image:
+        """The map with each trajectory."""
+        nominal = self.setting.nominal
+        return trajectory_picture(
+            nominal.terrain.grid.cells,
+            runs,
+            nominal.start,
+            nominal.goal,
+            goal_tolerance=nominal.goal_tolerance,
+            radius=nominal.robot.radius,
+            path=nominal.path_from(nominal.start),
+            outcomes=outcomes,
+            labels=labels,
+        )
+
+    def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
+        """Frames of the robot with its rays."""
+        nominal, trajectory = self.setting.nominal, rollout.trajectory
+        scene = Scene(
+            nominal.terrain.grid.cells,
+            trajectory.poses[0].tolist(),
+            nominal.goal,
+            goal_tolerance=nominal.goal_tolerance,
+            robot=nominal.robot,
+            path=nominal.path_from(nominal.start),
+            robot_image=self.setting.robot_image,
+        )
+        gaps, last = rollout.distances("euclidean"), trajectory.steps
+        for step in rollout.trajectory.every(stride):
+            outcome = rollout.outcome if step == last else ""
+            status = Status(step, nominal.horizon, float(gaps[step]), outcome)
+            trail = trajectory.poses[: step + 1, :2]
+            pose = trajectory.poses[step].tolist()
+            yield scene.frame(pose, trajectory.ranges[step], trail, status)

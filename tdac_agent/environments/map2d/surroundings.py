@@ -1,0 +1,92 @@
+"""A map as a diagnosis asks about it; px."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.tasks.units import PIXELS, Points, Units
+from tdac_agent.verification.diagnosis.touch import Touch, nearest_touch
+from tdac_agent.verification.suite.reference import pull
+from tdac_envs.grid.grid import body_free
+from tdac_envs.grid.plan import Path, descend, first_beyond
+from tdac_envs.map2d.task import Map2DTask, Pose
+from tdac_envs.map2d.terrain import entry
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapSurroundings:
+    """The map of a task; see `Surroundings`."""
+
+    task: Map2DTask
+
+    @property
+    def units(self) -> Units:
+        """Pixels."""
+        return PIXELS
+
+    @property
+    def radius(self) -> float:
+        """Of the body."""
+        return self.task.robot.radius
+
+    @property
+    def full_speed(self) -> float:
+        """Of the body, px/s."""
+        return self.task.robot.max_wheel_speed
+
+    def touch(self, pose: Pose, reach: float) -> Touch | None:
+        """The nearest wall."""
+        return nearest_touch(self.task, pose, reach)
+
+    def seen(self, touch: Touch, trajectory: Trajectory) -> str:
+        """Whether a ray of the fan looks there."""
+        half = self.task.robot.field_of_view_deg / 2.0
+        off = abs(math.degrees(touch.bearing))
+        if off > half:
+            digits = 1 if off < half + 1.0 else 0
+            return (
+                f"No ray looks there: {off:.{digits}f}° off the heading, the fan has "
+                f"±{half:g}°."
+            )
+        earlier = min(trajectory.steps, 10)
+        shortest = float(trajectory.ranges[trajectory.steps - earlier].min())
+        return (
+            f"{earlier} steps earlier the shortest ray read {shortest:.1f} px from the "
+            "centre."
+        )
+
+    def path_from(self, pose: Pose) -> Path:
+        """Shortest path to the goal."""
+        return self.task.path_from(pose)
+
+    def pull(self, path: Path) -> list[Point]:
+        """Corners of a path."""
+        return pull(self.task, path)
+
+    def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
+        """Where the shortest path from each place first is so far away, or ends."""
+        task = self.task
+        free = body_free(task.terrain.clear, task.robot.radius)
+        field = np.asarray(task.field, np.float64)
+        for x, y in places.tolist():
+            first = entry(task.terrain, task.field, x, y, task.robot.radius)
+            if first is None:
+                yield None
+                continue
+            yield first_beyond(descend(free, field, first), x, y, far)
+
+    def mistaken_goals(self) -> dict[str, Point]:
+        """X and y swapped, or counted from the other side."""
+        grid, (x, y) = self.task.terrain.grid, self.task.goal
+        return {
+            "x and y swapped": (y, x),
+            "y counted from the lower side of the map": (x, grid.height - 1 - y),
+            "x counted from the right side of the map": (grid.width - 1 - x, y),
+        }

@@ -1,0 +1,215 @@
+"""Tasks on maps: what is theirs alone of a `task.yaml` and of a working folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from tdac_agent.tasks.setting import Original, Setting
+from tdac_agent.tasks.task_file import RobotSpec, TaskFile
+from tdac_agent.tasks.units import PIXELS, Units
+from tdac_envs.core.errors import MapError, TaskError
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.grid.grid import OccupancyGrid
+from tdac_envs.map2d.env import Map2DEnv
+from tdac_envs.map2d.picture import ROBOT_IMAGE
+from tdac_envs.map2d.source import prepare
+from tdac_envs.map2d.task import Map2DTask, Pose, Terrain, make_task
+from tdac_envs.mapping.bundled import bundled_maps
+from tdac_envs.mapping.image import picture_size, read_bytes
+from tdac_envs.mapping.map_folder import preview_of, write_grid
+from tdac_envs.mapping.params import MapParams, RobotParams, Said
+from tdac_envs.mapping.preprocessing import as_image
+
+DT = 0.05
+ROBOT_IMAGE_BYTES = 16_000_000
+ROBOT_IMAGE_PIXELS = 4_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Map2DSetting:
+    """A map with a start, a goal and a robot.
+
+    Attributes:
+        params: Of the map, start, goal and robot filled in.
+        nominal: The feasible task.
+        image: Map image, where there is one.
+        robot_image: Picture of the robot.
+    """
+
+    params: MapParams
+    nominal: Map2DTask
+    image: Path | None
+    robot_image: Path
+
+    @property
+    def original(self) -> Original | None:
+        """The map image."""
+        if self.image is None:
+            return None
+        return Original(f"map{self.image.suffix}", self.image)
+
+    @property
+    def units(self) -> Units:
+        """Pixels."""
+        return PIXELS
+
+    @property
+    def suite(self) -> str:
+        """Table I."""
+        return "map2d"
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Nothing: a map is all there is."""
+        return ()
+
+    def remarks(self) -> list[str]:
+        """How the image was read."""
+        params = self.params
+        if params.method == "given":
+            return []
+        return [f"map: {params.polarity} obstacles, {params.method}"]
+
+    def env_kwargs(self) -> dict[str, Any]:
+        """Arguments that make this task's environment; see `Map2DEnv`."""
+        nominal, robot = self.nominal, self.nominal.robot
+        return {
+            "map": nominal.terrain.grid.cells,
+            "start": tuple(nominal.start),
+            "goal": nominal.goal,
+            "robot_radius": robot.radius,
+            "axle_length": robot.axle_length,
+            "max_wheel_speed": robot.max_wheel_speed,
+            "n_rays": robot.n_rays,
+            "field_of_view": robot.field_of_view_deg,
+            "range_max": robot.range_max,
+            "dt": nominal.dt,
+            "horizon": nominal.horizon,
+            "goal_tolerance": nominal.goal_tolerance,
+        }
+
+    def make_env(self, **options: Any) -> Map2DEnv:
+        """The environment of this task; options as for `Map2DEnv`."""
+        return Map2DEnv(**{**self.env_kwargs(), **options})
+
+    def noise(self, relative: float) -> dict[str, float]:
+        """Each range has it."""
+        return {"range_noise": relative}
+
+    def facts(self) -> dict[str, Any]:
+        """The arguments, the map by its hash."""
+        return {**self.env_kwargs(), "map": self.world_sha256()}
+
+    def world_sha256(self) -> str:
+        """Hash of the grid."""
+        return self.nominal.terrain.grid.sha256()
+
+    def write_files(self, folder: Path) -> None:
+        """Writes `params.json`, `occupancy.npy`, `occupancy.png` and `robot.png`."""
+        write_grid(folder, self.nominal.terrain.grid, self.params)
+        (folder / "robot.png").write_bytes(read_bytes(self.robot_image))
+
+    def preview(self) -> Image:
+        """The map image, what of it is free, start, goal and the way."""
+        grid = self.nominal.terrain.grid
+        shown = grid.cells if self.image is None else self.image
+        return preview_of(as_image(shown).colour, grid, self.params)
+
+    def portable(self) -> dict[str, Any]:
+        """The map is the folder's own grid."""
+        robot = self.nominal.robot
+        return {
+            "map": ".",
+            "robot": {
+                "radius": robot.radius,
+                "axle": robot.axle_length,
+                "max_wheel_speed": robot.max_wheel_speed,
+                "n_rays": robot.n_rays,
+                "field_of_view": robot.field_of_view_deg,
+                "range_max": robot.range_max,
+                "image": "robot.png",
+            },
+        }
+
+
+def map_setting(setting: Setting) -> Map2DSetting:
+    """The setting, which must be a map's."""
+    if not isinstance(setting, Map2DSetting):
+        raise TypeError(f"expected a Map2DSetting, got {type(setting).__name__}")
+    return setting
+
+
+def open_map(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
+    """The map's name, and the feasible task on it.
+
+    Args:
+        spec: Contents of the task file.
+        base: Folder that relative paths refer to.
+
+    Raises:
+        MapError: The map cannot be used.
+        TaskError: The task cannot be done, or the robot's picture is none.
+    """
+    bundled = spec.map in bundled_maps()
+    prepared = prepare(
+        spec.map if bundled else str(base / spec.map),
+        spec.start,
+        spec.goal,
+        robot_radius=spec.robot.radius,
+        snap=spec.snap,
+        said=Said(spec.polarity, spec.threshold),
+    )
+    params = _with_robot(prepared.params, spec.robot)
+    nominal = _feasible(prepared.grid, params, spec)
+    robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
+    if not robot_image.is_file():
+        raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
+    if spec.robot.image is not None:
+        _check_robot_image(robot_image)
+    name = spec.map if bundled else Path(spec.map).stem
+    return name, Map2DSetting(params, nominal, prepared.image, robot_image)
+
+
+def _check_robot_image(file: Path) -> None:
+    """Refuses a picture that cannot be drawn, or is too large for that.
+
+    Raises:
+        TaskError: It is one.
+    """
+    try:
+        width, height = picture_size(read_bytes(file, ROBOT_IMAGE_BYTES), file.name)
+    except MapError as error:
+        raise TaskError(f"the robot image: {error}") from error
+    if not cv2.haveImageReader(str(file)):
+        raise TaskError(f"the robot image {str(file)!r} is not a PNG or JPEG")
+    if width * height > ROBOT_IMAGE_PIXELS:
+        raise TaskError(
+            f"the robot image {str(file)!r} has {width} x {height} pixels; the limit "
+            f"is {ROBOT_IMAGE_PIXELS / 1e6:g} megapixels: scale it down"
+        )
+
+
+def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
+    given = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
+    fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
+    changes = {fields.get(key, key): value for key, value in given.items()}
+    robot = RobotParams(**{**params.robot.model_dump(), **changes})
+    return params.model_copy(update={"robot": robot})
+
+
+def _feasible(grid: OccupancyGrid, params: MapParams, spec: TaskFile) -> Map2DTask:
+    assert params.start is not None
+    assert params.goal is not None
+    return make_task(
+        Terrain.of(grid),
+        Pose(*params.start, params.heading),
+        params.goal,
+        params.robot,
+        dt=DT if spec.dt is None else spec.dt,
+        goal_tolerance=spec.tolerance,
+        horizon=spec.horizon,
+    )

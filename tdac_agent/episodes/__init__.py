@@ -1,0 +1,1 @@
+"""Judged episodes: who drives, what is recorded, how it is drawn."""

@@ -1,0 +1,1 @@
+"""Policies of any kind on the same tasks, from the same seeds."""

@@ -1,0 +1,143 @@
+"""The policies of an evaluation, from the words that name them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tdac_agent.episodes.learned import check_kind
+from tdac_agent.episodes.sb3_file import MOST_BYTES, load_weights, read_policy
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.task_file import TASK_FILE, read_task_file
+from tdac_agent.verification.judge.contenders import Contender, Kind
+from tdac_agent.verification.verify import read_source
+from tdac_envs.core.errors import TaskError, hint
+from tdac_envs.core.intake import read_file
+from tdac_envs.learning.wrappers import WRAPPERS, check_wrappers
+
+OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
+BUILTIN = "builtin"
+
+
+@dataclass(frozen=True, slots=True)
+class Entrant:
+    """A policy as the user named it.
+
+    Attributes:
+        name: In tables and files.
+        contender: Who drives; of `builtin`, whose file is written for each task, a
+            controller without a file.
+        sha256: Of its file.
+        env: Environment that it was written for, where its run folder says so.
+    """
+
+    name: str
+    contender: Contender
+    sha256: str | None = None
+    env: str | None = None
+
+    @property
+    def is_builtin(self) -> bool:
+        """Whether a controller is written for each task."""
+        return self.contender.kind == "controller" and self.contender.file is None
+
+
+def entrants_of(
+    policies: Sequence[str | Path], wrappers: Sequence[str] | None = None
+) -> tuple[Entrant, ...]:
+    """The entrants that some words or paths name.
+
+    Args:
+        policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
+            controller files, run folders, policies saved by stable-baselines3.
+        wrappers: Of saved policies that do not say which they were trained with.
+
+    Raises:
+        TaskError: There is none, one comes twice, or a wrapper is unknown.
+        ControllerFileError: A file is missing or is no policy.
+    """
+    for name in wrappers or ():
+        if name not in WRAPPERS:
+            known = ", ".join(WRAPPERS)
+            raise TaskError(f"unknown wrapper {name!r}; expected some of {known}")
+    found = tuple(_entrant(str(policy), wrappers) for policy in policies)
+    if not found:
+        raise TaskError("expected at least one policy to evaluate")
+    names = [entrant.name for entrant in found]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise TaskError(f"the policy {twice[0]!r} is given twice")
+    return found
+
+
+def _entrant(word: str, wrappers: Sequence[str] | None) -> Entrant:
+    if word in OURS:
+        return Entrant(word, Contender(word))
+    if word == BUILTIN:
+        return Entrant(word, Contender("controller"))
+    path = Path(word)
+    if path.is_dir():
+        return replace(_controller(word, path / "controller.py"), env=_env_of(path))
+    if not path.is_file():
+        names = (*OURS, BUILTIN)
+        raise ControllerFileError(
+            f"no policy {word!r}: expected a controller.py, a run folder, a .zip of "
+            f"stable-baselines3, or one of {', '.join(sorted(names))}"
+            f"{hint(word, names)}"
+        )
+    if path.suffix == ".zip":
+        return _learned(word, path, wrappers)
+    return _controller(word, path)
+
+
+def _controller(word: str, file: Path) -> Entrant:
+    if not file.is_file():
+        raise ControllerFileError(f"no controller.py in {word!r}")
+    sha256 = sha256_of(read_source(file))
+    return Entrant(word, Contender("controller", file.resolve()), sha256)
+
+
+def _env_of(run_folder: Path) -> str | None:
+    file = run_folder / TASK_FILE
+    try:
+        return read_task_file(file, file).env
+    except TaskError:
+        return None
+
+
+def _learned(word: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
+    found = read_policy(file)
+    saved = found.saved
+    if saved is not None:
+        names = saved.wrappers
+    elif wrappers is not None:
+        names = tuple(wrappers)
+    else:
+        known = ", ".join(WRAPPERS)
+        raise ControllerFileError(
+            f"{word!r} does not say which observations it was trained with: give "
+            f"--wrapper NAME for each of its wrappers ({known}), or --wrapper none"
+        )
+    check_wrappers(names)
+    check_kind(found)
+    load_weights(found.weights)
+    sha256 = sha256_of(read_file(file, MOST_BYTES))
+    return Entrant(word, Contender("sb3", file.resolve(), names), sha256)
+
+
+def write_builtin(task: Task) -> tuple[bytes, bool]:
+    """What `tdac synth` without a model writes for a task, and whether it is verified.
+
+    Where nothing is verified, it is the last candidate.
+    """
+    with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
+        run = synthesize(task, BUILTIN, out=Path(name) / "run")
+        if run.verified:
+            return run.controller.read_bytes(), True
+        candidates = sorted((run.folder / "iterations").rglob("controller.py"))
+        return candidates[-1].read_bytes(), False

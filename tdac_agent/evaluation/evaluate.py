@@ -1,0 +1,245 @@
+"""Evaluation: policies of any kind on the same tasks, from the same seeds."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import itertools
+import platform
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_agent.evaluation.entrants import Entrant, entrants_of, write_builtin
+from tdac_agent.evaluation.evaluation_report import (
+    EvaluatedPolicy,
+    EvaluatedTask,
+    Evaluation,
+    Result,
+    Timing,
+    comparisons_of,
+    row_of,
+    timing_of,
+)
+from tdac_agent.evaluation.overlay import Overlay, draw_overlay
+from tdac_agent.evaluation.seeded_run import run_seeds
+from tdac_agent.sandbox import Limits
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.provenance import VERSIONED, sha256_of
+from tdac_agent.tasks.task import Task, called, lay_out, load_task
+from tdac_agent.verification.diagnosis.measures import Measured
+from tdac_agent.verification.judge.seeded import CALLS_FILE, POSES_FILE, SeededJob
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.arguments import one_of, whole_number
+from tdac_envs.core.errors import TaskError
+from tdac_envs.map2d.env import VARIATIONS
+
+EPISODES = 100
+NO_DISTURBANCE = Disturbance(0.0, 0.0, 0.0, 0)
+NOT_VERIFIED = "tdac synth verified none here: its last candidate"
+# Told where what goes on: the task, the policy, episodes and successes so far.
+Watch = Callable[[str, str, int, int], None]
+
+
+def evaluate(
+    policies: Sequence[str | Path],
+    tasks: Sequence[Task | str | Path] = ("maze",),
+    episodes: int = EPISODES,
+    *,
+    seed: int = 0,
+    variation: str = "jitter",
+    wrappers: Sequence[str] | None = None,
+    tier: str = "auto",
+    limits: Limits | None = None,
+    out: Path | None = None,
+    judge: WarmJudge | None = None,
+    watch: Watch | None = None,
+) -> Evaluation:
+    """Lets policies drive the same episodes, and compares them.
+
+    The episodes of a seed are the same for all: their seeds are drawn from it, and an
+    environment draws start and noise from its own. Controllers run in the sandbox, in a
+    fresh process for each episode; of saved networks only the weights are read.
+
+    Args:
+        policies: Any mix of controller files, run folders, `.zip` files saved by
+            stable-baselines3, and the names `reference`, `builtin`, `random`,
+            `go-to-goal` and `follow-guidance`.
+        tasks: Tasks, or what `load_task` takes.
+        episodes: Of each policy on each task.
+        seed: Of the episodes.
+        variation: Of the starts: `nominal`, `jitter`, `mixed`, or `random` with the
+            goals too.
+        wrappers: Of saved policies that do not say what they were trained with.
+        tier: Sandbox tier, `auto` for the best one here.
+        limits: Of a controller's process in each episode.
+        out: Folder for `evaluation.json`, `episodes.csv`, `timing.csv`, and a picture
+            of each task; none by default.
+        judge: A warm one; one of its own by default.
+        watch: Called now and then.
+
+    Returns:
+        The evaluation. A policy that fails, however it does, is a row of failures.
+
+    Raises:
+        TaskError: A task or a number makes no sense, or a run is of another
+            environment than a task.
+        ControllerFileError: A policy's file cannot be read.
+        Fault: The sandbox is broken.
+    """
+    whole_number("episodes", episodes, 1)
+    whole_number("seed", seed, 0)
+    one_of("variation", variation, VARIATIONS)
+    entrants = entrants_of(policies, wrappers)
+    loaded = load_tasks(tasks)
+    for entrant, task in itertools.product(entrants, loaded):
+        if entrant.env not in (None, task.spec.env):
+            raise TaskError(
+                f"{entrant.name} was written for {entrant.env}; the task "
+                f"{task.name!r} is of {task.spec.env}"
+            )
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    seeds = episode_seeds(seed, episodes)
+    results: list[Result] = []
+    timings: list[Timing] = []
+    with contextlib.ExitStack() as stack:
+        warm = judge or stack.enter_context(WarmJudge())
+        for task in loaded:
+            folder = Path(
+                stack.enter_context(
+                    tempfile.TemporaryDirectory(prefix="tdac-evaluate-")
+                )
+            )
+            job = SeededJob(
+                task=lay_out(task, folder / "work"),
+                contender=entrants[0].contender,
+                disturbance=NO_DISTURBANCE,
+                variation=variation,
+                seeds=seeds,
+                test=None,
+                measured=True,
+                tier=tier,
+                limits=limits or Limits(),
+                out=folder / "results",
+            )
+            overlays = []
+            for number, entrant in enumerate(entrants):
+                at = job.model_copy(update={"out": folder / f"results-{number}"})
+                result, calls, poses = _compete(entrant, task, at, warm, watch)
+                results.append(result)
+                timings.append(timing_of(task.name, entrant.name, calls))
+                overlays.append(Overlay.of(result, poses))
+            if out is not None:
+                draw_overlay(task, overlays, out / f"{task.name}.png")
+    found = Evaluation(
+        variation=variation,
+        seed=seed,
+        episodes=episodes,
+        tasks=tuple(map(_about_task, loaded)),
+        policies=tuple(map(_about_policy, entrants)),
+        rows=tuple(map(row_of, results)),
+        comparisons=comparisons_of(results),
+        versions=_versions(),
+        results=tuple(results),
+        timings=tuple(timings),
+    )
+    if out is not None:
+        write_evaluation(found, out)
+    return found
+
+
+def episode_seeds(seed: int, episodes: int) -> tuple[int, ...]:
+    """The seeds of the episodes of an evaluation, drawn from its own."""
+    return tuple(np.random.SeedSequence(seed).generate_state(episodes).tolist())
+
+
+def write_evaluation(found: Evaluation, out: Path) -> None:
+    """Writes the figures into a folder; what the clock says is in a file of its own."""
+    write_atomic(out / "evaluation.json", found.model_dump_json(indent=2) + "\n")
+    write_atomic(out / "episodes.csv", found.to_frame().to_csv(index=False))
+    write_atomic(out / "timing.csv", found.timing_frame().to_csv(index=False))
+
+
+def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:
+    """Some tasks, as they are or as `load_task` reads them.
+
+    Raises:
+        TaskError: There is none, one cannot be used, or two have one name, by which
+            figures and pictures go.
+    """
+    loaded = [task if isinstance(task, Task) else load_task(task) for task in tasks]
+    if not loaded:
+        raise TaskError("expected at least one task")
+    names = [task.name for task in loaded]
+    for name in names:
+        if names.count(name) > 1:
+            raise TaskError(f"two tasks are called {name!r}: evaluate them one by one")
+    return loaded
+
+
+def _compete(
+    entrant: Entrant, task: Task, job: SeededJob, judge: WarmJudge, watch: Watch | None
+) -> tuple[Result, NDArray[np.float32], list[NDArray[np.float32]]]:
+    """The episodes of one policy on one task, seconds of its calls, and its poses."""
+    contender, sha256, note = entrant.contender, entrant.sha256, None
+    if entrant.is_builtin:
+        if watch is not None:
+            watch(task.name, entrant.name, 0, 0)
+        source, verified = write_builtin(task)
+        file = job.out.with_suffix(".py")
+        file.write_bytes(source)
+        contender, sha256 = replace(contender, file=file), sha256_of(source)
+        note = None if verified else NOT_VERIFIED
+
+    def seen(count: int, successes: int) -> None:
+        if watch is not None:
+            watch(task.name, entrant.name, count, successes)
+
+    seen(0, 0)
+    asked = job.model_copy(update={"contender": contender})
+    episodes, ending = run_seeds(asked, task.nominal, Measured, judge, seen)
+    result = Result(
+        task=task.name,
+        policy=entrant.name,
+        knows=contender.knows,
+        episodes=tuple(episodes),
+        sandbox=ending.tier,
+        controller_sha256=sha256,
+        note=note,
+    )
+    with np.load(job.out / POSES_FILE) as poses:
+        ways = [poses[f"arr_{number}"] for number in range(len(episodes))]
+    return result, np.load(job.out / CALLS_FILE), ways
+
+
+def _about_task(task: Task) -> EvaluatedTask:
+    return EvaluatedTask(
+        name=task.name,
+        called=called(task),
+        task_sha256=task.sha256(),
+        map_sha256=task.setting.world_sha256(),
+        unit=task.setting.units.place,
+        body_radius=task.nominal.body_radius,
+    )
+
+
+def _about_policy(entrant: Entrant) -> EvaluatedPolicy:
+    contender = entrant.contender
+    return EvaluatedPolicy(
+        name=entrant.name,
+        kind=contender.kind,
+        knows=contender.knows,
+        wrappers=contender.wrappers,
+        sha256=entrant.sha256,
+    )
+
+
+def _versions() -> dict[str, str]:
+    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
+    return {"python": platform.python_version(), **versions}

@@ -1,0 +1,137 @@
+"""One picture of a task with the ways of all policies laid over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.evaluation.evaluation_report import Result
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.figures import write_png
+from tdac_envs.drawing.canvas import (
+    GREY,
+    INK,
+    PAPER,
+    Canvas,
+    Colour,
+    Image,
+    blank,
+    write_text,
+)
+
+# Okabe and Ito's, told apart by all kinds of colour vision, without black and yellow.
+COLOURS: tuple[Colour, ...] = (
+    (0, 114, 178),
+    (213, 94, 0),
+    (0, 158, 115),
+    (204, 121, 167),
+    (230, 159, 0),
+    (86, 180, 233),
+)
+_ROW, _SWATCH = 22, 24
+# How much all ways of a policy cover where they run over each other.
+_COVER = 0.85
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overlay:
+    """The ways of one policy.
+
+    Attributes:
+        label: Who, and how many reached the goal.
+        ways: Each of shape (T + 1, 3).
+        collided: Whether each ended at a wall.
+    """
+
+    label: str
+    ways: Sequence[NDArray[np.float32]]
+    collided: Sequence[bool]
+
+    @classmethod
+    def of(cls, result: Result, ways: Sequence[NDArray[np.float32]]) -> Overlay:
+        """That of a result."""
+        reached = sum(episode.success for episode in result.episodes)
+        label = f"{result.policy}: {reached} of {len(result.episodes)}"
+        ascii_label = label.encode("ascii", "replace").decode()
+        touched = [episode.collisions > 0 for episode in result.episodes]
+        return cls(ascii_label, ways, touched)
+
+
+def draw_overlay(task: Task, overlays: Sequence[Overlay], path: Path) -> None:
+    """Writes a PNG of the map or the world with the ways of all policies."""
+    write_png(overlay_picture(task, overlays), path)
+
+
+def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
+    """The map or the world with all ways, and a legend, uint8 RGB.
+
+    The first policy lies on top; a dot is where a robot touched something.
+    """
+    chart = pictures_of(task.setting).backdrop().whole()
+    canvas = chart.canvas
+    for number, overlay in reversed(list(enumerate(overlays))):
+        colour = COLOURS[number % len(COLOURS)]
+        places = [
+            canvas.to_frame(chart.at(np.asarray(way[:, :2], np.float64)))
+            for way in overlay.ways
+        ]
+        _draw_ways(canvas.image, places, colour)
+        _draw_contacts(canvas.image, places, overlay.collided, colour)
+    return np.vstack([canvas.image, _legend(overlays, canvas.image.shape[1])])
+
+
+def _draw_ways(
+    image: Image, ways: Sequence[NDArray[np.float64]], colour: Colour
+) -> None:
+    """Lays lines over a picture, the denser the more of them there are at a place."""
+    count = np.zeros(image.shape[:2], np.float32)
+    for way in ways:
+        line = np.zeros(image.shape[:2], np.uint8)
+        fixed = np.rint(way * 16.0).astype(np.int32)
+        cv2.polylines(line, [fixed], False, 255, 2, cv2.LINE_AA, 4)
+        count += line
+    # A single way is seen, and where all run there is nearly nothing else.
+    each = max(0.25, 1.0 - (1.0 - _COVER) ** (3.0 / max(len(ways), 1)))
+    cover = _COVER * (1.0 - (1.0 - each) ** (count / 255.0))[..., None]
+    image[...] = np.rint(image * (1.0 - cover) + np.array(colour) * cover)
+
+
+def _draw_contacts(
+    image: Image,
+    ways: Sequence[NDArray[np.float64]],
+    collided: Sequence[bool],
+    colour: Colour,
+) -> None:
+    for way, touched in zip(ways, collided, strict=True):
+        if touched:
+            x, y = (round(16.0 * value) for value in way[-1])
+            cv2.circle(image, (x, y), 72, INK, cv2.FILLED, cv2.LINE_AA, 4)
+            cv2.circle(image, (x, y), 52, colour, cv2.FILLED, cv2.LINE_AA, 4)
+
+
+def _legend(overlays: Sequence[Overlay], width: int) -> Image:
+    """Colours and labels, in as many rows as they need."""
+    entries = [(COLOURS[n % len(COLOURS)], o.label) for n, o in enumerate(overlays)]
+    entries.append((GREY, "shortest path"))
+    rows: list[list[tuple[int, Colour, str]]] = [[]]
+    x = 10
+    for colour, text in entries:
+        taken = _SWATCH + 22 + Canvas.text_width(text)
+        if rows[-1] and x + taken > width:
+            rows.append([])
+            x = 10
+        rows[-1].append((x, colour, text))
+        x += taken
+    strip = blank(12 + _ROW * len(rows), width, PAPER)
+    for number, row in enumerate(rows):
+        baseline = 21 + _ROW * number
+        for x, colour, text in row:
+            strip[baseline - 7 : baseline - 3, x : x + _SWATCH - 6] = colour
+            write_text(strip, x + _SWATCH, baseline, text, INK)
+    return strip

@@ -1,0 +1,144 @@
+"""`robust.json`: how often a controller gets there when it is disturbed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Literal
+
+from pydantic import ConfigDict, Field
+
+from tdac_agent.episodes.trajectory import Outcome
+from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.units import Place
+from tdac_agent.verification.judge.seeded import SeededEpisode
+from tdac_agent.verification.judge.sequential import (
+    Characteristics,
+    Decision,
+    SequentialTest,
+)
+
+WORST = 20
+
+
+class _Record(PrintableRecord):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RobustProvenance(_Record):
+    """What the figures are about; together with a seed, all of an episode."""
+
+    task: str
+    task_sha256: str
+    unit: Place = Field("px", description="Of places and lengths.")
+    left_out: tuple[str, ...] = Field(
+        (), description="Nodes of the world that may be solid and were ignored."
+    )
+    map_sha256: str = Field(description="Of the map or the world.")
+    params_sha256: str
+    sensors_sha256: str
+    controller_sha256: str
+    disturbance: Disturbance
+    first_seed: int
+    sandbox: str = Field(description="Tier that held the controller.")
+    limits: dict[str, float] = Field(description="Of each episode.")
+    warnings: tuple[str, ...] = ()
+    versions: dict[str, str]
+
+
+class Interval(_Record):
+    """An interval that holds the true success rate with some confidence.
+
+    Exact (Clopper and Pearson 1934): for any rate it holds it at least so often.
+    """
+
+    low: float
+    high: float
+    confidence: float
+    method: Literal["Clopper-Pearson"] = "Clopper-Pearson"
+
+
+class SequentialResult(_Record):
+    """What a sequential test decided, and how often such a test errs."""
+
+    decision: Decision
+    test: SequentialTest
+    refuse_at: float = Field(description="Rate that must not be accepted.")
+    at_refused_rate: Characteristics
+    at_accepted_rate: Characteristics
+
+
+class RobustReport(_Record):
+    """A robust verification: independent episodes, each from its seed."""
+
+    schema_version: Literal[1] = 1
+    provenance: RobustProvenance
+    episodes: int = Field(description="That count; with a test, up to its decision.")
+    successes: int = Field(description="Goal reached, no contact, no error.")
+    rate: float | None = Field(description="None with a test: it would be biased.")
+    interval: Interval | None = Field(description="None with a test, likewise.")
+    outcomes: dict[Outcome, int]
+    time_outs: int = Field(
+        description="Failures by time-out: perhaps of a busy machine."
+    )
+    failed_seeds: tuple[int, ...]
+    worst: tuple[SeededEpisode, ...] = Field(description="The worst first.")
+    sequential: SequentialResult | None = None
+    child_cpu_seconds: float
+    seconds: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the sequential test accepts; True where there was none."""
+        return self.sequential is None or self.sequential.decision == "accepted"
+
+
+def summarise(
+    provenance: RobustProvenance,
+    episodes: Sequence[SeededEpisode],
+    test: SequentialTest | None,
+    seconds: float,
+) -> RobustReport:
+    """The report of some episodes, which are in the order of their seeds."""
+    failed = [episode.seed for episode in episodes if not episode.success]
+    count, successes = len(episodes), len(episodes) - len(failed)
+    return RobustReport(
+        provenance=provenance,
+        episodes=count,
+        successes=successes,
+        rate=None if test else successes / count,
+        interval=None if test else success_interval(successes, count),
+        outcomes=dict(Counter(e.outcome for e in episodes).most_common()),
+        time_outs=sum(e.cause == "time-out" for e in episodes),
+        failed_seeds=tuple(failed),
+        worst=tuple(sorted(episodes, key=badness)[:WORST]),
+        sequential=None if test is None else result_of(test, successes, len(failed)),
+        child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
+        seconds=round(seconds, 3),
+    )
+
+
+def success_interval(successes: int, episodes: int) -> Interval:
+    """The exact interval of a success rate."""
+    low, high = exact_interval(successes, episodes)
+    return Interval(low=low, high=high, confidence=CONFIDENCE)
+
+
+def badness(episode: SeededEpisode) -> tuple[bool, float, int]:
+    """Sorts the worst first: failures by the share of the way left, then the slow."""
+    if episode.success:
+        return True, -episode.steps, episode.seed
+    return False, -episode.d_min / episode.d0, episode.seed
+
+
+def result_of(test: SequentialTest, successes: int, failures: int) -> SequentialResult:
+    """What a test decides on some episodes, with its error rates."""
+    return SequentialResult(
+        decision=test.decide(successes, failures),
+        test=test,
+        refuse_at=test.refuse_at,
+        at_refused_rate=test.characteristics(test.refuse_at),
+        at_accepted_rate=test.characteristics(test.accept_at),
+    )

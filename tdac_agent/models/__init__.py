@@ -1,0 +1,1 @@
+"""Language models: one module per provider, prices, budget, retries."""

@@ -1,0 +1,95 @@
+"""`command:PROGRAM ARGS`: any program; prompt on its stdin, answer on its stdout."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+from contextlib import suppress
+
+from tdac_agent.errors import ProviderError
+from tdac_agent.models.choice import Options
+from tdac_agent.models.gathered import MAX_CHARS
+from tdac_agent.models.provider import ProviderFault, Reply, Request
+from tdac_agent.storage.secrets import one_line, without_secrets
+
+AFTER_KILL_SECONDS = 5.0
+
+
+def make(words: str, options: Options) -> Command:
+    """A program that answers.
+
+    Raises:
+        ProviderError: There is no such program, or the words cannot be split.
+    """
+    del options
+    try:
+        argv = shlex.split(words)
+    except ValueError as error:
+        raise ProviderError(f"cannot read command:{words}: {error}") from error
+    if not argv:
+        raise ProviderError("which program? As in command:'llm -m my-model'")
+    if shutil.which(argv[0]) is None:
+        raise ProviderError(f"there is no program {argv[0]!r} that can be run")
+    return Command(argv)
+
+
+class Command:
+    """A provider; see `Provider`. It is started anew for each question.
+
+    Args:
+        argv: Program and arguments.
+    """
+
+    paid = True
+
+    def __init__(self, argv: list[str]) -> None:
+        self.name = f"command:{without_secrets(shlex.join(argv))}"
+        self._argv = argv
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`."""
+        answer = self._run(request.prompt.encode("utf-8", "replace"), request.seconds)
+        text = answer.decode("utf-8", "replace")
+        if len(text) > MAX_CHARS:
+            raise ProviderFault(f"an answer of {len(text)} characters")
+        return Reply(without_secrets(text))
+
+    def _run(self, prompt: bytes, seconds: float) -> bytes:
+        """What the program writes; it and what it has started end with this call."""
+        pipe = subprocess.PIPE
+        try:
+            process = subprocess.Popen(
+                self._argv, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+            )
+        except OSError as error:
+            raise ProviderFault(f"it cannot be started: {error.strerror}") from None
+        try:
+            out, err = process.communicate(prompt, timeout=seconds)
+        except subprocess.TimeoutExpired:
+            raise ProviderFault(f"no answer in {seconds:.0f} s") from None
+        finally:
+            _end(process)
+        if process.returncode != 0:
+            last = err.decode("utf-8", "replace").strip().rpartition("\n")[2]
+            told = f": {last}" if last else ""
+            raise ProviderFault(one_line(f"{_ending(process)}{told}"))
+        return out
+
+
+def _ending(process: subprocess.Popen[bytes]) -> str:
+    code = process.returncode
+    return f"ended by signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Ends a program with all of its group, and takes back its pipes."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait(AFTER_KILL_SECONDS)
+    for pipe in (process.stdin, process.stdout, process.stderr):
+        if pipe is not None:
+            with suppress(OSError):
+                pipe.close()

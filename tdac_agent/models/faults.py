@@ -1,0 +1,154 @@
+"""What went wrong between a vendor's package and its server, in four kinds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+
+from tdac_agent.models.provider import PermanentFault, ProviderFault, RateLimited
+from tdac_agent.storage.secrets import one_line
+
+Headers = Mapping[str, str]
+
+# What a server may do again: a request time-out and a conflict pass, as do 5xx.
+PASSING = frozenset({408, 409, 425})
+# Words for the same in the body of an error, of both vendors. An error in the middle of
+# a stream has no other sign: its status is 200.
+LIMITED_WORDS = frozenset({"rate_limit_error", "rate_limit_exceeded"})
+PERMANENT_WORDS = frozenset(
+    {
+        *("invalid_request_error", "authentication_error", "permission_error"),
+        *("not_found_error", "request_too_large", "billing_error"),
+        *("insufficient_quota", "billing_hard_limit_reached", "invalid_api_key"),
+        *("model_not_found", "context_length_exceeded"),
+    }
+)
+
+
+def fault_of(error: Exception) -> ProviderFault:
+    """The fault that an error of a vendor's package stands for.
+
+    Args:
+        error: Of `anthropic` or `openai`, of the HTTP library below them, or what they
+            raise where an answer is not what they expect.
+    """
+    response = getattr(error, "response", None)
+    headers: Headers = getattr(response, "headers", {})
+    status = getattr(error, "status_code", None) or 200
+    words, told = _told(getattr(error, "body", None))
+    message = _message(error, status, words, told, headers)
+    kind = _kind(status, words)
+    fault = kind(message, None if kind is PermanentFault else retry_after(headers))
+    # A server that was not reached, or that says no, has not begun an answer.
+    fault.billed = status == 200 and not _unsent(error)
+    return fault
+
+
+def _kind(status: int, words: set[str]) -> type[ProviderFault]:
+    if words & PERMANENT_WORDS and status in {200, 429}:
+        return PermanentFault
+    if status == 429 or (status == 200 and words & LIMITED_WORDS):
+        return RateLimited
+    if 300 <= status < 500 and status not in PASSING:
+        return PermanentFault
+    return ProviderFault
+
+
+def _unsent(error: BaseException | None) -> bool:
+    """Whether there was no connection on which a question could be sent."""
+    import httpx2
+
+    if error is None:
+        return False
+    unsent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
+    return unsent or _unsent(error.__cause__)
+
+
+def _told(body: object) -> tuple[set[str], str]:
+    """Type and code in the body of an error, and its message."""
+    inner = body.get("error", body) if isinstance(body, dict) else body
+    if not isinstance(inner, dict):
+        return set(), inner if isinstance(inner, str) else ""
+    words = {str(inner[key]) for key in ("type", "code") if inner.get(key)}
+    return words, str(inner.get("message") or "")
+
+
+def _message(
+    error: Exception, status: int, words: set[str], told: str, headers: Headers
+) -> str:
+    """One line: status, words, message, and by what name the vendor knows the call."""
+    number = "" if status == 200 else str(status)
+    if not (words or number):
+        told = told or _plain(error)
+    parts = [number, " ".join(sorted(words)), told or type(error).__name__]
+    line = ": ".join(part for part in parts if part)
+    request_id = headers.get("request-id") or headers.get("x-request-id")
+    return one_line(f"{line} (request {request_id})" if request_id else line)
+
+
+def _plain(error: Exception) -> str:
+    """An error that is not of the server's making: the innermost reason is the best."""
+    reason = error
+    while isinstance(reason.__cause__, Exception) and str(reason.__cause__):
+        reason = reason.__cause__
+    name, text = type(error).__name__, str(reason)
+    return f"{name}: {text}" if text else name
+
+
+def retry_after(headers: Headers, now: datetime | None = None) -> float | None:
+    """Seconds that a server wants to be left alone; None where it does not say.
+
+    Args:
+        headers: Of its answer; `retry-after` may be seconds or a date.
+        now: For dates; the clock's by default.
+    """
+    for name, unit in (("retry-after-ms", 1e-3), ("retry-after", 1.0)):
+        text = headers.get(name, "").strip()
+        seconds = _number(text) if text else None
+        if seconds is not None:
+            return seconds * unit
+        if text and unit == 1.0:
+            return _until(text, now or datetime.now(UTC))
+    return None
+
+
+def _number(text: str) -> float | None:
+    try:
+        seconds = float(text)
+    except ValueError:
+        return None
+    return seconds if math.isfinite(seconds) and seconds >= 0 else None
+
+
+def _until(text: str, now: datetime) -> float | None:
+    try:
+        date = parsedate_to_datetime(text)
+        # A date without a zone is one in UTC.
+        return max(0.0, (date.replace(tzinfo=date.tzinfo or UTC) - now).total_seconds())
+    except (ValueError, TypeError, OverflowError):
+        return None
+
+
+@contextmanager
+def as_faults(known: tuple[type[Exception], ...]) -> Generator[None]:
+    """Turns errors of a vendor's package into faults, without their trace.
+
+    Args:
+        known: Its own errors, and those of the HTTP library.
+
+    Raises:
+        ProviderFault: Instead of them, and of what a malformed answer leads to.
+    """
+    # The packages check little of what they read: an answer of the wrong form shows as
+    # whatever their code then raises.
+    malformed = (ValueError, TypeError, AttributeError, LookupError, AssertionError)
+    try:
+        yield
+    except known as error:
+        raise fault_of(error) from None
+    except malformed as error:
+        reason = one_line(f"malformed answer ({type(error).__name__}: {error})")
+        raise ProviderFault(reason) from None

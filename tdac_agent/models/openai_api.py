@@ -1,0 +1,80 @@
+"""`openai:MODEL`, by the official package: of OpenAI, or of a server that is alike."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tdac_agent.models.faults import as_faults
+from tdac_agent.models.gathered import Gathered, Stop, count
+from tdac_agent.models.provider import Reply, Request
+from tdac_agent.models.vendor import Vendor, VendorModel
+
+if TYPE_CHECKING:
+    import openai
+    from openai.types.chat import ChatCompletionChunk
+
+STOPS: dict[str, Stop] = {
+    "stop": "end",
+    "length": "length",
+    "eos": "end",  # of some servers that are alike
+    "content_filter": "refusal",
+}
+
+
+class OpenAIModel(VendorModel["openai.OpenAI"]):
+    """A model of OpenAI, or of a server that speaks its language."""
+
+    vendor = Vendor(
+        package="openai",
+        company="OpenAI",
+        key="OPENAI_API_KEY",
+        base_url="OPENAI_BASE_URL",
+        example="gpt-6-sol",
+    )
+
+    def _client(self, **options: Any) -> openai.OpenAI:
+        import openai
+
+        return openai.OpenAI(**options)
+
+    def _ask(self, client: openai.OpenAI, request: Request) -> Reply:
+        import httpx2
+        import openai
+
+        # Local servers know the older name of the limit only, OpenAI the newer one.
+        own = self._base_url is None
+        gathered = Gathered(STOPS)
+        with as_faults((openai.OpenAIError, httpx2.HTTPError)):
+            with client.chat.completions.create(
+                model=self._model,
+                messages=[{"role": "user", "content": request.prompt}],
+                max_completion_tokens=request.max_tokens if own else openai.omit,
+                max_tokens=openai.omit if own else request.max_tokens,
+                stream=True,
+                stream_options={"include_usage": True},
+            ) as stream:
+                gathered.request_id = stream.response.headers.get("x-request-id")
+                for chunk in stream:
+                    _gather(gathered, chunk)
+            return gathered.reply()
+
+
+def _gather(gathered: Gathered, chunk: ChatCompletionChunk) -> None:
+    gathered.model = chunk.model or gathered.model
+    for choice in chunk.choices or ():
+        if choice.delta and choice.delta.content:
+            gathered.add(choice.delta.content)
+        if choice.delta and choice.delta.refusal:
+            gathered.add(choice.delta.refusal)
+            gathered.refused = True
+        gathered.reason = choice.finish_reason or gathered.reason
+    if chunk.usage is not None:
+        details = chunk.usage.prompt_tokens_details
+        gathered.tokens_in = count(chunk.usage.prompt_tokens)
+        gathered.tokens_out = count(chunk.usage.completion_tokens)
+        if details is not None:
+            gathered.tokens_cached = count(details.cached_tokens)
+            gathered.tokens_written = count(details.cache_write_tokens)
+
+
+make = OpenAIModel.make

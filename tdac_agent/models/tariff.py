@@ -1,0 +1,131 @@
+"""What a model's answers cost, as far as that is known, and what bounds a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from tdac_agent.errors import ProviderError
+from tdac_agent.models.budget import NOTHING, Amount
+from tdac_agent.models.prices import Price, load_prices
+from tdac_agent.models.provider import (
+    Provider,
+    Reply,
+    Request,
+    missing_for,
+    served_at,
+)
+from tdac_agent.models.tokens import most_tokens
+
+MAX_COST = 2.0
+"""USD of a run, where the user says nothing."""
+UNPRICED_TOKENS = 1_000_000
+"""Of a run whose price nobody knows, where the user says nothing."""
+OWN_MATTER = frozenset({"command", "manual"})
+"""Providers whose cost is not for us to know."""
+BY_VENDOR = frozenset({"anthropic", "openai"})
+
+
+@dataclass(frozen=True, slots=True)
+class Tariff:
+    """Of one model.
+
+    Attributes:
+        free: Whether no model is asked at all.
+        price: None where it is unknown.
+    """
+
+    free: bool = False
+    price: Price | None = None
+
+    def worst(self, request: Request) -> Amount:
+        """The most that an answer can cost."""
+        if self.free:
+            return NOTHING
+        return self.most(most_tokens(request.prompt), request.max_tokens)
+
+    def most(self, tokens_in: int, tokens_out: int) -> Amount:
+        """What so many tokens can cost, cached or not."""
+        usd = self.price.most(tokens_in, tokens_out) if self.price else 0.0
+        return Amount(tokens_in + tokens_out, usd)
+
+    def spent(self, request: Request, reply: Reply) -> Amount:
+        """What an answer took; the worst case where that is not reported."""
+        tokens = reply.tokens_in + reply.tokens_out
+        if self.free or tokens == 0:
+            return self.worst(request)
+        return Amount(tokens, 0.0 if self.price is None else self.price.cost(reply))
+
+    def cost(self, spent: Amount) -> float | None:
+        """USD of what was spent; None where the price is unknown."""
+        return spent.usd if self.free or self.price is not None else None
+
+
+class Bounds(NamedTuple):
+    """Limits of a run, and what a user should know of them."""
+
+    max_cost: float | None
+    max_tokens: int | None
+    notes: tuple[str, ...] = ()
+
+
+def tariffs_of(models: Iterable[Provider]) -> dict[str, Tariff]:
+    """The tariff of each model, by its name.
+
+    Raises:
+        PriceError: The user's price file is broken.
+    """
+    return {model.name: _tariff(model) for model in models}
+
+
+def _tariff(model: Provider) -> Tariff:
+    if not model.paid:
+        return Tariff(free=True)
+    return Tariff(price=load_prices().price_of(model.name, served_at(model)))
+
+
+def bounds_of(
+    models: Iterable[Provider],
+    tariffs: Mapping[str, Tariff],
+    max_cost: float | None,
+    max_tokens: int | None,
+) -> Bounds:
+    """The limits of a run.
+
+    Args:
+        models: That are asked.
+        tariffs: Theirs.
+        max_cost: As the user says, else `MAX_COST`.
+        max_tokens: As the user says. Where a price is unknown there has to be one: a
+            vendor's model is refused without, others get `UNPRICED_TOKENS`.
+
+    Raises:
+        ProviderError: A model lacks its key or its package, or is a vendor's without a
+            price, so that nothing bounds it; all of that is said at once.
+    """
+    cost = MAX_COST if max_cost is None else max_cost
+    notes: list[str] = []
+    problems: list[str] = []
+    for model in {model.name: model for model in models}.values():
+        problems += missing_for(model)
+        kind = model.name.partition(":")[0]
+        tariff = tariffs[model.name]
+        if tariff.free or tariff.price is not None or kind in OWN_MATTER:
+            continue
+        address = served_at(model)
+        if max_tokens is None and address is None and kind in BY_VENDOR:
+            problems.append(
+                f"no price is known for {model.name}, so --max-cost cannot bound it: "
+                "give --max-tokens N, or enter its price (docs/models.md)"
+            )
+            continue
+        max_tokens = UNPRICED_TOKENS if max_tokens is None else max_tokens
+        place = "" if address is None else f" at {address}"
+        notes.append(
+            f"no price is known for {model.name}{place}: its cost is not counted; "
+            f"at most {max_tokens} tokens (--max-tokens) bound the run"
+        )
+    if problems:
+        raise ProviderError("; and ".join(dict.fromkeys(problems)))
+    return Bounds(cost, max_tokens, tuple(notes))

@@ -1,0 +1,144 @@
+"""What the models of the vendors share, each of them behind its official package."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+from tdac_agent.errors import ProviderError
+from tdac_agent.models.choice import Options
+from tdac_agent.models.patience import CONNECT_SECONDS, STALL_SECONDS, within
+from tdac_agent.models.provider import PermanentFault, Reply, Request
+from tdac_agent.storage.secrets import (
+    NO_KEY,
+    keeps_secrets,
+    one_line,
+    public_url,
+    read_key,
+)
+from tdac_envs.core.extras import install_command
+
+C = TypeVar("C")
+
+
+@dataclass(frozen=True, slots=True)
+class Vendor:
+    """Who serves a model.
+
+    Attributes:
+        package: Of Python; also the extra, and the first word of a model's name.
+        company: For people.
+        key: Environment variable that holds the key.
+        base_url: Environment variable that names another server.
+        example: Of a model's id.
+    """
+
+    package: str
+    company: str
+    key: str
+    base_url: str
+    example: str
+
+
+class VendorModel(ABC, Generic[C]):
+    """A provider; see `Provider`. The key is read at each call, and not kept.
+
+    Args:
+        model: Its id.
+        base_url: Of the server; None for the vendor's own.
+        stall: Seconds of silence after which the connection is given up.
+        key_over_http: Whether the key may go to another machine unencrypted.
+    """
+
+    vendor: ClassVar[Vendor]
+    paid = True
+
+    def __init__(
+        self,
+        model: str,
+        base_url: str | None,
+        stall: float = STALL_SECONDS,
+        *,
+        key_over_http: bool = False,
+    ) -> None:
+        self.name = f"{self.vendor.package}:{model}"
+        self._model = model
+        self._base_url = base_url
+        self.served_at = None if base_url is None else public_url(base_url)
+        self._stall = stall
+        self._key_over_http = key_over_http
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What has to be had before it can be asked: package and key, a line each."""
+        vendor, found = self.vendor, []
+        # To import them takes a second or two: that is done beside the first question.
+        if importlib.util.find_spec(vendor.package) is None:
+            install = install_command(vendor.package)
+            found.append(f"{self.name} needs a package: {install}")
+        try:
+            self._read_key()
+        except ProviderError as error:
+            found.append(str(error))
+        return tuple(found)
+
+    @classmethod
+    def make(cls, words: str, options: Options) -> VendorModel[C]:
+        """A model of the vendor, or of a server that speaks its language.
+
+        Package and key may be missing; a run is not begun without them.
+
+        Raises:
+            ProviderError: The model's name is missing.
+        """
+        vendor = cls.vendor
+        if not words:
+            example = f"{vendor.package}:{vendor.example}"
+            raise ProviderError(f"which model? As in {example}")
+        base_url = options.base_url or os.environ.get(vendor.base_url) or None
+        return cls(words, base_url, key_over_http=options.key_over_http)
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`."""
+        package = self._package()
+        client = self._client(
+            api_key=self._read_key(),
+            base_url=self._base_url,
+            max_retries=0,
+            timeout=package.Timeout(self._stall, connect=CONNECT_SECONDS),
+            # A redirect might take prompt and key elsewhere.
+            http_client=package.DefaultHttpxClient(follow_redirects=False),
+        )
+        with client:
+            return within(
+                request.seconds, lambda: self._ask(client, request), client.close
+            )
+
+    @abstractmethod
+    def _client(self, **options: Any) -> Any:
+        """The package's client."""
+
+    @abstractmethod
+    def _ask(self, client: C, request: Request) -> Reply:
+        """Asks, and gathers the stream's answer."""
+
+    def _package(self) -> Any:
+        try:
+            return importlib.import_module(self.vendor.package)
+        except ImportError as error:
+            raise PermanentFault(one_line(f"{self.vendor.package}: {error}")) from error
+
+    def _read_key(self) -> str:
+        vendor = self.vendor
+        url = self._base_url
+        key = read_key(vendor.key, vendor.company, needed=url is None)
+        if key != NO_KEY and not (self._key_over_http or keeps_secrets(url)):
+            raise ProviderError(
+                f"the key in {vendor.key} would go unencrypted to {self.served_at}: "
+                "use https, unset the variable, or allow it with --key-over-http"
+            )
+        return key

@@ -1,0 +1,1 @@
+"""Prompts, answers, feedback and repair rules."""

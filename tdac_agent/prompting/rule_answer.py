@@ -1,0 +1,176 @@
+"""An optimizer's answer about the rules: at most three operations, strictly read."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+)
+
+from tdac_agent.prompting.extract import fenced_blocks
+from tdac_agent.prompting.rules import (
+    MAX_RULE_CHARS,
+    RepairRule,
+    RuleBook,
+    Scope,
+    clean,
+)
+from tdac_envs.core.errors import first_problem
+
+MAX_OPERATIONS = 3
+_FOREIGN = re.compile(r"```|~~~|https?://")
+
+
+def _checked(text: str) -> str:
+    """A clean text of a rule.
+
+    Raises:
+        ValueError: It is empty, too long, or holds what no rule may hold.
+    """
+    tidy = clean(text)
+    if not re.search(r"\w", tidy):
+        raise ValueError("a rule needs words")
+    if len(tidy) > MAX_RULE_CHARS:
+        raise ValueError(f"{len(tidy)} characters, at most {MAX_RULE_CHARS}")
+    if _FOREIGN.search(tidy):
+        raise ValueError("a rule holds no code block and no address")
+    return tidy
+
+
+Text = Annotated[str, AfterValidator(_checked)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Add(_Strict):
+    """A new rule."""
+
+    op: Literal["add"]
+    scope: Scope
+    text: Text
+
+
+class Edit(_Strict):
+    """Another text for a rule in force."""
+
+    op: Literal["edit"]
+    id: str
+    text: Text
+
+
+class Drop(_Strict):
+    """An end to a rule in force, for good."""
+
+    op: Literal["drop"]
+    id: str
+    reason: str = ""
+
+
+Operation = Annotated[Add | Edit | Drop, Field(discriminator="op")]
+_Operations: TypeAdapter[list[Operation]] = TypeAdapter(
+    Annotated[list[Operation], Field(max_length=MAX_OPERATIONS)]
+)
+
+
+class RuleAnswerError(ValueError):
+    """An answer that cannot be used; the message says to a model what is wrong."""
+
+
+class Applied(NamedTuple):
+    """The rules after an answer, and what became of each operation, a line each."""
+
+    book: RuleBook
+    notes: tuple[str, ...]
+
+
+def parse_operations(reply: str) -> list[Add | Edit | Drop]:
+    """The operations in an answer: one fenced block of JSON, or the answer itself.
+
+    Raises:
+        RuleAnswerError: There is no such block, or it holds anything else.
+    """
+    blocks = fenced_blocks(reply, frozenset({"json", ""}))
+    if not blocks and reply.lstrip().startswith("["):
+        blocks = [reply]
+    if len(blocks) != 1:
+        found = f"{len(blocks)} blocks" if blocks else "no block"
+        raise RuleAnswerError(f"expected one fenced ```json block, got {found}")
+    try:
+        return _Operations.validate_python(json.loads(blocks[0]))
+    except ValidationError as error:
+        raise RuleAnswerError(first_problem(error)) from error
+    except (ValueError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise RuleAnswerError(f"the block is not JSON: {reason}") from error
+
+
+def apply(
+    book: RuleBook,
+    operations: list[Add | Edit | Drop],
+    k: int,
+    evidence: tuple[str, ...],
+) -> Applied:
+    """The rules after some operations; one that is not possible changes nothing.
+
+    Args:
+        book: The rules before.
+        operations: What is wanted.
+        k: Iteration.
+        evidence: Tests that had failed.
+    """
+    notes = []
+    for operation in operations:
+        if isinstance(operation, Add):
+            book, note = _add(book, operation, k, evidence)
+        elif isinstance(operation, Edit):
+            book, note = _edit(book, operation, k)
+        else:
+            book, note = _drop(book, operation, k)
+        notes.append(note)
+    return Applied(book.bounded(k), tuple(notes))
+
+
+def _add(
+    book: RuleBook, wanted: Add, k: int, evidence: tuple[str, ...]
+) -> tuple[RuleBook, str]:
+    double = book.double_of(wanted.text)
+    if double is not None:
+        return book, f"not added: {_says(double)}"
+    book = book.add(wanted.text, wanted.scope, k, evidence)
+    return book, f"added {book.rules[-1].id}: {wanted.text}"
+
+
+def _edit(book: RuleBook, wanted: Edit, k: int) -> tuple[RuleBook, str]:
+    rule, double = book.get(wanted.id), book.double_of(wanted.text, but=wanted.id)
+    if rule is None:
+        return book, f"not edited: no rule {wanted.id} in force"
+    if double is not None:
+        return book, f"not edited: {_says(double)}"
+    edits = (*rule.edits, f"k={k}: was {rule.text!r}")
+    anew = {"tried": 0, "cured": 0, "passes": (), "worse": 0}
+    book = book.change(rule.id, text=wanted.text, edits=edits, **anew)
+    return book, f"edited {rule.id}: {wanted.text}"
+
+
+def _drop(book: RuleBook, wanted: Drop, k: int) -> tuple[RuleBook, str]:
+    rule = book.get(wanted.id)
+    if rule is None:
+        return book, f"not dropped: no rule {wanted.id} in force"
+    reason = clean(wanted.reason)[:MAX_RULE_CHARS]
+    book = book.change(rule.id, status="dropped", ended=k, reason=reason)
+    return book, f"dropped {rule.id}: {reason or 'no reason given'}"
+
+
+def _says(rule: RepairRule) -> str:
+    ended = "" if rule.in_force else f", which was ended in k={rule.ended}"
+    return f"it says what {rule.id} says{ended}"

@@ -1,0 +1,214 @@
+"""What is on disk of a run, as far as it can be read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from tdac_agent.episodes.trajectory import Trajectory, nominal_first
+from tdac_agent.errors import RunError
+from tdac_agent.prompting.rules import RuleBook
+from tdac_agent.runs.learnt import Learnt, what_was_learnt
+from tdac_agent.runs.records import (
+    JOURNAL,
+    RUN_FILE,
+    Attempt,
+    Run,
+    at_work,
+    load_rules,
+    load_run,
+    status_now,
+)
+from tdac_agent.storage.journal import read_records
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_envs.core.errors import TdacError
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+
+MOST_BYTES = 8 << 20
+T = TypeVar("T")
+State = Literal["passed", "failed", "no code", "unfinished"]
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """A candidate (k, j) and what came of it.
+
+    Attributes:
+        k: Its iteration.
+        j: Its edit, 0 for what the Learner wrote.
+        folder: Of its files.
+        state: What came of it; `unfinished` where nobody knows.
+        attempt: Its record, if it was judged.
+        report: Of its verification, if there is a readable one.
+        source: Its code.
+        diff: Against the candidate before it, unified.
+        learnt: Rules that it was written under, and what changed them afterwards.
+    """
+
+    k: int
+    j: int
+    folder: Path
+    state: State
+    attempt: Attempt | None
+    report: Report | None
+    source: str | None
+    diff: str
+    learnt: Learnt
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """The tests that it failed."""
+        return self.attempt.failed_tests if self.attempt else ()
+
+    def trajectories(self) -> Iterator[tuple[str, Trajectory]]:
+        """Episode names and trajectories; one that is damaged is left out."""
+        files = (self.folder / "trajectories").glob("*.npz")
+        for path in sorted(files, key=nominal_first):
+            try:
+                yield path.stem.replace("_", " "), Trajectory.load(path)
+            except RunError:
+                continue
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A run with all that is known of it.
+
+    Attributes:
+        run: Its record.
+        status: Of the moment: `running` and `killed` are told apart.
+        task: Its task, unless that cannot be read.
+        tried: Its candidates, oldest first.
+        report: On the verified controller, or on the last candidate that has one.
+        source: The verified controller, or the last candidate that has code.
+        book: Its rules.
+        problems: What could not be read, a line each.
+    """
+
+    run: Run
+    status: str
+    task: Task | None
+    tried: tuple[Tried, ...]
+    report: Report | None
+    source: str | None
+    book: RuleBook
+    problems: tuple[str, ...]
+
+
+def learner_named(learner: str) -> str:
+    """A learner for people: what is no language model says so."""
+    plain = learner == "builtin"
+    return f"{learner} (a tuned template, no language model)" if plain else learner
+
+
+def gather_run(source: Path | Run) -> Told:
+    """A run, also one that is torn, or still going on.
+
+    Args:
+        source: Its folder, or its record.
+
+    Raises:
+        RunError: The folder has no readable `run.json`.
+    """
+    folder = source.folder if isinstance(source, Run) else source
+    before, problems = at_work(folder), list[str]()
+    run = source if isinstance(source, Run) else load_run(source)
+    status = status_now(run, before=before)
+    tried = tuple(_candidates(run, problems))
+    reports = [one.report for one in tried if one.report is not None]
+    sources = [one.source for one in tried if one.source is not None]
+    report = sources_of = None
+    if run.verified:
+        report = _report(folder / "report.json", problems)
+        sources_of = read_text(run.controller)
+        if sources_of is None:
+            problems.append("controller.py of the verified run is missing")
+    return Told(
+        run,
+        status,
+        _kept(problems, lambda: load_task(folder)),
+        tried,
+        report or (reports[-1] if reports else None),
+        sources_of or (sources[-1] if sources else None),
+        _kept(problems, lambda: load_rules(folder)) or RuleBook(),
+        tuple(dict.fromkeys(problems)),
+    )
+
+
+def run_folders(place: Path) -> list[Path]:
+    """The run folders at or below a place, in the order of their names.
+
+    Raises:
+        RunError: There is none.
+    """
+    if not place.is_dir():
+        raise RunError(f"there is no folder {place}")
+    found = sorted(path.parent for path in place.rglob(RUN_FILE))
+    if not found:
+        raise RunError(f"there is no run at or below {place}: no file {RUN_FILE}")
+    return found
+
+
+def read_text(path: Path, most: int = MOST_BYTES) -> str | None:
+    """A text as far as it is one; None where there is no file, or a huge one."""
+    try:
+        return read_file(path, most).decode("utf-8", "replace")
+    except OSError:
+        return None
+
+
+def _candidates(run: Run, problems: list[str]) -> Iterator[Tried]:
+    """Those on record, and those whose folder is there although nobody judged them."""
+    learnt = what_was_learnt(read_records(run.folder / JOURNAL))
+    judged = {(attempt.k, attempt.j): attempt for attempt in run.attempts}
+    begun = {_numbers(path) for path in (run.folder / "iterations").glob("k*/j*")}
+    for k, j in sorted({*judged, *begun} - {(0, 0)}):
+        attempt = judged.get((k, j))
+        folder = run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        wanted = attempt is not None and attempt.valid and not attempt.unchanged
+        yield Tried(
+            k,
+            j,
+            folder,
+            _state(attempt),
+            attempt,
+            _report(folder / "report.json", problems) if wanted else None,
+            read_text(folder / "controller.py"),
+            read_text(folder / "controller.diff") or "",
+            learnt.get((k, j), Learnt()),
+        )
+
+
+def _numbers(folder: Path) -> tuple[int, int]:
+    """K and j of a candidate's folder; (0, 0) where it is something else."""
+    k, j = folder.parent.name[1:], folder.name[1:]
+    return (int(k), int(j)) if k.isdecimal() and j.isdecimal() else (0, 0)
+
+
+def _state(attempt: Attempt | None) -> State:
+    if attempt is None:
+        return "unfinished"
+    if not attempt.valid:
+        return "no code"
+    return "passed" if attempt.passed else "failed"
+
+
+def _report(path: Path, problems: list[str]) -> Report | None:
+    try:
+        return Report.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "damaged"
+        problems.append(f"{'/'.join(path.parts[-4:])}: {reason}")
+        return None
+
+
+def _kept(problems: list[str], read: Callable[[], T]) -> T | None:
+    """What is read, or None and a problem more."""
+    try:
+        return read()
+    except (TdacError, OSError) as error:
+        problems.append(str(error).partition("\n")[0])
+        return None

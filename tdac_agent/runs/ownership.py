@@ -1,0 +1,100 @@
+"""Runs that this installation began, and what those of others want."""
+
+from __future__ import annotations
+
+import hmac
+import json
+from collections.abc import Container, Iterator
+from pathlib import Path
+
+from tdac_agent.models.tariff import MAX_COST
+from tdac_agent.prompting.prompt import VARIANTS
+from tdac_agent.runs.records import PROMPT_FILE, Run
+from tdac_agent.tasks.installation import keyed, lasting_secret
+from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish, tree_sha256
+
+OWN_SUITE = "suite"
+"""Folder of a run's tests, beside the shipped ones."""
+OURS = "builtin"
+"""The learner that runs nothing and asks nobody."""
+
+
+def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
+    """What a run of somebody else's wants when it goes on, but for what is given.
+
+    Args:
+        run: As its folder tells.
+        task: As its folder tells.
+        given: Names of the arguments of `synthesize` that the user gave, and `suite`.
+    """
+    if "learner" not in given and run.learner != OURS:
+        yield Wish(asking("learner", run.learner), ("--learner", run.learner))
+    if "optimizer" not in given and run.optimizer not in {OURS, run.learner}:
+        yield Wish(asking("optimizer", run.optimizer), ("--optimizer", run.optimizer))
+    if run.base_url is not None and "base_url" not in given:
+        what = f"send its questions, with your key, to {run.base_url}"
+        yield Wish(what, ("--base-url", run.base_url))
+    template = run.folder / PROMPT_FILE
+    if run.prompt not in VARIANTS and "prompt" not in given:
+        what = f"fill in the template {template}"
+        digest = file_sha256(template) if template.is_file() else ""
+        yield Wish(what, ("--prompt", str(template)), digest)
+    if task.suite is not None and "suite" not in given:
+        yield suite_wish(task.suite)
+    if run.seed is not None and "seed" not in given:
+        what = f"choose where the moved starts lie (seed {run.seed})"
+        yield Wish(what, ("--seed", str(run.seed)))
+    if run.max_cost is not None and run.max_cost > MAX_COST and "max_cost" not in given:
+        what = f"spend up to {run.max_cost:g} USD"
+        yield Wish(what, ("--max-cost", f"{run.max_cost:g}"))
+
+
+def sign(run: Run, suite: Path | None) -> str:
+    """The mark of a run that this installation begins; empty where no secret lasts.
+
+    It is a MAC over all of the run that can run, reach out or spend. Its files are in
+    its folder by now.
+    """
+    facts = _facts(run, suite)
+    if facts is None or lasting_secret() is None:
+        return ""
+    return keyed(facts).hex()
+
+
+def is_own(run: Run, suite: Path | None) -> bool:
+    """Whether this installation has begun a run, and what it may do is as it was.
+
+    Args:
+        run: As its folder tells.
+        suite: Of its task, as its folder tells.
+    """
+    mark = run.mark.encode("utf-8", "surrogatepass")
+    return bool(mark) and hmac.compare_digest(mark, sign(run, suite).encode())
+
+
+def is_own_folder(run: Run) -> bool:
+    """The same of a run whose task is not read: its tests lie in its folder."""
+    suite = run.folder / OWN_SUITE
+    return is_own(run, suite if suite.is_dir() else None)
+
+
+def _facts(run: Run, suite: Path | None) -> bytes | None:
+    """All of a run that matters, as one text; None where a suite is none."""
+    template, tests = run.folder / PROMPT_FILE, ""
+    if suite is not None:
+        found = tree_sha256(suite)
+        if found is None:
+            return None
+        tests = found
+    facts = {
+        "learner": run.learner,
+        "optimizer": run.optimizer,
+        "base_url": run.base_url,
+        "seed": run.seed,
+        "max_cost": run.max_cost,
+        "max_tokens": run.max_tokens,
+        "template": file_sha256(template) if template.is_file() else "",
+        "suite": tests,
+    }
+    return b"run|" + json.dumps(facts, sort_keys=True).encode()

@@ -1,0 +1,152 @@
+"""What a run's journal tells of the processes that wrote it before this one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from tdac_agent.models.budget import Amount
+from tdac_agent.models.provider import Provider, Reply, Request, served_at
+from tdac_agent.storage.journal import JournalRecord
+
+KEY_SCHEMA = 1
+# What is the same when the same loop runs again; calls and processes are told apart.
+REPEATED = (
+    *("prove.start", "prove.end", "verify.start", "verify.end"),
+    *("call.unused", "rules"),
+)
+_REPLY = TypeAdapter(Reply)
+_AMOUNT = TypeAdapter(Amount)
+_REPORTED = (
+    *("stop", "tokens_in", "tokens_out", "tokens_cached", "tokens_written"),
+    *("model", "request_id", "notes"),
+)
+
+
+def call_key(model: Provider, request: Request) -> str:
+    """Hash of all that shapes an answer, and of which sample of it this is."""
+    facts = {
+        "schema": KEY_SCHEMA,
+        "model": model.name,
+        "served_at": served_at(model),
+        "kind": request.kind,
+        "prompt": request.prompt,
+        "max_tokens": request.max_tokens,
+        "sample": request.sample,
+        "turn": request.turn,
+    }
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def reply_of(record: JournalRecord, text: str) -> Reply | None:
+    """The answer that a record `call.reply` is about; None where it is damaged."""
+    reported = {name: record[name] for name in _REPORTED if name in record}
+    try:
+        return _REPLY.validate_python({"text": text, **reported})
+    except ValidationError:
+        return None
+
+
+@dataclass(slots=True)
+class Past:
+    """Calls and steps on record.
+
+    Attributes:
+        replies: Records of the answers by their keys.
+        taken: What each call took or may have taken of the budget, by `KEY/ATTEMPT`.
+        lost: The calls whose answer was lost: there may have been one, and a bill.
+        open: Those of them of which nothing at all is known.
+        attempts: How often each key was asked.
+        steps: What need not be written again, counted.
+        started: Whether the run's files were all written.
+        seconds: That the run took so far.
+    """
+
+    replies: dict[str, JournalRecord] = field(default_factory=dict)
+    taken: dict[str, Amount] = field(default_factory=dict)
+    lost: set[str] = field(default_factory=set)
+    open: set[str] = field(default_factory=set)
+    attempts: Counter[str] = field(default_factory=Counter)
+    steps: Counter[str] = field(default_factory=Counter)
+    started: bool = False
+    seconds: float = 0.0
+
+    @property
+    def proven(self) -> bool:
+        """Whether the suite has proven itself."""
+        return any(step.startswith('["prove.end"') for step in self.steps)
+
+    @property
+    def lost_usd(self) -> float:
+        """What the lost answers may have cost."""
+        return sum(self.taken[call].usd for call in self.lost)
+
+    @property
+    def unanswered(self) -> int:
+        """How many questions were put and have no answer to this day."""
+        keys = {call.rpartition("/")[0] for call in self.open}
+        return len(keys - self.replies.keys())
+
+    def next_call(self, key: str) -> str:
+        """Name of the next attempt to ask a question."""
+        self.attempts[key] += 1
+        return f"{key}/{self.attempts[key]}"
+
+    def has_step(self, event: str, facts: dict[str, Any]) -> bool:
+        """Whether a step is on record; each record stands for one step."""
+        step = _step(event, facts)
+        known = self.steps[step] > 0
+        self.steps[step] -= known
+        return known
+
+
+def read_past(records: Iterable[JournalRecord]) -> Past:
+    """Reads a journal; what is damaged in it is left out."""
+    past, asked = Past(), ""
+    for record in records:
+        event = record.get("event")
+        past.seconds = max(past.seconds, _number(record.get("seconds")))
+        key = str(record.get("key"))
+        call = f"{key}/{past.attempts[key]}"
+        if event == "run.start":
+            past.started = True
+        elif event == "call.intent":
+            asked = past.next_call(key)
+            past.taken[asked] = _amount(record.get("reserved"))
+            past.open.add(asked)
+        elif event == "call.fault" and call == asked:
+            past.open.discard(call)
+            if record.get("billed"):
+                past.lost.add(call)
+            else:
+                past.taken[call] = Amount()
+        elif event == "call.reply" and call == asked:
+            past.open.discard(call)
+            past.taken[call] = _amount(record.get("spent"))
+            past.replies[key] = record
+        elif event in REPEATED:
+            facts = {k: v for k, v in record.items() if k not in {"event", "seconds"}}
+            past.steps[_step(event, facts)] += 1
+    past.lost |= past.open
+    return past
+
+
+def _step(event: str, facts: dict[str, Any]) -> str:
+    return json.dumps([event, facts], sort_keys=True)
+
+
+def _amount(value: object) -> Amount:
+    try:
+        return _AMOUNT.validate_python(value)
+    except ValidationError:
+        return Amount()
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0

@@ -1,0 +1,310 @@
+"""Writes a run folder: everything that happens, when it happens."""
+
+from __future__ import annotations
+
+import difflib
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.models.budget import Amount
+from tdac_agent.models.provider import Reply, Request
+from tdac_agent.models.retry import Missed
+from tdac_agent.prompting.prompt import PromptTemplate
+from tdac_agent.prompting.rules import RuleBook
+from tdac_agent.runs.ownership import OWN_SUITE, sign
+from tdac_agent.runs.past import REPEATED, Past, reply_of
+from tdac_agent.runs.records import (
+    GIVEN_FILE,
+    JOURNAL,
+    PROMPT_FILE,
+    RULES_FILE,
+    RUN_FILE,
+    Attempt,
+    Run,
+    Status,
+)
+from tdac_agent.storage.blobs import Blobs
+from tdac_agent.storage.files import keep, write_atomic
+from tdac_agent.storage.journal import append_record
+from tdac_agent.tasks.task import Task, portable_task_file, write_workdir
+from tdac_agent.tasks.task_file import TASK_FILE
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_envs.mapping.map_folder import png
+
+PREVIEW_FILE = "preview.png"
+"""How map or world was read, for people."""
+Event = Callable[[dict[str, Any]], None]
+
+
+@dataclass(slots=True)
+class Recorder:
+    """Writes a run folder while the run goes on.
+
+    A run that is resumed goes through all of its steps again: those on record are
+    told, but not written again.
+
+    Attributes:
+        run: The record so far.
+        past: What is on record of earlier processes.
+        on_event: Called with each journal record, for live progress.
+    """
+
+    run: Run
+    past: Past = field(default_factory=Past)
+    on_event: Event | None = None
+    _clock: float = field(default_factory=time.monotonic)
+    _previous: str = ""
+    _turns: Counter[tuple[str, int, int]] = field(default_factory=Counter)
+    _prompts: Counter[str] = field(default_factory=Counter)
+
+    def start(
+        self, task: Task, template: PromptTemplate, given: str | None, **facts: Any
+    ) -> None:
+        """Fills the folder: task, original, suite, working files; begins the journal.
+
+        Args:
+            task: What the controller must do.
+            template: Of the first question; one of the user's own is kept.
+            given: Source of a controller to begin with, if there is one.
+            **facts: For the journal.
+        """
+        folder = self.run.folder
+        self.save()
+        write_workdir(folder, task)
+        write_atomic(folder / PREVIEW_FILE, png(task.setting.preview()))
+        if task.suite is not None:
+            ignored = shutil.ignore_patterns("__pycache__")
+            own = folder / OWN_SUITE
+            shutil.copytree(task.suite, own, ignore=ignored, dirs_exist_ok=True)
+        original = task.setting.original
+        if original is not None:
+            write_atomic(folder / original.name, original.file.read_bytes())
+        if template.text is not None:
+            write_atomic(folder / PROMPT_FILE, template.text)
+        if given is not None:
+            write_atomic(folder / GIVEN_FILE, given)
+        self.run.mark = sign(self.run, folder / OWN_SUITE if task.suite else None)
+        self.save()
+        # What has a task and no mark was not begun here.
+        write_atomic(folder / TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE))
+        self.event("run.start", task=task.name, learner=self.run.learner, **facts)
+
+    def resume(self, before: Run, **facts: Any) -> None:
+        """Says that the run goes on, and what is on record of it.
+
+        Args:
+            before: As the last process left it; it stays until there is more.
+            **facts: For the journal.
+        """
+        past = self.past
+        kept = ("max_cost", "max_tokens", "mark")
+        limits = {name: getattr(self.run, name) for name in kept}
+        going = {"status": "running", "censored": False}
+        ended = dict.fromkeys(("reason", "enough", "outlook"), "")
+        self._write(before.model_copy(update={**going, **ended, **limits}))
+        self.run.cost_lost = past.lost_usd
+        self.event(
+            "run.resume",
+            task=self.run.task,
+            learner=self.run.learner,
+            answers=Counter(str(one.get("kind")) for one in past.replies.values()),
+            unanswered=past.unanswered,
+            lost_usd=past.lost_usd,
+            **facts,
+        )
+
+    def event(self, name: str, /, **facts: Any) -> bool:
+        """Appends to the journal, unless it is on record; returns whether it did."""
+        record = {"event": name, "seconds": round(self._elapsed(), 3), **facts}
+        new = name not in REPEATED or not self.past.has_step(name, facts)
+        if new:
+            append_record(self.run.folder / JOURNAL, record)
+        self.tell(record)
+        return new
+
+    def tell(self, record: dict[str, Any]) -> None:
+        """Shows a record, and keeps nothing of it."""
+        if self.on_event is not None:
+            self.on_event(record)
+
+    def numbered(self, request: Request) -> Request:
+        """A question that knows how many came before it that are like it."""
+        _, k, j = request.sample
+        turn, repeat = self._turns[request.kind, k, j], self._prompts[request.prompt]
+        self._turns[request.kind, k, j] += 1
+        self._prompts[request.prompt] += 1
+        return replace(request, turn=turn, repeat=repeat)
+
+    def asked(self, request: Request, model: str, key: str, reserved: Amount) -> None:
+        """Keeps a prompt before it is sent to a model."""
+        keep(self._call_file(request, "prompt"), request.prompt)
+        self.event(
+            "call.intent",
+            **_about(request, key),
+            model=model,
+            prompt=self._blobs.put(request.prompt),
+            max_tokens=request.max_tokens,
+            reserved=asdict(reserved),
+        )
+
+    def missed(self, request: Request, key: str, miss: Missed, worst: Amount) -> None:
+        """Keeps a fault, and whether the question is put again."""
+        wait = None if miss.wait is None else round(miss.wait, 3)
+        self.event(
+            "call.fault",
+            **_about(request, key),
+            attempt=miss.attempt,
+            fault=miss.fault.kind,
+            reason=str(miss.fault),
+            wait=wait,
+            billed=miss.fault.billed,
+        )
+        if miss.fault.billed:
+            self.run.cost_lost += worst.usd
+
+    def answered(
+        self,
+        request: Request,
+        reply: Reply,
+        key: str,
+        spent: Amount,
+        cost: float | None,
+    ) -> None:
+        """Keeps an answer as it came."""
+        record = {
+            **_about(request, key),
+            **{k: v for k, v in asdict(reply).items() if k != "text"},
+            "notes": list(reply.notes),
+            "blob": self._blobs.put(reply.text),
+            "spent": asdict(spent),
+            "cost": cost,
+        }
+        self.event("call.reply", **record)
+        self._count(request, reply, cost)
+
+    def unused(self, request: Request, **facts: Any) -> None:
+        """Keeps why an answer could not be used, and how often it was asked for."""
+        _, k, j = request.sample
+        self.event("call.unused", kind=request.kind, k=k, j=j, **facts)
+
+    def recall(self, request: Request, key: str) -> Reply | None:
+        """The answer on record to this very question, if there is one."""
+        record = self.past.replies.get(key, {})
+        text = self._blobs.get(str(record.get("blob")))
+        reply = None if text is None else reply_of(record, text)
+        if reply is not None:
+            keep(self._call_file(request, "prompt"), request.prompt)
+            self._count(request, reply, record.get("cost"))
+            self.tell(record)
+        return reply
+
+    def _count(self, request: Request, reply: Reply, cost: float | None) -> None:
+        keep(self._call_file(request, "reply"), reply.text)
+        run = self.run
+        run.tokens_in += reply.tokens_in
+        run.tokens_out += reply.tokens_out
+        run.tokens_cached += reply.tokens_cached
+        run.cost = None if cost is None or run.cost is None else run.cost + cost
+        if reply.model is not None and reply.model not in run.models:
+            run.models = (*run.models, reply.model)
+
+    def candidate(self, k: int, j: int, source: str) -> Path:
+        """Keeps a candidate's source and its difference from the last one."""
+        folder = self._folder(k, j)
+        keep(folder / "controller.py", source)
+        difference = difflib.unified_diff(
+            self._previous.splitlines(keepends=True),
+            source.splitlines(keepends=True),
+            "previous",
+            "controller.py",
+        )
+        keep(folder / "controller.diff", "".join(difference))
+        self._previous = source
+        return folder
+
+    def judged(
+        self,
+        k: int,
+        j: int,
+        report: Report | None,
+        notes: tuple[str, ...],
+        *,
+        unchanged: bool = False,
+    ) -> bool:
+        """Keeps what came of a candidate; returns whether it is not on record yet.
+
+        Args:
+            k: Of the candidate.
+            j: Of the candidate.
+            report: On it; None where the model gave no code.
+            notes: Of the model.
+            unchanged: Whether the report is that of the attempt before.
+        """
+        failed = () if report is None else tuple(f.test for f in report.failures)
+        attempt = Attempt(
+            k=k,
+            j=j,
+            valid=report is not None,
+            passed=report is not None and report.passed,
+            failed_tests=failed,
+            seed=None if report is None else report.provenance.seed,
+            notes=notes,
+            unchanged=unchanged,
+        )
+        self.run.attempts.append(attempt)
+        new = self.event("verify.end", **attempt.model_dump(mode="json"))
+        if new:
+            self.save()
+        return new
+
+    def rules(self, k: int, book: RuleBook, notes: tuple[str, ...] = ()) -> None:
+        """Keeps the rules of the run, and what changed them in iteration k."""
+        rules = [rule.model_dump(mode="json") for rule in book.in_force]
+        keep(self.run.folder / RULES_FILE, book.model_dump_json(indent=2) + "\n")
+        self.event("rules", k=k, rules=rules, notes=list(notes))
+
+    def finish(self, status: Status, **facts: Any) -> None:
+        """Closes the run."""
+        self.run.status = status
+        self.run.reason = str(facts.get("reason", ""))
+        self.run.enough = str(facts.get("enough", ""))
+        self.run.outlook = str(facts.get("outlook", ""))
+        self.run.censored = not self.run.finished
+        self.event("run.end", status=status, **facts)
+        self.save()
+
+    def save(self) -> None:
+        """Writes `run.json`."""
+        self.run.seconds = round(self._elapsed(), 3)
+        self._write(self.run)
+
+    def _write(self, run: Run) -> None:
+        write_atomic(run.folder / RUN_FILE, run.model_dump_json(indent=2) + "\n")
+
+    @property
+    def _blobs(self) -> Blobs:
+        return Blobs(self.run.folder / "blobs")
+
+    def _call_file(self, request: Request, what: str) -> Path:
+        """`edit.reply.md`, or `edit.reply-2.md` of the second question of its kind."""
+        _, k, j = request.sample
+        suffix = f"-{request.turn + 1}" if request.turn else ""
+        return self._folder(k, j) / f"{request.kind}.{what}{suffix}.md"
+
+    def _folder(self, k: int, j: int) -> Path:
+        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
+    def _elapsed(self) -> float:
+        return self.past.seconds + time.monotonic() - self._clock
+
+
+def _about(request: Request, key: str) -> dict[str, Any]:
+    _, k, j = request.sample
+    return {"kind": request.kind, "k": k, "j": j, "key": key}

@@ -1,0 +1,142 @@
+"""`replay:RUN`: the answers of a recorded run; no model is asked, nothing is paid.
+
+`replay:demo` is the run of `tdac demo`, which is shipped.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.errors import ProviderError, RunError
+from tdac_agent.models.choice import Options
+from tdac_agent.models.provider import PermanentFault, Reply, Request
+from tdac_agent.runs.ownership import is_own_folder
+from tdac_agent.runs.past import reply_of
+from tdac_agent.runs.records import JOURNAL, load_run
+from tdac_agent.storage.journal import JournalRecord, read_records
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_envs.core.intake import RECORD_BYTES, read_file
+
+DEMO = Path(__file__).parent / "demo"
+Place = tuple[str, int, int]
+
+
+def make(words: str, options: Options) -> Replay:
+    """A recorded run.
+
+    Raises:
+        ProviderError: There is none.
+    """
+    del options
+    if not words:
+        raise ProviderError("which run? As in replay:runs/maze-1")
+    folder = DEMO if words == "demo" else Path(words)
+    try:
+        recorded = load_run(folder)
+        records = read_records(folder / JOURNAL)
+    except RunError as error:
+        raise ProviderError(f"cannot replay: {error}") from error
+    except OSError as error:
+        raise ProviderError(f"cannot replay {folder}: {error.strerror}") from error
+    shipped = folder == DEMO
+    seed = recorded.seed if shipped or is_own_folder(recorded) else None
+    return Replay(words, folder, records, reworded=shipped, seed=seed)
+
+
+class Replay:
+    """A provider; see `Provider`. A question that was not put in that run is a fault.
+
+    Args:
+        words: What the user calls the run.
+        folder: Of the run.
+        journal: Its records.
+        reworded: Whether what follows on the task, as how failures are told, may be
+            worded otherwise by now; it is noted where it is.
+        seed: Of the run's moved starts, where it had one and nobody else chose it.
+    """
+
+    paid = False
+
+    def __init__(
+        self,
+        words: str,
+        folder: Path,
+        journal: list[JournalRecord],
+        *,
+        reworded: bool = False,
+        seed: int | None = None,
+    ) -> None:
+        self.name = f"replay:{words}"
+        self._folder = folder
+        self._reworded = reworded
+        self.recorded_seed = seed
+        self._replies = [r for r in journal if r.get("event") == "call.reply"]
+
+    def answers_sha256(self) -> str:
+        """Hash of all that it may answer."""
+        return sha256_of(json.dumps(self._replies, sort_keys=True).encode())
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`."""
+        _, k, j = request.sample
+        place = (request.kind, k, j)
+        number = request.turn
+        at = f"{request.kind} k={k} j={j}"
+        try:
+            prompt, answer = _files(self._folder, place, number + 1)
+            where = f"{at} in {prompt}"
+            recorded = read_file(prompt, RECORD_BYTES).decode("utf-8")
+            notes = self._compare(recorded, request, where)
+            text = read_file(answer, RECORD_BYTES).decode("utf-8", "surrogatepass")
+            record = [r for r in self._replies if _place(r) == place][number]
+        except (OSError, IndexError):
+            raise PermanentFault(
+                f"answer {number + 1} to {at} is not in {self._folder}"
+            ) from None
+        except ValueError:
+            raise PermanentFault(f"{at} in {self._folder} is no text") from None
+        reply = reply_of(record, text)
+        if reply is None:
+            raise PermanentFault(f"the journal of {self._folder} is damaged at {at}")
+        return replace(
+            reply,
+            tokens_in=0,
+            tokens_out=0,
+            tokens_cached=0,
+            tokens_written=0,
+            notes=(*reply.notes, *notes),
+        )
+
+    def _compare(self, recorded: str, request: Request, where: str) -> tuple[str, ...]:
+        """Refuses an answer to another question, or notes how it is another one.
+
+        Raises:
+            PermanentFault: It names the first line that differs.
+        """
+        asked, stable = request.prompt, request.stable
+        if recorded == asked:
+            return ()
+        pairs = zip(recorded.split("\n"), asked.split("\n"), strict=False)
+        same = sum(
+            1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
+        )
+        line = f"line {same + 1} differs"
+        if self._reworded and recorded[:stable] == asked[:stable]:
+            return (f"recorded when this question was worded otherwise: {line}",)
+        raise PermanentFault(f"another question than {where}: {line}")
+
+
+def _files(folder: Path, place: Place, number: int) -> tuple[Path, Path]:
+    """Question and answer of the numbered call of its kind for a candidate."""
+    kind, k, j = place
+    calls = folder / "iterations" / f"k{k:02d}" / f"j{j}"
+    suffix = "" if number == 1 else f"-{number}"
+    return calls / f"{kind}.prompt{suffix}.md", calls / f"{kind}.reply{suffix}.md"
+
+
+def _place(record: JournalRecord) -> tuple[Any, Any, Any]:
+    return record.get("kind"), record.get("k"), record.get("j")

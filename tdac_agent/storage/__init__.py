@@ -1,0 +1,1 @@
+"""Files, locks and journals that survive a crash."""

@@ -1,0 +1,40 @@
+"""Texts by their hash: each is there as a whole, or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.storage.files import write_atomic
+from tdac_envs.core.intake import RECORD_BYTES, read_file
+
+
+@dataclass(frozen=True, slots=True)
+class Blobs:
+    """A folder of texts, each in a file that is named by its SHA-256.
+
+    Attributes:
+        folder: Made when the first text is put.
+    """
+
+    folder: Path
+
+    def put(self, text: str) -> str:
+        """Keeps a text; returns its hash."""
+        raw = text.encode("utf-8", "surrogatepass")
+        name = hashlib.sha256(raw).hexdigest()
+        if self.get(name) is None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_atomic(self.folder / name, raw)
+        return name
+
+    def get(self, name: str) -> str | None:
+        """The text with a hash; None where it is missing or damaged."""
+        try:
+            raw = read_file(self.folder / name, RECORD_BYTES)
+        except OSError:
+            return None
+        if hashlib.sha256(raw).hexdigest() != name:
+            return None
+        return raw.decode("utf-8", "surrogatepass")

@@ -1,0 +1,34 @@
+"""The base of what is stored about controllers, models and files of others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, model_validator
+
+from tdac_agent.storage.plain import printable
+
+
+class PrintableRecord(BaseModel):
+    """A record whose texts can all be written and printed, wherever they come from.
+
+    Half a surrogate pair, for one, would make the whole record unwritable.
+    """
+
+    @model_validator(mode="before")
+    @classmethod
+    def _filter(cls, values: Any) -> Any:
+        return _filtered(values)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        super().__setattr__(name, _filtered(value))
+
+
+def _filtered(value: Any) -> Any:
+    if type(value) is str:
+        return printable(value)
+    if type(value) is dict:
+        return {_filtered(key): _filtered(item) for key, item in value.items()}
+    if type(value) in (list, tuple):
+        return type(value)(map(_filtered, value))
+    return value

@@ -1,0 +1,1 @@
+"""The loop that writes, verifies and repairs a controller."""

@@ -1,0 +1,186 @@
+"""What a run is, what bounds it, and its folder: before the first question."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import secrets
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.errors import RunError
+from tdac_agent.models.budget import Budget
+from tdac_agent.models.provider import Provider, recorded_seed, served_at
+from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
+from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
+from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, sign
+from tdac_agent.runs.past import read_past
+from tdac_agent.runs.recorder import Event, Recorder
+from tdac_agent.runs.records import JOURNAL, Run
+from tdac_agent.runs.resume import run_there
+from tdac_agent.storage.files import clear_unfinished
+from tdac_agent.storage.journal import mend, read_records
+from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.tasks.installation import drawn_seed, lasting_secret
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.verify import suite_sha256
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """What a run may spend, and what its models cost.
+
+    Attributes:
+        budget: Of this run, or of several.
+        tariffs: By the names of the models.
+        notes: What a user should know of it.
+    """
+
+    budget: Budget
+    tariffs: Mapping[str, Tariff]
+    notes: tuple[str, ...] = ()
+
+
+def account_of(
+    models: Sequence[Provider],
+    before: Run | None,
+    max_cost: float | None,
+    max_tokens: int | None,
+    shared: Budget | None,
+) -> Account:
+    """The account of a run; limits that are not given are those it had before.
+
+    Raises:
+        ProviderError: Nothing bounds what a model costs, or it lacks a key or package;
+            all of that is said at once.
+        PriceError: The user's price file is broken.
+    """
+    tariffs = tariffs_of(models)
+    if shared is not None:
+        if max_cost is not None or max_tokens is not None:
+            raise ValueError("a shared budget has limits of its own")
+        bounds = bounds_of(models, tariffs, shared.max_cost, shared.max_tokens)
+        return Account(shared, tariffs, bounds.notes)
+    if before is not None:
+        max_cost = before.max_cost if max_cost is None else max_cost
+        max_tokens = before.max_tokens if max_tokens is None else max_tokens
+    bounds = bounds_of(models, tariffs, max_cost, max_tokens)
+    return Account(Budget(bounds.max_cost, bounds.max_tokens), tariffs, bounds.notes)
+
+
+def describe(
+    task: Task,
+    models: Sequence[Provider],
+    template: PromptTemplate,
+    *,
+    start_from: str | None,
+    **facts: Any,
+) -> Run:
+    """A run that has not begun.
+
+    Args:
+        task: What the controller must do.
+        models: Learner and optimizer.
+        template: Of the first question.
+        start_from: Source of a controller to begin with, if there is one.
+        **facts: Further fields.
+
+    Raises:
+        PromptError: The template cannot be used.
+    """
+    addresses = {model.name: served_at(model) for model in models}
+    return Run(
+        task=task.name,
+        task_sha256=task.sha256(),
+        learner=models[0].name,
+        optimizer=models[1].name,
+        served_at={name: url for name, url in addresses.items() if url is not None},
+        prompt=template.name,
+        version=importlib.metadata.version("tdac"),
+        suite_sha256=suite_sha256(task),
+        prompt_sha256=_hash(generate_prompt(task, (), template)),
+        given_sha256=None if start_from is None else _hash(start_from),
+        cost=0.0,
+        id=secrets.token_hex(8),
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        **facts,
+    )
+
+
+def settled_seed(given: int | None, learner: Provider, out: Path) -> int | None:
+    """The seed of a run; None where each of its candidates has its own.
+
+    Where no secret can be kept, a run is given one at its beginning.
+    """
+    known = recorded_seed(learner) if given is None else given
+    if known is not None or lasting_secret() is not None:
+        return known
+    before = run_there(out)
+    return drawn_seed() if before is None else before.seed
+
+
+@contextmanager
+def hold_folder(out: Path) -> Generator[None]:
+    """Makes a run's folder, and keeps other processes out of it meanwhile.
+
+    Raises:
+        RunError: It cannot be made, or another process is at work in it.
+    """
+    with ExitStack() as stack:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            mine = stack.enter_context(hold(out / LOCK_FILE))
+        except OSError as error:
+            raise RunError(f"cannot write to {out}: {error.strerror}") from error
+        if not mine:
+            raise RunError(f"another process is at work on {out}; wait for its end")
+        yield
+
+
+def open_record(
+    task: Task,
+    run: Run,
+    before: Run | None,
+    template: PromptTemplate,
+    given: str | None,
+    account: Account,
+    on_event: Event | None,
+) -> Recorder:
+    """The recorder of a run that begins or goes on; what is on record is counted.
+
+    Raises:
+        RunError: The folder cannot be written.
+    """
+    budget = account.budget
+    run.max_cost, run.max_tokens = budget.max_cost, budget.max_tokens
+    facts = {
+        "max_cost": budget.max_cost,
+        "max_tokens": budget.max_tokens,
+        "notes": list(account.notes),
+    }
+    if before is not None:
+        run.id, run.started, run.prompt = before.id, before.started, before.prompt
+        # What somebody else began stays theirs, whatever was allowed this time.
+        if is_own_folder(before):
+            run.mark = sign(run, run.folder / OWN_SUITE if task.suite else None)
+    try:
+        mend(run.folder / JOURNAL)
+        past = read_past(read_records(run.folder / JOURNAL))
+        budget.restore({f"{run.id}/{call}": a for call, a in past.taken.items()})
+        recorder = Recorder(run, past, on_event)
+        if before is not None and past.started:
+            clear_unfinished(run.folder)
+            recorder.resume(before, **facts)
+        else:
+            recorder.start(task, template, given, **facts)
+    except OSError as error:
+        raise RunError(f"cannot write to {run.folder}: {error.strerror}") from error
+    return recorder
+
+
+def _hash(text: str) -> str:
+    return sha256_of(text.encode("utf-8", "surrogatepass"))

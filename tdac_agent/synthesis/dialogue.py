@@ -1,0 +1,194 @@
+"""Asking the two models: questions out, sources and rules back, all on record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from tdac_agent.models.provider import Kind, Provider, Reply, Request
+from tdac_agent.prompting.extract import Answer, read_answer
+from tdac_agent.prompting.feedback import tell_attempt
+from tdac_agent.prompting.prompt import (
+    FULL,
+    PromptTemplate,
+    generate_prompt,
+    repair_prompt,
+)
+from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_operations
+from tdac_agent.prompting.rules import BEGIN, RuleBook
+from tdac_agent.storage.secrets import one_line
+from tdac_agent.synthesis.calls import Calls
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.report import Report
+
+MAX_ASKS = 3
+MAX_EARLIER = 12
+EXCERPT_CHARS = 160
+_AGAIN = "\n## Your last answer could not be used\nThe reason: "
+_SAME = "the code of the attempt before came back"
+_ENDED = {"length": "it was cut off at its end", "refusal": "it was refused"}
+
+
+class Candidate(NamedTuple):
+    """A controller's source, None where the model gave no code, and what it noted."""
+
+    source: str | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class Dialogue:
+    """The Learner (LLM1) and the Optimizer (LLM2) of one run.
+
+    Attributes:
+        task: What the controller must do.
+        learner: Generates controllers.
+        optimizer: Edits them and writes rules.
+        calls: Through which every question passes.
+        book: Rules of this run, in force and ended.
+        template: Of the question for a new controller.
+        earlier: The attempts so far, a line each.
+    """
+
+    task: Task
+    learner: Provider
+    optimizer: Provider
+    calls: Calls
+    book: RuleBook = field(default_factory=RuleBook)
+    template: PromptTemplate = FULL
+    earlier: tuple[str, ...] = ()
+    _failed: int = 0
+    _unchanged: bool = False
+
+    def generate(self, k: int) -> Candidate:
+        """A new controller under the rules in force."""
+        request = Request(
+            "generate",
+            self._question(),
+            rules=self._texts(),
+            sample=self._at(k, 0),
+            stable=_stable(self._question()),
+            max_tokens=self.calls.max_output,
+        )
+        return self._code(self.learner, request)
+
+    def edit(self, k: int, j: int, source: str, report: Report) -> Candidate:
+        """A repaired controller, candidate (k, j)."""
+        request = self._repair("edit", source, report, self._at(k, j))
+        return self._code(self.optimizer, request)
+
+    def summarise(self, k: int, j: int, source: str, report: Report) -> None:
+        """Has the rules changed by what is to be learnt from a failure.
+
+        An answer that is malformed is asked for again twice; then the rules stay.
+        """
+        request = self._repair("summarise", source, report, self._at(k, j))
+        evidence = tuple(failure.test for failure in report.failures)
+        for asked in range(1, MAX_ASKS + 1):
+            reply = self.calls.ask(self.optimizer, request)
+            try:
+                if reply.stop != "end":
+                    raise RuleAnswerError(_ENDED[reply.stop])
+                operations = parse_operations(reply.text)
+            except RuleAnswerError as error:
+                request = self._again(request, reply, str(error), asked)
+                continue
+            self.book, notes = apply(self.book, operations, k, evidence)
+            self.calls.recorder.rules(k, self.book, notes or ("no change",))
+            return
+        self.calls.recorder.rules(k, self.book, ("no usable answer: the rules stay",))
+
+    def saw_no_change(self, k: int, j: int) -> None:
+        """Remembers that candidate (k, j) is the one before it."""
+        self.earlier = (*self.earlier, f"k={k} j={j}: no change: {_SAME}")
+        self._unchanged = True
+
+    def saw(self, k: int, j: int, report: Report) -> None:
+        """Remembers what came of candidate (k, j), and of the rules behind it."""
+        self._unchanged = False
+        failed = tuple(failure.test for failure in report.failures)
+        if j == 0 and self.book.in_force:
+            self.book = self.book.observed(failed, self._failed)
+            self.calls.recorder.rules(k, self.book)
+        self._failed = len(failed)
+        if failed:
+            self.earlier = (*self.earlier, tell_attempt(k, j, report))
+
+    def _question(self) -> str:
+        return generate_prompt(self.task, self.book.in_force, self.template)
+
+    def _repair(
+        self, kind: Kind, source: str, report: Report, sample: tuple[int, int, int]
+    ) -> Request:
+        question = repair_prompt(
+            kind,
+            self._question(),
+            source,
+            report,
+            # The last one is what the question is about.
+            earlier=self.earlier[:-1][-MAX_EARLIER:],
+            rules=self.book.in_force,
+            unchanged=self._unchanged,
+        )
+        stable = _stable(question)
+        return Request(
+            kind,
+            question,
+            source,
+            report,
+            self._texts(),
+            sample,
+            stable=stable,
+            max_tokens=self.calls.max_output,
+        )
+
+    def _code(self, model: Provider, request: Request) -> Candidate:
+        """Asks until a whole answer holds code; a refused one is asked again twice.
+
+        The question is then put with what was wrong; a truncated answer is never used,
+        and asked for again with more room.
+        """
+        problems = []
+        for asked in range(1, MAX_ASKS + 1):
+            reply = self.calls.ask(model, request)
+            answer = _file_in(reply)
+            if answer.source is not None:
+                return Candidate(answer.source, reply.notes)
+            problems.append(answer.problem)
+            request = self._again(request, reply, answer.problem, asked)
+        reasons = "; ".join(dict.fromkeys(problems))
+        why = f"none of {MAX_ASKS} answers could be used: {reasons}"
+        return Candidate(None, (*reply.notes, why))
+
+    def _again(
+        self, request: Request, reply: Reply, problem: str, asked: int
+    ) -> Request:
+        """The same question with what was wrong with the answer; the last word only."""
+        # It may be long, and begin with white space.
+        says = one_line(reply.text[:2000], EXCERPT_CHARS)
+        facts = {"problem": problem, "says": says, "asked": asked, "most": MAX_ASKS}
+        self.calls.recorder.unused(request, **facts)
+        first = request.prompt.partition(_AGAIN)[0]
+        prompt = f"{first}{_AGAIN}{problem}. Give the whole answer anew.\n"
+        room = request.max_tokens
+        if reply.stop == "length":
+            room = 2 * self.calls.max_output
+        return replace(request, prompt=prompt, max_tokens=room)
+
+    def _texts(self) -> tuple[str, ...]:
+        return tuple(rule.text for rule in self.book.in_force)
+
+    def _at(self, k: int, j: int) -> tuple[int, int, int]:
+        return (self.calls.recorder.run.index, k, j)
+
+
+def _stable(prompt: str) -> int:
+    """How much of a prompt is the same in all of a run: all before its rules."""
+    return max(0, prompt.find(BEGIN))
+
+
+def _file_in(reply: Reply) -> Answer:
+    """The file in a reply; there is none in a truncated or refused one."""
+    if reply.stop != "end":
+        return Answer(None, _ENDED[reply.stop])
+    return read_answer(reply.text, must_define="policy")

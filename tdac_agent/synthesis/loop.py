@@ -1,0 +1,267 @@
+"""Algorithm 2: test-driven synthesis of a controller."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from tdac_agent.errors import Fault
+from tdac_agent.models.budget import Budget
+from tdac_agent.models.choice import choose_models
+from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.prompting.extract import same_code
+from tdac_agent.prompting.prompt import load_template
+from tdac_agent.runs.recorder import Event, Recorder
+from tdac_agent.runs.records import Run
+from tdac_agent.runs.resume import check_own, check_same, run_there
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.synthesis.beginning import (
+    account_of,
+    describe,
+    hold_folder,
+    open_record,
+    settled_seed,
+)
+from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.dialogue import Candidate, Dialogue
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.figures import draw_trajectories
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.suite_check import prove_suite
+from tdac_agent.verification.verify import kept_report, load_trajectories, verify
+
+MOST_SPENT = 3
+"""Iterations in a row in which a model that costs something may give no code."""
+
+
+def synthesize(
+    task: Task,
+    learner: str | Provider = "builtin",
+    optimizer: str | Provider | None = None,
+    *,
+    out: Path,
+    iterations: int = 20,
+    patience: int = 1,
+    seed: int | None = None,
+    start_from: str | None = None,
+    base_url: str | None = None,
+    key_over_http: bool = False,
+    prompt: str = "full",
+    refine: bool = True,
+    max_output: int = MAX_OUTPUT_TOKENS,
+    max_cost: float | None = None,
+    max_tokens: int | None = None,
+    budget: Budget | None = None,
+    index: int = 0,
+    retry: RetryPolicy | None = None,
+    judge: WarmJudge | None = None,
+    on_event: Event | None = None,
+) -> Run:
+    """Writes, tests and repairs controllers until one is verified.
+
+    Where `out` holds an unfinished run of the same, it goes on with that: answers and
+    verifications on record are not asked or made again (docs/models.md).
+
+    Args:
+        task: What the controller must do.
+        learner: LLM1 of the paper, writes controllers: a provider, or its name as in
+            `anthropic:MODEL` (docs/models.md).
+        optimizer: LLM2, edits code and writes rules; the learner by default.
+        out: New or empty folder for the run, or one with the same run.
+        iterations: K.
+        patience: J, edits per iteration.
+        seed: Of the jittered starts of all candidates; by default each has its own, as
+            for `verify`; those of a recorded run have its seed.
+        start_from: Source of a controller to begin with instead of a generated one.
+        base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
+        key_over_http: Whether a key may go to such a server unencrypted, where it is
+            on another machine.
+        prompt: Template of the question for a new controller: `full`,
+            `underspecified`, or a file (docs/prompts.md).
+        refine: Whether failures become rules of the prompt; without, each new
+            controller is asked for in the same words.
+        max_output: Tokens that an answer may have; twice as many after a cut one.
+        max_cost: USD that the run may spend; by default what it was begun with, or 2.
+        max_tokens: That it may spend, in and out together; the same, or no limit.
+        budget: Shared with other runs, in the place of these limits.
+        index: Of several runs of the same, which keeps their samples apart.
+        retry: How patiently a model is asked after faults.
+        judge: A warm one, for several runs one after the other; its own by default.
+        on_event: Called with each journal record, if given.
+
+    Returns:
+        The run; `run.verified` tells whether `run.controller` was written.
+
+    Raises:
+        RunError: The folder cannot be used, or holds another run.
+        ProviderError: A model cannot be chosen so, e.g. without its key, or nothing
+            bounds what it costs.
+        PriceError: The user's price file is broken.
+        PromptError: The template cannot be used.
+        Fault: Sandbox, suite or provider broken; the run's record says so, too.
+    """
+    template = load_template(prompt)
+    models = choose_models(
+        learner, optimizer, task.setting, base_url, key_over_http=key_over_http
+    )
+    run = describe(
+        task,
+        models,
+        template,
+        folder=out,
+        base_url=base_url,
+        max_output=max_output,
+        index=index,
+        start_from=start_from,
+        iterations=iterations,
+        patience=patience,
+        refine=refine,
+        seed=settled_seed(seed, models[0], out),
+    )
+    account = account_of(models, run_there(out), max_cost, max_tokens, budget)
+    with hold_folder(out):
+        before = run_there(out)
+        if before is not None:
+            check_same(before, run)
+            if before.finished:
+                check_own(before)
+                return before
+        recorder = open_record(
+            task, run, before, template, start_from, account, on_event
+        )
+        calls = Calls(
+            recorder,
+            account.budget,
+            account.tariffs,
+            retry or RetryPolicy(),
+            max_output,
+        )
+        dialogue = Dialogue(task, *models, calls, template=template)
+        paid = any(model.paid for model in models)
+        with ExitStack() as stack:
+            warm = judge or stack.enter_context(WarmJudge(task=task))
+            return _run(dialogue, start_from, warm, paid=paid)
+
+
+def _run(dialogue: Dialogue, given: str | None, judge: WarmJudge, *, paid: bool) -> Run:
+    """The loop, and how it ended on record."""
+    recorder = dialogue.calls.recorder
+    try:
+        if paid:
+            _prove(dialogue.task, recorder, judge)
+        _search(dialogue, given, judge)
+    except OutOfBudget as error:
+        facts = {"enough": error.way_on, "outlook": error.outlook}
+        recorder.finish("budget", reason=str(error), **facts)
+    except KeyboardInterrupt:
+        recorder.finish("interrupted")
+        raise
+    except Exception as error:
+        # A disk that is full is told as it was met first.
+        with suppress(OSError):
+            recorder.finish("fault", reason=str(error))
+        raise
+    return recorder.run
+
+
+def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
+    """Algorithm 2, until a candidate has passed or K iterations are over."""
+    recorder = dialogue.calls.recorder
+    run = recorder.run
+    first = None if given is None else Candidate(given)
+    # Those on record do not count: who goes on with a run wants it to be tried again.
+    spent = 0
+    for k in range(1, run.iterations + 1):
+        candidate = (k == 1 and first) or dialogue.generate(k)
+        parent, report = "", None
+        for j in range(run.patience + 1):
+            source, notes = candidate
+            if source is None:
+                new = recorder.judged(k, j, None, notes)
+                spent += new and j == 0
+                if dialogue.learner.paid and spent >= MOST_SPENT and k < run.iterations:
+                    raise _given_up(dialogue.learner, spent, notes)
+                break
+            spent = 0
+            folder = recorder.candidate(k, j, source)
+            if report is not None and same_code(source, parent):
+                recorder.judged(k, j, report, notes, unchanged=True)
+                dialogue.saw_no_change(k, j)
+            else:
+                report = _verify(dialogue.task, recorder, k, j, source, folder, judge)
+                recorder.judged(k, j, report, notes)
+                dialogue.saw(k, j, report)
+            if report.passed:
+                _deliver(recorder, dialogue.task, k, source, report, folder)
+                return
+            parent = source
+            if j < run.patience:
+                candidate = dialogue.edit(k, j + 1, source, report)
+            elif run.refine:
+                dialogue.summarise(k, j, source, report)
+    recorder.finish("not verified")
+
+
+def _given_up(model: Provider, spent: int, notes: tuple[str, ...]) -> Fault:
+    """That a model gives no code, with what was noted of its last answers."""
+    return Fault(
+        f"{model.name}: {spent} iterations in a row without a controller; of the last "
+        f"one, {notes[-1]}"
+    )
+
+
+def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
+    """Has the suite prove itself before an answer is paid for, once in a run.
+
+    Raises:
+        Fault: It does not: no controller can pass it, or one that does nothing can.
+    """
+    # Nothing is believed of a run that somebody else began.
+    if recorder.past.proven and recorder.run.mark:
+        return
+
+    def tell(doing: str) -> None:
+        recorder.tell({"event": "prove.step", "doing": doing})
+
+    recorder.event("prove.start")
+    seed = recorder.run.seed
+    proof = prove_suite(task, seed=seed, judge=judge, on_progress=tell)
+    facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
+    recorder.event("prove.end", **facts)
+
+
+def _verify(
+    task: Task,
+    recorder: Recorder,
+    k: int,
+    j: int,
+    source: str,
+    folder: Path,
+    judge: WarmJudge,
+) -> Report:
+    """The report on a candidate; one on record is not made again."""
+    seed = recorder.run.seed
+    recorder.event("verify.start", k=k, j=j)
+    kept = kept_report(folder, task, source, seed) if recorder.run.mark else None
+    return kept or verify(
+        folder / "controller.py", task, seed=seed, out=folder, judge=judge
+    )
+
+
+def _deliver(
+    recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
+) -> None:
+    """Puts the verified controller and its evidence at the top of the run."""
+    folder = recorder.run.folder
+    write_atomic(folder / "controller.py", source)
+    write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
+    (folder / "trajectories").mkdir(exist_ok=True)
+    for path in sorted((evidence / "trajectories").glob("*.npz")):
+        write_atomic(folder / "trajectories" / path.name, path.read_bytes())
+    outcomes = {episode.name: episode.outcome for episode in report.episodes}
+    trajectories = load_trajectories(folder / "trajectories")
+    draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
+    recorder.run.tau = k
+    recorder.finish("verified", k=k)

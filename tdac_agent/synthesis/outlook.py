@@ -1,0 +1,147 @@
+"""What a run would ask first, and what it can cost at most, before it is begun."""
+
+from __future__ import annotations
+
+from pydantic import ConfigDict, Field
+
+from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
+from tdac_agent.models.prices import PriceList
+from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
+from tdac_agent.models.tariff import MAX_COST, OWN_MATTER, UNPRICED_TOKENS, Tariff
+from tdac_agent.models.tokens import estimate_tokens, most_tokens
+from tdac_agent.prompting.prompt import FULL, PromptTemplate, generate_prompt
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.synthesis.dialogue import MAX_ASKS
+from tdac_agent.synthesis.workload import tokens_asked, whole
+from tdac_agent.tasks.task import Task
+
+
+class Outlook(PrintableRecord):
+    """The first question of a run, and bounds of the whole; tokens are estimates."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    task: str
+    learner: str
+    optimizer: str
+    iterations: int = Field(description="K")
+    patience: int = Field(description="J")
+    prompt: str = Field(description="The first prompt, exactly.")
+    prompt_tokens: int = Field(description="Estimated from its length in bytes.")
+    answer_tokens: int = Field(description="That the first answer may have.")
+    first_cost: float | None = Field(
+        description="USD that are reserved for the first question; None if unknown."
+    )
+    max_cost: float | None = Field(
+        description="USD that the run may spend; None where nothing has a price."
+    )
+    max_tokens: int | None = Field(description="That it may spend; None for no limit.")
+    first_needs: str = Field(
+        description="Flag that pays the first question; empty where the limits do."
+    )
+    questions: int = Field(description="Of the whole run, if nothing ever passes.")
+    cost_once: float | None = Field(
+        description="USD at most, each question being answered at once."
+    )
+    cost_most: float | None = Field(
+        description="USD at most, each answer being cut off, and asked for three times."
+    )
+    unknown_prices: tuple[str, ...] = Field(description="Models without a price.")
+    uncounted: tuple[str, ...] = Field(
+        description="Programs and people, whose cost is not for this program to know."
+    )
+    prices_dated: str
+
+
+def foresee(
+    task: Task,
+    learner: str,
+    optimizer: str,
+    prices: PriceList,
+    *,
+    iterations: int = 20,
+    patience: int = 1,
+    refine: bool = True,
+    template: PromptTemplate = FULL,
+    base_url: str | None = None,
+    max_output: int = MAX_OUTPUT_TOKENS,
+    max_cost: float | None = None,
+    max_tokens: int | None = None,
+) -> Outlook:
+    """The first prompt of a run and its worst case; no model is asked, no key needed.
+
+    Args:
+        task: What the controller must do.
+        learner: Name of LLM1.
+        optimizer: Name of LLM2.
+        prices: Of the models.
+        iterations: K.
+        patience: J.
+        refine: Whether failures become rules.
+        template: Of the question for a new controller.
+        base_url: Where the models are served, if not by the vendor.
+        max_output: Tokens that an answer may have.
+        max_cost: USD that the run may spend; by default 2.
+        max_tokens: That it may spend; by default what `bounds_of` says.
+
+    Raises:
+        PromptError: The template cannot be used.
+    """
+    prompt = generate_prompt(task, (), template)
+    tokens = estimate_tokens(prompt)
+    work = whole(iterations, patience, refine=refine)
+    sizes = tokens_asked(tokens, max_output)
+    prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
+    first, second = prices_of
+    once = most = first_cost = None
+    if first is not None:
+        first_cost = first.most(most_tokens(prompt), max_output)
+    if first is not None and second is not None:
+        said = max_output * (1 + 2 * (MAX_ASKS - 1))
+        once, most = (
+            work.learner * first.most(times * sizes.learner, out)
+            + work.optimizer * second.most(times * sizes.optimizer, out)
+            for times, out in ((1, max_output), (MAX_ASKS, said))
+        )
+    without = [
+        name
+        for name, price in zip((learner, optimizer), prices_of, strict=True)
+        if price is None
+    ]
+    own = [name for name in without if name.partition(":")[0] in OWN_MATTER]
+    if base_url is not None and max_tokens is None and len(without) > len(own):
+        max_tokens = UNPRICED_TOKENS
+    priced = any(price is not None and price.most(1, 1) > 0 for price in prices_of)
+    limit = (MAX_COST if max_cost is None else max_cost) if priced else None
+    worst = NOTHING
+    if first_cost != 0.0:
+        worst = Tariff(price=first).most(most_tokens(prompt), max_output)
+    return Outlook(
+        task=task.name,
+        learner=learner,
+        optimizer=optimizer,
+        iterations=iterations,
+        patience=patience,
+        prompt=prompt,
+        prompt_tokens=tokens,
+        answer_tokens=max_output,
+        first_cost=first_cost,
+        max_cost=limit,
+        max_tokens=max_tokens,
+        first_needs=_needed(Budget(limit, max_tokens), worst),
+        questions=work.questions,
+        cost_once=once,
+        cost_most=most,
+        unknown_prices=tuple(dict.fromkeys(n for n in without if n not in own)),
+        uncounted=tuple(dict.fromkeys(own)),
+        prices_dated=prices.dated.isoformat(),
+    )
+
+
+def _needed(budget: Budget, worst: Amount) -> str:
+    """The flag with which a question can be paid; empty where the budget is enough."""
+    try:
+        budget.reserve("first", worst)
+    except BudgetExhausted as error:
+        return error.flag(worst)
+    return ""

@@ -1,0 +1,1 @@
+"""From a `task.yaml` to a feasible task."""

@@ -1,0 +1,57 @@
+"""What every report says of its origin: hashes, limits, versions."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.metadata
+import platform
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.sandbox import Limits
+from tdac_agent.tasks.task import Task
+
+VERSIONED = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
+
+
+def origin(
+    task: Task, source: bytes, workdir: Path, tier: str, limits: Limits
+) -> dict[str, Any]:
+    """The fields that provenance of any kind begins with.
+
+    Args:
+        task: What the controller must do.
+        source: Bytes of `controller.py`.
+        workdir: Folder whose files it saw.
+        tier: Sandbox tier that held it.
+        limits: Of its processes.
+    """
+    weak = "this sandbox tier cannot withhold the network and other files"
+    return {
+        "task": task.name,
+        "task_sha256": task.sha256(),
+        "unit": task.setting.units.place,
+        "left_out": task.setting.left_out,
+        "map_sha256": task.setting.world_sha256(),
+        "params_sha256": sha256_of(task.params.model_dump_json().encode()),
+        "sensors_sha256": sha256_of((workdir / "sensors.py").read_bytes()),
+        "controller_sha256": sha256_of(source),
+        "sandbox": tier,
+        "limits": asdict(limits),
+        "warnings": (*((weak,) if tier == "rlimits" else ()), *task.params.notes),
+        "versions": dict(versions()),
+    }
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Of Python and of the packages that a verdict may depend on."""
+    packages = {name: importlib.metadata.version(name) for name in VERSIONED}
+    return {"python": platform.python_version(), **packages}
+
+
+def sha256_of(data: bytes) -> str:
+    """Hash of some bytes, in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()

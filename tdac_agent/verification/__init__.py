@@ -1,0 +1,1 @@
+"""From a controller, a task and a suite to a report."""

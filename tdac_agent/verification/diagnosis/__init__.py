@@ -1,0 +1,1 @@
+"""What went wrong in an episode, in words and figures."""

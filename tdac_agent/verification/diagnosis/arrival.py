@@ -1,0 +1,157 @@
+"""Why an episode without a contact did not arrive: cause, step and figures."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tdac_agent.episodes.trajectory import Rollout, Trajectory
+from tdac_agent.tasks.units import Units
+from tdac_agent.verification.diagnosis.motion import (
+    flips,
+    forward,
+    lengths,
+    rounds_about,
+    turns,
+    wheels_turn,
+)
+from tdac_agent.verification.diagnosis.stall import (
+    FLIPS,
+    PROGRESS,
+    Finding,
+    percent,
+    standing_since,
+    why_stalled,
+)
+from tdac_agent.verification.diagnosis.surroundings import Surroundings
+
+# Share of the episode without progress from which a robot is not merely slow.
+_STALLED = 0.2
+
+
+def why_no_arrival(rollout: Rollout, around: Surroundings) -> Finding:
+    """What kept a robot from its goal that touched nothing."""
+    trajectory, units = rollout.trajectory, around.units
+    gone = np.hypot(*(trajectory.poses[:, :2] - trajectory.poses[0, :2]).T).max()
+    if gone < PROGRESS and np.abs(turns(trajectory)).sum() < 1.0:
+        text = f"in {trajectory.steps} steps it went {gone:.1f} {units.length} from its"
+        return Finding("no motion", f"{text} start and hardly turned.", 0)
+    since = last_progress(rollout)
+    if rollout.reached or trajectory.steps - since < _STALLED * trajectory.steps:
+        return _unfinished(trajectory, around)
+    return (
+        _missed_goal(rollout, since, units)
+        or _wrong_goal(rollout, around)
+        or why_stalled(trajectory, since, rollout.radius, units)
+    )
+
+
+def near_goal(rollout: Rollout) -> float:
+    """Path left from which a robot has come to its goal without reaching it."""
+    d0 = float(rollout.trajectory.path_distances[0])
+    near = 3.0 * max(rollout.tolerance, rollout.radius)
+    return min(near, max(0.25 * d0, 1.5 * rollout.tolerance))
+
+
+def last_progress(rollout: Rollout) -> int:
+    """Step after which a robot hardly came nearer to its goal."""
+    distances = rollout.trajectory.path_distances
+    progress = float(distances[0] - distances.min())
+    # What creeps, or trembles, does not get on.
+    slack = max(PROGRESS, min(0.05 * progress, 0.5 * rollout.radius))
+    return int(np.argmax(distances <= float(distances.min()) + slack))
+
+
+def _unfinished(trajectory: Trajectory, around: Surroundings) -> Finding:
+    """Still under way at the end of its time."""
+    distances, steps = trajectory.path_distances, trajectory.steps
+    limit, unit = around.full_speed, around.units.length
+    driven, seconds = float(lengths(trajectory).sum()), steps * trajectory.dt
+    speed = float(np.abs(forward(trajectory)).mean())
+    facts = (
+        f"{percent(1 - distances[-1] / max(distances[0], 1e-9))} of the way in {steps} "
+        f"steps, at {limit * speed:.1f} {unit}/s on average ({percent(speed)} of the "
+        f"wheel limit), {distances[0] / seconds:.1f} {unit}/s or more were needed; "
+        f"{driven:.0f} {unit} driven for {distances[0] - distances[-1]:.0f} {unit} of "
+        f"progress; both wheels stood in "
+        f"{percent(1 - wheels_turn(trajectory).mean())} of the steps."
+    )
+    reversed_share = flips(trajectory, 0)
+    spin = float(np.abs(np.diff(trajectory.actions, axis=1)).mean()) / 2.0
+    if reversed_share >= 5 * FLIPS and spin >= 0.3:
+        text = "it reversed its turn or its drive in "
+        text += f"{percent(reversed_share)} of the steps and made {facts}"
+        return Finding("oscillating", text, steps)
+    return Finding("too slow", facts, steps)
+
+
+def _missed_goal(rollout: Rollout, since: int, units: Units) -> Finding | None:
+    """It came near to its goal, and did not get there."""
+    trajectory, straight = rollout.trajectory, rollout.distances("euclidean")
+    distances, unit = trajectory.path_distances, units.length
+    within = straight <= rollout.tolerance
+    if within.any():
+        step = int(np.argmax(within))
+        text = (
+            f"in step {step} it was {straight[step]:.1f} {unit} from the goal, within "
+            f"the tolerance of {rollout.tolerance:.1f} {unit}, but a wall stands in "
+            f"between: the way there is {distances[step]:.1f} {unit}."
+        )
+        return Finding("missed goal", text, step)
+    if distances[since] > near_goal(rollout):
+        return None
+    best = int(np.argmin(distances))
+    after = _after_the_goal(rollout, since, best, units)
+    if after is None:
+        return None
+    step, what = after
+    text = (
+        f"in step {best} it was {straight[best]:.1f} {unit} from the goal, tolerance "
+        f"{rollout.tolerance:.1f} {unit}; {what}."
+    )
+    return Finding("missed goal", text, step)
+
+
+def _after_the_goal(
+    rollout: Rollout, since: int, best: int, units: Units
+) -> tuple[int, str] | None:
+    """What a robot did after it had been nearest to its goal, if that is clear.
+
+    Returns:
+        The step to look at, and the words.
+    """
+    trajectory, straight = rollout.trajectory, rollout.distances("euclidean")[since:]
+    rounds, unit = rounds_about(trajectory, since, rollout.goal), units.length
+    away = float(trajectory.path_distances[-1] - trajectory.path_distances[best])
+    if abs(rounds) >= 2.0 and straight.max() < 4.0 * near_goal(rollout):
+        way = "clockwise" if rounds > 0 else "counter-clockwise"
+        return best, (
+            f"since step {since} it circled the goal {abs(rounds):.1f} times, {way} on "
+            f"the picture, {straight.min():.1f} to {straight.max():.1f} {unit} from it"
+        )
+    rest = standing_since(trajectory)
+    if straight[-1] <= near_goal(rollout) and rest < trajectory.steps:
+        place = units.point(*trajectory.poses[-1, :2])
+        text = f"it stands since step {rest} at {place}, {straight[-1]:.1f} {unit}"
+        return rest, f"{text} from the goal"
+    if away > 2.0 * rollout.radius:
+        return best, f"it then passed by and went {away:.1f} {unit} away"
+    return None
+
+
+def _wrong_goal(rollout: Rollout, around: Surroundings) -> Finding | None:
+    """It ended where the goal is for one who mixes up the coordinates."""
+    trajectory, units = rollout.trajectory, around.units
+    final = trajectory.poses[-math.ceil(_STALLED * trajectory.steps) :, :2]
+    start = trajectory.poses[0, :2]
+    for mistake, place in around.mistaken_goals().items():
+        off = float(np.hypot(*(final - place).T).max())
+        apart = min(math.dist(place, rollout.goal), math.dist(place, start))
+        if off <= rollout.tolerance + rollout.radius < apart:
+            text = (
+                f"it ended within {off:.1f} {units.length} of {units.point(*place)}, "
+                f"which is the goal {units.point(*rollout.goal)} with {mistake}."
+            )
+            return Finding("wrong goal", text, trajectory.steps)
+    return None

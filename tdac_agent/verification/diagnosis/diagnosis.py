@@ -1,0 +1,223 @@
+"""What happened in a judged episode, from its trajectory alone."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from tdac_agent.episodes.trajectory import Rollout, Trajectory
+from tdac_agent.storage.plain import plain
+from tdac_agent.tasks.setting import Nominal
+from tdac_agent.tasks.units import Units
+from tdac_agent.verification.diagnosis.arrival import near_goal, why_no_arrival
+from tdac_agent.verification.diagnosis.course import (
+    goal_bearing,
+    heading_error,
+    turned_away,
+)
+from tdac_agent.verification.diagnosis.motion import forward, saturated
+from tdac_agent.verification.diagnosis.report import Cause, Diagnosis
+from tdac_agent.verification.diagnosis.stall import PROGRESS, percent
+from tdac_agent.verification.diagnosis.surroundings import (
+    Surroundings,
+    rollout_on_screen,
+    surroundings_of,
+)
+from tdac_agent.verification.diagnosis.touch import side_of, where_on_the_wall
+from tdac_envs.map2d.task import Pose
+
+LAST_POSES = 4
+# Share of turns away from the path, and their number, from which it is no accident.
+_AWAY, _AWAY_STEPS = 0.8, 8
+_RETURNED = "run_episode returned"
+_OUT_OF_CPU = re.compile(r"CPU time")
+_CONTRACT = re.compile(
+    rf"must return|reset\(\)|step\(\)|{_RETURNED}|module 'controller'"
+)
+
+
+def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
+    """Cause and circumstances of a failed (or late) episode.
+
+    Args:
+        rollout: The episode.
+        task: Map or world of the episode.
+
+    Returns:
+        For an episode that is held out: the cause `held out`, and no figures.
+    """
+    if rollout.outcome == "not run":
+        return Diagnosis(cause="error", text=f"{rollout.name}: {rollout.error}.")
+    if rollout.held_out:
+        text = "A start that is held out failed; nothing more is told of it."
+        return Diagnosis(cause="held out", text=text)
+    around = surroundings_of(task)
+    return _on_screen(rollout_on_screen(rollout, around.units), around)
+
+
+def _on_screen(rollout: Rollout, around: Surroundings) -> Diagnosis:
+    if rollout.error is not None:
+        return _error(rollout, around.units)
+    if rollout.trajectory.steps == 0:
+        text = "no motion: no step was made."
+        return _diagnosis(rollout, around.units, "no motion", text, 0)
+    if rollout.outcome == "collision":
+        return _collision(rollout, around)
+    return _no_arrival(rollout, around)
+
+
+def _error(rollout: Rollout, units: Units) -> Diagnosis:
+    message, steps = f"{plain(rollout.error or '')}.", rollout.trajectory.steps
+    cause: Cause = "error"
+    if rollout.timed_out or _OUT_OF_CPU.search(message):
+        cause = "time-out"
+    elif _CONTRACT.search(message):
+        cause = "contract"
+    when = f"after {steps} steps" if steps else "before its first step"
+    # A loop of its own that has returned says by itself how far it came.
+    failed = "" if _RETURNED in message else f"the controller failed {when}: "
+    text = f"{cause}: {failed}{message}"
+    return _diagnosis(rollout, units, cause, text, steps)
+
+
+def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
+    trajectory, units = rollout.trajectory, around.units
+    pose, speed = _pose(trajectory, trajectory.steps), float(forward(trajectory)[-1])
+    touch = around.touch(pose, rollout.radius + 3.0)
+    assert touch is not None
+    side, share = side_of(touch.bearing), saturated(trajectory)
+    towards = pose.heading + (math.pi if speed < 0.0 else 0.0)
+    corner = where_on_the_wall(touch, towards, units)
+    error, course = _course(rollout, around)
+    text = (
+        f"collision in step {trajectory.steps} "
+        f"({trajectory.steps * trajectory.dt:.1f} s) at {units.point(pose.x, pose.y)}, "
+        f"heading {units.heading_of(pose.heading):z.2f} rad, at "
+        f"{speed * around.full_speed:.0f} {units.length}/s, the {side} of the body "
+        f"touched the {touch.thing} at "
+        f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
+        f"{around.seen(touch, trajectory)} {_limits(share)}"
+        f"{_passed_goal(rollout, units)}{course}"
+    )
+    return _diagnosis(
+        rollout,
+        units,
+        "collision",
+        text,
+        trajectory.steps,
+        side=side,
+        wall=units.kept_place(*touch.wall),
+        corner=None if touch.corner is None else units.kept_place(*touch.corner),
+        thing=touch.thing,
+        heading_error=error,
+        saturated=round(share, 3),
+    )
+
+
+def _limits(share: float) -> str:
+    told = f"A wheel was at its limit in {percent(share)} of the steps. "
+    return told if share else ""
+
+
+def _passed_goal(rollout: Rollout, units: Units) -> str:
+    distances = rollout.trajectory.path_distances
+    best = int(distances.argmin())
+    if distances[best] > near_goal(rollout):
+        return ""
+    if distances[-1] - distances[best] < PROGRESS:
+        return ""
+    off = f"{distances[best]:.1f} {units.length} off"
+    return f"It had passed the goal in step {best}, {off}. "
+
+
+def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
+    cause, text, step = why_no_arrival(rollout, around)
+    trajectory = rollout.trajectory
+    end = _pose(trajectory, trajectory.steps)
+    touch = around.touch(end, 5.0 * rollout.radius)
+    if touch is not None and cause in ("stuck", "oscillating", "no motion"):
+        near = "wall" if touch.border else touch.thing
+        text += f" The nearest {near} is "
+        text += f"{touch.gap:.1f} {around.units.length} from the body, at its "
+        text += f"{side_of(touch.bearing)}."
+    error, course = _course(rollout, around)
+    text = f"{cause}: {text} {course}"
+    return _diagnosis(rollout, around.units, cause, text, step, heading_error=error)
+
+
+def _course(rollout: Rollout, around: Surroundings) -> tuple[float | None, str]:
+    """Where the shortest path lay at the end, and whether the robot turned to it."""
+    trajectory = rollout.trajectory
+    error = heading_error(around, trajectory, trajectory.steps)
+    if error is None:
+        return None, ""
+    straight = goal_bearing(trajectory, rollout.goal)
+    text = (
+        f"Heading error {_turn(error)} to the shortest path, {_turn(straight)} to the "
+        f"goal itself. "
+    )
+    share, steps = turned_away(around, trajectory, rollout.goal)
+    if steps >= _AWAY_STEPS and share >= _AWAY:
+        text += f"In {percent(share)} of its first {steps} steps with a turn it turned "
+        text += "away from both: look at the sign of the turn. "
+    return round(error, 3), text
+
+
+def _turn(angle: float) -> str:
+    """An angle in words: `41° to the right`."""
+    return f"{abs(math.degrees(angle)):.0f}° {'right' if angle > 0 else 'left'}"
+
+
+def _diagnosis(
+    rollout: Rollout, units: Units, cause: Cause, text: str, step: int, **facts: Any
+) -> Diagnosis:
+    """Adds the distances and the last poses to what is known."""
+    trajectory = rollout.trajectory
+    text = f"{rollout.name}: {text.strip()}"
+    if not len(trajectory.poses):
+        return Diagnosis(cause=cause, text=text, step=step, episode=rollout.name)
+    distances = trajectory.path_distances
+    d0, d_min = float(distances[0]), float(distances.min())
+    x, y = units.kept_place(*trajectory.poses[step, :2].tolist())
+    if trajectory.steps:
+        text += f" Path left: {d0:.1f} {units.length} at the start, {d_min:.1f} "
+        text += f"{units.length} at best. {_last_poses(trajectory, units)}"
+    return Diagnosis(
+        cause=cause,
+        text=text,
+        episode=rollout.name,
+        step=step,
+        x=x,
+        y=y,
+        d0=units.kept(d0),
+        d_min=units.kept(d_min),
+        **facts,
+    )
+
+
+def _last_poses(trajectory: Trajectory, units: Units) -> str:
+    """The last poses with the wheel speeds that followed, equal ones told once."""
+    poses, actions = trajectory.poses.tolist(), trajectory.actions.tolist()
+    end = units.pose(*poses[-1])
+    groups = [(trajectory.steps, trajectory.steps, end)]
+    for step in range(trajectory.steps - 1, -1, -1):
+        place, (left, right) = units.pose(*poses[step]), actions[step]
+        row = f"{place} [{left:z.2f} {right:z.2f}]"
+        _, last, told = groups[-1]
+        # The pose at the end has no wheel speeds of its own.
+        if told == row or told == place == end:
+            groups[-1] = (step, last, row)
+        elif len(groups) < LAST_POSES:
+            groups.append((step, step, row))
+        else:
+            break
+    rows = [
+        f"{first}{f'-{last}' if last > first else ''}: {row}"
+        for first, last, row in reversed(groups)
+    ]
+    return f"Last poses (step: x y heading [left right]): {'; '.join(rows)}."
+
+
+def _pose(trajectory: Trajectory, step: int) -> Pose:
+    return Pose(*trajectory.poses[step].tolist())

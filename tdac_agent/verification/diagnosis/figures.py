@@ -1,0 +1,159 @@
+"""Pictures of judged episodes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.setting import Nominal
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.course import way_from
+from tdac_agent.verification.diagnosis.report import Diagnosis, Episode, Report
+from tdac_agent.verification.diagnosis.surroundings import (
+    surroundings_of,
+    trajectory_on_screen,
+)
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.drawing.closeup import Event, run_picture
+from tdac_envs.map2d.task import Pose
+
+MAX_FACT = 240
+
+
+def draw_trajectories(
+    task: Task,
+    trajectories: dict[str, Trajectory],
+    outcomes: dict[str, str],
+    path: Path,
+) -> None:
+    """Writes a PNG of the map or the world with each trajectory.
+
+    Args:
+        task: Whose map or world.
+        trajectories: By episode name.
+        outcomes: By episode name.
+        path: The file.
+    """
+    picture = pictures_of(task.setting).trajectories(
+        [trajectory.poses for trajectory in trajectories.values()],
+        [outcomes.get(name, "") for name in trajectories],
+        list(trajectories),
+    )
+    write_png(picture, path)
+
+
+def draw_failures(
+    task: Task, report: Report, trajectories: dict[str, Trajectory], folder: Path
+) -> list[Path]:
+    """Writes a PNG for each episode that failed, `NAME.png`; returns the files.
+
+    Args:
+        task: Whose map or world.
+        report: What failed, and why.
+        trajectories: By episode name; one that is missing gives no picture.
+        folder: Where to; it must exist.
+    """
+    background, files = None, []
+    for episode in report.episodes:
+        trajectory = trajectories.get(episode.name)
+        # A file may hold another run of that start, one driven by `run_episode`.
+        if trajectory is None or trajectory.steps != episode.steps:
+            continue
+        if episode.outcome in ("reached", "not run"):
+            continue
+        background = background or pictures_of(task.setting).backdrop()
+        diagnosis = _diagnosis_of(report, episode)
+        event = event_of(task.nominal, trajectory, episode, diagnosis)
+        picture = run_picture(background, trajectory.poses, event)
+        files.append(folder / f"{file_stem(episode.name)}.png")
+        write_png(picture, files[-1])
+    return files
+
+
+def _diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
+    found = (failure.diagnosis for failure in report.failures)
+    return next((d for d in found if d is not None and d.episode == episode.name), None)
+
+
+def file_stem(name: str) -> str:
+    """What the files of an episode are called: `jitter_1` for `jitter 1`."""
+    return name.replace(" ", "_")
+
+
+def event_of(
+    task: Nominal,
+    trajectory: Trajectory,
+    episode: Episode,
+    diagnosis: Diagnosis | None,
+) -> Event:
+    """What a picture of a failed episode shows; its outcome where no cause is known."""
+    around = surroundings_of(task)
+    units, shown = around.units, trajectory_on_screen(trajectory, around.units)
+    end = Pose(*shown.poses[-1].tolist())
+    held_out = " (held out)" if episode.held_out else ""
+    title = f"{episode.name}{held_out}: {episode.outcome}"
+    facts = [f"ended in step {trajectory.steps} at {units.point(*end[:2])}"]
+    where = trajectory.poses[-1:, :2]
+    if diagnosis is not None:
+        title = f"{episode.name}: {diagnosis.cause}"
+        facts = _facts(diagnosis)
+        where = _where(task, trajectory, diagnosis)
+    d_min, d0 = (units.scale * d for d in (episode.d_min, episode.d0))
+    way = way_from(around, shown, trajectory.steps)
+    return Event(
+        title=title,
+        facts=(*facts, f"path left: {d_min:.0f} of {d0:.0f} {units.length}"),
+        where=where,
+        contact=contact_of(task, trajectory, episode.outcome),
+        way=None if way is None else np.array([units.place_of(x, y) for x, y in way]),
+    )
+
+
+def contact_of(
+    task: Nominal, trajectory: Trajectory, outcome: str
+) -> tuple[float, float] | None:
+    """Where the body touched something at the end of an episode, px or m."""
+    if outcome != "collision":
+        return None
+    around = surroundings_of(task)
+    end = Pose(*around.units.on_screen(trajectory.poses[-1:])[0].tolist())
+    touch = around.touch(end, around.radius + 3.0)
+    return None if touch is None else around.units.place_of(*touch.wall)
+
+
+def _facts(diagnosis: Diagnosis) -> list[str]:
+    """The first sentence of a diagnosis and its heading error, in ASCII."""
+    head = f"{diagnosis.episode}: "
+    words = diagnosis.text.removeprefix(head).removeprefix(diagnosis.cause)
+    sentence = words.lstrip(": ").partition(". ")[0].replace("°", " deg")
+    facts = [sentence.encode("ascii", "replace").decode()[:MAX_FACT]]
+    if diagnosis.heading_error is not None:
+        error = math.degrees(diagnosis.heading_error)
+        way = "right" if error > 0 else "left"
+        facts.append(f"heading error {abs(error):.0f} deg, path to the {way}")
+    return facts
+
+
+def _where(
+    task: Nominal, trajectory: Trajectory, diagnosis: Diagnosis
+) -> NDArray[np.float64]:
+    """The places to look at, shape (n, 2)."""
+    places = trajectory.poses[:, :2]
+    if diagnosis.cause in ("stuck", "spinning", "oscillating"):
+        return places[diagnosis.step :]
+    if diagnosis.cause == "missed goal":
+        return np.vstack([places[diagnosis.step], places[-1], task.goal])
+    return places[-1:]
+
+
+def write_png(picture: Image, path: Path) -> None:
+    """Writes an RGB picture."""
+    encoded = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1]
+    write_atomic(path, encoded.tobytes())

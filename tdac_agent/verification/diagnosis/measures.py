@@ -1,0 +1,140 @@
+"""What is measured of an episode: time, way, clearance, smoothness."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
+
+from tdac_agent.episodes.trajectory import Outcome, Rollout
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.setting import Nominal
+from tdac_agent.verification.diagnosis.surroundings import surroundings_of
+from tdac_envs.grid.plan import path_length
+from tdac_envs.map2d.task import Pose
+
+# Of the spectral arc length, as its authors have them.
+_HIGHEST, _FAINT, _PADDING = 10.0, 0.05, 4
+_DIGITS = 6
+
+
+class Measured(PrintableRecord):
+    """Figures of one episode of an evaluation; lengths in px, of the e-puck in m.
+
+    Those of the way are of successes only: what ends at a wall has none.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    seed: int
+    outcome: Outcome
+    steps: int
+    collisions: int
+    seconds: float = Field(description="Simulated.")
+    driven: float = Field(description="Length of the way that was driven.")
+    shortest: float | None = Field(
+        None, description="Length of the shortest way, straightened."
+    )
+    path_ratio: float | None = Field(
+        None, description="Way driven, and the rest of it at the end, to the shortest."
+    )
+    time_ratio: float | None = Field(
+        None, description="Time to that of the shortest way at full speed."
+    )
+    smoothness: float | None = Field(
+        None, description="Spectral arc length of the speed; 0 would be smoothest."
+    )
+    clearance_min: float = Field(description="Least gap beside the body.")
+    clearance_mean: float = Field(description="Mean gap beside the body.")
+    error: str | None = None
+
+    @property
+    def success(self) -> bool:
+        """Whether the goal was reached without a contact."""
+        return self.outcome == "reached" and not self.collisions
+
+
+def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
+    """The figures of an episode.
+
+    Args:
+        rollout: As it was driven.
+        seed: Of its environment.
+        task: With the start and the goal of the episode.
+    """
+    trajectory = rollout.trajectory
+    steps = np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T)
+    gaps = np.maximum(rollout.rooms - rollout.radius, 0.0)
+    seconds, driven = trajectory.steps * trajectory.dt, float(steps.sum())
+    way: dict[str, float] = {}
+    if rollout.reached and not rollout.collisions:
+        shortest = shortest_way(task)
+        rest = float(trajectory.path_distances[-1])
+        way = {
+            "shortest": shortest,
+            "path_ratio": (driven + rest) / shortest,
+            "time_ratio": seconds * task.full_step / (shortest * task.dt),
+            "smoothness": spectral_arc_length(steps / trajectory.dt, trajectory.dt),
+        }
+    figures = {
+        "seconds": seconds,
+        "driven": driven,
+        "clearance_min": float(gaps.min()),
+        "clearance_mean": float(gaps.mean()),
+        **way,
+    }
+    return Measured(
+        seed=seed,
+        outcome=rollout.outcome,
+        steps=trajectory.steps,
+        collisions=rollout.collisions,
+        error=rollout.error,
+        **{name: round(value, _DIGITS) for name, value in figures.items()},
+    )
+
+
+def shortest_way(task: Nominal) -> float:
+    """Length of the shortest way from a task's start to its goal.
+
+    The grid's shortest path in eight directions, after every shortcut that the body
+    can take.
+    """
+    around, start = surroundings_of(task), task.start
+    units = around.units
+    x, y = units.on_screen([start[:2]])[0].tolist()
+    path = around.path_from(Pose(x, y, 0.0))
+    if len(path) < 2:
+        return task.shortest
+    return path_length(np.array(around.pull(path))) / units.scale
+
+
+def spectral_arc_length(speeds: NDArray[np.float64], dt: float) -> float:
+    """Smoothness of a movement (SPARC): minus the arc length of its speed's spectrum.
+
+    S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet, "On the analysis
+    of movement smoothness", J. NeuroEng. Rehabil. 12:112, 2015, with its constants: 10
+    Hz, threshold 0.05, four times zero padding. It depends neither on how large nor on
+    how long a movement is; about -1.4 for a single stroke, the less the more often the
+    robot slows down and goes on.
+
+    Args:
+        speeds: At equal intervals, not negative.
+        dt: Interval, s.
+    """
+    if not speeds.size or speeds.max() == 0.0:
+        return 0.0
+    size = 2 ** (math.ceil(math.log2(speeds.size)) + _PADDING)
+    spectrum = np.abs(np.fft.rfft(speeds, size))
+    spectrum /= spectrum.max()
+    frequencies = np.fft.rfftfreq(size, dt)
+    kept = frequencies <= _HIGHEST
+    spectrum, frequencies = spectrum[kept], frequencies[kept]
+    strong = np.flatnonzero(spectrum >= _FAINT)
+    part = slice(strong[0], strong[-1] + 1)
+    spectrum, frequencies = spectrum[part], frequencies[part]
+    if len(spectrum) < 2:
+        return 0.0
+    along = np.diff(frequencies) / (frequencies[-1] - frequencies[0])
+    return -float(np.hypot(along, np.diff(spectrum)).sum())

@@ -1,0 +1,179 @@
+"""`report.json`: what was verified, how, and what came out."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.units import Place
+
+Group = Literal["static", "unit", "end to end", "user", "judge"]
+GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
+SHIPPED, OWN = "shipped", "own"
+"""Folders of the suite that is shipped, and of a user's own."""
+MAX_MESSAGE = 4000
+"""Characters of a test's message."""
+Cause = Literal[
+    "collision",
+    "no motion",
+    "stuck",
+    "spinning",
+    "oscillating",
+    "looping",
+    "too slow",
+    "missed goal",
+    "wrong goal",
+    "error",
+    "time-out",
+    "contract",
+    "held out",
+]
+
+
+class _Record(PrintableRecord):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Diagnosis(_Record):
+    """What happened in an episode, computed from its trajectory.
+
+    Figures are there where they apply; distances and places in px, of the e-puck in m.
+    """
+
+    cause: Cause
+    text: str = Field(description="One paragraph, deterministic, no paths.")
+    episode: str | None = Field(
+        None, description="`nominal`, `jitter 1` … or `run_episode`."
+    )
+    step: int | None = Field(None, description="Of the event.")
+    x: float | None = Field(None, description="Of the robot at that step.")
+    y: float | None = None
+    side: str | None = Field(None, description="Of the body that was hit.")
+    wall: tuple[float, float] | None = Field(None, description="What was touched.")
+    thing: str | None = Field(None, description="What that is.")
+    corner: tuple[float, float] | None = Field(
+        None, description="Corner of the wall within a body radius of that."
+    )
+    heading_error: float | None = Field(
+        None, description="To the shortest path at the end, rad, right positive."
+    )
+    saturated: float | None = Field(
+        None, description="Share of steps with a wheel at its limit."
+    )
+    d0: float | None = Field(None, description="Path left at the start.")
+    d_min: float | None = Field(None, description="Path left at best.")
+
+
+class Failure(_Record):
+    """One expected test that did not pass."""
+
+    test: str = Field(description="Test id, as pytest prints it.")
+    group: Group
+    message: str = Field(description="What was expected and what came.")
+    diagnosis: Diagnosis | None = None
+
+
+class Episode(_Record):
+    """Figures of one judged episode; distances in px, of the e-puck in m."""
+
+    # JSON has no word for infinity: a report with one would not read back.
+    model_config = ConfigDict(allow_inf_nan=False)
+
+    name: str
+    held_out: bool
+    outcome: str
+    steps: int
+    collisions: int
+    d0: float
+    d_min: float
+    d0_euclidean: float
+    d_min_euclidean: float
+    progress_passed: bool = Field(description="The progress test, geodesic.")
+    progress_passed_euclidean: bool
+    call_ms_mean: float
+    call_ms_p99: float
+    error: str | None = None
+
+
+class Provenance(_Record):
+    """What the verdict is about."""
+
+    task: str
+    called: str = Field("", description="The task in words, not by its name alone.")
+    task_sha256: str
+    unit: Place = Field("px", description="Of places and lengths.")
+    left_out: tuple[str, ...] = Field(
+        (), description="Nodes of the world that may be solid and were ignored."
+    )
+    map_sha256: str = Field(description="Of the map or the world.")
+    params_sha256: str
+    sensors_sha256: str
+    controller_sha256: str
+    suite: str
+    suite_sha256: str
+    own_suite: str = Field("", description="Short hash of tests that are not shipped.")
+    profile: Literal["policy", "paper"]
+    paper: bool = Field(description="Nominal start only.")
+    seed: int
+    sandbox: str = Field(description="Tier that held the controller.")
+    limits: dict[str, float] = Field(description="Of the controller's processes.")
+    warnings: tuple[str, ...] = ()
+    versions: dict[str, str]
+
+
+class Verdict(_Record):
+    """Passed means: exactly the expected tests ran and each one passed."""
+
+    passed: bool
+    expected: int
+    passed_tests: int
+    failed_tests: int
+
+
+class Report(_Record):
+    """One verification."""
+
+    schema_version: Literal[1] = 1
+    verdict: Verdict
+    provenance: Provenance
+    failures: tuple[Failure, ...]
+    tests: dict[str, str] = Field(description="Outcome of each expected test.")
+    episodes: tuple[Episode, ...]
+    child_cpu_seconds: float
+    seconds: float
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """A verdict that its own tests do not bear out is none."""
+        passed = sum(outcome == "passed" for outcome in self.tests.values())
+        counts = (len(self.tests), passed, len(self.tests) - passed)
+        verdict = self.verdict
+        told = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
+        failed = {name for name, outcome in self.tests.items() if outcome != "passed"}
+        if told != counts or {failure.test for failure in self.failures} != failed:
+            raise ValueError(f"expected counts {counts} and their failures, got {told}")
+        if verdict.passed != (0 < passed == len(self.tests)):
+            raise ValueError(f"expected not passed={verdict.passed} with {counts}")
+        return self
+
+    @property
+    def passed(self) -> bool:
+        """Whether the controller is verified."""
+        return self.verdict.passed
+
+
+def id_of(nodeid: str) -> str:
+    """A test's id: `test_unit.py::test_plan_path`, `own/test_mine.py::test_gap`."""
+    return nodeid.removeprefix(f"{SHIPPED}/")
+
+
+def group_of(test: str) -> Group:
+    """Which part of a suite a test belongs to."""
+    files: dict[str, Group] = {
+        "test_static.py": "static",
+        "test_unit.py": "unit",
+        "test_end_to_end.py": "end to end",
+    }
+    return files.get(test.partition("::")[0], "user")

@@ -1,0 +1,82 @@
+"""What a diagnosis asks about a map or a world, in units of the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Protocol
+
+from tdac_agent.episodes.trajectory import Rollout, Trajectory
+from tdac_agent.tasks.setting import Nominal
+from tdac_agent.tasks.units import Points, Units
+from tdac_agent.verification.diagnosis.touch import Touch
+from tdac_envs.grid.plan import Path
+from tdac_envs.map2d.task import Map2DTask, Pose
+
+Point = tuple[float, float]
+
+
+class Surroundings(Protocol):
+    """A task's map or world; places and lengths as in `units`."""
+
+    @property
+    def units(self) -> Units:
+        """Of the environment."""
+
+    @property
+    def radius(self) -> float:
+        """Of the body."""
+
+    @property
+    def full_speed(self) -> float:
+        """Lengths a second."""
+
+    def touch(self, pose: Pose, reach: float) -> Touch | None:
+        """What the body touches, or would touch first, within `reach`."""
+
+    def seen(self, touch: Touch, trajectory: Trajectory) -> str:
+        """Whether the distance sensors look at what was touched, in words."""
+
+    def path_from(self, pose: Pose) -> Path:
+        """Shortest path to the goal, shape (n, 2); empty where there is none."""
+
+    def pull(self, path: Path) -> list[Point]:
+        """Corners of a path after every shortcut that the body can take."""
+
+    def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
+        """Where the shortest path from each place first is so far away, or ends."""
+
+    def mistaken_goals(self) -> dict[str, Point]:
+        """Where the goal is for one who mixes up coordinates, by the mistake."""
+
+
+def surroundings_of(task: Nominal) -> Surroundings:
+    """The surroundings of a task of either kind."""
+    if isinstance(task, Map2DTask):
+        from tdac_agent.environments.map2d.surroundings import MapSurroundings
+
+        return MapSurroundings(task)
+    from tdac_agent.environments.epuck.surroundings import world_surroundings
+
+    return world_surroundings(task)
+
+
+def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:
+    """A trajectory in units of the screen."""
+    return replace(
+        trajectory,
+        poses=units.on_screen(trajectory.poses),
+        path_distances=trajectory.path_distances * units.scale,
+    )
+
+
+def rollout_on_screen(rollout: Rollout, units: Units) -> Rollout:
+    """An episode in units of the screen."""
+    (goal,) = units.on_screen([rollout.goal])
+    return replace(
+        rollout,
+        trajectory=trajectory_on_screen(rollout.trajectory, units),
+        goal=(float(goal[0]), float(goal[1])),
+        radius=rollout.radius * units.scale,
+        tolerance=rollout.tolerance * units.scale,
+    )

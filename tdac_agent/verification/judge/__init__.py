@@ -1,0 +1,1 @@
+"""The judge's process: it runs a suite over a controller."""

@@ -1,0 +1,78 @@
+"""What a judge found in a suite's episodes, beside pytest's own report log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.report import Episode
+from tdac_agent.verification.judge.jobs import Findings
+from tdac_agent.verification.judge.judge import NOMINAL, Judge, Key, rollout_key
+
+
+def driven(judge: Judge) -> list[Rollout]:
+    """The whole episodes that `policy` drove."""
+    return [
+        rollout
+        for (_, steps, drive), rollout in judge.rollouts.items()
+        if steps is None and drive == "policy"
+    ]
+
+
+def findings_of(judge: Judge, expected: list[str]) -> Findings:
+    """The findings of a judge that has settled, of tests that had to run."""
+    task = judge.task
+    rollouts = judge.rollouts
+    diagnoses = {
+        rollout_key(*key): diagnose(
+            _named(key, rollouts), task.nominal
+        ).model_dump_json()
+        for key, rollout in rollouts.items()
+        if rollout.outcome != "not run"
+        and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))
+    }
+    return Findings(
+        expected=expected,
+        episodes=[_episode(rollout, task) for rollout in driven(judge)],
+        diagnoses=diagnoses,
+        tier=judge.tier,
+        child_cpu_seconds=round(judge.cpu_seconds, 3),
+        fault=judge.fault,
+    )
+
+
+def _named(key: Key, rollouts: Mapping[Key, Rollout]) -> Rollout:
+    """The episode under the name of what drove it: two begin at the nominal start.
+
+    An error that `policy` meets as well, as where an import fails, is told once.
+    """
+    rollout, nominal = rollouts[key], rollouts.get(NOMINAL)
+    of_both = nominal is not None and rollout.error == nominal.error is not None
+    if key[2] == "policy" or of_both:
+        return rollout
+    return replace(rollout, name="run_episode")
+
+
+def _episode(rollout: Rollout, task: Task) -> Episode:
+    fraction, within = task.spec.progress.fraction, task.progress_steps + 1
+    figures = {}
+    for kind, suffix in (("geodesic", ""), ("euclidean", "_euclidean")):
+        distances = rollout.distances(kind)
+        figures[f"d0{suffix}"] = float(distances[0])
+        figures[f"d_min{suffix}"] = float(distances.min())
+        best = float(distances[:within].min())
+        figures[f"progress_passed{suffix}"] = best <= fraction * float(distances[0])
+    return Episode(
+        name=rollout.name,
+        held_out=rollout.held_out,
+        outcome=rollout.outcome,
+        steps=rollout.trajectory.steps,
+        collisions=rollout.collisions,
+        call_ms_mean=round(rollout.call_ms[0], 3),
+        call_ms_p99=round(rollout.call_ms[1], 3),
+        error=rollout.error,
+        **figures,
+    )

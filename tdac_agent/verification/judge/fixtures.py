@@ -1,0 +1,121 @@
+"""The fixtures that suites are written with; a public contract, see docs/suites.md."""
+
+from __future__ import annotations
+
+import ast
+import functools
+from collections.abc import Callable
+from importlib.util import decode_source
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.sandbox import ControllerError
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.judge.judge import Judge, rollout_key
+from tdac_agent.verification.suite.contract import MAX_SOURCE_BYTES
+from tdac_agent.verification.suite.oracle import Oracle
+
+JUDGE: pytest.StashKey[Judge] = pytest.StashKey()
+"""Where pytest's configuration has the judge."""
+
+
+class Controller:
+    """The controller under test; its code runs in the sandbox, never here.
+
+    Attributes:
+        source: The file's text.
+    """
+
+    def __init__(self, judge: Judge) -> None:
+        self._judge = judge
+        self.source = judge.source.decode("utf-8", "replace")
+
+    @functools.cached_property
+    def tree(self) -> ast.Module:
+        """Syntax tree of the source; a source that does not parse fails the test."""
+        size = len(self._judge.source)
+        if size > MAX_SOURCE_BYTES:
+            limit = f"at most {MAX_SOURCE_BYTES} are allowed"
+            pytest.fail(f"the source has {size} bytes, {limit}", pytrace=False)
+        try:
+            # As Python itself reads a file, which may declare an encoding.
+            return ast.parse(decode_source(self._judge.source))
+        except SyntaxError as error:
+            line = f" (line {error.lineno})" if error.lineno else ""
+            reason = f"{error.msg}{line}"
+        except (ValueError, RecursionError, MemoryError) as error:
+            reason = str(error) or type(error).__name__
+        pytest.fail(f"the source does not parse: {reason}", pytrace=False)
+
+    def constant(self, name: str) -> Any:
+        """Value of a top-level name."""
+        return self._judge.unit().get(name)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> Any:
+        """Calls a top-level function or class.
+
+        Exact Python types are kept. What cannot be sent as data comes back as a
+        `Remote`, with `call(method, ...)`, and may be passed on as an argument.
+        """
+        return self._judge.unit().call(name, *args, **kwargs)
+
+    def error_of(self, name: str, *args: Any, **kwargs: Any) -> ControllerError | None:
+        """The error that a call raises, or None where it returns."""
+        try:
+            self.call(name, *args, **kwargs)
+        except ControllerError as error:
+            return error
+        return None
+
+
+@pytest.fixture(scope="session")
+def task(pytestconfig: pytest.Config) -> Task:
+    """The task: `params`, `nominal`, `spec`, `progress_steps`."""
+    return pytestconfig.stash[JUDGE].task
+
+
+@pytest.fixture(scope="session")
+def controller(pytestconfig: pytest.Config) -> Controller:
+    """The controller under test."""
+    return Controller(pytestconfig.stash[JUDGE])
+
+
+@pytest.fixture(scope="session")
+def oracle() -> Oracle:
+    """Exact answers to planning questions."""
+    return Oracle()
+
+
+@pytest.fixture(scope="session")
+def generator(pytestconfig: pytest.Config) -> Callable[[str], np.random.Generator]:
+    """`generator(name)`: random numbers that follow from the run's seed and a name.
+
+    A controller that is right in cases which are always the same may have them by
+    heart.
+    """
+    seed = pytestconfig.stash[JUDGE].seed
+    return lambda name: np.random.default_rng([seed, *name.encode()])
+
+
+@pytest.fixture
+def rollout(
+    pytestconfig: pytest.Config, record_property: Callable[[str, object], None]
+) -> Callable[..., Rollout]:
+    """`rollout(name, steps=None, drive="policy")`: a judged episode, run once.
+
+    Names are `nominal` and `jitter 1` … `jitter 5`; `drive="run_episode"` lets the
+    controller's own loop step an environment that the judge holds;
+    `drive="truncated run_episode"` ends that loop by `truncated`.
+    """
+    judge = pytestconfig.stash[JUDGE]
+
+    def run(
+        name: str = "nominal", *, steps: int | None = None, drive: str = "policy"
+    ) -> Rollout:
+        record_property("rollout", rollout_key(name, steps, drive))
+        return judge.rollout(name, steps=steps, drive=drive)
+
+    return run

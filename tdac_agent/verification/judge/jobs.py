@@ -1,0 +1,47 @@
+"""What the judge's process is asked for, and what it answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_agent.sandbox import Limits
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.task_file import Profile
+from tdac_agent.verification.diagnosis.report import Episode
+
+SUITE: Final = "suite"
+"""The kind of a `Job`."""
+
+
+class Job(BaseModel):
+    """A suite that the judge's process is to run; all paths are absolute."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["suite"] = SUITE
+    task: Path
+    controller: Path
+    suites: list[Path] = Field(description="In the order in which they run.")
+    profile: Profile
+    paper: bool
+    tier: str
+    seed: int
+    limits: Limits
+    out: Path
+    trajectories: Path | None = Field(description="Folder for them, if wanted.")
+
+
+class Findings(PrintableRecord):
+    """What the judge's process found, beside pytest's own report log."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    expected: list[str]
+    episodes: list[Episode]
+    diagnoses: dict[str, str]
+    tier: str
+    child_cpu_seconds: float
+    fault: str | None

@@ -1,0 +1,144 @@
+"""How pytest runs a suite: which tests of it, in which order, with which plugins."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+import pytest_reportlog.plugin
+from _pytest.runner import runtestprotocol
+
+from tdac_agent.verification.diagnosis.report import (
+    GROUPS,
+    MAX_MESSAGE,
+    group_of,
+    id_of,
+)
+from tdac_agent.verification.judge import fixtures as suite_fixtures
+from tdac_agent.verification.judge.judge import Judge
+
+# Some of these cost a verification more than its tests do.
+UNUSED_PLUGINS = (
+    "cacheprovider",
+    "unraisableexception",
+    "threadexception",
+    "doctest",
+    "pastebin",
+    "stepwise",
+    "faulthandler",
+    "legacypath",
+)
+# Of a traceback, of which only the end is told.
+MOST_CALLS = 50
+
+
+class JudgePlugin:
+    """Gives a suite its judge and notes what ran.
+
+    Attributes:
+        expected: Test ids of this profile, as collected before any of them ran.
+    """
+
+    def __init__(self, judge: Judge, *, profile: str, paper: bool) -> None:
+        self._judge = judge
+        self._left_out = set() if profile == "paper" else {"paper"}
+        if paper:
+            self._left_out.add("jitter")
+        self.expected: list[str] = []
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        """Declares the markers that choose tests by profile; adds the fixtures."""
+        config.stash[suite_fixtures.JUDGE] = self._judge
+        config.pluginmanager.register(suite_fixtures)
+        config.addinivalue_line("markers", "paper: only in the profile `paper`")
+        config.addinivalue_line("markers", "jitter: not with `--paper`")
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Leaves out the tests of other profiles, and fixes what must run.
+
+        What another hook leaves out afterwards is missing, and so has failed.
+        """
+        chosen = [i for i in items if not self._left_out & _marker_names(i)]
+        # What costs little and explains most comes first.
+        items[:] = sorted(chosen, key=lambda i: GROUPS.index(group_of(id_of(i.nodeid))))
+        self.expected = [id_of(item.nodeid) for item in items]
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_setup(self) -> Generator[None]:
+        """Ends what a test prepares when the verification has taken too long."""
+        with self._judge.time_limit():
+            return (yield)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self) -> Generator[None]:
+        """The same for the test itself, and for what it says."""
+        with self._judge.time_limit():
+            return (yield)
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
+        """Cuts what an error says, before a report takes it apart line by line.
+
+        A message may quote megabytes that a controller returned, and a source that is
+        nested deeply gives a traceback of many calls.
+        """
+        error = None if call.excinfo is None else call.excinfo.value
+        known: set[int] = set()
+        while error is not None and id(error) not in known:
+            known.add(id(error))
+            _shorten(error)
+            error = error.__cause__ or error.__context__
+
+    def pytest_runtest_protocol(
+        self, item: pytest.Item, nextitem: pytest.Item | None
+    ) -> bool:
+        """Runs a test; one that failed for want of time is run once more."""
+        item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+        reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        if self._judge.call_may_pass():
+            item._initrequest()  # type: ignore[attr-defined]
+            reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        for report in reports:
+            item.ihook.pytest_runtest_logreport(report=report)
+        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        return True
+
+
+def _shorten(error: BaseException) -> None:
+    call = error.__traceback__
+    for _ in range(MOST_CALLS):
+        call = call and call.tb_next
+    if call is not None:
+        call.tb_next = None
+    text = str(error)
+    if len(text) > MAX_MESSAGE:
+        error.args = (f"{text[:MAX_MESSAGE]} …",)
+        if isinstance(error, pytest.fail.Exception):
+            error.msg = error.args[0]
+
+
+def _marker_names(item: pytest.Item) -> set[str]:
+    return {marker.name for marker in item.iter_markers()}
+
+
+def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
+    """Runs pytest over folders that lie side by side, hermetic, with a report log."""
+    root = suites[0].parent
+    arguments = [
+        *(str(folder) for folder in suites),
+        f"--rootdir={root}",
+        f"--confcutdir={root}",
+        "-c",
+        os.devnull,
+        f"--report-log={log}",
+        *(word for name in UNUSED_PLUGINS for word in ("-p", f"no:{name}")),
+        "--import-mode=importlib",
+        "--assert=plain",
+        "--strict-markers",
+        "-q",
+    ]
+    # By its name, pytest would look for it among all packages that are installed.
+    pytest.main(arguments, plugins=[pytest_reportlog.plugin, *plugins])

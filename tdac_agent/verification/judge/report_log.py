@@ -1,0 +1,253 @@
+"""What the judge's process left behind, as an outcome of each expected test."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from pydantic import BaseModel, Field, StrictInt, ValidationError
+
+from tdac_agent.errors import Fault
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.verification.diagnosis.report import (
+    MAX_MESSAGE,
+    Diagnosis,
+    Failure,
+    Verdict,
+    group_of,
+    id_of,
+)
+from tdac_agent.verification.judge.jobs import Findings
+
+PHASES = frozenset({"setup", "call", "teardown"})
+INTERNAL_ERROR = 3
+"""pytest's exit status, and the mark of its lines about it."""
+BREAKDOWN = "INTERNALERROR>"
+NOT_RUN = "the test did not run to its end"
+TORN = "the report log is torn or unfinished, so that nothing in it counts as passed"
+
+
+class _Crash(PrintableRecord):
+    message: str
+    lineno: int | None = None
+
+
+class _Details(PrintableRecord):
+    reprcrash: _Crash | None = None
+
+
+class _Collected(PrintableRecord):
+    """pytest's word about a file; it has more fields than are read here."""
+
+    nodeid: str
+    outcome: Literal["passed", "failed", "skipped"]
+    longrepr: _Details | tuple[str, int | None, str] | str | None = None
+
+
+class _Tested(_Collected):
+    """pytest's word about one phase of one test."""
+
+    when: Literal["setup", "call", "teardown"]
+    wasxfail: Any = None
+    user_properties: list[tuple[str, Any]] = Field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        return self.outcome == "passed" and "wasxfail" not in self.model_fields_set
+
+
+class _Finished(BaseModel):
+    """pytest's last word."""
+
+    exitstatus: StrictInt
+
+
+class _Other(BaseModel):
+    """A record of something else, such as a warning."""
+
+    kind: str = Field(alias="$report_type")
+
+
+_KINDS: dict[str, type[BaseModel]] = {
+    "CollectReport": _Collected,
+    "TestReport": _Tested,
+    "SessionFinish": _Finished,
+}
+
+
+class _Log(NamedTuple):
+    """Records of a report log; None for a line that is not one."""
+
+    records: list[BaseModel | None]
+
+    def is_whole(self, failed: bool) -> bool:
+        """Whether it was written to its end, and knows of as many failures as it tells.
+
+        Args:
+            failed: Whether it tells of any.
+        """
+        last = self.records[-1] if self.records else None
+        ended = isinstance(last, _Finished) and last.exitstatus in (0, int(failed))
+        return ended and None not in self.records
+
+    @property
+    def broke_down(self) -> bool:
+        """Whether pytest ended by an error of a hook and not of a test."""
+        last = self.records[-1] if self.records else None
+        return isinstance(last, _Finished) and last.exitstatus == INTERNAL_ERROR
+
+
+def read_findings(results: Path, output: str) -> Findings:
+    """The judge's findings.
+
+    Args:
+        results: Folder the judge wrote to.
+        output: What it printed.
+
+    Raises:
+        Fault: There are none, or they say that the sandbox failed.
+    """
+    try:
+        raw = (results / "findings.json").read_bytes()
+        findings = Findings.model_validate_json(raw)
+        for text in findings.diagnoses.values():
+            Diagnosis.model_validate_json(text)
+    except (OSError, ValidationError) as error:
+        raise Fault(f"the judge left no findings: {_tail(output)}") from error
+    if findings.fault is not None:
+        raise Fault(findings.fault)
+    if not findings.expected:
+        raise Fault(f"the suite could not be collected: {_tail(output)}")
+    return findings
+
+
+def read_outcomes(
+    path: Path, findings: Findings, output: str = ""
+) -> tuple[dict[str, str], list[Failure]]:
+    """Outcome of each expected test; what is missing from the log has failed.
+
+    A test has passed if each phase of it is on record, each as passed, in a log that
+    is whole.
+
+    Args:
+        path: The log.
+        findings: What the judge found.
+        output: What it printed.
+
+    Raises:
+        Fault: The suite cannot be collected, ran what was not expected, or has a hook
+            that raised.
+    """
+    log = _read(path)
+    if log.broke_down:
+        raise Fault(f"the suite broke down: {_breakdown(output)}")
+    phases: dict[str, set[str]] = {name: set() for name in findings.expected}
+    tests: dict[str, str] = dict.fromkeys(findings.expected, "missing")
+    failures: dict[str, Failure] = {}
+    for record in log.records:
+        if not isinstance(record, _Collected):
+            continue
+        name = id_of(record.nodeid)
+        if not isinstance(record, _Tested):
+            if record.outcome != "passed":
+                raise Fault(f"the suite is broken: {_collect_error(name, record)}")
+        elif name not in tests:
+            raise Fault(f"the suite ran a test that was not expected: {name}")
+        elif record.passed:
+            phases[name].add(record.when)
+        elif name not in failures:
+            tests[name] = "failed" if record.outcome == "failed" else "skipped"
+            failures[name] = _failure(name, record, findings)
+    whole = log.is_whole(failed=bool(failures))
+    for name in tests.keys() - failures.keys():
+        if phases[name] == PHASES and whole:
+            tests[name] = "passed"
+        else:
+            message = TORN if phases[name] == PHASES else NOT_RUN
+            failures[name] = Failure(test=name, group="judge", message=message)
+    return tests, [failures[name] for name in tests if name in failures]
+
+
+def verdict_of(tests: dict[str, str]) -> Verdict:
+    """Passed if there are tests and each of them passed."""
+    passed = sum(outcome == "passed" for outcome in tests.values())
+    return Verdict(
+        passed=0 < passed == len(tests),
+        expected=len(tests),
+        passed_tests=passed,
+        failed_tests=len(tests) - passed,
+    )
+
+
+def _read(path: Path) -> _Log:
+    """A report log; one that cannot be read is empty."""
+    try:
+        lines = path.read_bytes().split(b"\n")
+    except OSError:
+        return _Log([])
+    return _Log([_record(line) for line in lines[: -1 if not lines[-1] else None]])
+
+
+def _record(line: bytes) -> BaseModel | None:
+    """The record in one line, None where it is damaged."""
+    try:
+        value = json.loads(line.decode("utf-8"))
+        kind = _Other.model_validate(value).kind
+        return _KINDS.get(kind, _Other).model_validate(value)
+    except (ValueError, RecursionError):  # ValidationError is a ValueError
+        return None
+
+
+def _failure(name: str, record: _Tested, findings: Findings) -> Failure:
+    diagnosis = None
+    for key, value in record.user_properties:
+        if key == "rollout" and type(value) is str and value in findings.diagnoses:
+            diagnosis = Diagnosis.model_validate_json(findings.diagnoses[value])
+    message = _message(record)
+    return Failure(
+        test=name, group=group_of(name), message=message, diagnosis=diagnosis
+    )
+
+
+def _message(record: _Collected) -> str:
+    """Why a test failed, without the assertion's source; printable and bounded."""
+    details = record.longrepr
+    if isinstance(details, _Details):
+        text = _of_crash(details.reprcrash) if details.reprcrash else ""
+    elif isinstance(details, tuple):
+        text = details[-1]  # of a skip: file, line, reason
+    else:
+        text = details or ""
+    for prefix in ("AssertionError: ", "Failed: "):
+        text = text.removeprefix(prefix)
+    # Exceptions are shown with their module; the class says enough.
+    head, separator, tail = text.partition(": ")
+    if separator and head.startswith("tdac_agent."):
+        text = tail
+    return text if len(text) <= MAX_MESSAGE else f"{text[:MAX_MESSAGE]} …"
+
+
+def _of_crash(crash: _Crash) -> str:
+    """What an error says; of a bare assertion, where it stands."""
+    if crash.message != "AssertionError" or crash.lineno is None:
+        return crash.message
+    return f"line {crash.lineno}: an assertion without a message"
+
+
+def _collect_error(name: str, record: _Collected) -> str:
+    """Why a test file cannot be imported: pytest's own last line about it."""
+    text = _message(record)
+    marked = [line[1:].strip() for line in text.splitlines() if line.startswith("E ")]
+    return f"{name}: {marked[-1] if marked else text}"
+
+
+def _breakdown(output: str) -> str:
+    """The error of a hook: the last line that pytest marks so."""
+    marked = [line for line in output.splitlines() if line.startswith(BREAKDOWN)]
+    return marked[-1].removeprefix(BREAKDOWN).strip() if marked else _tail(output)
+
+
+def _tail(output: str) -> str:
+    kept = [line for line in output.strip().splitlines() if line.strip()][-6:]
+    return " | ".join(kept) or "no output"

@@ -1,0 +1,247 @@
+"""Many episodes by seed, in the judge's process; what is kept of each."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from tdac_agent.episodes.episode import not_driven
+from tdac_agent.episodes.trajectory import Outcome
+from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.measures import Measured, measure
+from tdac_agent.verification.diagnosis.report import Cause
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.contenders import Contender
+from tdac_agent.verification.judge.driving import Driven, Stage, drive_seed, record_of
+from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_agent.verification.judge.turns import Turns
+from tdac_agent.verification.judge.workers import SIZE, Crew
+
+EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
+POSES_FILE, CALLS_FILE = "poses.npz", "calls.npy"
+# Of an evaluation: after so many time-outs the rest is not waited for.
+MOST_LATE = 3
+
+
+class SeededJob(BaseModel):
+    """Episodes that the judge's process is to run; all paths are absolute.
+
+    `test` stops a robust verification early; `measured` is of an evaluation: figures
+    for a comparison in the place of a diagnosis, and poses and times beside them.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["seeds"] = "seeds"
+    task: Path
+    contender: Contender
+    disturbance: Disturbance
+    variation: str
+    seeds: tuple[int, ...]
+    test: SequentialTest | None
+    measured: bool
+    tier: str
+    limits: Limits
+    out: Path
+
+
+class SeededEpisode(PrintableRecord):
+    """Figures of one disturbed episode; distances in px, of the e-puck in m.
+
+    `cause`, `step`, `x`, `y` and `side` are the diagnosis of a failure.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    seed: int
+    outcome: Outcome
+    steps: int
+    collisions: int
+    d0: float
+    d_min: float
+    cause: Cause | None = None
+    step: int | None = None
+    x: float | None = None
+    y: float | None = None
+    side: str | None = None
+    error: str | None = None
+    cpu_seconds: float
+
+    @property
+    def success(self) -> bool:
+        """Whether the goal was reached without a contact."""
+        return self.outcome == "reached" and not self.collisions
+
+
+class Ending(PrintableRecord):
+    """What the judge's process found beside the episodes."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    tier: str
+    fault: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """What the judge's process keeps of an episode.
+
+    Attributes:
+        figures: A line of the results.
+        tier: Sandbox tier; empty where nothing was started.
+        late: Whether it took too long.
+        may_pass: Whether that may have been the machine's doing.
+        poses: Shape (T + 1, 3), float32; of an evaluation, as is the next one.
+        calls: Shape (T,), float32, seconds.
+    """
+
+    figures: SeededEpisode | Measured
+    tier: str
+    late: bool
+    may_pass: bool
+    poses: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), "f4"))
+    calls: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, "f4"))
+
+
+def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
+    """Runs the episodes as asked, and writes a line for each in the order of seeds.
+
+    A sequential test sees them in this order, too, and so decides the same however
+    they happen to end; those after its decision are dropped.
+    """
+    job.out.mkdir(exist_ok=True)
+    stage = Stage(
+        load_task(job.task),
+        job.contender,
+        job.task,
+        job.disturbance,
+        job.tier,
+        job.limits,
+        nursery,
+        job.variation,
+    )
+    counts, tier, fault = [0, 0], job.tier, None
+    everything: list[Kept] = []
+    with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
+        try:
+            with closing(_in_order(stage, job)) as episodes:
+                for kept in episodes:
+                    tier = kept.tier or tier
+                    file.write(kept.figures.model_dump_json() + "\n")
+                    file.flush()
+                    counts[not kept.figures.success] += 1
+                    if job.measured:
+                        everything.append(kept)
+                    if job.test and job.test.decide(*counts) != "undecided":
+                        break
+        except SandboxError as error:
+            fault = f"the sandbox failed: {error}"
+    if job.measured:
+        _write_arrays(everything, job.out)
+    ending = Ending(tier=tier, fault=fault)
+    write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
+
+
+def _write_arrays(everything: list[Kept], out: Path) -> None:
+    np.savez(out / POSES_FILE, *(kept.poses for kept in everything))
+    calls = [kept.calls for kept in everything]
+    np.save(out / CALLS_FILE, np.concatenate([np.zeros(0, np.float32), *calls]))
+
+
+def _in_order(stage: Stage, job: SeededJob) -> Generator[Kept]:
+    """Episodes, several at a time; closing waits for the last."""
+    size = min(SIZE, len(job.seeds))
+    turns, late = Turns(size), list[int]()
+    work = partial(_kept, stage, job.measured)
+    with (
+        closing(Crew(work, stage.nursery.close, size)) as crew,
+        ThreadPoolExecutor(max_workers=size) as pool,
+    ):
+        try:
+            patience = MOST_LATE if job.measured else len(job.seeds)
+            yield from pool.map(
+                partial(_in_turn, crew, turns, late, patience), job.seeds
+            )
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _kept(stage: Stage, measured: bool, seed: int, given_up: bool) -> Kept:
+    """What is kept of the episode of a seed, or of one that is not waited for."""
+    driven = _given_up(stage, seed) if given_up else drive_seed(stage, seed)
+    rollout = driven.rollout
+    late = rollout.outcome == "error" and rollout.timed_out
+    if not measured:
+        found = figures(driven, seed, stage.task)
+        return Kept(found, driven.tier, late, rollout.may_pass)
+    return Kept(
+        measure(rollout, seed, driven.task),
+        driven.tier,
+        late,
+        rollout.may_pass,
+        rollout.trajectory.poses.astype(np.float32),
+        rollout.calls.astype(np.float32),
+    )
+
+
+def _given_up(stage: Stage, seed: int) -> Driven:
+    reason = f"not driven, since {MOST_LATE} episodes before it timed out"
+    record = record_of(stage, seed)
+    rollout = not_driven(record, f"seed {seed}", ControllerFault(reason, "policy"))
+    return Driven(rollout, 0.0, "", record.env.task)
+
+
+def _in_turn(
+    crew: Crew[[int, bool], Kept],
+    turns: Turns,
+    late: list[int],
+    patience: int,
+    seed: int,
+) -> Kept:
+    """An episode.
+
+    A time-out that may be the machine's doing is tried once more, alone.
+    """
+    given_up = len(late) >= patience
+    with turns.beside():
+        kept = crew.do(seed, given_up)
+    if kept.late and kept.may_pass and len(late) < patience:
+        with turns.alone():
+            kept = crew.do(seed, False)
+    if kept.late:
+        late.append(seed)
+    return kept
+
+
+def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:
+    """What is kept of an episode; its trajectory is not."""
+    rollout, failure = driven.rollout, {}
+    distances, digits = rollout.distances(), task.setting.units.digits
+    if not rollout.reached or rollout.collisions:
+        found = diagnose(rollout, task.nominal)
+        failure = found.model_dump(include={"cause", "step", "x", "y", "side"})
+    return SeededEpisode(
+        seed=seed,
+        outcome=rollout.outcome,
+        steps=rollout.trajectory.steps,
+        collisions=rollout.collisions,
+        d0=round(float(distances[0]), digits),
+        d_min=round(float(distances.min()), digits),
+        error=rollout.error,
+        cpu_seconds=round(driven.cpu_seconds, 3),
+        **failure,
+    )

@@ -1,0 +1,168 @@
+"""An episode of a suite, from a fresh child to its end, in a process of the crew."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tdac_agent.episodes.episode import Record, run_own_loop, run_policy
+from tdac_agent.episodes.trajectory import Outcome, Rollout
+from tdac_agent.sandbox import (
+    Child,
+    ControllerFault,
+    ControllerTimeout,
+    Limits,
+)
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.verification.judge.blame import ours
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.workers import Crew
+from tdac_envs.map2d.task import Pose
+
+SHOWN_JITTERS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Brief:
+    """What the episodes of a verification have in common.
+
+    Attributes:
+        source: Bytes of `controller.py`.
+        workdir: Folder of the task, whose files the controller may read.
+        tier: Sandbox tier, or `auto`.
+        limits: Of each child.
+        deadline: When to stop at the latest, by `time.monotonic`.
+    """
+
+    source: bytes
+    workdir: Path
+    tier: str
+    limits: Limits
+    deadline: float
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """An episode as it is asked for.
+
+    Attributes:
+        name: `nominal`, or `jitter 1` and so on.
+        start: Where it begins.
+        steps: Most steps; the horizon by default.
+        drive: `policy`, `run_episode` or `truncated run_episode`.
+    """
+
+    name: str
+    start: Pose
+    steps: int | None
+    drive: str
+
+    @property
+    def held_out(self) -> bool:
+        """Whether feedback may tell only pass or fail of it."""
+        return self.name != "nominal" and int(self.name.split()[1]) > SHOWN_JITTERS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Driven:
+    """An episode as it was driven.
+
+    Attributes:
+        rollout: What came of it.
+        cpu_seconds: CPU time of its child.
+        tier: Sandbox tier of its child.
+        import_fault: Why the controller could not be imported, where it could not.
+    """
+
+    rollout: Rollout
+    cpu_seconds: float
+    tier: str
+    import_fault: ControllerFault | None = None
+
+
+SuiteCrew = Crew[[Brief, Order], Driven]
+
+
+def drive_known(nursery: Nursery, brief: Brief, order: Order) -> Driven:
+    """The same as `drive`, of the task in the brief's folder."""
+    return drive(_task_of(brief.workdir), nursery, brief, order)
+
+
+@functools.lru_cache(maxsize=1)
+def _task_of(workdir: Path) -> Task:
+    return load_task(workdir)
+
+
+@ours()
+def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
+    """Drives an episode in a fresh child.
+
+    Raises:
+        Fault: Sandbox or judge failed.
+    """
+    limit = order.steps if order.steps is not None else task.nominal.horizon
+    record = Record(task.make_env(), order.start, limit)
+    if order.drive == "truncated run_episode":
+        record.truncates, record.collisions_before = True, 2
+    child = nursery.take(brief.tier, brief.limits)
+    try:
+        load_controller(child, brief)
+    except ControllerFault as fault:
+        cpu_seconds = child.close().cpu_seconds
+        rollout = not_driven(task, order, fault)
+        return Driven(rollout, cpu_seconds, child.tier, fault)
+    try:
+        if order.drive != "policy":
+            seconds = child.limits.reset_seconds + 2 * limit * task.nominal.dt
+            rollout = run_own_loop(
+                child, record, order.name, timeout=seconds, deadline=brief.deadline
+            )
+        else:
+            rollout = run_policy(
+                child,
+                record,
+                order.name,
+                held_out=order.held_out,
+                deadline=brief.deadline,
+            )
+    finally:
+        cpu_seconds = child.close().cpu_seconds
+    return Driven(rollout, cpu_seconds, child.tier)
+
+
+def load_controller(child: Child, brief: Brief) -> None:
+    """Gives a child its files, and has it import the controller.
+
+    Raises:
+        ControllerFault: It cannot be imported.
+        SandboxError: Its files cannot be copied.
+    """
+    child.furnish(brief.workdir, brief.source)
+    child.load()
+
+
+def not_driven(task: Task, order: Order, fault: ControllerFault) -> Rollout:
+    """The episode of a controller that cannot be imported, or may use no more."""
+    return replace(
+        skipped(task, order, "error", str(fault)),
+        timed_out=isinstance(fault, ControllerTimeout),
+        may_pass=fault.may_pass,
+    )
+
+
+def skipped(task: Task, order: Order, outcome: Outcome, reason: str) -> Rollout:
+    """An episode that ended where it began."""
+    record = Record(task.make_env(), order.start, 1)
+    record.reset()
+    nominal = task.nominal
+    return Rollout(
+        order.name,
+        order.held_out,
+        outcome,
+        record.trajectory(),
+        nominal.goal,
+        nominal.body_radius,
+        nominal.goal_tolerance,
+        error=reason,
+    )

@@ -1,0 +1,50 @@
+"""A suite of tests over one controller, run by pytest, in the judge's process."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+from tdac_agent.tasks.task import load_task
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.jobs import Job
+from tdac_agent.verification.judge.judge import Judge
+from tdac_agent.verification.judge.suite_episode import SuiteCrew
+
+
+def judge_suite(
+    job: Job, nursery: Nursery, crew: SuiteCrew | None, later: contextlib.ExitStack
+) -> None:
+    """Runs a suite as asked, and writes the findings."""
+    task = load_task(job.task)
+    judge = Judge(
+        task,
+        job.controller.read_bytes(),
+        job.task,
+        tier=job.tier,
+        seed=job.seed,
+        limits=job.limits,
+        nursery=nursery,
+        crew=crew,
+    )
+    later.callback(judge.close)
+    judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")
+    # Loaded while the first episodes are under way.
+    from tdac_agent.verification.judge.findings import driven, findings_of
+    from tdac_agent.verification.judge.plugin import JudgePlugin, run_tests
+
+    if len(job.suites) > 1:
+        # What lies beside tests of somebody else's is not what they were compiled to.
+        sys.pycache_prefix = str(job.out / "bytecode")
+    plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
+    run_tests(job.suites, job.out / "report.jsonl", plugin)
+    with ThreadPoolExecutor() as pool:  # most of it is compression
+        if job.trajectories is not None:
+            for rollout in driven(judge):
+                name = f"{rollout.name.replace(' ', '_')}.npz"
+                if rollout.trajectory.steps:
+                    pool.submit(rollout.trajectory.save, job.trajectories / name)
+        judge.settle()
+        findings = findings_of(judge, plugin.expected).model_dump_json()
+    (job.out / "findings.json").write_text(findings, encoding="utf-8")

@@ -1,0 +1,251 @@
+"""Judges that are warm before there is anything to judge.
+
+Importing what a judge needs takes about a second, and each sandboxed child a tenth. A
+server process does the importing once; for each verification it forks a worker, which
+starts its children and then waits for its job. A worker does one job and ends, so that
+nothing of a verification is left for the next one.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.errors import Fault
+from tdac_agent.storage.locks import wait_for
+from tdac_agent.tasks.task import Task, lay_out
+from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.workers import end_with_parent
+
+# What of Python's own environment the judge's process keeps: where things are. The
+# rest can change a verdict; PYTHONOPTIMIZE, for one, takes away every assertion.
+KEPT_VARIABLES = frozenset(
+    ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
+)
+# The judge starts the controllers, so it holds no keys: on the weakest tier they may
+# read its environment.
+SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
+# One that has died is noticed at once; a starved machine may take minutes.
+START_SECONDS = 600.0
+FAREWELL_SECONDS = 5.0
+POLL_SECONDS = 0.2
+
+
+class WarmJudge:
+    """Does jobs, each in a process of its own that was started ahead of it.
+
+    Making one returns at once: it warms up while the caller goes on. A context manager.
+
+    Args:
+        nursery: Where its children come from, started ahead and ended by the caller;
+            the server is then forked from this process, which should have a single
+            thread, and has all that this one has loaded. By default it is an
+            interpreter of its own.
+        task: What most of its jobs will be about, which that one reads ahead.
+        turn: File whose lock is held during a job, so that those who share it do one
+            after the other.
+    """
+
+    def __init__(
+        self,
+        nursery: Nursery | None = None,
+        *,
+        task: Task | None = None,
+        turn: Path | None = None,
+    ) -> None:
+        self._turn = turn
+        environment = {
+            name: value
+            for name, value in os.environ.items()
+            if (not name.startswith(("PYTHON", "PYTEST")) or name in KEPT_VARIABLES)
+            and not SECRET.search(name)
+        }
+        environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+        environment["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
+        environment.setdefault("OPENBLAS_NUM_THREADS", "1")
+        # A worker that is killed leaves the folders of its children here.
+        self._folder = tempfile.TemporaryDirectory(
+            prefix="tdac-judge-", ignore_cleanup_errors=True
+        )
+        self._path = Path(self._folder.name)
+        environment["TMPDIR"] = self._folder.name
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
+        place = environment, self._path, self._log.fileno()
+        if nursery is None:
+            known = [] if task is None else [lay_out(task, self._path / "task")]
+            self._server = _start_server(known, *place)
+        else:
+            self._server = _fork_server(nursery, *place)
+
+    def run(
+        self,
+        request: Path,
+        seconds: float,
+        meanwhile: Callable[[], None] | None = None,
+    ) -> None:
+        """Does one job; returns when its process has ended, however it ended.
+
+        Args:
+            request: File that holds the job.
+            seconds: Wall time it may take.
+            meanwhile: Called now and then until it has ended.
+
+        Raises:
+            Fault: The judge did not start, or the job took too long.
+        """
+        with nullcontext() if self._turn is None else wait_for(self._turn):
+            self._run(request, seconds, meanwhile)
+
+    def _run(
+        self, request: Path, seconds: float, meanwhile: Callable[[], None] | None
+    ) -> None:
+        worker = self._worker()
+        try:
+            os.write(self._server.requests, f"{request}\n".encode())
+            self._line(seconds, meanwhile)
+        except BaseException:
+            # A worker leads a process group; its children end with it.
+            with suppress(ProcessLookupError):  # just ended by itself
+                os.killpg(worker, signal.SIGKILL)
+            self._line(FAREWELL_SECONDS)
+            raise
+
+    def _worker(self) -> int:
+        """Process id of the one that waits for a job."""
+        line = b""
+        while not line.startswith(b"worker "):
+            line = self._line(START_SECONDS)
+        return int(line.split()[1])
+
+    def close(self) -> None:
+        """Ends the server; its worker ends with it, and the children with that."""
+        self._server.end()
+        self._log.close()
+        self._folder.cleanup()
+
+    def __enter__(self) -> WarmJudge:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def _line(
+        self, seconds: float, meanwhile: Callable[[], None] | None = None
+    ) -> bytes:
+        """The server's next line, without its end."""
+        stream, deadline = self._server.answers, time.monotonic() + seconds
+        line = b""
+        while not line.endswith(b"\n"):
+            left = max(deadline - time.monotonic(), 0.0)
+            if not select.select([stream], [], [], min(left, POLL_SECONDS))[0]:
+                if left == 0.0:
+                    raise Fault(f"the judge did not answer within {seconds:g} s")
+                if meanwhile is not None:
+                    meanwhile()
+                continue
+            read = os.read(stream, 1)
+            if not read:
+                raise Fault(f"the judge ended: {self._last_words()}")
+            line += read
+        return line[:-1]
+
+    def _last_words(self) -> str:
+        self._log.seek(0)
+        text = self._log.read().decode("utf-8", "replace")
+        kept = [line.strip() for line in text.splitlines() if line.strip()][-4:]
+        return " | ".join(kept) or "no output"
+
+
+@dataclass(frozen=True, slots=True)
+class _Server:
+    """A server process.
+
+    Attributes:
+        requests: Descriptor to write to.
+        answers: Descriptor to read from.
+        end: Kills and reaps it, and closes both.
+    """
+
+    requests: int
+    answers: int
+    end: Callable[[], None]
+
+
+def _start_server(
+    known: list[Path], environment: dict[str, str], folder: Path, log: int
+) -> _Server:
+    """A server in an interpreter of its own, which reads a known task ahead."""
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-P",
+            "-m",
+            "tdac_agent.verification.judge.server",
+            *map(str, known),
+        ],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        env=environment,
+        cwd=folder,
+        start_new_session=True,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+
+    def end() -> None:
+        process.kill()
+        process.communicate()
+
+    return _Server(process.stdin.fileno(), process.stdout.fileno(), end)
+
+
+def _fork_server(
+    nursery: Nursery, environment: dict[str, str], folder: Path, log: int
+) -> _Server:
+    """A server that has what this process has imported."""
+    import cv2
+
+    (theirs_in, requests), (answers, theirs_out) = os.pipe(), os.pipe()
+    # OpenCV's threads would not survive the fork, and the child would wait for them.
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    pid = os.fork()
+    if pid == 0:
+        try:
+            os.setsid()
+            end_with_parent()
+            for number, descriptor in enumerate((theirs_in, theirs_out, log)):
+                os.dup2(descriptor, number)
+            for descriptor in (theirs_in, theirs_out, requests, answers):
+                os.close(descriptor)
+            os.environ.clear()
+            os.environ.update(environment)
+            tempfile.tempdir = None
+            os.chdir(folder)
+            from tdac_agent.verification.judge.server import serve
+
+            serve(nursery)
+        finally:
+            os._exit(1)
+    cv2.setNumThreads(threads)
+    os.close(theirs_in)
+    os.close(theirs_out)
+
+    def end() -> None:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        os.close(requests)
+        os.close(answers)
+
+    return _Server(requests, answers, end)

@@ -1,0 +1,1 @@
+"""What a suite tests with: contract, oracles, references."""

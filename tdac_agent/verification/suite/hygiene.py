@@ -1,0 +1,186 @@
+"""Unstable patterns in a controller's source, each found by name with its line."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+
+from tdac_agent.verification.suite.contract import call_name, calls, last_name, nodes_of
+
+FORBIDDEN_CALLS = frozenset(
+    ["eval", "exec", "compile", "__import__", "breakpoint", "input", "globals", "vars"]
+)
+FORBIDDEN_ATTRIBUTES = frozenset(
+    [
+        *("__globals__", "__builtins__", "__subclasses__", "__code__", "__bases__"),
+        *("__mro__", "__loader__", "__spec__", "__import__"),
+    ]
+)
+SEEDED_CONSTRUCTORS = frozenset({"Random", "default_rng", "Generator", "SeedSequence"})
+SAVERS = frozenset(
+    [
+        *("save", "savez", "savez_compressed", "savetxt", "tofile", "memmap"),
+        *("dump", "open_memmap", "write_text", "write_bytes"),
+    ]
+)
+# A longer name is no module that draws random numbers, and may take long to spell.
+MOST_DOTS = 3
+SURFACES = frozenset({"surface", "screen", "window", "map_img", "display"})
+
+
+def forbidden_calls(tree: ast.Module) -> Iterator[str]:
+    """Calls and names that run or reach code a reader cannot see."""
+    for node in nodes_of(tree):
+        if (
+            isinstance(node, ast.Name)
+            and node.id in FORBIDDEN_CALLS | FORBIDDEN_ATTRIBUTES
+        ):
+            yield f"line {node.lineno}: {node.id}"
+        elif isinstance(node, ast.Attribute) and node.attr in FORBIDDEN_ATTRIBUTES:
+            yield f"line {node.lineno}: .{node.attr}"
+
+
+def file_writes(tree: ast.Module) -> Iterator[str]:
+    """Calls of `open` that may write, and functions that save."""
+    for node in calls(tree):
+        name = call_name(node)
+        if name == "open" and not _reads_only(node):
+            yield f"line {node.lineno}: open() for writing"
+        if name in SAVERS:
+            yield f"line {node.lineno}: {name}()"
+    called = {node.func for node in calls(tree)}
+    for other in nodes_of(tree):
+        if isinstance(other, ast.Name) and other.id == "open" and other not in called:
+            yield f"line {other.lineno}: open under another name"
+
+
+def _reads_only(call: ast.Call) -> bool:
+    # `path.open(mode)` has no first argument for the file.
+    place = 1 if isinstance(call.func, ast.Name) else 0
+    mode: ast.expr | None = call.args[place] if len(call.args) > place else None
+    for keyword in call.keywords:
+        if keyword.arg in ("mode", None):
+            mode = keyword.value
+    if mode is None:
+        return True
+    return isinstance(mode, ast.Constant) and mode.value in {"r", "rt", "rb"}
+
+
+def sleeps(tree: ast.Module) -> Iterator[str]:
+    """Calls of `sleep`."""
+    for node in calls(tree):
+        if call_name(node) == "sleep":
+            yield f"line {node.lineno}: sleep()"
+    for statement in nodes_of(tree):
+        if isinstance(statement, ast.ImportFrom) and statement.module == "time":
+            names = {alias.name for alias in statement.names}
+            yield from (f"line {statement.lineno}: import of sleep",) * (
+                "sleep" in names
+            )
+
+
+def swallowed_errors(tree: ast.Module) -> Iterator[str]:
+    """Bare `except`, and handlers that do nothing."""
+    for node in nodes_of(tree):
+        if not isinstance(node, ast.ExceptHandler):
+            continue
+        if node.type is None:
+            yield f"line {node.lineno}: bare except"
+        elif isinstance(node.type, ast.Name) and node.type.id == "BaseException":
+            yield f"line {node.lineno}: except BaseException"
+        elif all(_does_nothing(statement) for statement in node.body):
+            yield f"line {node.lineno}: except that only passes"
+
+
+def _does_nothing(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Pass | ast.Continue) or (
+        isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    )
+
+
+def runtime_errors(tree: ast.Module) -> Iterator[str]:
+    """`raise RuntimeError`."""
+    for node in nodes_of(tree):
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            raised = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+            if isinstance(raised, ast.Name) and raised.id == "RuntimeError":
+                yield f"line {node.lineno}: raise RuntimeError"
+
+
+def surface_indexing(tree: ast.Module) -> Iterator[str]:
+    """Subscripts of a drawing surface, which is not an array."""
+    for node in nodes_of(tree):
+        if isinstance(node, ast.Subscript):
+            name = last_name(node.value)
+            if name in SURFACES:
+                yield f"line {node.lineno}: {name}[...]"
+
+
+def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
+    """Random numbers that differ from run to run."""
+    modules = _random_modules(tree)
+    for node in calls(tree):
+        function = node.func
+        if isinstance(function, ast.Attribute):
+            if _spelled(function.value) not in modules:
+                continue
+            name = function.attr
+        elif isinstance(function, ast.Name) and function.id in modules:
+            name = function.id
+        else:
+            continue
+        seeds = [*node.args, *(keyword.value for keyword in node.keywords)]
+        seeded = any(not _is_none(seed) for seed in seeds)
+        if name in SEEDED_CONSTRUCTORS and seeded:
+            continue
+        if name == "seed" and seeded:
+            continue
+        yield f"line {node.lineno}: {_spelled(function)}()"
+
+
+def _is_none(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value is None
+
+
+def _spelled(node: ast.expr) -> str:
+    """A name with up to three dots, such as `np.random`; else an empty text."""
+    names: list[str] = []
+    while isinstance(node, ast.Attribute) and len(names) < MOST_DOTS:
+        names.append(node.attr)
+        node = node.value
+    if not isinstance(node, ast.Name):
+        return ""
+    return ".".join([node.id, *reversed(names)])
+
+
+def _random_modules(tree: ast.Module) -> set[str]:
+    """How this file spells the modules (and functions) that draw random numbers."""
+    names = set()
+    for node in nodes_of(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                spelled = alias.asname or alias.name
+                if alias.name in {"random", "numpy.random"}:
+                    names.add(spelled)
+                if alias.name == "numpy":
+                    names.add(f"{spelled}.random")
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                spelled = alias.asname or alias.name
+                if node.module in {"random", "numpy.random"}:
+                    names.add(spelled)
+                if node.module == "numpy" and alias.name == "random":
+                    names.add(spelled)
+    return names
+
+
+HYGIENE: dict[str, Callable[[ast.Module], Iterator[str]]] = {
+    "forbidden_calls": forbidden_calls,
+    "file_writes": file_writes,
+    "sleeps": sleeps,
+    "swallowed_errors": swallowed_errors,
+    "runtime_errors": runtime_errors,
+    "surface_indexing": surface_indexing,
+    "unseeded_randomness": unseeded_randomness,
+}
+"""The unstable patterns, each by name."""

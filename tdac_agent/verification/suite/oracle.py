@@ -1,0 +1,212 @@
+"""Answers that suites compare a controller's own functions with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.grid.plan import path_length, plan_path
+
+if TYPE_CHECKING:
+    from tdac_agent.environments.epuck.oracle import WorldCase
+    from tdac_envs.worlds.world import World
+
+Point = tuple[int, int]
+
+# Of `walks`: how many, from how many starts at most, and the legs of each.
+WALKS, MOST_STARTS, LEGS = 3, 200, 5
+
+# Random grids on which a search whose heuristic counts a diagonal step as two finds a
+# path that is more than 1.15 times the shortest.
+DEAR_DIAGONALS = (2119, 2260)
+# The same of one that hurries towards the goal, by a heuristic of 2 to 20 times the
+# distance.
+DETOURS = (561, 702, 877, 1184, 1310, *DEAR_DIAGONALS)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanCase:
+    """A planning question with its answer.
+
+    Attributes:
+        name: For messages.
+        occ: Shape (height, width), bool `[y, x]`, True = occupied.
+        start: Pixel (x, y).
+        goal: Pixel (x, y).
+        length: Octile length of the shortest path, px; inf where there is none.
+    """
+
+    name: str
+    occ: BoolGrid
+    start: Point
+    goal: Point
+    length: float
+
+
+class Oracle:
+    """Shortest paths, reachability and nearest free pixels, by exact search."""
+
+    def shortest_length(self, occ: BoolGrid, start: Point, goal: Point) -> float:
+        """Octile length of the shortest 8-connected path without corner cutting, px.
+
+        Args:
+            occ: Shape (height, width), bool `[y, x]`, True = occupied.
+            start: Pixel (x, y).
+            goal: Pixel (x, y).
+
+        Returns:
+            inf where an end is occupied or no path joins them.
+        """
+        path = plan_path(~occ, start, goal)
+        return path_length(path) if len(path) else math.inf
+
+    def path_error(self, occ: BoolGrid, path: list[Point], cell: int = 1) -> str | None:
+        """What is wrong with a path of pixels, or None.
+
+        Args:
+            occ: Shape (height, width), bool `[y, x]`, True = occupied.
+            path: Pixels (x, y).
+            cell: Length of a straight step, px.
+        """
+        height, width = occ.shape
+        for x, y in path:
+            if not (0 <= x < width and 0 <= y < height):
+                return f"({x}, {y}) lies outside the map of {width} x {height} px"
+            if occ[y, x]:
+                return f"({x}, {y}) is occupied"
+        for (x0, y0), (x1, y1) in pairwise(path):
+            dx, dy = x1 - x0, y1 - y0
+            if max(abs(dx), abs(dy)) != cell or abs(dx) not in (0, abs(dy), cell):
+                return f"({x0}, {y0}) -> ({x1}, {y1}) is not a step to a neighbour"
+            if dx and dy and (occ[y0, x1] or occ[y1, x0]):
+                return f"({x0}, {y0}) -> ({x1}, {y1}) cuts an occupied corner"
+        return None
+
+    def path_length(self, path: list[Point]) -> float:
+        """Euclidean length of a polyline, px."""
+        return sum(math.dist(a, b) for a, b in pairwise(path))
+
+    def nearest_free_distance(self, occ: BoolGrid, x: int, y: int) -> float:
+        """Euclidean distance from (x, y) to the nearest free pixel, px."""
+        rows, columns = np.nonzero(~occ)
+        if rows.size == 0:
+            return math.inf
+        return float(np.sqrt(((columns - x) ** 2 + (rows - y) ** 2).min()))
+
+    def grid(
+        self, seed: int, width: int = 40, height: int = 30, density: float = 0.25
+    ) -> BoolGrid:
+        """A seeded random grid."""
+        random = np.random.default_rng(seed)
+        return np.asarray(random.random((height, width)) < density)
+
+    def walks(
+        self, occ: BoolGrid, cell: int, random: np.random.Generator
+    ) -> Iterator[tuple[Point, Point]]:
+        """Pairs of free pixels that some steps of `cell` px join, not far apart.
+
+        Args:
+            occ: Shape (height, width), bool `[y, x]`, True = occupied.
+            cell: Length of a straight step, px.
+            random: Draws them.
+        """
+        height, width = occ.shape
+        found = 0
+        for _ in range(MOST_STARTS):
+            start = int(random.integers(width)), int(random.integers(height))
+            goal = self._walk(occ, start, cell, random)
+            if goal != start:
+                found += 1
+                yield start, goal
+            if found == WALKS:
+                return
+
+    def _walk(
+        self, occ: BoolGrid, start: Point, cell: int, random: np.random.Generator
+    ) -> Point:
+        """Where some legs in any of the eight directions end; the start if nowhere."""
+        here = start
+        for dx, dy, steps in random.integers((-1, -1, 1), (2, 2, 7), (LEGS, 3)):
+            for _ in range(steps):
+                way = [
+                    (here[0] + k * int(dx), here[1] + k * int(dy))
+                    for k in range(cell + 1)
+                ]
+                if self.path_error(occ, way) is not None:
+                    break
+                here = way[-1]
+        return here
+
+    def plan_cases(self) -> list[PlanCase]:
+        """Fixed grids with traps, and seeded random ones."""
+        cases = [self._case(*question) for question in _fixed_grids()]
+        for seed in range(12):
+            occ = self.grid(seed, 44, 31, 0.1 + 0.03 * seed)
+            cases.append(self._random_case(seed, occ, free_ends=bool(seed % 4)))
+        detours = (self._random_case(s, self.grid(s, 30, 22, 0.3)) for s in DETOURS)
+        return [*cases, *detours]
+
+    def world_cases(
+        self, world: World, random: np.random.Generator | None = None
+    ) -> list[WorldCase]:
+        """The file of a world, and of copies that are moved, turned and fuller.
+
+        Args:
+            world: Of a task.
+            random: Draws one of the copies, and the points to be looked at.
+        """
+        from tdac_agent.environments.epuck.world_copies import world_cases
+
+        return world_cases(world, random)
+
+    def _random_case(
+        self, seed: int, occ: BoolGrid, *, free_ends: bool = True
+    ) -> PlanCase:
+        height, width = occ.shape
+        random = np.random.default_rng(1000 + seed)
+        start, goal = (
+            (int(random.integers(width)), int(random.integers(height)))
+            for _ in range(2)
+        )
+        if free_ends:
+            occ[start[1], start[0]] = occ[goal[1], goal[0]] = False
+        return self._case(f"random grid {seed}", occ, start, goal)
+
+    def _case(self, name: str, occ: BoolGrid, start: Point, goal: Point) -> PlanCase:
+        return PlanCase(name, occ, start, goal, self.shortest_length(occ, start, goal))
+
+
+def _fixed_grids() -> list[tuple[str, BoolGrid, Point, Point]]:
+    def empty() -> NDArray[np.bool_]:
+        return np.zeros((30, 50), np.bool_)
+
+    trap = empty()
+    trap[5:25, 30] = trap[5, 10:31] = trap[24, 10:31] = True
+    wall = empty()
+    wall[:, 25] = True
+    gap = wall.copy()
+    gap[17, 25] = False
+    diagonal = empty()
+    for k in range(30):
+        diagonal[k, 10 + k] = True
+    speck = empty()
+    speck[10, 12] = True
+    return [
+        ("open grid", empty(), (2, 3), (47, 26)),
+        ("start is the goal", empty(), (7, 8), (7, 8)),
+        ("trap", trap, (20, 15), (45, 15)),
+        ("closed wall", wall, (3, 3), (46, 3)),
+        ("one-pixel gap", gap, (3, 3), (46, 3)),
+        ("diagonal wall, no corner cutting", diagonal, (5, 25), (45, 4)),
+        ("occupied start", wall, (25, 3), (3, 3)),
+        ("occupied goal", wall, (3, 3), (25, 3)),
+        ("start in a lone obstacle", speck, (12, 10), (40, 20)),
+        ("goal in a lone obstacle", speck, (40, 20), (12, 10)),
+    ]

@@ -1,0 +1,258 @@
+"""Unit API (Table I): the controller's own map, utility and planner functions."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tdac_agent.storage.plain import shown
+from tdac_agent.verification.suite.every_task import check_path
+
+pytestmark = pytest.mark.paper
+
+REACH, MOST_PIXELS = 30, 20_000
+
+
+@pytest.fixture
+def small_map(controller, oracle):
+    """The controller's map object over a grid that is not square."""
+    occ = oracle.grid(seed=3, width=37, height=23)
+    return occ, controller.call("OccMap2D", occ)
+
+
+def is_int_pair(value):
+    """Whether a value is a pair of Python ints."""
+    return (
+        isinstance(value, tuple)
+        and len(value) == 2
+        and all(type(item) is int for item in value)
+    )
+
+
+def test_robot_constants(controller, task):
+    """The robot's constants equal params.json."""
+    robot = task.params.robot
+    expected = {
+        "AXLE_LENGTH_PX": robot.axle_length,
+        "SENSOR_RANGE_PX": robot.range_max,
+        "SENSOR_FOV_DEG": robot.field_of_view_deg,
+        "N_RAYS": robot.n_rays,
+    }
+    for name, value in expected.items():
+        found = controller.constant(name)
+        assert isinstance(found, int | float), f"{name} is {shown(found)}, not a number"
+        assert math.isclose(found, value, rel_tol=1e-6), (
+            f"{name} = {shown(found)}, not {value}"
+        )
+
+
+@pytest.mark.parametrize("name", ["LOOKAHEAD", "STOP_DIST", "SLOW_DIST"])
+def test_tuning_constants(controller, name):
+    """The tuning constants are numbers that are not negative."""
+    value = controller.constant(name)
+    good = isinstance(value, int | float) and math.isfinite(value) and value >= 0
+    assert good, f"{name} is {shown(value)}, not a number of at least 0"
+
+
+@pytest.mark.parametrize("name", ["MAP_IMG", "PARAMS_JSON", "ROBOT_IMG"])
+def test_file_constants(controller, name):
+    """The file constants name a file of the working folder."""
+    known = {"occupancy.png", "occupancy.npy", "params.json", "robot.png"}
+    value = controller.constant(name)
+    assert isinstance(value, str), f"{name} is {shown(value)}, not a file name"
+    base = value.replace("\\", "/").rsplit("/", 1)[-1]
+    assert base in known, f"{name} = {shown(value)}, expected one of {', '.join(known)}"
+
+
+@pytest.fixture
+def this_map(controller, task):
+    """The controller's map object over the map of the task."""
+    occ = task.nominal.terrain.grid.cells
+    return occ, controller.call("OccMap2D", occ)
+
+
+def test_is_occupied_inside(small_map, this_map, generator):
+    """Every pixel of a small map is answered as it is, indexed [y, x].
+
+    So are pixels, rows and columns of the task's own map that are drawn.
+    """
+    occ, own = small_map
+    check_pixels(occ, own, [(x, y) for y, x in np.ndindex(occ.shape)])
+    occ, own = this_map
+    random, (height, width) = generator("pixels"), occ.shape
+    pixels = random.integers((width, height), size=(200, 2)).tolist()
+    for _ in range(2):
+        row, column = int(random.integers(height)), int(random.integers(width))
+        pixels += [(x, row) for x in range(width)]
+        pixels += [(column, y) for y in range(height)]
+    check_pixels(occ, own, [(x, y) for x, y in pixels])
+
+
+def check_pixels(occ, own, pixels):
+    """What the controller's map says of pixels (x, y)."""
+    answers = own.call_each("is_occupied", pixels)
+    assert len(answers) == len(pixels), f"{len(answers)} answers to {len(pixels)}"
+    for (x, y), found in zip(pixels, answers, strict=True):
+        assert found == occ[y, x], (
+            f"is_occupied({x}, {y}) is {shown(found)}, not {occ[y, x]}"
+        )
+
+
+def test_is_occupied_returns_bool(small_map):
+    """The answer is a Python bool, inside and outside."""
+    _, own = small_map
+    for x, y in ((0, 0), (5, 4), (36, 22), (-1, 3), (999, 999)):
+        found = own.call("is_occupied", x, y)
+        kind = f"{type(found).__module__}.{type(found).__name__}"
+        assert type(found) is bool, f"is_occupied({x}, {y}) is a {kind}, not a bool"
+
+
+def test_is_occupied_outside(small_map):
+    """Everything outside the map is occupied; nothing wraps around."""
+    _, own = small_map
+    for x, y in ((-1, 0), (0, -1), (37, 0), (0, 23), (-37, -23), (22, 36), (10**6, 3)):
+        found = own.call("is_occupied", x, y)
+        assert found, f"is_occupied({x}, {y}) outside a 37 x 23 map is {shown(found)}"
+
+
+def test_nearest_free_of_a_free_pixel(controller, small_map, this_map, generator):
+    """A free pixel is its own nearest free pixel, as Python ints.
+
+    On a small map, and on the task's own map where pixels are drawn.
+    """
+    occ, own = small_map
+    check_free_pixels(controller, own, np.argwhere(~occ)[::40].tolist())
+    occ, own = this_map
+    drawn = generator("free").integers(occ.shape, size=(24, 2))
+    free = drawn[~occ[drawn[:, 0], drawn[:, 1]]]
+    check_free_pixels(controller, own, free.tolist())
+
+
+def check_free_pixels(controller, own, pixels):
+    """Free pixels [y, x], which are their own nearest ones."""
+    for y, x in pixels:
+        for reach in (10, 0):
+            found = controller.call("nearest_free", own, x, y, reach)
+            assert is_int_pair(found), f"nearest_free is {shown(found)}, not (int, int)"
+            assert found == (x, y), f"nearest_free({x}, {y}, {reach}) is {found}: free"
+
+
+def test_nearest_free_is_nearest(controller, oracle, this_map, generator):
+    """From an occupied pixel: free, and as near as any, up to max_rad itself.
+
+    The same on the task's own map, from pixels that are drawn.
+    """
+    occ = oracle.grid(seed=11, width=40, height=30, density=0.85)
+    own = controller.call("OccMap2D", occ)
+    for y, x in np.argwhere(occ)[::60].tolist():
+        best = oracle.nearest_free_distance(occ, x, y)
+        check_nearest_free(controller, occ, own, (x, y), best)
+    occ, own = this_map
+    height, width = occ.shape
+    for x, y in generator("nearest").integers((width, height), size=(24, 2)).tolist():
+        left, low = max(0, x - REACH), max(0, y - REACH)
+        around = occ[low : y + REACH + 1, left : x + REACH + 1]
+        best = oracle.nearest_free_distance(around, x - left, y - low)
+        if 0 < best <= REACH:
+            check_nearest_free(controller, occ, own, (x, y), best)
+
+
+def check_nearest_free(controller, occ, own, pixel, best):
+    """The pixel that is free and nearest, which is `best` px away."""
+    asked = f"nearest_free({pixel[0]}, {pixel[1]})"
+    found = controller.call("nearest_free", own, *pixel, math.ceil(best))
+    assert is_int_pair(found), f"{asked} is {shown(found)}, not (int, int)"
+    x, y = found
+    height, width = occ.shape
+    inside = 0 <= x < width and 0 <= y < height
+    assert inside, f"{asked} is {found}: outside the map"
+    assert not occ[y, x], f"{asked} is {found}: occupied"
+    got = math.dist(pixel, found)
+    assert got <= best + 1e-9, f"{asked} is {found}, {got:.2f} px away, not {best:.2f}"
+
+
+def test_nearest_free_at_the_end_of_its_reach(controller):
+    """The only free pixel is found on every side, exactly max_rad away."""
+    for dx, dy in ((5, 0), (-5, 0), (0, 5), (0, -5), (3, -4), (-4, 3)):
+        occ = np.ones((21, 31), np.bool_)
+        occ[10 + dy, 15 + dx] = False
+        own = controller.call("OccMap2D", occ)
+        found = controller.call("nearest_free", own, 15, 10, 5)
+        only = (15 + dx, 10 + dy)
+        assert found == only, f"nearest_free(15, 10, 5) is {shown(found)}, not {only}"
+
+
+def test_nearest_free_raises(controller):
+    """ValueError where there is no free pixel within max_rad."""
+    occ = np.ones((21, 31), np.bool_)
+    occ[2, 2] = False
+    own = controller.call("OccMap2D", occ)
+    message = "nearest_free without a free pixel in reach"
+    # The second is 5 px away, though no more than 4 px in x and in y.
+    for x, y, max_rad in ((25, 15, 5), (5, 6, 4)):
+        error = controller.error_of("nearest_free", own, x, y, max_rad)
+        assert error is not None, f"{message} returned instead of raising ValueError"
+        assert error.type_name == "ValueError", f"{message} raised {error.type_name}"
+
+
+def test_plan_path(controller, oracle, task, this_map, generator):
+    """Int pixels, both ends, free, connected; cell 1: <= 1.1 x optimum, or [].
+
+    On fixed and random grids, and on the task's own map between pixels that are drawn.
+    """
+    for case in oracle.plan_cases():
+        own = controller.call("OccMap2D", case.occ)
+        path = controller.call("plan_path", own, case.start, case.goal, 1)
+        check_path(oracle, case, path, is_int_pair)
+    for cell in (2, 3):
+        check_larger_steps(controller, oracle, cell)
+    check_walks(controller, oracle, task, this_map, generator("walks"))
+
+
+def check_larger_steps(controller, oracle, cell):
+    """Steps of `cell` px to a goal that is a whole number of them away."""
+    occ = np.zeros((40, 60), np.bool_)
+    occ[12:, 28:32] = True
+    occ[6:9, 20] = occ[13, 40:44] = True
+    own = controller.call("OccMap2D", occ)
+    check_steps(controller, oracle, (occ, own), (4, 17), (52, 23), cell)
+
+
+def check_walks(controller, oracle, task, this_map, random):
+    """Paths on the task's own map, between pixels that are drawn."""
+    occ, _ = this_map
+    # A search over all pixels of a large map may take longer than a call. Only steps
+    # of one pixel have to be found wherever there is room for a point.
+    room = task.nominal.terrain.clear
+    cell = math.ceil(math.sqrt(occ.size / MOST_PIXELS))
+    while cell > 1 and room.max() <= 2 * cell:
+        cell //= 2
+    tight = occ if cell == 1 else room <= 2 * cell
+    for start, goal in oracle.walks(tight, cell, random):
+        path = check_steps(controller, oracle, this_map, start, goal, cell)
+        best = oracle.shortest_length(occ, start, goal) if cell == 1 else math.inf
+        length = oracle.path_length(path)
+        assert length <= 1.1 * best + 1e-6, (
+            f"{start} to {goal}: {length:.1f} px long, the shortest is {best:.1f} px"
+        )
+
+
+def check_steps(controller, oracle, map_and_own, start, goal, cell):
+    """A path from start to goal in steps of `cell` px; returns it."""
+    occ, own = map_and_own
+    path = controller.call("plan_path", own, start, goal, cell)
+    assert isinstance(path, list), f"cell {cell}: a {type(path).__name__}, not a list"
+    assert path, f"cell {cell}: [], but there is a path from {start} to {goal}"
+    assert all(map(is_int_pair, path)), f"cell {cell}: points must be (int, int)"
+    ends = (path[0], path[-1])
+    assert ends == (start, goal), f"cell {cell}: runs {ends}"
+    for (x0, y0), (x1, y1) in pairwise(path):
+        step = f"cell {cell}: ({x0}, {y0}) -> ({x1}, {y1})"
+        sizes = {abs(x1 - x0), abs(y1 - y0)}
+        assert sizes in ({cell}, {0, cell}), f"{step} has another length"
+        dx, dy = (x1 - x0) // cell, (y1 - y0) // cell
+        passed = [(x0 + k * dx, y0 + k * dy) for k in range(cell + 1)]
+        error = oracle.path_error(occ, passed)
+        assert error is None, f"{step}: {error}"
+    return path

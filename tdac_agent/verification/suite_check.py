@@ -1,0 +1,135 @@
+"""A suite proves itself: the reference passes it, and bad controllers do not."""
+
+from __future__ import annotations
+
+import contextlib
+import textwrap
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from tdac_agent.errors import Fault
+from tdac_agent.sandbox import Limits
+from tdac_agent.tasks.installation import seed_of
+from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.task_file import Profile
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.suite.privileged import (
+    BAD,
+    DO_NOTHING,
+    REFERENCE,
+    SLOW,
+    privileged_controller,
+    reference_ways,
+)
+from tdac_agent.verification.suite.proof import SuiteCheck, row_of, verdict_on_suite
+from tdac_agent.verification.verify import verify
+
+REPEATS = 5
+# A slow controller is cut off for its speed; where steps are long, by this.
+SLOW_LIMITS = Limits(cpu_seconds=30)
+FAULT_WIDTH = 300
+
+
+def check_suite(
+    task: Task,
+    *,
+    profile: Profile | None = None,
+    suite: Path | None = None,
+    shipped: Path | None = None,
+    tier: str = "auto",
+    seed: int | None = None,
+    repeats: int = REPEATS,
+    bad: Sequence[str] = BAD,
+    judge: WarmJudge | None = None,
+    on_progress: Callable[[str], None] = lambda _: None,
+) -> SuiteCheck:
+    """Verifies the reference and bad controllers, repeatedly.
+
+    Args:
+        task: What the controllers must do.
+        profile: `policy` or `paper`; the task's own by default.
+        suite: Folder with further tests; the task's own by default.
+        shipped: Folder of tests in the place of the shipped ones.
+        tier: Sandbox tier, `auto` for the best one here.
+        seed: Of the jittered starts of all controllers; by default it follows from the
+            task and a secret of this installation.
+        repeats: Verifications of each controller, which must agree. Of the slow one
+            the clock decides: it has one, of the nominal episode alone.
+        bad: Names of the bad controllers.
+        judge: A warm one; one of its own by default.
+        on_progress: Called with what is being done, in a few words.
+
+    Raises:
+        ControllerFileError: The suite's folder holds no tests.
+        Fault: Sandbox or suite broken.
+    """
+    if repeats < 1:
+        raise ValueError(f"expected at least 1 repeat, got {repeats}")
+    began = time.monotonic()
+    # The reference knows its starts, so that they cannot follow from its bytes.
+    seed = seed_of(b"", task) if seed is None else seed
+    with contextlib.ExitStack() as stack:
+        warm = judge or stack.enter_context(WarmJudge(task=task))
+        ask = partial(
+            verify,
+            task=task,
+            suite=suite,
+            shipped=shipped,
+            tier=tier,
+            seed=seed,
+            judge=warm,
+        )
+        ways = reference_ways(task.nominal, seed)
+        reports: dict[str, list[Report]] = {}
+        for name in (REFERENCE, *bad):
+            source = privileged_controller(task.nominal, ways, name)
+            full = partial(ask, source, profile=profile)
+            short = partial(
+                ask, source, profile="policy", paper=True, limits=SLOW_LIMITS
+            )
+            times, verified = (1, short) if name == SLOW else (repeats, full)
+            reports[name] = []
+            for number in range(1, times + 1):
+                on_progress(name if times == 1 else f"{name}, {number} of {times}")
+                reports[name].append(verified())
+    rows = [row_of(name, about_it) for name, about_it in reports.items()]
+    return verdict_on_suite(reports[REFERENCE][0], rows, time.monotonic() - began)
+
+
+def prove_suite(
+    task: Task,
+    *,
+    profile: Profile | None = None,
+    suite: Path | None = None,
+    tier: str = "auto",
+    seed: int | None = None,
+    judge: WarmJudge | None = None,
+    on_progress: Callable[[str], None] = lambda _: None,
+) -> SuiteCheck:
+    """The short form, for the beginning of a run; arguments as for `check_suite`.
+
+    The reference must pass once, and a controller that does nothing must fail once.
+
+    Raises:
+        Fault: One of them does not, or sandbox or suite are broken.
+    """
+    check = check_suite(
+        task,
+        profile=profile,
+        suite=suite,
+        tier=tier,
+        seed=seed,
+        repeats=1,
+        bad=(DO_NOTHING,),
+        judge=judge,
+        on_progress=on_progress,
+    )
+    if not check.proven:
+        first, *more = check.problems
+        others = f" ({len(more)} more: tdac check-suite)" if more else ""
+        told = textwrap.shorten(first, FAULT_WIDTH, placeholder=" …")
+        raise Fault(f"the suite did not prove itself: {told}{others}")
+    return check

@@ -1,0 +1,277 @@
+"""Verification: a controller, a task and a suite in; a report out."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tdac_agent.episodes.trajectory import Trajectory, nominal_first
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.sandbox import Limits
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.installation import seed_of
+from tdac_agent.tasks.provenance import origin, sha256_of, versions
+from tdac_agent.tasks.task import Task, called, lay_out
+from tdac_agent.tasks.task_file import Profile
+from tdac_agent.tasks.trust import allowed
+from tdac_agent.verification.diagnosis.report import OWN, SHIPPED, Provenance, Report
+from tdac_agent.verification.judge.jobs import Findings, Job
+from tdac_agent.verification.judge.report_log import (
+    read_findings,
+    read_outcomes,
+    verdict_of,
+)
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+
+SHIPPED_SUITES = Path(__file__).parent / "suite" / "shipped"
+SHIPPED_SUITE = SHIPPED_SUITES / "map2d"
+EVERY_TASK = SHIPPED_SUITES.parent / "every_task.py"
+DEADLINE_SECONDS = 900.0
+MAX_FILE_BYTES = 64_000_000
+
+
+def verify(
+    controller: str | bytes | Path,
+    task: Task,
+    *,
+    profile: Profile | None = None,
+    paper: bool = False,
+    suite: Path | None = None,
+    shipped: Path | None = None,
+    tier: str = "auto",
+    seed: int | None = None,
+    limits: Limits | None = None,
+    out: Path | None = None,
+    judge: WarmJudge | None = None,
+    meanwhile: Callable[[], None] | None = None,
+) -> Report:
+    """Tests a controller in the sandbox against everything the task asks for.
+
+    Args:
+        controller: Path of the file, or its source (text of several lines, or bytes).
+        task: What it must do.
+        profile: `policy` or `paper`; the task's own by default.
+        paper: Nominal start only, as in the paper.
+        suite: Folder with further tests beside the shipped ones; the task's own by
+            default.
+        shipped: Folder of tests in the place of the shipped ones.
+        tier: Sandbox tier, `auto` for the best one here.
+        seed: Of the jittered starts; by default it follows from the controller, the
+            task and a secret of this installation, so that no author can aim at it.
+        limits: Of the controller's processes; `cpu_seconds` is for all of them.
+        out: Folder for `report.json` and `trajectories/`, with a picture of each
+            episode that failed; none by default.
+        judge: A warm one, for several verifications; one of its own by default.
+        meanwhile: Called now and then while the judge is at work.
+
+    Returns:
+        The report; a failing controller is a report, never an exception.
+
+    Raises:
+        ControllerFileError: The file cannot be read.
+        Fault: Sandbox or suite broken: neither pass nor fail.
+    """
+    began = time.monotonic()
+    source = read_source(controller)
+    suites = _suites(task, suite, shipped)
+    with tempfile.TemporaryDirectory(prefix="tdac-verify-") as name:
+        folder = Path(name)
+        job = Job(
+            task=folder / "work",
+            controller=folder / "controller.py",
+            suites=[folder / "suites" / name for name in suites],
+            profile=profile or task.spec.profile,
+            paper=paper,
+            tier=tier,
+            seed=seed_of(source, task) if seed is None else seed,
+            limits=limits or Limits(),
+            out=folder / "results",
+            trajectories=None if out is None else folder / "trajectories",
+        )
+        _prepare(job, task, source, suites)
+        with contextlib.ExitStack() as stack:
+            warm = judge or stack.enter_context(WarmJudge())
+            output = _run_judge(job, folder, warm, meanwhile)
+        findings = read_findings(job.out, output)
+        tests, failures = read_outcomes(job.out / "report.jsonl", findings, output)
+        report = Report(
+            verdict=verdict_of(tests),
+            provenance=_provenance(task, source, job, suites, findings),
+            failures=tuple(failures),
+            tests=tests,
+            episodes=tuple(findings.episodes),
+            child_cpu_seconds=findings.child_cpu_seconds,
+            seconds=round(time.monotonic() - began, 3),
+        )
+        if out is not None:
+            _keep(report, task, folder / "trajectories", out)
+    return report
+
+
+def kept_report(
+    folder: Path, task: Task, source: str, seed: int | None
+) -> Report | None:
+    """The report of a verification in a folder, if that is one of this very controller.
+
+    None where it is of other bytes, another task, suite, seed or version of a package;
+    a seed of None is the controller's own, which nobody else can have made up.
+    """
+    raw = source.encode("utf-8", "surrogatepass")
+    try:
+        told = read_file(folder / "report.json", RECORD_BYTES)
+        report = Report.model_validate(parse_json(told))
+    except (OSError, ValueError):
+        return None
+    about = report.provenance
+    wanted = {
+        "controller_sha256": sha256_of(raw),
+        "task_sha256": task.sha256(),
+        "suite_sha256": suite_sha256(task),
+        "profile": task.spec.profile,
+        "paper": False,
+        "seed": seed_of(raw, task) if seed is None else seed,
+        "versions": versions(),
+    }
+    same = all(getattr(about, name) == value for name, value in wanted.items())
+    return report if same else None
+
+
+def suite_sha256(task: Task) -> str:
+    """Hash of all tests that a task's controllers are held to."""
+    return _hash(_suites(task))
+
+
+def _suites(
+    task: Task, suite: Path | None = None, shipped: Path | None = None
+) -> dict[str, Path]:
+    """The folders of tests: the shipped ones, and further ones where there are any."""
+    suites = {SHIPPED: _suite_folder(shipped or SHIPPED_SUITES / task.setting.suite)}
+    extra = suite or task.suite
+    if suite is None:
+        allowed(task, None, trust=False)
+    if extra is not None:
+        suites[OWN] = _suite_folder(extra)
+    return suites
+
+
+def read_source(controller: str | bytes | Path) -> bytes:
+    """Source of a controller given as a path, as text of several lines or as bytes.
+
+    Raises:
+        ControllerFileError: The file cannot be read, or is far too large.
+    """
+    if isinstance(controller, bytes):
+        return controller
+    if isinstance(controller, str) and "\n" in controller:
+        return controller.encode("utf-8", "surrogatepass")
+    try:
+        return read_file(controller, MAX_FILE_BYTES)
+    except OSError as error:
+        message = f"cannot read the controller {str(controller)!r}: {error.strerror}"
+        raise ControllerFileError(message) from error
+
+
+def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> None:
+    """Lays out the judge's folder.
+
+    The suites are linked side by side, so that no `conftest.py` or `pytest.ini` from
+    above one of them takes part.
+    """
+    job.out.mkdir()
+    if job.trajectories is not None:
+        job.trajectories.mkdir()
+    lay_out(task, job.task)
+    job.controller.write_bytes(source)
+    for link, folder in zip(job.suites, suites.values(), strict=True):
+        link.parent.mkdir(exist_ok=True)
+        link.symlink_to(folder, target_is_directory=True)
+
+
+def load_trajectories(folder: Path) -> dict[str, Trajectory]:
+    """The trajectories that a verification kept, by episode name."""
+    return {
+        path.stem.replace("_", " "): Trajectory.load(path)
+        for path in sorted(folder.glob("*.npz"), key=nominal_first)
+    }
+
+
+def _suite_folder(path: Path) -> Path:
+    if not path.is_dir():
+        raise ControllerFileError(f"no suite {str(path)!r}: no such folder")
+    if not list(path.glob("test_*.py")):
+        raise ControllerFileError(f"no suite in {str(path)!r}: it has no test_*.py")
+    return path.resolve()
+
+
+def _run_judge(
+    job: Job, folder: Path, judge: WarmJudge, meanwhile: Callable[[], None] | None
+) -> str:
+    """Has the job done; returns what was printed meanwhile."""
+    request = folder / "job.json"
+    request.write_text(job.model_dump_json(), encoding="utf-8")
+    judge.run(request, DEADLINE_SECONDS, meanwhile)
+    output = (folder / "output.txt").read_bytes().decode("utf-8", "replace")
+    return output.replace(f"{folder}/", "")
+
+
+def _provenance(
+    task: Task, source: bytes, job: Job, suites: dict[str, Path], findings: Findings
+) -> Provenance:
+    return Provenance(
+        **origin(task, source, job.task, findings.tier, job.limits),
+        called=called(task),
+        own_suite=_own(suites),
+        suite=" + ".join(folder.name for folder in suites.values()),
+        suite_sha256=_hash(suites),
+        profile=job.profile,
+        paper=job.paper,
+        seed=job.seed,
+    )
+
+
+def _own(suites: dict[str, Path]) -> str:
+    """Short hash of tests that are not shipped; empty without."""
+    own = suites.get(OWN)
+    return _hash_of(own)[:8] if own else ""
+
+
+def _hash_of(folder: Path) -> str:
+    return sha256_of(json.dumps(_suite_hash(folder), sort_keys=True).encode())
+
+
+def _hash(suites: dict[str, Path]) -> str:
+    hashes = {name: _suite_hash(folder) for name, folder in suites.items()}
+    hashes[SHIPPED][EVERY_TASK.name] = sha256_of(EVERY_TASK.read_bytes())
+    return sha256_of(json.dumps(hashes, sort_keys=True).encode())
+
+
+def _suite_hash(folder: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(folder)): sha256_of(read_file(path, RECORD_BYTES))
+        for path in sorted(folder.rglob("*.py"))
+    }
+
+
+def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
+    """Keeps report, trajectories and pictures; those of an earlier one are removed."""
+    folder = out / "trajectories"
+    folder.mkdir(parents=True, exist_ok=True)
+    for pattern in ("nominal.*", "jitter_*.*"):
+        for path in folder.glob(pattern):
+            path.unlink()
+    for path in sorted(results.glob("*.npz")):
+        write_atomic(folder / path.name, path.read_bytes(), lasting=False)
+    if not report.passed:
+        from tdac_agent.verification.diagnosis.figures import (
+            draw_failures,  # loads what draws
+        )
+
+        draw_failures(task, report, load_trajectories(folder), folder)
+    # Of the candidate that was here before.
+    (out / "robust.json").unlink(missing_ok=True)
+    write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")

@@ -1,0 +1,1 @@
+"""Webots controllers in the sandbox."""

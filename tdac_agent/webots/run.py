@@ -1,0 +1,182 @@
+"""Run a Webots controller in the sandbox, in a world that the judge holds."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import tdac_envs.webots
+from tdac_agent.errors import ControllerFileError, Fault
+from tdac_agent.sandbox import (
+    ControllerError,
+    ControllerFault,
+    EnvRefusalError,
+    Limits,
+    SandboxError,
+    start,
+)
+from tdac_agent.verification.verify import read_source
+from tdac_agent.webots.report import WebotsReport, report_of
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.webots.log import Log
+from tdac_envs.webots.requests import RequestError
+from tdac_envs.webots.server import RunEnded, StepServer
+from tdac_envs.webots.stage import Stage
+
+PACKAGE = Path(tdac_envs.webots.__file__).parent / "controller"
+LIMITS = Limits(output_bytes=16 << 20)
+GRACE_SECONDS = 1.0
+"""Of a controller after the end, as in Webots."""
+START_SECONDS = 10.0
+LARGEST_FOLDER = 64 << 20
+Watch = Callable[[int], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WebotsRun:
+    """A run: its report, and what is needed to draw it.
+
+    Attributes:
+        report: The report.
+        log: The judge's record.
+    """
+
+    report: WebotsReport
+    log: Log
+
+
+class _World:
+    """A step server that refuses in the words of the sandbox."""
+
+    def __init__(self, server: StepServer, watch: Watch | None) -> None:
+        self._server, self._watch = server, watch
+
+    @property
+    def is_over(self) -> bool:
+        return self._server.is_over
+
+    def reset(self) -> dict[str, Any]:
+        try:
+            return self._server.reset()
+        except RequestError as error:
+            raise EnvRefusalError(str(error)) from error
+
+    def step(self, action: Any) -> dict[str, Any]:
+        try:
+            answer = self._server.step(action)
+        except RequestError as error:
+            raise EnvRefusalError(str(error)) from error
+        if self._watch is not None:
+            self._watch(self._server.log.steps)
+        return answer
+
+
+def run_controller(
+    controller: Path,
+    stage: Stage,
+    env: EPuckEnv,
+    *,
+    tier: str = "auto",
+    limits: Limits = LIMITS,
+    watch: Watch | None = None,
+) -> WebotsRun:
+    """Runs a controller's file, with the files beside it, until the end.
+
+    Args:
+        controller: The file.
+        stage: The world.
+        env: Of the stage; see `Stage.make_env`.
+        tier: Sandbox tier, or `auto`.
+        limits: What the controller may use.
+        watch: Called with the number of steps so far.
+
+    Raises:
+        ControllerFileError: The controller cannot be read.
+        Fault: The sandbox failed.
+    """
+    source = read_source(controller)
+    server = StepServer(env, stage)
+    seconds = START_SECONDS + env.nominal.horizon * env.nominal.dt
+    fault: ControllerFault | None = None
+    with tempfile.TemporaryDirectory(prefix="tdac-webots-") as folder:
+        _furnish(Path(folder), controller, stage)
+        try:
+            child = start(Path(folder), source, tier=tier, limits=limits)
+        except ControllerError as error:
+            raise ControllerFileError(f"{controller}: {error}") from error
+        except SandboxError as error:
+            raise Fault(f"the sandbox failed: {error}") from error
+        try:
+            shutil.copytree(
+                PACKAGE,
+                child.folder.work / PACKAGE.name,
+                ignore=shutil.ignore_patterns("__pycache__"),
+            )
+            arguments = list(stage.arguments())
+            child.run_program(_World(server, watch), arguments, seconds, GRACE_SECONDS)
+        except RunEnded:
+            pass
+        except ControllerFault as error:
+            fault = error
+        except SandboxError as error:
+            raise Fault(f"the sandbox failed: {error}") from error
+        finally:
+            usage = child.close()
+    if not server.log.poses:
+        server.reset()
+    report = report_of(controller, stage, server.log, env, fault, usage, child.tier)
+    return WebotsRun(report, server.log)
+
+
+def frames(env: EPuckEnv, log: Log, stride: int) -> Iterator[NDArray[np.uint8]]:
+    """Pictures of a run: every so many steps, and the last one.
+
+    Args:
+        env: A second one of the same stage, with `render_mode="rgb_array"`.
+        log: Of the run.
+        stride: Steps between two pictures.
+    """
+    env.reset(seed=0)
+    for step, action in enumerate(log.actions):
+        if step % stride == 0:
+            yield _picture(env)
+        env.step(action)
+    yield _picture(env)
+
+
+def _picture(env: EPuckEnv) -> NDArray[np.uint8]:
+    frame = env.render()
+    assert frame is not None
+    return frame
+
+
+def _furnish(folder: Path, controller: Path, stage: Stage) -> None:
+    """Copies the files beside the controller, and the world.
+
+    Raises:
+        ControllerFileError: They cannot be read, or are far too large.
+    """
+    room = LARGEST_FOLDER
+    try:
+        for entry in sorted(controller.resolve().parent.iterdir()):
+            if not entry.is_file():
+                continue
+            room -= entry.stat().st_size
+            if room < 0:
+                raise ControllerFileError(
+                    f"{entry.parent} holds more than {LARGEST_FOLDER >> 20} MB; put "
+                    "the controller in a folder of its own"
+                )
+            shutil.copyfile(entry, folder / entry.name)
+    except OSError as error:
+        raise ControllerFileError(
+            f"cannot copy the folder of {controller}: {error}"
+        ) from error
+    (folder / stage.name).write_text(stage.text, encoding="utf-8")

@@ -1,0 +1,1 @@
+"""The files that a controller gets beside its task."""

@@ -1,0 +1,341 @@
+"""Map, robot and range sensor of this task, for use by `controller.py`.
+
+Needs only the standard library and numpy. Pixel frame: x to the right, y DOWN,
+heading in radians from +x towards +y, so a robot of heading 0 looks right and a
+positive turn goes clockwise on the screen. Arrays are indexed [y, x]. Pixel (i, j)
+is the square [i - 1/2, i + 1/2) x [j - 1/2, j + 1/2); everything outside the map is
+occupied. File names without a folder are looked up beside this file.
+
+Of an e-puck in a world (`world.wbt`), only `HERE`, `load_params` and `show` are of use.
+"""
+
+import json
+import math
+import os
+import struct
+import sys
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+HERE = Path(__file__).resolve().parent
+
+
+def load_occupancy(path: str | Path = "occupancy.npy") -> NDArray[np.bool_]:
+    """The map: shape (height, width), bool, indexed [y, x], True = occupied.
+
+    Args:
+        path: A `.npy` array, or a `.png` (8-bit grey or RGB, dark = occupied).
+    """
+    file = HERE / path
+    if file.suffix.lower() == ".npy":
+        return np.asarray(np.load(file, allow_pickle=False), np.bool_)
+    return np.asarray(_read_png(file).mean(axis=2) < 128)
+
+
+def load_params(path: str | Path = "params.json") -> dict[str, Any]:
+    """The task, lengths in pixels and angles in radians unless named otherwise.
+
+    Returns:
+        `start` [x, y], `heading`, `goal` [x, y], `width`, `height`, `inflation`
+        (margin proposed for planning), `resolution` (metres per pixel or None) and
+        `robot`, a dict of `radius`, `axle_length`, `max_wheel_speed` (px/s),
+        `n_rays`, `field_of_view_deg` and `range_max`; and how the map was made.
+    """
+    params: dict[str, Any] = json.loads((HERE / path).read_text(encoding="utf-8"))
+    return params
+
+
+class Ultrasonic:
+    """The robot's range sensor: a fan of exact rays over the occupancy grid.
+
+    Ray i points at `heading + angles[i]`, from -fov/2 (`ranges[0]`, the robot's
+    LEFTMOST ray, as y points down) to +fov/2 (`ranges[-1]`, its rightmost). A single
+    ray points straight ahead.
+
+    Args:
+        occ: Shape (height, width), bool, True = occupied.
+        n_rays: Number of rays.
+        field_of_view_deg: Whole angle of the fan, degrees.
+        range_max: Reading of a ray that hits nothing, px.
+    """
+
+    def __init__(
+        self,
+        occ: NDArray[np.bool_],
+        n_rays: int = 18,
+        field_of_view_deg: float = 110.0,
+        range_max: float = 220.0,
+    ) -> None:
+        occ = np.asarray(occ, dtype=np.bool_)
+        self.height, self.width = occ.shape
+        self.range_max = float(range_max)
+        fov = math.radians(field_of_view_deg) if n_rays > 1 else 0.0
+        first, step = -0.5 * fov, fov / max(n_rays - 1, 1)
+        self.angles = first + step * np.arange(n_rays)
+        self._ways = [(math.cos(turn), math.sin(turn)) for turn in self.angles.tolist()]
+        # A rim of obstacles stands for the outside; bytes are quick to index.
+        self._cells = np.pad(occ, 1, constant_values=True).tobytes()
+
+    def ranges(self, x: float, y: float, heading: float) -> NDArray[np.float32]:
+        """Distances from the robot's centre to the first obstacle along each ray.
+
+        Returns:
+            Shape (n_rays,), float32, px; `range_max` without a hit, and 0 where
+            (x, y) itself is occupied.
+        """
+        x, y, heading = float(x), float(y), float(heading)
+        c, s = math.cos(heading), math.sin(heading)
+        hits = [self._cast(x, y, c * a - s * b, s * a + c * b) for a, b in self._ways]
+        return np.array(hits, np.float32)
+
+    def _cast(self, x: float, y: float, dx: float, dy: float) -> float:
+        """Walks from pixel to pixel in the order in which the ray enters them."""
+        u, v = x + 1.5, y + 1.5  # in the map with its rim
+        i, j = math.floor(u), math.floor(v)
+        if not (0 <= i < self.width + 2 and 0 <= j < self.height + 2):
+            return 0.0
+        cells, pitch = self._cells, self.width + 2
+        if cells[j * pitch + i]:
+            return 0.0
+        step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
+        ahead_x, ahead_y = (1 if dx > 0 else 0), (1 if dy > 0 else 0)
+        per_x, per_y = (1 / dx if dx else math.inf), (1 / dy if dy else math.inf)
+        next_x = (i + ahead_x - u) * per_x if dx else math.inf
+        next_y = (j + ahead_y - v) * per_y if dy else math.inf
+        while True:
+            if next_x < next_y:
+                distance, i = next_x, i + step_x
+                next_x = (i + ahead_x - u) * per_x
+            else:
+                distance, j = next_y, j + step_y
+                next_y = (j + ahead_y - v) * per_y
+            if distance >= self.range_max:
+                return self.range_max
+            if cells[j * pitch + i]:
+                return max(distance, 0.0)
+
+
+class Graphics:
+    """A pygame window: map, goal, trail, rays and the robot. Optional, for people.
+
+    Args:
+        occ: Shape (height, width), bool, True = occupied.
+        params: From `load_params`.
+        robot_image: Picture of the robot looking right; a disc where it is missing.
+    """
+
+    def __init__(
+        self,
+        occ: NDArray[np.bool_],
+        params: Mapping[str, Any],
+        robot_image: str | Path = "robot.png",
+    ) -> None:
+        try:
+            import pygame
+        except ImportError:
+            hint = "Graphics needs pygame: pip install pygame-ce"
+            raise ImportError(hint) from None
+        self._pygame, self._robot = pygame, params["robot"]
+        height, width = occ.shape
+        self._scale = scale = min(1200 / width, 850 / height, 4.0)
+        pygame.display.init()
+        size = (max(1, round(width * scale)), max(1, round(height * scale)))
+        self._screen = pygame.display.set_mode(size)
+        pygame.display.set_caption("TDAC-Map2D")
+        colours = np.where(occ.T[..., None], (51, 60, 76), (248, 247, 243))
+        picture = pygame.surfarray.make_surface(colours.astype(np.uint8))
+        self._map = pygame.transform.scale(picture, size)
+        for point, colour in (
+            (params["start"], "gray55"),
+            (params["goal"], "seagreen"),
+        ):
+            if point is not None:
+                pygame.draw.circle(self._map, colour, self._to_screen(*point), 7, 3)
+        self._body = None
+        if (HERE / robot_image).exists():
+            self._body = pygame.image.load(str(HERE / robot_image)).convert_alpha()
+        self._trail: list[tuple[float, float]] = []
+
+    def _to_screen(self, x: float, y: float) -> tuple[float, float]:
+        return (x + 0.5) * self._scale, (y + 0.5) * self._scale
+
+    def draw(self, pose: Sequence[float], ranges: Sequence[float] = ()) -> bool:
+        """Shows the robot at `pose` (x, y, heading) with its rays.
+
+        Returns:
+            False once the window has been closed.
+        """
+        pygame, screen = self._pygame, self._screen
+        x, y, heading = (float(value) for value in pose)
+        centre = self._to_screen(x, y)
+        self._trail.append(centre)
+        screen.blit(self._map, (0, 0))
+        fov = math.radians(self._robot["field_of_view_deg"])
+        for i, distance in enumerate(map(float, ranges)):
+            turn = -fov / 2 + i * fov / (len(ranges) - 1) if len(ranges) > 1 else 0.0
+            tip_x = x + distance * math.cos(heading + turn)
+            tip_y = y + distance * math.sin(heading + turn)
+            tip = self._to_screen(tip_x, tip_y)
+            pygame.draw.aaline(screen, (226, 150, 70), centre, tip)
+        if len(self._trail) > 1:
+            pygame.draw.lines(screen, (98, 84, 190), False, self._trail, 2)
+        self._draw_body(centre, heading)
+        pygame.display.flip()
+        return all(event.type != pygame.QUIT for event in pygame.event.get())
+
+    def _draw_body(self, centre: tuple[float, float], heading: float) -> None:
+        pygame, radius = self._pygame, max(self._robot["radius"] * self._scale, 3.0)
+        if self._body is not None:
+            zoom = 2 * radius / self._body.get_width()
+            turned = pygame.transform.rotozoom(self._body, -math.degrees(heading), zoom)
+            self._screen.blit(turned, turned.get_rect(center=centre))
+            return
+        nose_x = centre[0] + radius * math.cos(heading)
+        nose_y = centre[1] + radius * math.sin(heading)
+        pygame.draw.circle(self._screen, (40, 110, 180), centre, radius)
+        pygame.draw.line(self._screen, "white", centre, (nose_x, nose_y), 2)
+
+    def close(self) -> None:
+        """Closes the window."""
+        self._pygame.display.quit()
+
+
+def show(
+    policy: Callable[[dict[str, Any]], Any],
+    reset: Callable[[dict[str, Any]], Any] | None = None,
+) -> None:
+    """Runs one episode of this folder's task with `policy` and shows it.
+
+    Opens a window where there is a display and pygame, else writes
+    `controller.mp4` beside this file; then prints how the episode ended. Closing the
+    window stops it.
+
+    Args:
+        policy: Maps an observation to (left, right), each in [-1, 1].
+        reset: Called once with the first observation, before `policy`.
+    """
+    try:
+        import gymnasium
+
+        from tdac_envs.drawing.video import write_video
+    except ImportError:
+        needed = "show() needs the simulator: use the Python that has tdac installed"
+        raise SystemExit(needed) from None
+    mode = "human" if _has_window() else "rgb_array"
+    name, arguments = _environment()
+    env: Any = gymnasium.make(f"tdac_envs:{name}", render_mode=mode, **arguments)
+    outcome: list[str] = []
+    frames = _episode(env, policy, reset, outcome)
+    try:
+        if mode == "human":
+            for _ in frames:
+                pass
+        else:
+            write_video(frames, HERE / "controller.mp4", fps=30)
+            print("no display: wrote", HERE / "controller.mp4")
+    except KeyboardInterrupt:
+        outcome.append("stopped")
+    finally:
+        env.close()
+    print(outcome[0])
+
+
+def _environment() -> tuple[str, dict[str, Any]]:
+    """Name and arguments of the environment of this folder's task."""
+    if not (HERE / "world.wbt").exists():
+        return "TDAC-Map2D-v0", {"map": str(HERE)}
+    params = load_params()
+    same = ("goal", "goal_tolerance", "dt", "horizon")
+    return "TDAC-EPuck-v0", {
+        "world": str(HERE / "world.wbt"),
+        "start": [*params["start"], params["heading"]],
+        **{key: params[key] for key in same},
+    }
+
+
+def _has_window() -> bool:
+    try:
+        import pygame  # noqa: F401
+    except ImportError:
+        return False
+    desktop = sys.platform in ("win32", "darwin")
+    return desktop or any(os.environ.get(k) for k in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+def _episode(
+    env: Any,
+    policy: Callable[[dict[str, Any]], Any],
+    reset: Callable[[dict[str, Any]], Any] | None,
+    outcome: list[str],
+) -> Iterator[Any]:
+    """Steps the env and yields every second frame and the last one."""
+    obs, info = env.reset(seed=0)
+    if reset is not None:
+        reset(obs)
+    steps, done = 0, False
+    while not done:
+        if steps % 2 == 0:
+            yield env.render()
+        obs, _, terminated, truncated, info = env.step(policy(obs))
+        steps, done = steps + 1, terminated or truncated
+    yield env.render()
+    end = "collided" if info.get("collision") else "not reached"
+    outcome.append(f"{'reached' if info.get('is_success') else end}, {steps} steps")
+
+
+def _read_png(file: Path) -> NDArray[np.uint8]:
+    """Pixels of an 8-bit grey or RGB PNG, shape (height, width, 1 or 3)."""
+    data = file.read_bytes()
+    if data[:8] != b"\x89PNG\r\n\x1a\n":
+        raise ValueError(f"{file}: expected a PNG file")
+    head, packed, at = b"", b"", 8
+    while at + 8 <= len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        body, at = data[at + 8 : at + 8 + size], at + 12 + size
+        head = body if kind == b"IHDR" else head
+        packed += body if kind == b"IDAT" else b""
+    width, height, depth, colour, _, _, interlaced = struct.unpack(">IIBBBBB", head)
+    channels = {0: 1, 2: 3}.get(colour)
+    if depth != 8 or channels is None or interlaced:
+        raise ValueError(f"{file}: expected 8-bit grey or RGB without interlacing")
+    raw = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, -1)
+    image = np.zeros((height + 1, width, channels), np.uint8)
+    for j in range(height):
+        row = raw[j, 1:].reshape(width, channels)
+        image[j + 1] = _unfilter(int(raw[j, 0]), row, image[j])
+    return image[1:]
+
+
+def _unfilter(
+    kind: int, row: NDArray[np.uint8], above: NDArray[np.uint8]
+) -> NDArray[np.uint8] | list[list[int]]:
+    """Undoes a row's filter: none, left, up, average of the two, or Paeth."""
+    if kind == 0:
+        return row
+    if kind == 1:
+        return np.cumsum(row, axis=0, dtype=np.uint8)
+    if kind == 2:
+        return row + above
+    channels = row.shape[1]
+    left, corner, pixels = [0] * channels, [0] * channels, []
+    for delta, up in zip(row.tolist(), above.tolist(), strict=True):
+        guess = map(_paeth if kind == 4 else _average, left, up, corner)
+        left = [(d + g) & 255 for d, g in zip(delta, guess, strict=True)]
+        corner = up
+        pixels.append(left)
+    return pixels
+
+
+def _average(left: int, up: int, _corner: int) -> int:
+    return (left + up) // 2
+
+
+def _paeth(left: int, up: int, corner: int) -> int:
+    """Whichever neighbour is nearest to left + up - corner."""
+    estimate = left + up - corner
+    return min((left, up, corner), key=lambda value: abs(estimate - value))

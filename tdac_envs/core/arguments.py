@@ -1,0 +1,161 @@
+"""Numbers that a user gives: taken as they are meant, or refused in one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from tdac_envs.core.errors import TaskError
+
+LARGEST = 1e9
+"""Bound of every number that a user gives, so that what is computed stays finite."""
+SMALLEST = 1e-9
+"""Bound of one that must be above 0."""
+MOST_STEPS = 10_000_000
+"""Of an episode: the longest path on the largest map, at a crawl."""
+
+
+def finite_numbers(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
+    """The values as floats.
+
+    Raises:
+        TaskError: There are not `count` of them, or one is not a finite number, or
+            beyond `LARGEST`.
+    """
+    try:
+        numbers = tuple(float(value) for value in values)
+    except (TypeError, ValueError, OverflowError):
+        numbers = ()
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise TaskError(f"expected {name} to be {count} finite numbers, got {values!r}")
+    for number in numbers:
+        _bounded(name, number)
+    return numbers
+
+
+def finite_point(name: str, values: Sequence[float]) -> tuple[float, float]:
+    """The values as a point (x, y); raises as `finite_numbers` does."""
+    x, y = finite_numbers(name, values, 2)
+    return x, y
+
+
+def finite(name: str, value: float) -> float:
+    """The value as a float.
+
+    Raises:
+        TaskError: It is not a finite number, or beyond `LARGEST`.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise TaskError(f"expected {name} to be a finite number, got {value!r}")
+    _bounded(name, number)
+    return number
+
+
+def _bounded(name: str, number: float) -> None:
+    if abs(number) > LARGEST:
+        raise TaskError(f"expected {name} within +-{LARGEST:g}, got {number:g}")
+
+
+def positive(name: str, value: float) -> float:
+    """The value as a float.
+
+    Raises:
+        TaskError: It is not a finite number above 0.
+    """
+    number = finite(name, value)
+    if number <= 0.0:
+        raise TaskError(f"expected {name} above 0, got {value!r}")
+    if number < SMALLEST:
+        raise TaskError(f"expected {name} of at least {SMALLEST:g}, got {value!r}")
+    return number
+
+
+def not_negative(name: str, value: float) -> float:
+    """The value as a float.
+
+    Raises:
+        TaskError: It is not a finite number of at least 0.
+    """
+    number = finite(name, value)
+    if number < 0.0:
+        raise TaskError(f"expected {name} of at least 0, got {value!r}")
+    return number
+
+
+def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
+    """Accepts one of the allowed values.
+
+    Raises:
+        TaskError: It is another one.
+    """
+    if value not in allowed:
+        choices = ", ".join(map(repr, allowed))
+        raise TaskError(f"expected {name} to be one of {choices}, got {value!r}")
+
+
+def whole_number(name: str, value: float, least: int) -> int:
+    """The value as an int.
+
+    Raises:
+        TaskError: It is not a whole number, or below `least`.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise TaskError(
+            f"expected {name} to be a whole number from {least}, got {value!r}"
+        )
+    return int(value)
+
+
+def steps_of(horizon: float) -> int:
+    """The horizon as an int.
+
+    Raises:
+        TaskError: It is not a whole number from 1 to `MOST_STEPS`.
+    """
+    steps = whole_number("horizon", horizon, 1)
+    if steps > MOST_STEPS:
+        raise TaskError(
+            f"expected a horizon of at most {MOST_STEPS} steps, got {steps}: "
+            "give faster wheels or longer steps"
+        )
+    return steps
+
+
+def check_reset_options(options: dict[str, Any]) -> None:
+    """Refuses options of `reset` that are neither a start nor a goal.
+
+    Raises:
+        TaskError: There is another one.
+    """
+    unknown = sorted(map(str, options.keys() - {"start", "goal"}))
+    if unknown:
+        raise TaskError(f"unknown reset options {unknown}; expected 'start' and 'goal'")
+
+
+def wheel_speeds(action: Any) -> tuple[float, float]:
+    """The wheel speeds of an action, which may be out of [-1, 1].
+
+    Raises:
+        ValueError: The action is not two finite numbers.
+    """
+    try:
+        array = action if type(action) is np.ndarray else np.asarray(action)
+        left, right = array.tolist()
+        # NaN and infinity times 0 are not 0.
+        if 0.0 * left + 0.0 * right == 0.0:
+            return float(left), float(right)
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(_not_an_action(action)) from None
+
+
+def _not_an_action(action: Any) -> str:
+    return f"expected an action of two finite numbers in [-1, 1], got {action!r}"

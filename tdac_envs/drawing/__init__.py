@@ -1,0 +1,1 @@
+"""Pictures: canvas, marks, runs, close-ups, video, window."""

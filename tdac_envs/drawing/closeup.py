@@ -1,0 +1,185 @@
+"""A picture of one run: the whole map, a close-up of where it ended, and a caption."""
+
+from __future__ import annotations
+
+import itertools
+import textwrap
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from tdac_envs.drawing.backdrop import CLOSE_UP, Backdrop, Chart, Points, Window
+from tdac_envs.drawing.canvas import (
+    FREE,
+    GREEN,
+    GREY,
+    INK,
+    PAPER,
+    TRAIL,
+    Canvas,
+    Colour,
+    Image,
+    blank,
+    write_text,
+)
+
+# Told apart from the green of the goal by all kinds of colour vision.
+EVENT: Colour = (213, 94, 0)
+EARLY: Colour = (176, 168, 232)
+COLUMN, MARGIN = 400, 14
+_LINE, _CHARACTERS = 21, 50
+_PIECES = 16
+# A close-up shows this much around the event at least, radii of the body.
+_AROUND = 5.0
+# Below this enlargement there is nothing to be gained from a close-up.
+_WORTH = 1.5
+_SMALLEST_BODY = 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Event:
+    """What is to be seen in a run.
+
+    Attributes:
+        title: First line of the caption, ASCII.
+        facts: Further lines; long ones are wrapped.
+        where: Shape (n, 2): places that the close-up must hold.
+        contact: Point of a wall that the body touched.
+        way: Shape (m, 2): the way that should have been taken from the end.
+    """
+
+    title: str
+    facts: tuple[str, ...]
+    where: Points
+    contact: tuple[float, float] | None = None
+    way: Points | None = None
+
+
+def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
+    """The picture of a run, uint8 RGB.
+
+    Args:
+        background: Of the run's task.
+        poses: Shape (T + 1, 3): x, y, heading.
+        event: What is to be seen.
+    """
+    chart, radius = background.whole(), background.radius
+    canvas = chart.canvas
+    window = _window(background, event, poses, chart.scale)
+    _draw_run(chart, poses, event, radius, way=window is None)
+    close = None
+    if window is not None:
+        _draw_window(chart, window)
+        close = _close_up(background.close_up(window), poses, event, radius)
+    column = _column(event, close)
+    columns = canvas.image.shape[1]
+    rows = max(canvas.strip_top, column.shape[0])
+    picture = blank(rows, columns + COLUMN, PAPER)
+    picture[: canvas.strip_top, :columns] = canvas.image[: canvas.strip_top]
+    picture[: column.shape[0], columns:] = column
+    return picture
+
+
+def _draw_run(
+    chart: Chart, poses: Points, event: Event, radius: float, *, way: bool
+) -> None:
+    """Trail, body at the end, the contact, and perhaps the way from there."""
+    canvas, places = chart.canvas, chart.at(poses[:, :2])
+    if way and event.way is not None:
+        canvas.line(chart.at(event.way), GREEN, 2, 0.9, dash=6)
+    body = max(radius * chart.scale, _SMALLEST_BODY)
+    canvas.disc(places[0], 4, FREE)
+    canvas.disc(places[0], 4, EARLY, width=2)
+    _draw_trail(canvas, places)
+    x, y = places[-1]
+    canvas.disc((x, y), body, TRAIL, 0.35)
+    canvas.disc((x, y), body, TRAIL, width=2)
+    turns = chart.turned(float(poses[-1, 2])) + np.array([0.0, 2.6, -2.6])
+    nose = np.column_stack([np.cos(turns), np.sin(turns)]) * 0.6 * body / canvas.scale
+    canvas.polygon(np.add(nose, (x, y)), TRAIL)
+    if event.contact is not None:
+        size, contact = max(0.3 * body, 6.0), chart.at(np.array([event.contact]))
+        canvas.disc(contact, size, FREE, 0.9, 5)
+        canvas.disc(contact, size, EVENT, width=3)
+
+
+def _draw_trail(canvas: Canvas, places: Points) -> None:
+    """A line that gets darker along the way driven."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
+    cuts = np.searchsorted(along, np.linspace(0.0, along[-1], _PIECES + 1))
+    early, late = np.array(EARLY), np.array(TRAIL)
+    for k, (first, last) in enumerate(itertools.pairwise(cuts.tolist())):
+        shade = k / (_PIECES - 1)
+        red, green, blue = np.rint((1.0 - shade) * early + shade * late).tolist()
+        canvas.line(places[first : last + 1], (red, green, blue), 2)
+
+
+def _window(
+    background: Backdrop, event: Event, poses: Points, scale: float
+) -> Window | None:
+    """The part to enlarge; None where the picture itself shows as much."""
+    for where in (event.where, poses[-1:, :2]):
+        low, high = where.min(axis=0), where.max(axis=0)
+        extent = float((high - low).max()) + 2.0 * _AROUND * background.radius
+        window = background.window((low + high) / 2.0, extent)
+        if CLOSE_UP / window.side >= _WORTH * scale:
+            return window
+    return None
+
+
+def _draw_window(chart: Chart, window: Window) -> None:
+    x, y, side = window
+    corners = np.array([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
+    at = chart.at(corners + np.array([x, y]))
+    for colour, width in ((FREE, 4), (EVENT, 2)):
+        # Not in one go: a closed line has no farthest point.
+        chart.canvas.line(at[:3], colour, width)
+        chart.canvas.line(at[2:], colour, width)
+
+
+def _close_up(chart: Chart, poses: Points, event: Event, radius: float) -> Image:
+    """The part around the event with the run, framed."""
+    _draw_run(chart, poses, event, radius, way=True)
+    close = chart.canvas.image[: chart.canvas.strip_top]
+    cv2.rectangle(close, (0, 0), (close.shape[1] - 1, close.shape[0] - 1), EVENT, 2)
+    return close
+
+
+def _column(event: Event, close: Image | None) -> Image:
+    """Caption, close-up and legend, one below the other."""
+    lines = [line for fact in event.facts for line in textwrap.wrap(fact, _CHARACTERS)]
+    legend = [
+        (GREY, True, "shortest path on the grid"),
+        (TRAIL, False, "driven, light to dark"),
+    ]
+    if event.way is not None:
+        legend.append((GREEN, True, "shortest path from the end"))
+    if event.contact is not None:
+        legend.append((EVENT, False, "contact"))
+    rows = len(lines) + len(legend) + 1
+    tall = 0 if close is None else close.shape[0] + MARGIN
+    column = blank(2 * MARGIN + _LINE * rows + 10 + tall, COLUMN, PAPER)
+    at = MARGIN + 12
+    write_text(column, MARGIN, at, event.title, EVENT)
+    for line in lines:
+        at += _LINE
+        write_text(column, MARGIN, at, line, INK)
+    at += MARGIN
+    if close is not None:
+        column[at : at + close.shape[0], MARGIN : MARGIN + close.shape[1]] = close
+        at += close.shape[0]
+    at += 10
+    for colour, dashed, text in legend:
+        at += _LINE
+        _draw_key(column, at - 5, colour, dashed)
+        write_text(column, MARGIN + 34, at, text, INK)
+    return column
+
+
+def _draw_key(column: Image, y: int, colour: Colour, dashed: bool) -> None:
+    """The line of a legend's entry."""
+    ends = ((0, 7), (10, 17), (20, 26)) if dashed else ((0, 26),)
+    for first, last in ends:
+        begin, end = (MARGIN + first, y), (MARGIN + last, y)
+        cv2.line(column, begin, end, colour, 2, cv2.LINE_AA)

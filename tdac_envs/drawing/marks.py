@@ -1,0 +1,140 @@
+"""The things that are drawn on a map: start, goal, robot, rays, outcome."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tdac_envs.drawing.canvas import (
+    AMBER,
+    BLUE,
+    FREE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    TRAIL,
+    Canvas,
+    Colour,
+)
+
+OUTCOMES: dict[str, Colour] = {"reached": GREEN, "collision": RED, "out of time": AMBER}
+LEFT_RAYS, RIGHT_RAYS = BLUE, ORANGE
+Sprite = NDArray[np.float32]
+
+
+def load_sprite(file: Path, radius: float) -> Sprite | None:
+    """The robot's picture at three times a radius (frame px), for `Canvas.paste`.
+
+    Returns:
+        None where there is no such picture.
+    """
+    picture = cv2.imread(str(file), cv2.IMREAD_UNCHANGED) if file.is_file() else None
+    if picture is None or picture.dtype != np.uint8:
+        return None
+    if picture.ndim == 2 or picture.shape[2] == 3:
+        code = cv2.COLOR_GRAY2RGBA if picture.ndim == 2 else cv2.COLOR_BGR2RGBA
+        picture = cv2.cvtColor(picture, code)
+    else:
+        picture = cv2.cvtColor(picture, cv2.COLOR_BGRA2RGBA)
+    rows, columns = picture.shape[:2]
+    zoom = 6 * radius / max(rows, columns)
+    size = (max(1, round(columns * zoom)), max(1, round(rows * zoom)))
+    colour = picture.astype(np.float32)
+    alpha = colour[..., 3:] / 255
+    sprite = np.concatenate([colour[..., :3] * alpha, alpha], axis=2)
+    small = cv2.resize(sprite, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(small, np.float32)
+
+
+def draw_task(
+    canvas: Canvas,
+    start: Sequence[float],
+    goal: Sequence[float],
+    goal_tolerance: float,
+    path: ArrayLike,
+) -> None:
+    """Draws the reference path, the start with its heading, and the goal."""
+    canvas.line(path, GREY, 1 if canvas.scale < 1 else 2, 0.75, dash=7)
+    canvas.disc(start[:2], 5, FREE)
+    canvas.disc(start[:2], 5, GREY, width=2)
+    ring = max(goal_tolerance * canvas.scale, 6.0)
+    canvas.disc(goal, ring, GREEN, 0.16)
+    canvas.disc(goal, ring, GREEN, width=2)
+    canvas.disc(goal, min(3.5, ring / 3), GREEN)
+
+
+def draw_rays(
+    canvas: Canvas,
+    pose: tuple[float, float, float],
+    ranges: NDArray[np.float64],
+    field_of_view: float,
+    range_max: float,
+) -> None:
+    """Draws the sensor's fan: the robot's left half blue, its right half orange.
+
+    Args:
+        canvas: Where to draw.
+        pose: (x, y, heading).
+        ranges: Shape (n_rays,), px, leftmost first.
+        field_of_view: Whole angle, rad.
+        range_max: Range without a hit, px.
+    """
+    n, (x, y, heading) = len(ranges), pose
+    if n == 0:
+        return
+    turns = np.linspace(-0.5, 0.5, n) * field_of_view if n > 1 else np.zeros(1)
+    angles = heading + turns
+    tips = np.column_stack([np.cos(angles), np.sin(angles)]) * ranges[:, None] + (x, y)
+    halves = ((turns < 1e-9, LEFT_RAYS), (turns > -1e-9, RIGHT_RAYS))
+    for half, colour in halves:
+        canvas.polygon(np.vstack([(x, y), tips[half]]), colour, 0.10)
+        canvas.fan((x, y), tips[half], colour, 0.45)
+    for half, colour in halves:
+        for tip in tips[half & (ranges < range_max)]:
+            canvas.disc(tip, 2, colour)
+
+
+def draw_disc(canvas: Canvas, pose: tuple[float, float, float], radius: float) -> None:
+    """Draws the robot as a disc with a nose; the radius is in frame pixels."""
+    x, y, heading = pose
+    canvas.disc((x, y), radius, TRAIL)
+    if radius >= 5:
+        canvas.disc((x, y), radius, FREE, width=1)
+        reach = 0.62 * radius / canvas.scale
+        turns = heading + np.array([0.0, 2.5, math.pi, -2.5])
+        reaches = reach * np.array([1.0, 0.9, 0.35, 0.9])
+        nose = np.column_stack([np.cos(turns), np.sin(turns)]) * reaches[:, None]
+        canvas.polygon(np.add(nose, (x, y)), FREE)
+
+
+def draw_outcome(
+    canvas: Canvas, centre: ArrayLike, radius: float, outcome: str
+) -> None:
+    """Marks how an episode ended: a tick, a cross or a bar in the outcome's colour.
+
+    Args:
+        canvas: Where to draw.
+        centre: Where the robot ended.
+        radius: Of the body, frame px.
+        outcome: One of `OUTCOMES`; nothing is drawn for another.
+    """
+    if outcome not in OUTCOMES:
+        return
+    colour = OUTCOMES[outcome]
+    canvas.disc(centre, radius + 3, colour, width=2)
+    size = max(0.55 * radius, 5.0) / canvas.scale
+    strokes = {
+        "reached": [[(-0.9, 0.0), (-0.25, 0.7), (0.95, -0.7)]],
+        "collision": [[(-0.8, -0.8), (0.8, 0.8)], [(-0.8, 0.8), (0.8, -0.8)]],
+        "out of time": [[(-0.8, 0.0), (0.8, 0.0)]],
+    }[outcome]
+    middle = np.asarray(centre, np.float64)
+    for width, ink in ((6, FREE), (3, colour)):
+        for stroke in strokes:
+            canvas.line(np.add(np.multiply(stroke, size), middle), ink, width)

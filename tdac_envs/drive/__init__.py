@@ -1,0 +1,1 @@
+"""What both robots share: poses, motion, steps, rewards, batches."""

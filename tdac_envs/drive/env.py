@@ -1,0 +1,139 @@
+"""What the environments share: a robot on two wheels drives to a goal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.arguments import not_negative, one_of, wheel_speeds, whole_number
+from tdac_envs.drive.rewards import weights_of
+from tdac_envs.drive.stepping import (
+    HEADING,
+    LEFT,
+    RIGHT,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    info_of,
+)
+from tdac_envs.map2d.picture import ending
+
+if TYPE_CHECKING:
+    from tdac_envs.drawing.window import Window
+
+Observation = dict[str, NDArray[np.float32]]
+
+
+class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
+    """An environment whose actions are the speeds of two wheels.
+
+    A subclass has the robot's memory, makes the call that moves it (`_call_drive`),
+    observes (`_observation`) and draws (`_frame`).
+
+    Args:
+        on_collision: `"terminate"` or `"block"`.
+        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        motor_lag: Time constant of the wheel speeds, s.
+        delay: Steps by which an action takes effect late.
+        reward_weights: Those of the reward that are to differ, by their names.
+        dt: Duration of a step, s.
+        render_mode: `"rgb_array"`, `"human"` or None.
+
+    Attributes:
+        title: Of the window.
+        robot: Its memory; see `tdac_envs.drive.stepping`.
+    """
+
+    title: str
+    robot: Any
+    _call_drive: Callable[[], None]
+    _steps: int
+    _trail: list[tuple[float, float]]
+    _status: str
+
+    def __init__(
+        self,
+        *,
+        on_collision: str,
+        wheel_slip: float,
+        motor_lag: float,
+        delay: int,
+        reward_weights: Mapping[str, float] | None,
+        dt: float,
+        render_mode: str | None,
+    ) -> None:
+        one_of("on_collision", on_collision, ("terminate", "block"))
+        one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        self.on_collision = on_collision
+        self.wheel_slip = not_negative("wheel_slip", wheel_slip)
+        self.motor_lag = not_negative("motor_lag", motor_lag)
+        self.delay = whole_number("delay", delay, 0)
+        self.weights = weights_of(reward_weights)
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": max(round(1.0 / dt), 1)}
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self._window: Window | None = None
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Applies wheel speeds for one `dt`.
+
+        Raises:
+            ValueError: The action is not two finite numbers.
+        """
+        state = self.robot.state
+        state[LEFT], state[RIGHT] = wheel_speeds(action)
+        if self.wheel_slip:
+            slip = self.np_random.normal(1.0, self.wheel_slip, 2)
+            state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
+        self._call_drive()
+        outcome = self.robot.outcome.tolist()
+        reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
+        info = info_of(outcome)
+        if self.render_mode is not None:
+            self._steps += 1
+            self._note(info["is_success"], info["collision"], truncated)
+        return self._observation(), reward, terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The current frame, uint8 (height, width, 3), or None in a window."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs gym.make(..., render_mode='rgb_array')")
+            return None
+        frame = self._frame()
+        if self.render_mode == "rgb_array":
+            return frame
+        if self._window is None:
+            from tdac_envs.drawing.window import Window
+
+            self._window = Window(self.title, self.metadata["render_fps"])
+        self._window.show(frame)
+        return None
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def pose(self) -> NDArray[np.float64]:
+        """The true pose, shape (3,): x, y (px or m), heading (rad)."""
+        pose: NDArray[np.float64] = self.robot.state[: HEADING + 1].copy()
+        return pose
+
+    def _observation(self) -> Observation:
+        raise NotImplementedError
+
+    def _frame(self) -> NDArray[np.uint8]:
+        raise NotImplementedError
+
+    def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
+        x, y, _ = self.pose().tolist()
+        self._trail.append((x, y))
+        self._status = ending(reached, collided, truncated) or self._status
+        if self.render_mode == "human":
+            self.render()

@@ -1,0 +1,59 @@
+"""Reward of both environments, as pure functions of one step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.core.compiled import subkernel
+
+
+class RewardWeights(NamedTuple):
+    """Weights of the four terms.
+
+    Attributes:
+        progress: For each full-speed step's worth of progress along the shortest
+            path.
+        goal: Once, on reaching the goal.
+        collision: Subtracted at each contact.
+        time: Subtracted at each step.
+    """
+
+    progress: float = 0.1
+    goal: float = 10.0
+    collision: float = 10.0
+    time: float = 0.01
+
+
+def weights_of(given: Mapping[str, float] | None) -> RewardWeights:
+    """The weights that are given by their names, and the default of the others.
+
+    Raises:
+        TaskError: A name is unknown, or a weight is not a finite number of at least 0.
+    """
+    weights = {}
+    for name, value in (given or {}).items():
+        one_of("a name in reward_weights", name, RewardWeights._fields)
+        weights[name] = not_negative(f"reward_weights[{name!r}]", value)
+    return RewardWeights(**weights)
+
+
+@subkernel
+def step_reward(
+    weights: RewardWeights, progress: float, reached: bool, collided: bool
+) -> float:
+    """Reward of one step.
+
+    Args:
+        weights: Weights of the terms.
+        progress: Path distance gained, in full-speed steps.
+        reached: Whether the goal was reached in this step.
+        collided: Whether the body touched an obstacle in this step.
+    """
+    reward = weights.progress * progress - weights.time
+    if reached:
+        reward += weights.goal
+    if collided:
+        reward -= weights.collision
+    return reward

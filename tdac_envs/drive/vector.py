@@ -1,0 +1,331 @@
+"""What the batched environments share: many robots, stepped in one go on all cores."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from tdac_envs.core.addresses import Addresses, words_of
+from tdac_envs.core.arguments import whole_number
+from tdac_envs.core.slices import Rows, Slices
+from tdac_envs.drive import stepping
+from tdac_envs.drive.batching import (
+    Array,
+    Flags,
+    autoreset_mode_of,
+    ends_of,
+    infos_of,
+    joint_space,
+    mask_of,
+    seeds_of,
+)
+
+Observations = dict[str, NDArray[np.float32]]
+Result = tuple[Observations, Array, Flags, Flags, dict[str, Any]]
+
+
+class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
+    """Many robots, each with a task of its own, each as in an environment alone.
+
+    Robot i does what `envs[i % len(envs)]` would do with its seed and its actions, to
+    the last bit: both call the same compiled functions.
+
+    Args:
+        envs: Environments of one kind, whose robots have memory of one shape. Each
+            has a `robot` and a `setup`, as `Map2DEnv` has.
+        num_envs: Number of robots.
+        autoreset_mode: When an episode that has ended begins anew.
+        threads: How many work at a time; by default as many as there are cores.
+
+    Attributes:
+        step_rows: The compiled loop of such robots; see
+            `tdac_envs.map2d.kernels.step_rows`.
+        copied: Keys of what it copies of what they observe.
+        last_poses: True poses in which the episodes ended that the last step began
+            anew, with `SAME_STEP`; shape (num_envs, 3), of the others as they are.
+    """
+
+    step_rows: Callable[..., None]
+    copied: tuple[str, ...]
+
+    def __init__(
+        self,
+        envs: Sequence[Any],
+        num_envs: int,
+        *,
+        autoreset_mode: str | AutoresetMode,
+        threads: int | None,
+    ) -> None:
+        self.num_envs = num_envs
+        self.autoreset_mode = autoreset_mode_of(autoreset_mode)
+        self.threads = None if threads is None else whole_number("threads", threads, 1)
+        first = envs[0]
+        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
+        self.single_action_space = first.action_space
+        self.action_space = batch_space(first.action_space, num_envs)
+        self.single_observation_space = joint_space(envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.setups: list[Any] = [envs[i % len(envs)].setup for i in range(num_envs)]
+        self.tasks = [setup.nominal for setup in self.setups]
+        self.robots = type(first.robot)(
+            *(np.zeros((num_envs, *each.shape), each.dtype) for each in first.robot)
+        )
+        for constants, setup in zip(self.robots.constants, self.setups, strict=True):
+            constants[:] = setup.constants()
+        self.last_poses = self.pose()
+        self._slices = Slices(self.threads)
+        self._all = np.arange(num_envs)
+        self._everyone = np.ones(num_envs, np.bool_)
+        self._slippery = [i for i, s in enumerate(self.setups) if s.wheel_slip]
+        self._randoms: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds: list[int | None] = [None] * num_envs
+        self._vary = [setup.variation != "nominal" for setup in self.setups]
+        # Whether a robot's next task may be another one than its last.
+        self._drawn = any(self._vary)
+        self._over = np.zeros(num_envs, np.bool_)
+        self._never_begun = np.ones(num_envs, np.bool_)
+        self._begun = False
+        self._commands = np.zeros((num_envs, 2))
+        self.goals = np.array([task.goal for task in self.tasks], np.float32)
+        self._starts = np.array([(*task.start, task.shortest) for task in self.tasks])
+        self._bind()
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts the episodes of all robots, or of those in `options["reset_mask"]`.
+
+        Args:
+            seed: One number, from which robot i has `seed + i`; or one for each.
+            options: As of one environment, and `reset_mask`.
+
+        Raises:
+            ValueError: There are more or fewer seeds than robots, the mask is not one
+                of robots, or the options are no dict.
+            TaskError: The options are not feasible.
+        """
+        if not isinstance(options, Mapping | None):
+            raise ValueError(f"expected options to be a dict, got {options!r}")
+        rest = dict(options or {})
+        mask = mask_of(rest.pop("reset_mask", None), self.num_envs)
+        for i, one in enumerate(seeds_of(seed, self.num_envs)):
+            if one is not None and mask[i]:
+                self._randoms[i], self._seeds[i] = seeding.np_random(one)
+        self._begin(mask, rest)
+        self._never_begun[mask] = False
+        self._begun = not self._never_begun.any()
+        observations = {key: seen.copy() for key, seen in self._seen().items()}
+        self._complete(observations, np.flatnonzero(mask).tolist())
+        return observations, self._infos(mask)
+
+    def step(self, actions: NDArray[np.float32]) -> Result:
+        """Applies wheel speeds, shape (num_envs, 2), for one step.
+
+        Raises:
+            ValueError: The actions are not two finite numbers a robot.
+            ResetNeeded: Not all robots have been reset yet; or the mode is `DISABLED`
+                and an episode has ended.
+        """
+        if not self._begun:
+            raise gym.error.ResetNeeded("expected reset() of all robots before step()")
+        self._command(actions)
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
+            resting = np.flatnonzero(self._over)
+            raise gym.error.ResetNeeded(
+                f"expected reset(options={{'reset_mask': ...}}) of the robots whose "
+                f"episodes have ended: {resting[:10].tolist()}"
+            )
+        if self._slippery:
+            self._slip()
+        if self._drawn:
+            self._draw(np.flatnonzero(self._over), {})
+        observations, outcome = self._results()
+        self._act(self._all, observations, outcome)
+        rewards, terminated, truncated = ends_of(outcome)
+        infos = infos_of(outcome, self._everyone)
+        np.logical_or(terminated, truncated, out=self._over)
+        self._complete(observations, range(self.num_envs))
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
+            infos |= self._restart(observations, infos)
+        return observations, rewards, terminated, truncated, infos
+
+    def close_extras(self, **_: Any) -> None:
+        """Ends the threads."""
+        # Gymnasium 1.2 also closes what was refused before it was made.
+        if hasattr(self, "_slices"):
+            self._slices.close()
+
+    def pose(self) -> Array:
+        """The true poses, shape (num_envs, 3)."""
+        poses: Array = self.robots.state[:, : stepping.HEADING + 1].copy()
+        return poses
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """Of each robot."""
+        return tuple(self._random(i) for i in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
+        """Of each robot."""
+        return tuple(self._seeds)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_slices": None, "_addresses": None, "_shared": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._slices = Slices(self.threads)
+        self._bind()
+
+    def _seen(self) -> Observations:
+        """What the kernels let the robots observe, in their own arrays."""
+        raise NotImplementedError
+
+    def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
+        """Adds what no kernel does; noise is drawn anew for these robots."""
+        raise NotImplementedError
+
+    def _bind(self) -> None:
+        """Finds out where all arrays are that the kernels take."""
+        self._addresses = Addresses(map(self._arrays, range(self.num_envs)))
+        words = self._addresses.words
+        self._unread = self._results()
+        shared = self._over, self._commands, self._starts, words
+        self._shared = Addresses([shared])
+
+    def _results(self) -> tuple[Observations, Array]:
+        """Arrays for what a step returns; what no step changes is filled in."""
+        seen = self._seen()
+        results = {key: np.empty_like(array) for key, array in seen.items()}
+        for key in seen.keys() - set(self.copied):
+            results[key][:] = seen[key]
+        return results, np.empty_like(self.robots.outcome)
+
+    def _act(self, rows: Rows, observations: Observations, outcome: Array) -> None:
+        """Makes the step of some robots, or begins their episodes.
+
+        Args:
+            rows: The robots; the threads share them.
+            observations: What these robots observe, without noise, is put here.
+            outcome: And here, what their steps led to.
+        """
+        out = words_of((outcome, *(observations[key] for key in self.copied)))
+        batch = np.concatenate([self._shared.words[0], out])
+        self._slices.run(partial(self.step_rows, batch), rows)
+
+    def _arrays(self, i: int) -> tuple[NDArray[Any], ...]:
+        """What the kernels take of a robot and its world."""
+        return *self.setups[i].world(self.tasks[i]), *self.robots.row(i)
+
+    def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
+        """Begins the episodes of the robots in a mask, and of no others."""
+        chosen = np.flatnonzero(mask)
+        if options or self._drawn:
+            self._draw(chosen, options)
+        self._over[chosen] = True
+        # Only the robots' own arrays are read after this.
+        self._act(chosen, *self._unread)
+        self._over[chosen] = False
+
+    def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
+        """Gives robots the tasks that their next episodes are about."""
+        drawn = [
+            (i, self.setups[i].draw(options, self._random(i)))
+            for i in robots.tolist()
+            if options or self._vary[i] or self.tasks[i] is not self.setups[i].nominal
+        ]
+        for i, task in drawn:
+            self._give(i, task)
+
+    def _give(self, i: int, task: Any) -> None:
+        """Gives a robot another task."""
+        self._drawn = True
+        before = self.tasks[i]
+        self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
+        self.goals[i] = task.goal
+        if task.field is not before.field:
+            self._addresses.put(i, self._arrays(i))
+        self.robots.row(i).place(task)
+
+    def _random(self, i: int) -> np.random.Generator:
+        random = self._randoms[i]
+        if random is None:
+            random, self._seeds[i] = seeding.np_random()
+            self._randoms[i] = random
+        return random
+
+    def _slip(self) -> None:
+        """Draws the wheels' slip of the robots that move."""
+        for i in self._slippery:
+            if not self._over[i]:
+                slip = self._random(i).normal(1.0, self.setups[i].wheel_slip, 2)
+                state = self.robots.state[i]
+                state[stepping.SLIP_LEFT : stepping.SLIP_RIGHT + 1] = slip
+
+    def _restart(
+        self, observations: Observations, infos: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Begins anew what has ended; returns what it ended with.
+
+        Overwrites what the robots observe and what their infos say.
+        """
+        ended = self._over.copy()
+        over = np.flatnonzero(ended)
+        final = np.full(self.num_envs, None, object)
+        for i in over.tolist():
+            final[i] = {key: value[i].copy() for key, value in observations.items()}
+        last = self._infos(ended)
+        self.last_poses = self.pose()
+        self._begin(ended, {})
+        for key, seen in self._seen().items():
+            observations[key][over] = seen[over]
+        for key, values in self._infos(ended).items():
+            infos[key][over] = values[over]
+        self._complete(observations, over.tolist())
+        return {
+            "final_obs": final,
+            "_final_obs": ended,
+            "final_info": last,
+            "_final_info": ended.copy(),
+        }
+
+    def _infos(self, mask: Flags) -> dict[str, Any]:
+        return infos_of(np.where(mask[:, None], self.robots.outcome, 0.0), mask)
+
+    def _command(self, actions: Any) -> None:
+        """Keeps wheel speeds for the kernel, which limits them."""
+        try:
+            wanted = np.asarray(actions)
+            if wanted.shape == self._commands.shape:
+                self._commands[:] = wanted
+                if np.isfinite(self._commands).all():
+                    return
+        except (TypeError, ValueError):
+            pass
+        raise ValueError(
+            f"expected actions of two finite numbers in [-1, 1] for each of "
+            f"{self.num_envs} robots, got {self._wrong(actions)}"
+        )
+
+    def _wrong(self, actions: Any) -> str:
+        """What is wrong with actions, in few words."""
+        shape = np.shape(actions) if isinstance(actions, np.ndarray) else None
+        if shape is not None and shape != self._commands.shape:
+            return f"an array of shape {shape}"
+        if shape is None or actions.dtype.kind not in "fiu":
+            return reprlib.repr(actions)
+        robot = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
+        return f"{actions[robot].tolist()} for robot {robot}"

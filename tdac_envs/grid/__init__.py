@@ -1,0 +1,1 @@
+"""Occupancy grids: distances to obstacles, shortest paths, metres."""

@@ -1,0 +1,59 @@
+"""Pixels and metres of a map that has a resolution, as ROS `map.yaml` relates them."""
+
+from __future__ import annotations
+
+import math
+
+from tdac_envs.core.errors import MapError
+from tdac_envs.grid.grid import OccupancyGrid
+
+Point = tuple[float, float]
+
+
+def to_pixels(grid: OccupancyGrid, x_m: float, y_m: float) -> Point:
+    """Pixel coordinates of a point of the map frame.
+
+    The frame has x right and y up before `origin` turns it; the outer corner of the
+    lower-left pixel lies at `origin[:2]`.
+
+    Args:
+        grid: The map.
+        x_m: Metres in the map frame.
+        y_m: Metres in the map frame.
+
+    Raises:
+        MapError: The map has no resolution.
+    """
+    resolution, (x0, y0, yaw) = resolution_of(grid), grid.origin
+    dx, dy = x_m - x0, y_m - y0
+    right = math.cos(yaw) * dx + math.sin(yaw) * dy
+    up = math.cos(yaw) * dy - math.sin(yaw) * dx
+    return right / resolution - 0.5, grid.height - 0.5 - up / resolution
+
+
+def to_metres(grid: OccupancyGrid, x: float, y: float) -> Point:
+    """Map-frame coordinates in metres of a point in pixels; inverse of `to_pixels`.
+
+    Raises:
+        MapError: The map has no resolution.
+    """
+    resolution, (x0, y0, yaw) = resolution_of(grid), grid.origin
+    right, up = (x + 0.5) * resolution, (grid.height - 0.5 - y) * resolution
+    return (
+        x0 + math.cos(yaw) * right - math.sin(yaw) * up,
+        y0 + math.sin(yaw) * right + math.cos(yaw) * up,
+    )
+
+
+def resolution_of(grid: OccupancyGrid) -> float:
+    """Metres per pixel; divide a length in metres by it to get pixels.
+
+    Raises:
+        MapError: The map has no resolution.
+    """
+    if grid.resolution is None:
+        raise MapError(
+            "this map has no resolution, so lengths in metres mean nothing on it; "
+            "give pixels, or a ROS map.yaml with a resolution"
+        )
+    return grid.resolution

@@ -1,0 +1,288 @@
+"""Shortest paths on a grid: 8-connected, octile cost, no corner cutting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.compiled import constant, kernel
+from tdac_envs.grid.astar import ROUNDING, Guide, Lengths, lengths_between
+from tdac_envs.grid.grid import BoolGrid
+
+Path = NDArray[np.float64]
+Field = NDArray[np.float64]
+
+_DX = np.array([1, -1, 0, 0, 1, 1, -1, -1])
+_DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
+_SQRT2 = 2.0**0.5
+_SOLID, _OPEN, _TRIED = 0, 1, 2
+
+
+@kernel
+def _spread(
+    free: BoolGrid,
+    goal_x: int,
+    goal_y: int,
+    field: Field,
+    settled: NDArray[np.bool_],
+    buckets: NDArray[np.int64],
+) -> bool:
+    """Dijkstra in buckets of width 1; False where these have no room.
+
+    No step is shorter than 1, so a bucket never receives a cell while it is
+    worked off, and three buckets in rotation suffice.
+    """
+    height, width = free.shape
+    room = buckets.shape[1]
+    one, two, three = 0, 1, 2
+    n_one, n_two, n_three = 1, 0, 0
+    buckets[one, 0] = goal_y * width + goal_x
+    field[goal_y, goal_x] = 0.0
+    level = 0
+    while n_one + n_two + n_three > 0:
+        for index in range(n_one):
+            cell = buckets[one, index]
+            if settled[cell]:
+                continue
+            settled[cell] = True
+            y, x = cell // width, cell % width
+            if n_two + 8 > room or n_three + 8 > room:
+                return False
+            for k in range(8):
+                nx, ny = x + _DX[k], y + _DY[k]
+                if nx < 0 or ny < 0 or nx >= width or ny >= height:
+                    continue
+                if not free[ny, nx]:
+                    continue
+                if k >= 4 and not (free[y, nx] and free[ny, x]):
+                    continue
+                candidate = field[y, x] + (1.0 if k < 4 else _SQRT2)
+                if candidate < field[ny, nx] - 1e-12:
+                    field[ny, nx] = candidate
+                    if int(candidate) == level + 1:
+                        buckets[two, n_two] = ny * width + nx
+                        n_two += 1
+                    else:
+                        buckets[three, n_three] = ny * width + nx
+                        n_three += 1
+        one, two, three = two, three, one
+        n_one, n_two, n_three = n_two, n_three, 0
+        level += 1
+    return True
+
+
+def distance_field(free: BoolGrid, goal: tuple[int, int]) -> Field:
+    """Length of the shortest path from every free pixel to the goal, in px.
+
+    Args:
+        free: Shape (height, width), bool, True where the path may go.
+        goal: Pixel (x, y).
+
+    Returns:
+        Shape (height, width), float64; inf where the goal cannot be reached.
+    """
+    if not _is_free(free, goal):
+        return np.full(free.shape, np.inf)
+    room, open_ = 4 * sum(free.shape) + 1024, constant(free)
+    while True:
+        field: Field = np.full(free.shape, np.inf)
+        settled, buckets = np.zeros(free.size, np.bool_), np.empty((3, room), np.int64)
+        if _spread(open_, *goal, field, settled, buckets):
+            return field
+        room *= 4
+
+
+def _is_free(free: BoolGrid, pixel: tuple[int, int]) -> bool:
+    height, width = free.shape
+    inside = 0 <= pixel[0] < width and 0 <= pixel[1] < height
+    return inside and bool(free[pixel[::-1]])
+
+
+@kernel
+def _descend(
+    free: BoolGrid, field: Field, start_x: int, start_y: int, path: NDArray[np.int64]
+) -> int:
+    """Writes the pixels of the path; returns how many."""
+    height, width = field.shape
+    x, y, count = start_x, start_y, 0
+    while True:
+        path[count, 0], path[count, 1] = x, y
+        count += 1
+        if field[y, x] == 0.0:
+            return count
+        best, best_x, best_y = np.inf, x, y
+        for k in range(8):
+            nx, ny = x + _DX[k], y + _DY[k]
+            if nx < 0 or ny < 0 or nx >= width or ny >= height:
+                continue
+            if not free[ny, nx]:
+                continue
+            if k >= 4 and not (free[y, nx] and free[ny, x]):
+                continue
+            through = field[ny, nx] + (1.0 if k < 4 else _SQRT2)
+            if through < best - ROUNDING:
+                best, best_x, best_y = through, nx, ny
+        x, y = best_x, best_y
+
+
+def descend(free: BoolGrid, field: Field, start: tuple[int, int]) -> Path:
+    """The shortest path from `start` down a `distance_field`.
+
+    Returns:
+        Shape (n, 2), float64, columns x and y, start and goal included; empty
+        where the goal cannot be reached.
+    """
+    height, width = free.shape
+    inside = 0 <= start[0] < width and 0 <= start[1] < height
+    if not inside or not np.isfinite(field[start[1], start[0]]):
+        return np.empty((0, 2))
+    pixels = np.empty((int(field[start[1], start[0]]) + 2, 2), np.int64)
+    known = constant(field, np.float64)
+    count = _descend(constant(free), known, *start, pixels)
+    return pixels[:count].astype(np.float64)
+
+
+def plan_path(
+    free: BoolGrid,
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    guide: Guide | None = None,
+) -> Path:
+    """The shortest path between two pixels, as `descend` has it on the whole field.
+
+    Args:
+        free: Shape (height, width), bool, True where the path may go.
+        start: Pixel (x, y).
+        goal: Pixel (x, y).
+        guide: From `guide_between`, for the same ends and pixels that hold all of
+            `free`; it makes the search faster and leaves its result as it is.
+    """
+    if not (_is_free(free, start) and _is_free(free, goal)):
+        return np.empty((0, 2))
+    return _among(free, lengths_between(free, start, goal, guide), start)
+
+
+def plan_paths(
+    spaces: Sequence[BoolGrid],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    guide: Guide,
+) -> list[Path]:
+    """The same as `plan_path` in each of several spaces, which have much in common.
+
+    One search in all of them together mostly does: where the shortest path of a space
+    is no longer than that, it is found among the ones of all.
+
+    Args:
+        spaces: Shape (height, width), bool, each; best with more space towards the end.
+        start: Pixel (x, y).
+        goal: Pixel (x, y).
+        guide: From `guide_between`, for pixels that hold all of the spaces.
+    """
+    paths: list[Path] = [np.empty((0, 2))] * len(spaces)
+    lengths: Lengths | None = None
+    for number in reversed(range(len(spaces))):
+        path = _among(spaces[number], lengths, start)
+        if len(path) == 0:
+            together = np.logical_or.reduce(spaces[: number + 1])
+            if not (_is_free(together, start) and _is_free(together, goal)):
+                break
+            lengths = lengths_between(together, start, goal, guide)
+            if np.isinf(lengths[start[1] + 1, start[0] + 1]):
+                break
+            path = _among(spaces[number], lengths, start)
+        if len(path) == 0:
+            path = plan_path(spaces[number], start, goal, guide)
+        paths[number] = path
+    return paths
+
+
+def _among(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> Path:
+    """The path of `plan_path` in a part of a space, if it is as short as there.
+
+    Args:
+        free: The part, or all of the space, shape (height, width).
+        lengths: From `lengths_between`, of the space; None where there is none.
+        start: Pixel (x, y).
+
+    Returns:
+        Shape (n, 2); empty where it is longer, or where there is none.
+    """
+    if lengths is None or not _is_free(free, start):
+        return np.empty((0, 2))
+    length = lengths[start[1] + 1, start[0] + 1]
+    if np.isinf(length):
+        return np.empty((0, 2))
+    most = int(length) + 2
+    pixels, turns = np.empty((most, 2), np.int64), np.zeros(most, np.int64)
+    open_ = np.pad(free, 1).view(np.uint8)
+    count = _walk(open_, lengths, start[0] + 1, start[1] + 1, pixels, turns)
+    return pixels[:count].astype(np.float64) - 1
+
+
+@kernel
+def _walk(
+    open_: NDArray[np.uint8],
+    lengths: Lengths,
+    start_x: int,
+    start_y: int,
+    path: NDArray[np.int64],
+    turns: NDArray[np.int64],
+) -> int:
+    """Writes the first of the shortest ways down the lengths; returns how many pixels.
+
+    All ways to a pixel are equally long, so it need not be tried again after one of
+    them has led nowhere. Returns 0 where all do.
+    """
+    path[0, 0], path[0, 1] = start_x, start_y
+    count = 1
+    while count > 0:
+        x, y, k = path[count - 1, 0], path[count - 1, 1], turns[count - 1]
+        length = lengths[y, x]
+        if length == 0.0:
+            return count
+        if k == 8:
+            open_[y, x] = _TRIED
+            count -= 1
+            continue
+        turns[count - 1] = k + 1
+        i, j = x + _DX[k], y + _DY[k]
+        through = lengths[j, i] + (1.0 if k < 4 else _SQRT2)
+        if open_[j, i] != _OPEN or abs(through - length) > ROUNDING:
+            continue
+        if k >= 4 and (open_[y, i] == _SOLID or open_[j, x] == _SOLID):
+            continue
+        path[count, 0], path[count, 1], turns[count] = i, j, 0
+        count += 1
+    return 0
+
+
+def guide_between(
+    free: BoolGrid, start: tuple[int, int], goal: tuple[int, int]
+) -> Guide | None:
+    """What speeds up searches between two pixels in parts of `free`.
+
+    Returns:
+        None where there is no path, so that there is none in any part either.
+    """
+    if not (_is_free(free, start) and _is_free(free, goal)):
+        return None
+    lengths = lengths_between(free, goal, start)
+    length = float(lengths[goal[1] + 1, goal[0] + 1])
+    return Guide(lengths, length) if np.isfinite(length) else None
+
+
+def path_length(path: Path) -> float:
+    """Length of a polyline, in its own unit."""
+    if len(path) < 2:
+        return 0.0
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def first_beyond(path: Path, x: float, y: float, far: float) -> tuple[float, float]:
+    """The first point of a path that is so far from (x, y), or its last one."""
+    distant = np.hypot(path[:, 0] - x, path[:, 1] - y) >= far
+    to_x, to_y = path[int(np.argmax(distant)) if distant.any() else -1].tolist()
+    return to_x, to_y

@@ -1,0 +1,1 @@
+"""What learning needs: observation wrappers, guidance, batches for SB3."""

@@ -1,0 +1,198 @@
+"""The observation wrappers for a batched environment: no loop runs over its robots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import VectorEnv, VectorWrapper
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from tdac_envs.core.addresses import Addresses
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.slices import Slices
+from tdac_envs.drive.vector import DrivenVectorEnv, Observations
+from tdac_envs.learning.guidance import Route, look_ahead, route_to_goal
+from tdac_envs.learning.wrappers import Frame, check_wrappers, guided_space
+
+Array = NDArray[np.float64]
+Seen = Any
+"""Observations of a batch, or one array where they are flattened."""
+
+
+class Routes:
+    """The routes of many robots, which are asked for all way-points in one call.
+
+    Args:
+        batch: Whose tasks they lead through.
+    """
+
+    def __init__(self, batch: DrivenVectorEnv) -> None:
+        count = batch.num_envs
+        self._batch = batch
+        self._tasks: list[Any] = list(batch.tasks)
+        self._cells, self._found = np.zeros((count, 2)), np.zeros((count, 2))
+        self._goals, self._corners = np.zeros((count, 2)), np.zeros((count, 2))
+        self._reaches = np.zeros(count)
+        self._spacings, self.reach = np.ones((count, 1)), np.ones((count, 1))
+        # Robots of one setup mostly have one task in the beginning.
+        known = {id(task): task for task in self._tasks}
+        routes = {key: route_to_goal(task) for key, task in known.items()}
+        own = [routes[id(task)] for task in self._tasks]
+        self._addresses = Addresses((route.roomy, route.shortest) for route in own)
+        for i, route in enumerate(own):
+            self._place(i, route)
+        shared = self._addresses.words, self._cells, self._reaches, self._found
+        self._shared = Addresses([shared])
+        self._slices, self._all = Slices(batch.threads), np.arange(count)
+
+    def refresh(self) -> None:
+        """Has the routes lead to the goals of the episodes that have begun."""
+        tasks = self._batch.tasks
+        if self._tasks == tasks:
+            return
+        for i, task in enumerate(tasks):
+            if task is not self._tasks[i]:
+                route = route_to_goal(task)
+                self._addresses.put(i, (route.roomy, route.shortest))
+                self._place(i, route)
+        self._tasks = list(tasks)
+
+    def ahead(self, poses: Array) -> Array:
+        """The next way-point of each robot, shape (n, 2), as of `Route.ahead`."""
+        np.divide(poses[:, :2] - self._corners, self._spacings, out=self._cells)
+        self._slices.run(partial(look_ahead, self._shared.words[0]), self._all)
+        at = self._found * self._spacings + self._corners
+        return np.where(np.isfinite(self._found), at, self._goals)
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._slices.close()
+
+    def _place(self, i: int, route: Route) -> None:
+        """Keeps where a robot's route lies."""
+        *self._corners[i], self._spacings[i] = route.frame
+        self._goals[i], self.reach[i] = route.goal, route.reach
+        self._reaches[i] = route.reach / route.frame[2]
+
+
+class WrappedVectorEnv(VectorWrapper):
+    """A batched environment that is observed through some wrappers.
+
+    Robot i is told, to the last bit, what `wrap` tells in a single environment.
+
+        batch = gym.make_vec("TDAC-Map2D-v0", 64, autoreset_mode="SameStep")
+        batch = WrappedVectorEnv(batch, ("goal-relative", "guidance", "flatten"))
+
+    Args:
+        batch: Of this package.
+        names: Of `tdac_envs.wrappers.WRAPPERS`, the first innermost.
+
+    Raises:
+        TaskError: It is no batch of this package, a name is unknown, or a wrapper
+            cannot be used on what is inside.
+    """
+
+    def __init__(self, batch: VectorEnv[Any, Any, Any], names: Sequence[str]) -> None:
+        if not isinstance(batch, DrivenVectorEnv):
+            raise TaskError(f"expected a batch made by gym.make_vec, got {batch}")
+        check_wrappers(names)
+        super().__init__(batch)
+        self.batch = batch
+        self.names = tuple(names)
+        self._bind()
+        self.single_observation_space = self._space
+        self.observation_space = batch_space(self._space, self.num_envs)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Seen, dict[str, Any]]:
+        """Starts episodes; see `DrivenVectorEnv.reset`."""
+        observations, infos = self.batch.reset(seed=seed, options=options)
+        return self._begun(observations), infos
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[Seen, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Steps once; see `DrivenVectorEnv.step`."""
+        observations, rewards, terminated, truncated, infos = self.batch.step(actions)
+        if "final_obs" in infos:
+            self._last(observations, infos)
+        return self._begun(observations), rewards, terminated, truncated, infos
+
+    def close(self, **kwargs: Any) -> None:
+        """Ends the threads."""
+        if self._routes is not None:
+            self._routes.close()
+        super().close(**kwargs)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_routes": None, "_stages": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
+
+    def _bind(self) -> None:
+        """Prepares what each wrapper computes."""
+        self._routes: Routes | None = None
+        self._space: spaces.Space[Any] = self.batch.single_observation_space
+        self._stages = [self._stage(name) for name in self.names]
+
+    def _stage(self, name: str) -> Callable[[Any, Array], Any]:
+        own, frame = self._space, _frame(self.batch)
+        if name == "goal-relative":
+            self._space = frame.relative_space(own)
+            return lambda seen, _: frame.goal_relative(seen)
+        if name == "guidance":
+            self._space = guided_space(own)
+            routes = self._routes = self._routes or Routes(self.batch)
+            return lambda seen, poses: {
+                **seen,
+                "guidance": frame.guidance_to(routes.ahead(poses), poses, routes.reach),
+            }
+        self._space = spaces.flatten_space(own)
+        if not isinstance(own, spaces.Dict):
+            return lambda seen, _: seen
+        keys = tuple(own.spaces)
+        return lambda seen, _: np.concatenate([seen[key] for key in keys], axis=-1)
+
+    def _begun(self, observations: Observations) -> Seen:
+        if self._routes is not None:
+            self._routes.refresh()
+        return self._seen(observations, self.batch.pose())
+
+    def _seen(self, observations: Observations, poses: Array) -> Seen:
+        seen: Any = observations
+        for stage in self._stages:
+            seen = stage(seen, poses)
+        return seen
+
+    def _last(self, observations: Observations, infos: dict[str, Any]) -> None:
+        """Wraps the last observations of the episodes that have ended."""
+        final = infos["final_obs"]
+        over = np.flatnonzero(infos["_final_obs"]).tolist()
+        last = {key: value.copy() for key, value in observations.items()}
+        for i in over:
+            for key, value in final[i].items():
+                last[key][i] = value
+        seen = self._seen(last, self.batch.last_poses)
+        for i in over:
+            single = not isinstance(seen, dict)
+            final[i] = seen[i] if single else {key: v[i] for key, v in seen.items()}
+
+
+def _frame(batch: DrivenVectorEnv) -> Frame:
+    """The frame of all robots, with a radius and a largest reading for each."""
+    frames = [Frame.of_task(setup.nominal) for setup in batch.setups]
+    first = frames[0]
+    radii = np.array([[frame.radius] for frame in frames])
+    largest = np.array([[frame.largest] for frame in frames])
+    return Frame(radii, first.up, first.readings, largest)

@@ -1,0 +1,256 @@
+"""Observation wrappers for learning: the same form on every map, and guidance.
+
+Robots that learn on one map and drive on another must not be told where they are on
+it. `GoalRelativeObservation` says where the goal is from the robot, `Guidance` where to
+go next; both are Gymnasium wrappers for either environment:
+
+    env = gym.make("TDAC-Map2D-v0", map="office", variation="jitter")
+    env = wrap(env, ("goal-relative", "guidance", "flatten"))
+
+What they compute, they compute for one observation or for a batch of them;
+`tdac_envs.learning.wrapped_vector` has the same for batched environments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.wrappers import FlattenObservation
+from numpy.typing import ArrayLike, NDArray
+
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.env import Observation
+from tdac_envs.epuck.infrared import LARGEST
+from tdac_envs.learning.guidance import REACH, Route, route_to_goal
+from tdac_envs.map2d.task import Map2DTask
+
+if TYPE_CHECKING:
+    from tdac_envs.epuck.task import EPuckTask
+
+Env = gym.Env[Any, NDArray[np.float32]]
+
+MIDDLE = 10.0
+"""Distance of the goal that is told as 1/2, in radii of the body."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What an observation is told in: the robot's frame, and its sizes.
+
+    Attributes:
+        radius: Of the body, px or m; of a batch, shape (n, 1).
+        up: Whether y points up, and headings are counter-clockwise.
+        readings: Key of the distance sensors.
+        largest: Their largest reading; of a batch, shape (n, 1).
+    """
+
+    radius: float | NDArray[np.float64]
+    up: bool
+    readings: str
+    largest: float | NDArray[np.float64]
+
+    @classmethod
+    def of(cls, env: Env) -> Frame:
+        """The frame of an environment, wrapped or not.
+
+        Raises:
+            TaskError: It is none of ours.
+        """
+        plain: Any = env.unwrapped
+        if not hasattr(plain, "nominal"):
+            raise TaskError(f"expected an environment of tdac_envs, got {plain}")
+        return cls.of_task(plain.nominal)
+
+    @classmethod
+    def of_task(cls, task: Map2DTask | EPuckTask) -> Frame:
+        """The frame of a task's robot."""
+        if isinstance(task, Map2DTask):
+            return cls(task.body_radius, False, "ranges", float(task.robot.range_max))
+        return cls(task.body_radius, True, "ps", float(LARGEST))
+
+    def seen(self, poses: ArrayLike, places: ArrayLike) -> NDArray[np.float64]:
+        """Places as seen from the robot: how far ahead, and how far to its left.
+
+        Args:
+            poses: Shape (…, 3): x, y, heading.
+            places: Shape (…, 2).
+        """
+        pose = np.asarray(poses, np.float64)
+        dx, dy = np.moveaxis(np.asarray(places) - pose[..., :2], -1, 0)
+        cos, sin = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+        left = dy * cos - dx * sin
+        return np.stack([dx * cos + dy * sin, left if self.up else -left], axis=-1)
+
+    def goal_relative(self, observation: Observation) -> Observation:
+        """What `GoalRelativeObservation` makes of an observation, or of a batch."""
+        seen = self.seen(observation["pose"], observation["goal"])
+        distance = np.hypot(seen[..., 0], seen[..., 1])[..., None]
+        near = distance / (distance + MIDDLE * self.radius)
+        bearing = seen / np.maximum(distance, 1e-9)
+        readings = observation[self.readings] / np.asarray(self.largest, np.float32)
+        return {
+            "goal": np.concatenate([bearing, near], axis=-1).astype(np.float32),
+            "wheel_speeds": observation["wheel_speeds"],
+            self.readings: np.clip(readings, 0.0, 1.0),
+        }
+
+    def guidance(self, route: Route, poses: ArrayLike) -> NDArray[np.float32]:
+        """What `Guidance` says at some poses, shape (n, 3), of one route."""
+        return self.guidance_to(route.ahead(poses), poses, route.reach)
+
+    def guidance_to(
+        self, places: ArrayLike, poses: ArrayLike, reach: float | NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """The same of way-points that are known, shape (n, 2)."""
+        seen = self.seen(poses, places) / reach
+        return np.clip(seen, -1.0, 1.0).astype(np.float32)
+
+    def relative_space(self, own: spaces.Space[Any]) -> spaces.Dict:
+        """The space of `goal_relative`.
+
+        Args:
+            own: Of what is observed.
+
+        Raises:
+            TaskError: It has no pose.
+        """
+        if not isinstance(own, spaces.Dict) or "pose" not in own.spaces:
+            raise TaskError(f"expected observations with a pose, got {own}")
+        readings = own[self.readings].shape
+        return spaces.Dict(
+            {
+                "goal": spaces.Box(-1.0, 1.0, (3,), np.float32),
+                "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
+                self.readings: spaces.Box(0.0, 1.0, readings, np.float32),
+            }
+        )
+
+
+def guided_space(own: spaces.Space[Any]) -> spaces.Dict:
+    """The space of what is observed, with `guidance`.
+
+    Raises:
+        TaskError: It is no `Dict`.
+    """
+    if not isinstance(own, spaces.Dict):
+        raise TaskError(f"expected observations in a Dict, got {own}")
+    more = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    return spaces.Dict({**own.spaces, "guidance": more})
+
+
+class GoalRelativeObservation(
+    gym.ObservationWrapper[Observation, NDArray[np.float32], Observation],
+    gym.utils.RecordConstructorArgs,
+):
+    """The goal as seen from the robot, and the sensors as shares; no place, no map.
+
+    `Dict` of float32 arrays:
+
+    | key | shape | range | content |
+    |---|---|---|---|
+    | `goal` | (3,) | [-1, 1] | direction of the goal in the robot's frame: ahead and |
+    | | | | left (a unit vector); its distance d as d / (d + 10 body radii) |
+    | `wheel_speeds` | (2,) | [-1, 1] | left, right, as last applied |
+    | `ranges` or `ps` | (n,) | [0, 1] | share of the largest reading |
+
+    Left is the robot's left as a person sees it, in either environment.
+
+    Args:
+        env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0` with its own observations.
+    """
+
+    def __init__(self, env: Env) -> None:
+        gym.utils.RecordConstructorArgs.__init__(self)
+        gym.ObservationWrapper.__init__(self, env)
+        self.frame = Frame.of(env)
+        space = self.frame.relative_space(env.observation_space)
+        self.observation_space = space  # type: ignore[assignment]
+
+    def observation(self, observation: Observation) -> Observation:
+        """See the class."""
+        return self.frame.goal_relative(observation)
+
+
+class Guidance(
+    gym.ObservationWrapper[Observation, NDArray[np.float32], Observation],
+    gym.utils.RecordConstructorArgs,
+):
+    """Adds the next way-point of the reference route, as seen from the robot.
+
+    | key | shape | range | content |
+    |---|---|---|---|
+    | `guidance` | (2,) | [-1, 1] | how far ahead and how far to the robot's left, in |
+    | | | | shares of `reach` |
+
+    The route is the shortest path for the body that keeps some room
+    (`tdac_envs.learning.guidance`), from wherever the robot is at the moment; the
+    way-point is `reach` further on it, or the goal where that is nearer. It knows the
+    whole map and the true pose, which is what a policy that sees it is given beside its
+    sensors.
+
+    Args:
+        env: Either environment; its observations must be a `Dict`.
+        reach: How far ahead the way-point is, in radii of the body.
+    """
+
+    def __init__(self, env: Env, reach: float = REACH) -> None:
+        gym.utils.RecordConstructorArgs.__init__(self, reach=reach)
+        gym.ObservationWrapper.__init__(self, env)
+        self.frame = Frame.of(env)
+        self.reach = reach
+        space = guided_space(env.observation_space)
+        self.observation_space = space  # type: ignore[assignment]
+        self._task: Any = None
+        self._route: Route | None = None
+
+    def observation(self, observation: Observation) -> Observation:
+        """See the class."""
+        plain: Any = self.unwrapped
+        if self._route is None or plain.task is not self._task:
+            self._task, self._route = plain.task, route_to_goal(plain.task, self.reach)
+        poses = plain.pose()[None]
+        return {**observation, "guidance": self.frame.guidance(self._route, poses)[0]}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_task": None, "_route": None}
+
+
+WRAPPERS: dict[str, Callable[[Env], Env]] = {
+    "goal-relative": GoalRelativeObservation,
+    "guidance": Guidance,
+    "flatten": FlattenObservation,
+}
+"""By the names that `wrap`, `tdac train` and `tdac evaluate` take."""
+
+
+def check_wrappers(names: Sequence[str]) -> None:
+    """Refuses a name that is not of `WRAPPERS`.
+
+    Raises:
+        TaskError: There is one.
+    """
+    for name in names:
+        if name not in WRAPPERS:
+            known = ", ".join(WRAPPERS)
+            raise TaskError(f"unknown wrapper {name!r}; expected some of {known}")
+
+
+def wrap(env: Env, names: Sequence[str]) -> Env:
+    """The environment in some wrappers, the first of them innermost.
+
+    Args:
+        env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0`.
+        names: Of `WRAPPERS`; `flatten` makes one `Box` of the `Dict`, by sorted keys.
+
+    Raises:
+        TaskError: A name is unknown, or a wrapper cannot be used on what is inside.
+    """
+    check_wrappers(names)
+    for name in names:
+        env = WRAPPERS[name](env)
+    return env

@@ -1,0 +1,266 @@
+"""Compiled motion of a disc on a differential drive, up to its first contact.
+
+`clear` is the clearance of a map, from `grid.clearance`, with a border of zeros.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.grid.grid import FloatGrid
+
+# A disc that starts in touch is stopped when it gets this much deeper, px: driving
+# along a wall in touch with it is free.
+SINK = 1e-8
+# No sequence of such steps gets deeper than this, px.
+DEEPEST = 1e-7
+# The search for a contact ends this near to it, px.
+_CLOSE = 1e-9
+# For the float32 rounding of the clearance field, px.
+_ROUNDING = 1e-3
+_TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def wrap_angle(angle: float) -> float:
+    """The same direction in (-pi, pi]."""
+    wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
+    return math.pi if wrapped <= -math.pi else wrapped
+
+
+@subkernel
+def move(
+    x: float, y: float, heading: float, forward: float, turn: float
+) -> tuple[float, float, float]:
+    """Pose after the exact arc of `forward` px and `turn` rad; heading unwrapped.
+
+    The chord of the arc points along the middle heading.
+    """
+    half = 0.5 * turn
+    # Below 1e-4 rad the series is exact to the last bit.
+    shrink = math.sin(half) / half if abs(half) > 1e-4 else 1.0 - half * half / 6.0
+    chord, middle = forward * shrink, heading + half
+    return (
+        x + chord * math.cos(middle),
+        y + chord * math.sin(middle),
+        heading + turn,
+    )
+
+
+@kernel
+def first_contact(
+    clear: FloatGrid,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    radius: float,
+) -> float:
+    """Fraction of a step at which a disc first touches an occupied square.
+
+    Exact for the arc of constant wheel speeds, to 1e-8 px.
+
+    Args:
+        clear: Padded clearance, px.
+        x: Column of the disc's centre, px.
+        y: Row of the disc's centre, px.
+        heading: rad, from +x towards +y.
+        forward: Arc length of the step, px, negative backwards.
+        turn: Change of heading over the step, rad.
+        radius: Disc radius, px.
+
+    Returns:
+        In [0, 1); 2.0 where the step is free. A disc that starts in touch and moves
+        away or along is free.
+    """
+    end_x, end_y, _ = move(x, y, heading, forward, turn)
+    return contact_before(clear, x, y, heading, forward, turn, radius, end_x, end_y)
+
+
+@subkernel
+def contact_before(
+    clear: FloatGrid,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    radius: float,
+    end_x: float,
+    end_y: float,
+) -> float:
+    """As `first_contact`, with the place where the step ends."""
+    length = abs(forward)
+    if length == 0.0:
+        return 2.0
+    # Both ends are the centre of a stretch of the arc that is surely free.
+    open_at_start = max(_room(clear, x, y) - radius, 0.0)
+    open_at_end = max(_room(clear, end_x, end_y) - radius, 0.0)
+    if open_at_start + open_at_end > length:
+        return 2.0
+    best, gap = _scan(clear, x, y, heading, forward, turn, radius, 0.0)
+    if gap < SINK:
+        floor = max(gap - SINK, -DEEPEST)
+        best, _ = _scan(clear, x, y, heading, forward, turn, radius, floor)
+    return best / length if best < length else 2.0
+
+
+@subkernel
+def _scan(
+    clear: FloatGrid,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    radius: float,
+    floor: float,
+) -> tuple[float, float]:
+    """Way to the first square that the disc gets into by more than `-floor` px.
+
+    Returns:
+        The way along the arc, px, and the distance at its start between the disc and
+        the nearest of the squares that were looked at, px.
+    """
+    end_x, end_y, _ = move(x, y, heading, forward, turn)
+    best = abs(forward)
+    # How far the arc swings out beyond the box of its two ends, at most.
+    swing = 0.5 * best * min(1.0, 0.25 * abs(turn))
+    reach = radius + swing + _ROUNDING
+    left, right = min(x, end_x), max(x, end_x)
+    top, bottom = min(y, end_y), max(y, end_y)
+    first_row = max(math.ceil(top - reach - 0.5), -1)
+    last_row = min(math.floor(bottom + reach + 0.5), clear.shape[0] - 2)
+    nearest = math.inf
+    for j in range(first_row, last_row + 1):
+        above = max(j - 0.5 - bottom, top - j - 0.5, 0.0)
+        span = math.sqrt(max(reach * reach - above * above, 0.0)) + 0.5
+        i = max(math.ceil(left - span), -1)
+        last = min(math.floor(right + span), clear.shape[1] - 2)
+        while i <= last:
+            room = clear[j + 1, i + 1]
+            if room > 0.0:
+                # The nearest square is this far off, so it is in the row, too.
+                i += max(math.ceil(room + 0.5 - _ROUNDING), 1)
+                continue
+            if _is_edge(clear, i + 1, j + 1):
+                gap = math.sqrt(_square_distance2(x, y, i, j)) - radius
+                nearest = min(nearest, gap)
+                if gap < best:
+                    best = _travel(
+                        x, y, heading, forward, turn, i, j, radius, floor, best
+                    )
+            i += 1
+    return best, nearest
+
+
+@subkernel
+def _square_distance2(x: float, y: float, i: int, j: int) -> float:
+    dx = max(abs(x - i) - 0.5, 0.0)
+    dy = max(abs(y - j) - 0.5, 0.0)
+    return dx * dx + dy * dy
+
+
+@subkernel
+def has_room(clear: FloatGrid, x: float, y: float, radius: float) -> bool:
+    """Whether a point is at least `radius` px from all occupied squares."""
+    for j in range(math.ceil(y - radius - 0.5), math.floor(y + radius + 0.5) + 1):
+        for i in range(math.ceil(x - radius - 0.5), math.floor(x + radius + 0.5) + 1):
+            inside = -1 <= i < clear.shape[1] - 1 and -1 <= j < clear.shape[0] - 1
+            occupied = not inside or clear[j + 1, i + 1] == 0.0
+            if occupied and _square_distance2(x, y, i, j) < radius * radius:
+                return False
+    return True
+
+
+@subkernel
+def _room(clear: FloatGrid, x: float, y: float) -> float:
+    """Lower bound of the distance from a point to the nearest occupied square."""
+    i, j = math.floor(x + 0.5), math.floor(y + 0.5)
+    if i < 0 or j < 0 or j >= clear.shape[0] - 2 or i >= clear.shape[1] - 2:
+        return 0.0
+    off_x, off_y = x - i, y - j
+    off = math.sqrt(off_x * off_x + off_y * off_y)
+    return float(clear[j + 1, i + 1]) - off - _ROUNDING
+
+
+@subkernel
+def _is_edge(clear: FloatGrid, i: int, j: int) -> bool:
+    """Whether a free pixel is beside (i, j) of the padded map.
+
+    The first contact with a union of squares is one with such a square.
+    """
+    height, width = clear.shape
+    return bool(
+        (i > 0 and clear[j, i - 1] > 0.0)
+        or (j > 0 and clear[j - 1, i] > 0.0)
+        or (i + 1 < width and clear[j, i + 1] > 0.0)
+        or (j + 1 < height and clear[j + 1, i] > 0.0)
+    )
+
+
+@subkernel
+def free_way(rest: float, approach: float, curvature: float) -> float:
+    """Way that is surely free: to the root of `rest + approach h - curvature h^2 / 2`.
+
+    Args:
+        rest: Distance to the body.
+        approach: Rate at which it grows along the tangent, in [-1, 1].
+        curvature: Of the arc.
+    """
+    root = math.sqrt(approach * approach + 2.0 * curvature * rest)
+    if approach < 0.0:
+        return 2.0 * rest / (root - approach)
+    if curvature > 0.0:
+        return (approach + root) / curvature
+    return math.inf
+
+
+@subkernel
+def _travel(
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    i: int,
+    j: int,
+    radius: float,
+    floor: float,
+    limit: float,
+) -> float:
+    """Way along the arc, px, until the disc's gap to square (i, j) falls to `floor`.
+
+    The distance to a convex body is convex along a straight line, and an arc of
+    curvature k is at most k h^2 / 2 away from its tangent after h px. So
+    `d + d' h - k h^2 / 2` bounds the distance from below, and going from root to
+    root of this bound never jumps over a contact and converges quadratically.
+
+    Returns:
+        At most `limit`, where there is no contact before it.
+    """
+    length = abs(forward)
+    curvature = abs(turn) / length
+    way, at_x, at_y, at_heading = 0.0, x, y, heading
+    while True:
+        off_x = at_x - max(i - 0.5, min(at_x, i + 0.5))
+        off_y = at_y - max(j - 0.5, min(at_y, j + 0.5))
+        distance = math.sqrt(off_x * off_x + off_y * off_y)
+        rest = distance - radius - floor
+        approach = -1.0
+        if distance > 0.0:
+            along = off_x * math.cos(at_heading) + off_y * math.sin(at_heading)
+            approach = math.copysign(1.0, forward) * along / distance
+        if way == 0.0 and approach >= 0.0 and rest < SINK:
+            # Even a disc that is too deep may leave.
+            floor -= SINK - rest
+            rest = SINK
+        if rest <= _CLOSE:
+            return way
+        way += free_way(rest, approach, curvature)
+        if way >= limit:
+            return limit
+        part = way / length
+        at_x, at_y, at_heading = move(x, y, heading, part * forward, part * turn)

@@ -1,0 +1,300 @@
+"""TDAC-Map2D-v0: a differential-drive robot with range rays on an occupancy grid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from tdac_envs.core.addresses import Addresses
+from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.drive.env import DrivenEnv, Observation
+from tdac_envs.drive.stepping import info_of
+from tdac_envs.map2d.kernels import begin, drive
+from tdac_envs.map2d.picture import Scene, Status
+from tdac_envs.map2d.robot import Robot
+from tdac_envs.map2d.setup import Setup, override
+from tdac_envs.map2d.source import MapSource, prepare
+from tdac_envs.map2d.task import Map2DTask, Pose, Terrain, make_task
+from tdac_envs.mapping.params import Said, Shade
+
+VARIATIONS = ("nominal", "jitter", "mixed", "random")
+
+
+class Map2DEnv(DrivenEnv):
+    """A disc-shaped robot drives over a map image to a goal and touches nothing.
+
+    ## Description
+    The world is an occupancy grid made from a map image. The pixel frame has x to
+    the right and y down; headings go from +x towards +y, so a positive turn is
+    clockwise on the screen. Pixel (i, j) is the square [i-1/2, i+1/2) x
+    [j-1/2, j+1/2), and everything outside the map is occupied. Motion follows the
+    exact arc of constant wheel speeds, and the disc swept along it is tested exactly
+    against the occupied squares: no step jumps through a thin wall.
+
+    ## Action Space
+    `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
+    fraction of `max_wheel_speed`. Values out of range are clipped and counted in
+    `info["clipped"]`.
+
+    ## Observation Space
+    `Dict` of float32 arrays:
+
+    | key | shape | unit | content |
+    |---|---|---|---|
+    | `pose` | (3,) | px, px, rad | x, y, heading in (-pi, pi] |
+    | `goal` | (2,) | px | x, y of the goal |
+    | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
+    | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
+
+    Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
+    heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
+    Rays start at the centre; no hit gives `range_max`.
+
+    ## Rewards
+    Progress along the shortest path for the body (in full-speed steps) x 0.1, goal
+    +10, collision -10, each step -0.01; see `tdac_envs.drive.rewards.RewardWeights`.
+
+    ## Starting State
+    `variation="nominal"`: the given start. `"jitter"`: within one body radius of it,
+    heading +- 0.5 rad. `"mixed"`: so, or in every second episode on average any
+    feasible start. `"random"`: any feasible start and goal.
+    `reset(options={"start": (x, y, heading), "goal": (x, y)})` sets them.
+
+    ## Episode End
+    Terminated when the centre is within `goal_tolerance` of the goal with no wall in
+    between (`info["is_success"]`), or on a collision (with `on_collision="block"` the
+    robot is stopped there and the contact counted). Truncated after `horizon` steps.
+
+    ## Arguments
+    Args:
+        map: Bundled name (`tdac_envs.bundled_maps()`); path of an image, ROS
+            `map.yaml`, MovingAI `.map` or `.npy` grid; folder with `occupancy.npy`
+            and `params.json`; or a bool array `[y, x]`, True = occupied.
+        start: (x, y) or (x, y, heading), px and rad. Default: the map's own.
+        goal: (x, y), px. Default: the map's own.
+        heading: Nominal start heading, rad.
+        robot_radius: Radius of the body, px.
+        axle_length: Distance of the wheels, px. Default: twice the radius.
+        max_wheel_speed: px/s; 75.59 is the paper's 0.02 m/s at 3779.52 px/m.
+        n_rays: Number of range rays.
+        field_of_view: Whole angle of the fan, degrees.
+        range_max: Range without a hit, px.
+        dt: Duration of a step, s.
+        horizon: Steps. Default: max(2500, 6 * d0 / (max_wheel_speed * dt)).
+        goal_tolerance: px. Default: min(20, d0 / 4).
+        on_collision: `"terminate"` or `"block"`.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
+        range_noise: Standard deviation of each range, relative to it.
+        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        motor_lag: Time constant of the wheel speeds, s.
+        delay: Steps by which an action takes effect late.
+        reward_weights: Those of the reward that are to differ, by the names of
+            `RewardWeights`; who compares rewards leaves them.
+        snap: Move start and goal to the nearest place that holds the body.
+        polarity: Which pixels of a map image are obstacles: `"dark"`, `"light"`, or
+            None to find out.
+        render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
+
+    ## Version History
+    * v0: first version.
+    """
+
+    title = "TDAC-Map2D-v0"
+    metadata: dict[str, Any] = {  # noqa: RUF012 - as declared by gym.Env
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 20,
+    }
+    readings = "ranges"
+    """Key of the distance sensors in an observation."""
+
+    def __init__(
+        self,
+        map: MapSource = "maze",  # noqa: A002 - the field's word
+        start: tuple[float, ...] | None = None,
+        goal: tuple[float, float] | None = None,
+        heading: float | None = None,
+        robot_radius: float | None = None,
+        axle_length: float | None = None,
+        max_wheel_speed: float | None = None,
+        n_rays: int | None = None,
+        field_of_view: float | None = None,
+        range_max: float | None = None,
+        dt: float = 0.05,
+        horizon: int | None = None,
+        goal_tolerance: float | None = None,
+        on_collision: str = "terminate",
+        variation: str = "nominal",
+        range_noise: float = 0.0,
+        wheel_slip: float = 0.0,
+        motor_lag: float = 0.0,
+        delay: int = 0,
+        reward_weights: Mapping[str, float] | None = None,
+        snap: bool = False,
+        polarity: Shade | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        one_of("variation", variation, VARIATIONS)
+        prepared = prepare(
+            map,
+            start,
+            goal,
+            heading=heading,
+            robot_radius=robot_radius,
+            snap=snap,
+            said=Said(polarity),
+        )
+        params = prepared.params
+        robot = override(
+            params.robot,
+            axle_length=axle_length,
+            max_wheel_speed=max_wheel_speed,
+            n_rays=n_rays,
+            field_of_view=field_of_view,
+            range_max=range_max,
+        )
+        assert params.start is not None
+        assert params.goal is not None
+        self.nominal = make_task(
+            Terrain.of(prepared.grid),
+            Pose(*params.start, params.heading),
+            params.goal,
+            robot,
+            dt=dt,
+            goal_tolerance=goal_tolerance,
+            horizon=horizon,
+        )
+        self.params = params
+        self.task = self.nominal
+        super().__init__(
+            on_collision=on_collision,
+            wheel_slip=wheel_slip,
+            motor_lag=motor_lag,
+            delay=delay,
+            reward_weights=reward_weights,
+            dt=self.nominal.dt,
+            render_mode=render_mode,
+        )
+        self.variation = variation
+        self.range_noise = not_negative("range_noise", range_noise)
+        self.setup = Setup(
+            self.nominal,
+            variation,
+            horizon is not None,
+            on_collision,
+            self.range_noise,
+            self.wheel_slip,
+            self.motor_lag,
+            self.delay,
+            self.weights,
+        )
+        space = observation_space(self.nominal)
+        self.observation_space = space  # type: ignore[assignment]
+        self.robot = Robot.blank(robot.n_rays, self.delay)
+        self.robot.constants[:] = self.setup.constants()
+        self._goal = np.array(self.nominal.goal, np.float32)
+        self._bind()
+        self._scene: Scene | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode; see the class for `options`.
+
+        Raises:
+            TaskError: The options name something else than a start and a goal, or
+                these are not feasible.
+        """
+        super().reset(seed=seed)
+        before, self.task = self.task, self.setup.draw(options or {}, self.np_random)
+        if self.task.field is not before.field:
+            self._bind()
+        task, robot = self.task, self.robot
+        robot.place(task)
+        self._goal[:] = task.goal
+        self._call_begin()
+        self._steps = 0
+        self._trail = [task.start[:2]]
+        self._status = ""
+        self._scene = None
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), info_of(robot.outcome.tolist())
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            **self.__dict__,
+            **dict.fromkeys(("addresses", "_call_begin", "_call_drive", "_copies")),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind()
+
+    def _bind(self) -> None:
+        """Makes the kernels' calls on this environment's own arrays."""
+        self.addresses = Addresses([(*self.setup.world(self.task), *self.robot)])
+        (words,) = self.addresses.words
+        self._call_begin: Callable[[], None] = partial(begin, words)
+        self._call_drive = partial(drive, words)
+        robot = self.robot
+        seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
+        self._copies = [array.copy for array in seen]
+
+    def _observation(self) -> Observation:
+        pose, goal, wheels, ranges = self._copies
+        seen = {
+            "pose": pose(),
+            "goal": goal(),
+            "wheel_speeds": wheels(),
+            "ranges": ranges(),
+        }
+        if self.range_noise:
+            seen["ranges"][:] = noisy(seen["ranges"], self.setup, self.np_random)
+        return seen
+
+    def _frame(self) -> NDArray[np.uint8]:
+        task, robot = self.task, self.robot
+        if self._scene is None:
+            self._scene = Scene(
+                task.terrain.grid.cells,
+                task.start,
+                task.goal,
+                goal_tolerance=task.goal_tolerance,
+                robot=task.robot,
+                path=task.path_from(task.start),
+            )
+        gap = math.dist(self._trail[-1], task.goal)
+        status = Status(self._steps, task.horizon, gap, self._status)
+        return self._scene.frame(
+            robot.state[:3].tolist(), robot.ranges, self._trail, status
+        )
+
+
+def noisy(
+    ranges: NDArray[np.float32], setup: Setup, random: np.random.Generator
+) -> NDArray[np.float64]:
+    """Ranges of one robot with relative noise, within the sensor's limits."""
+    noise = random.normal(1.0, setup.range_noise, ranges.size)
+    return np.clip(ranges * noise, 0.0, setup.nominal.robot.range_max, out=noise)
+
+
+def observation_space(task: Map2DTask) -> spaces.Dict:
+    """The observation space of a task; see `Map2DEnv`."""
+    grid, robot = task.terrain.grid, task.robot
+    corner = np.array([grid.width - 0.5, grid.height - 0.5], np.float32)
+    least = np.full(2, -0.5, np.float32)
+    pi = np.float32(math.pi)
+    return spaces.Dict(
+        {
+            "pose": spaces.Box(np.append(least, -pi), np.append(corner, pi)),
+            "goal": spaces.Box(least, corner),
+            "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
+            "ranges": spaces.Box(0.0, robot.range_max, (robot.n_rays,), np.float32),
+        }
+    )

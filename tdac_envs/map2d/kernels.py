@@ -1,0 +1,304 @@
+"""Compiled step of TDAC-Map2D-v0: motion up to a contact, rays, reward and ends.
+
+`clear` and `leaps` are those of a `tdac_envs.map2d.terrain.Terrain`, which are padded;
+the arrays of one robot are described in `tdac_envs.map2d.robot.Robot`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.addresses import Words, block, line, plane
+from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.drive.stepping import (
+    AXLE,
+    DT,
+    GAP,
+    GOAL_X,
+    GOAL_Y,
+    HEADING,
+    MAX_SPEED,
+    RADIUS,
+    RANGE_MAX,
+    REACHED,
+    REMAINING,
+    ROOM,
+    SLIP_LEFT,
+    SLIP_RIGHT,
+    TOLERANCE,
+    TOUCHED,
+    Array,
+    X,
+    Y,
+    apply_command,
+    batch_at,
+    copy_row,
+    give_command,
+    settle,
+    within,
+)
+from tdac_envs.drive.stepping import clear as forget
+from tdac_envs.grid.grid import FloatGrid
+from tdac_envs.map2d.contact import contact_before, move, wrap_angle
+from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
+
+# A body that was stopped by an obstacle goes back by this much of its way, px, so
+# that the next step starts outside it.
+CONTACT_GAP = 1e-6
+# Places of some arrays among those of `begin`.
+STATE, POSE, WHEEL_SPEEDS, RANGES, OUTCOME = 5, 7, 8, 9, 10
+
+
+@subkernel
+def advance(
+    clear: FloatGrid,
+    state: Array,
+    left: float,
+    right: float,
+    axle: float,
+    dt: float,
+    radius: float,
+) -> bool:
+    """Moves the robot by one step at constant wheel speeds, up to a contact.
+
+    Args:
+        clear: Padded clearance, px.
+        state: Begins with x, y (px) and heading (rad), which are overwritten.
+        left: Speed of the left wheel, px/s.
+        right: Speed of the right wheel, px/s.
+        axle: Distance of the wheels, px.
+        dt: Duration, s.
+        radius: Body radius, px.
+
+    Returns:
+        Whether the body touched an obstacle. It then stands `CONTACT_GAP` before
+        the touching pose, with the heading it had there.
+    """
+    forward = 0.5 * (left + right) * dt
+    # y points down, so a positive turn is clockwise on the screen.
+    turn = (left - right) * dt / axle
+    x, y, heading = state[X], state[Y], state[HEADING]
+    end_x, end_y, end_heading = move(x, y, heading, forward, turn)
+    touch = contact_before(
+        clear, x, y, heading, forward, turn, radius, end_x, end_y
+    )  # fmt: skip
+    if touch <= 1.0:
+        part = max(touch - CONTACT_GAP / abs(forward), 0.0)
+        end_x, end_y, end_heading = move(x, y, heading, part * forward, part * turn)
+    state[X], state[Y], state[HEADING] = end_x, end_y, wrap_angle(end_heading)
+    return bool(touch <= 1.0)
+
+
+@subkernel
+def _path_distance(
+    leaps: LeapGrid,
+    field: FloatGrid,
+    x: float,
+    y: float,
+    previous: float,
+) -> float:
+    """Length of the shortest path to the goal from any point, px.
+
+    The least sum of the way to a nearby pixel in sight and that pixel's distance.
+    Where no pixel within 2 px has a path (the body is squeezed into a corner),
+    `previous`.
+
+    Args:
+        leaps: From `rays.leaps_of`.
+        field: Shape (height, width), float32, from `plan.distance_field`.
+        x: Column, px.
+        y: Row, px.
+        previous: Value to fall back to.
+    """
+    height, width = field.shape
+    column, row = math.floor(x), math.floor(y)
+    for ring in range(3):
+        best = math.inf
+        for j in range(max(row - ring, 0), min(row + ring + 2, height)):
+            for i in range(max(column - ring, 0), min(column + ring + 2, width)):
+                off_x, off_y = x - i, y - j
+                through = field[j, i] + math.sqrt(off_x * off_x + off_y * off_y)
+                # The four pixels around a point are never behind a wall.
+                if through < best and (
+                    ring == 0 or in_sight(leaps, x, y, float(i), float(j))
+                ):
+                    best = through
+        if best < math.inf:
+            return best
+    return previous
+
+
+@kernel
+def path_distance(
+    leaps: LeapGrid, field: FloatGrid, x: float, y: float, previous: float
+) -> float:
+    """`_path_distance` for calls from Python."""
+    return _path_distance(leaps, field, x, y, previous)
+
+
+@subkernel
+def _observe(
+    leaps: LeapGrid,
+    clear: FloatGrid,
+    field: FloatGrid,
+    directions: Array,
+    constants: Array,
+    state: Array,
+    pose: NDArray[np.float32],
+    ranges: NDArray[np.float32],
+    outcome: Array,
+) -> None:
+    """Fills in what follows from where the robot is."""
+    x, y, heading = state[X], state[Y], state[HEADING]
+    pose[0], pose[1], pose[2] = x, y, heading
+    cast_rays(leaps, directions, x, y, heading, constants[RANGE_MAX], ranges)
+    goal_x, goal_y = constants[GOAL_X], constants[GOAL_Y]
+    gap = math.hypot(goal_x - x, goal_y - y)
+    near = gap <= constants[TOLERANCE]
+    outcome[REACHED] = near and in_sight(leaps, x, y, goal_x, goal_y)
+    outcome[GAP] = gap
+    outcome[REMAINING] = _path_distance(leaps, field, x, y, outcome[REMAINING])
+    outcome[ROOM] = clear[math.floor(y + 1.5), math.floor(x + 1.5)]
+
+
+@subkernel
+def _begin(
+    leaps: LeapGrid,
+    clear: FloatGrid,
+    field: FloatGrid,
+    directions: Array,
+    constants: Array,
+    state: Array,
+    queue: Array,
+    pose: NDArray[np.float32],
+    wheel_speeds: NDArray[np.float32],
+    ranges: NDArray[np.float32],
+    outcome: Array,
+) -> None:
+    """Begins an episode where `state` says; arguments as of `_drive`.
+
+    `outcome[REMAINING]` is given: the length of the shortest path from there.
+    """
+    forget(state, queue, wheel_speeds, outcome)
+    remaining = outcome[REMAINING]
+    _observe(
+        leaps, clear, field, directions, constants, state, pose, ranges, outcome
+    )  # fmt: skip
+    outcome[REACHED], outcome[REMAINING] = 0.0, remaining
+
+
+@subkernel
+def _drive(
+    leaps: LeapGrid,
+    clear: FloatGrid,
+    field: FloatGrid,
+    directions: Array,
+    constants: Array,
+    state: Array,
+    queue: Array,
+    pose: NDArray[np.float32],
+    wheel_speeds: NDArray[np.float32],
+    ranges: NDArray[np.float32],
+    outcome: Array,
+) -> None:
+    """One step of the environment, all of it but the random numbers.
+
+    Args:
+        leaps: From `rays.leaps_of`.
+        clear: Padded clearance, px.
+        field: Shape (height, width), float32: way to the goal, px.
+        directions: From `rays.fan`.
+        constants: See `Robot`, as the following ones.
+        state: Overwritten, but for the wanted speeds and the slip.
+        queue: Overwritten.
+        pose: Overwritten.
+        wheel_speeds: Overwritten.
+        ranges: Overwritten.
+        outcome: Overwritten.
+    """
+    apply_command(constants, state, queue, wheel_speeds, outcome)
+    limit, before = constants[MAX_SPEED], outcome[REMAINING]
+    outcome[TOUCHED] = advance(
+        clear,
+        state,
+        limit * within(wheel_speeds[0] * state[SLIP_LEFT]),
+        limit * within(wheel_speeds[1] * state[SLIP_RIGHT]),
+        constants[AXLE],
+        constants[DT],
+        constants[RADIUS],
+    )
+    _observe(
+        leaps, clear, field, directions, constants, state, pose, ranges, outcome
+    )  # fmt: skip
+    settle(constants, state, outcome, before)
+
+
+@subkernel
+def _arrays_at(words: Words) -> Any:
+    """The arrays of a robot: of the world `leaps`, `clear`, `field`, `directions`, then
+    those of `Robot`, each as `_drive` says.
+    """
+    return (
+        block(words[0], np.uint8),
+        plane(words[1], np.float32),
+        plane(words[2], np.float32),
+        plane(words[3], np.float64),
+        line(words[4], np.float64),
+        line(words[STATE], np.float64),
+        plane(words[6], np.float64),
+        line(words[POSE], np.float32),
+        line(words[WHEEL_SPEEDS], np.float32),
+        line(words[RANGES], np.float32),
+        line(words[OUTCOME], np.float64),
+    )
+
+
+@kernel
+def begin(words: Words) -> None:
+    """Begins an episode where the robot's `state` says, from `outcome[REMAINING]`.
+
+    Args:
+        words: Shape (11, 4), of a `tdac_envs.core.addresses.Addresses`; see
+            `Setup.world`.
+    """
+    _begin(*_arrays_at(words))
+
+
+@kernel
+def drive(words: Words) -> None:
+    """One step of a robot; `words` as for `begin`."""
+    _drive(*_arrays_at(words))
+
+
+@kernel
+def step_rows(batch: Words, rows: Words) -> None:
+    """One step of many robots, or the begin of an episode where one is over.
+
+    What comes out of it is copied here: the robots' own memory then stays in the cache
+    of the core that steps them.
+
+    Args:
+        batch: Shape (8, 4): where the arrays of `tdac_envs.drive.stepping.batch_at`
+            are, with `words` of shape (n, 11, 4), and what is overwritten, with a row
+            for each robot: outcome, pose, wheel speeds and ranges.
+        rows: Numbers of the robots, shape (k,).
+    """
+    over, commands, starts, words = batch_at(batch)
+    outcomes = plane(batch[4], np.float64)
+    poses, speeds = plane(batch[5], np.float32), plane(batch[6], np.float32)
+    ranges = plane(batch[7], np.float32)
+    for row in rows:
+        own = _arrays_at(words[row])
+        give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
+        if over[row]:
+            _begin(*own)
+        else:
+            _drive(*own)
+        copy_row(own[OUTCOME], outcomes, row)
+        copy_row(own[POSE], poses, row)
+        copy_row(own[WHEEL_SPEEDS], speeds, row)
+        copy_row(own[RANGES], ranges, row)

@@ -1,0 +1,186 @@
+"""Compiled geometry of the range sensor: exact rays that leap over open squares.
+
+Everything works on a *padded* map: it has one occupied pixel added on every side, so
+that pixel (i, j) of the map is `[j + 1, i + 1]` and no ray needs a bounds test.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.compiled import constant, kernel, subkernel
+from tdac_envs.grid.grid import BoolGrid
+
+LeapGrid = NDArray[np.uint8]
+
+# Of the quadrants: whether their x grows, and whether their y grows.
+_GROWS_X = np.array([True, False, True, False])
+_GROWS_Y = np.array([True, True, False, False])
+_LONGEST = 255
+
+
+def leaps_of(cells: BoolGrid) -> LeapGrid:
+    """How far a ray may go at once from each pixel, for rays of each quadrant.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+
+    Returns:
+        Shape (4, height + 2, width + 2), uint8: the side of the largest square of
+        free pixels that has the pixel in its corner and lies in the quadrant, at
+        most 255 px; 0 in obstacles. A ray that is in the pixel stays in the square
+        until it leaves it by one of the two far sides.
+    """
+    height, width = cells.shape
+    leaps = np.zeros((4, height + 2, width + 2), np.uint8)
+    _fill_leaps(constant(cells), leaps)
+    return constant(leaps)
+
+
+@kernel
+def _fill_leaps(cells: BoolGrid, leaps: LeapGrid) -> None:
+    """The square of a pixel is one more than the least of its three neighbours'."""
+    height, width = cells.shape
+    for quadrant in range(4):
+        out = leaps[quadrant]
+        dx = 1 if _GROWS_X[quadrant] else -1
+        dy = 1 if _GROWS_Y[quadrant] else -1
+        for row in range(height):
+            j = height - row if dy > 0 else row + 1
+            for column in range(width):
+                i = width - column if dx > 0 else column + 1
+                if not cells[j - 1, i - 1]:
+                    beside = min(out[j, i + dx], out[j + dy, i])
+                    least = min(beside, out[j + dy, i + dx])
+                    out[j, i] = min(least, _LONGEST - 1) + 1
+
+
+@subkernel
+def _cast(
+    leaps: LeapGrid, u: float, v: float, dx: float, dy: float, range_max: float
+) -> float:
+    """Distance from (u, v) of the padded map along a unit vector to an obstacle."""
+    i, j, t = math.floor(u), math.floor(v), 0.0
+    quadrant, flip_x, flip_y = 0, 0, 0
+    # Mirrored, both coordinates grow along the ray, and pixel i is pixel ~i.
+    if dx < 0.0:
+        quadrant, flip_x, u, dx, i = 1, -1, -u, -dx, ~i
+    if dy < 0.0:
+        quadrant, flip_y, v, dy, j = quadrant + 2, -1, -v, -dy, ~j
+    inv_x = 1.0 / dx if dx > 0.0 else math.inf
+    inv_y = 1.0 / dy if dy > 0.0 else math.inf
+    squares = leaps[quadrant]
+    while True:
+        # Unsigned: an index below 0 would have to be told from one from the end.
+        side = int(squares[np.uint64(j ^ flip_y), np.uint64(i ^ flip_x)])
+        if side == 0:
+            return t
+        out_i, out_j = i + side, j + side
+        t_x, t_y = (out_i - u) * inv_x, (out_j - v) * inv_y
+        # Rounding must not lead out of the square but by the side that is crossed.
+        if t_x < t_y:
+            t, i, j = t_x, out_i, min(max(math.floor(v + dy * t_x), j), out_j - 1)
+        else:
+            t, j, i = t_y, out_j, min(max(math.floor(u + dx * t_y), i), out_i - 1)
+        if t >= range_max:
+            return range_max
+
+
+@subkernel
+def cast_ray(
+    leaps: LeapGrid, x: float, y: float, angle: float, range_max: float
+) -> float:
+    """Distance from (x, y) along `angle` to the first occupied square, px.
+
+    Args:
+        leaps: From `leaps_of`.
+        x: Column in map pixels.
+        y: Row in map pixels.
+        angle: Direction, rad, from +x towards +y.
+        range_max: Range without a hit, px.
+    """
+    return _cast_from(leaps, x, y, math.cos(angle), math.sin(angle), range_max)
+
+
+@subkernel
+def _cast_from(
+    leaps: LeapGrid, x: float, y: float, dx: float, dy: float, range_max: float
+) -> float:
+    """As `_cast`, from a point of the map or outside, where it is 0."""
+    u, v = x + 1.5, y + 1.5
+    return _cast(leaps, u, v, dx, dy, range_max) if _is_on(leaps, u, v) else 0.0
+
+
+@subkernel
+def _is_on(leaps: LeapGrid, u: float, v: float) -> bool:
+    """Whether a point of the padded map is one."""
+    return bool(0.0 <= u < leaps.shape[2] and 0.0 <= v < leaps.shape[1])
+
+
+def fan(field_of_view: float, n_rays: int) -> NDArray[np.float64]:
+    """Directions of the rays in the robot's frame, shape (2, n_rays): cosines, sines.
+
+    Ray i is `-field_of_view / 2 + i * field_of_view / (n_rays - 1)` off the heading;
+    a single ray points ahead.
+
+    Args:
+        field_of_view: Whole angle of the fan, rad.
+        n_rays: Number of rays.
+    """
+    step = field_of_view / (n_rays - 1) if n_rays > 1 else 0.0
+    first = -0.5 * field_of_view if n_rays > 1 else 0.0
+    offsets = (first + step * np.arange(n_rays)).tolist()
+    # As in `sensors`, to the last bit.
+    return np.array([[math.cos(v) for v in offsets], [math.sin(v) for v in offsets]])
+
+
+@subkernel
+def cast_rays(
+    leaps: LeapGrid,
+    directions: NDArray[np.float64],
+    x: float,
+    y: float,
+    heading: float,
+    range_max: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Fills `out` with the fan of ranges; `out[0]` is the robot's leftmost ray.
+
+    Args:
+        leaps: From `leaps_of`.
+        directions: From `fan`.
+        x: Column in map pixels.
+        y: Row in map pixels.
+        heading: rad, from +x towards +y.
+        range_max: Range without a hit, px.
+        out: Shape (n_rays,), float32, overwritten.
+    """
+    u, v = x + 1.5, y + 1.5
+    if not _is_on(leaps, u, v):
+        out[:] = 0.0
+        return
+    cos, sin = math.cos(heading), math.sin(heading)
+    for k in range(out.shape[0]):
+        ahead, aside = directions[0, k], directions[1, k]
+        dx, dy = cos * ahead - sin * aside, sin * ahead + cos * aside
+        out[k] = _cast(leaps, u, v, dx, dy, range_max)
+
+
+@subkernel
+def in_sight(leaps: LeapGrid, x: float, y: float, to_x: float, to_y: float) -> bool:
+    """Whether the segment between two points crosses no occupied square."""
+    off_x, off_y = to_x - x, to_y - y
+    distance = math.sqrt(off_x * off_x + off_y * off_y)
+    if distance == 0.0:
+        return True
+    dx, dy = off_x / distance, off_y / distance
+    return bool(_cast_from(leaps, x, y, dx, dy, distance) >= distance)
+
+
+@kernel
+def sees(leaps: LeapGrid, x: float, y: float, to_x: float, to_y: float) -> bool:
+    """`in_sight` for calls from Python."""
+    return bool(in_sight(leaps, x, y, to_x, to_y))

@@ -1,0 +1,111 @@
+"""The memory of a robot of TDAC-Map2D-v0, as its compiled step reads and writes it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.drive import stepping
+from tdac_envs.drive.rewards import RewardWeights
+from tdac_envs.map2d.task import Map2DTask
+
+Array = NDArray[np.float64]
+Observed = NDArray[np.float32]
+
+
+class Robot(NamedTuple):
+    """Arrays of one robot; or of many, with one more axis in front.
+
+    Attributes:
+        constants: Shape (17,), float64: axle length (px), wheel limit (px/s), dt (s),
+            body radius, range limit (px), the share of its speed that a wheel keeps
+            from one step to the next, delay (steps), whether a contact ends the
+            episode, way of a step at full speed (px); weights of the reward:
+            progress, goal, collision, time; goal x and y, goal tolerance (px),
+            horizon (steps).
+        state: Shape (8,), float64: x, y (px), heading (rad); wanted speeds of the left
+            and of the right wheel, which may be out of [-1, 1]; for each the factor
+            between its speed and what it does on the ground; steps so far.
+        queue: Shape (delay, 2), float64: wanted speeds that are still to be applied.
+        pose: Shape (3,), float32: x, y, heading, as observed.
+        wheel_speeds: Shape (2,), float32: fractions as last applied.
+        ranges: Shape (n_rays,), float32, px.
+        outcome: Shape (10,), float64: reward of the last step, whether it terminated
+            or truncated the episode, whether the goal was reached and something
+            touched; contacts and clipped actions so far; straight distance to the
+            goal, length of the shortest path to it, clearance of the pixel under the
+            robot, px.
+    """
+
+    constants: Array
+    state: Array
+    queue: Array
+    pose: Observed
+    wheel_speeds: Observed
+    ranges: Observed
+    outcome: Array
+
+    @classmethod
+    def blank(cls, n_rays: int, delay: int, *count: int) -> Robot:
+        """One robot, or `count` of them, all zeros."""
+        return cls(
+            np.zeros((*count, stepping.N_CONSTANTS)),
+            np.zeros((*count, stepping.N_STATE)),
+            np.zeros((*count, delay, 2)),
+            np.zeros((*count, 3), np.float32),
+            np.zeros((*count, 2), np.float32),
+            np.zeros((*count, n_rays), np.float32),
+            np.zeros((*count, stepping.N_OUTCOME)),
+        )
+
+    def row(self, index: int) -> Robot:
+        """One of many robots; its arrays are views."""
+        return Robot(*(array[index] for array in self))
+
+    def place(self, task: Map2DTask) -> None:
+        """Puts the robot at the start of a task; `kernels.begin` does the rest."""
+        goal = slice(stepping.GOAL_X, stepping.HORIZON + 1)
+        self.constants[goal] = *task.goal, task.goal_tolerance, task.horizon
+        self.state[: stepping.HEADING + 1] = task.start
+        self.outcome[stepping.REMAINING] = task.shortest
+
+
+def constants_of(
+    task: Map2DTask,
+    weights: RewardWeights,
+    *,
+    motor_lag: float,
+    delay: int,
+    stops: bool,
+) -> Array:
+    """`Robot.constants` of a task.
+
+    Args:
+        task: Robot, goal and horizon.
+        weights: Of the reward.
+        motor_lag: Time constant of the wheel speeds, s.
+        delay: Steps by which an action takes effect late.
+        stops: Whether a contact ends the episode.
+    """
+    robot = task.robot
+    return np.array(
+        [
+            robot.axle_length,
+            robot.max_wheel_speed,
+            task.dt,
+            robot.radius,
+            robot.range_max,
+            math.exp(-task.dt / motor_lag) if motor_lag else 0.0,
+            delay,
+            stops,
+            task.full_step,
+            *weights,
+            *task.goal,
+            task.goal_tolerance,
+            task.horizon,
+        ],
+        np.float64,
+    )

@@ -1,0 +1,134 @@
+"""What a TDAC-Map2D-v0 is made of, and how its episodes begin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from tdac_envs.core.arguments import check_reset_options, positive, whole_number
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.rewards import RewardWeights
+from tdac_envs.map2d.rays import fan
+from tdac_envs.map2d.robot import constants_of
+from tdac_envs.map2d.task import (
+    Map2DTask,
+    default_horizon,
+    jittered_start,
+    make_task,
+    mixed_start,
+    random_task,
+)
+from tdac_envs.mapping.params import RobotParams
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Setup:
+    """Everything about an environment that lasts longer than an episode.
+
+    Attributes:
+        nominal: The task as given.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
+        fixed_horizon: Whether the horizon was given, or follows from the task.
+        on_collision: `"terminate"` or `"block"`.
+        range_noise: Standard deviation of each range, relative to it.
+        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        motor_lag: Time constant of the wheel speeds, s.
+        delay: Steps by which an action takes effect late.
+        weights: Of the reward.
+        directions: Of the rays, from `rays.fan`.
+    """
+
+    nominal: Map2DTask
+    variation: str
+    fixed_horizon: bool
+    on_collision: str
+    range_noise: float
+    wheel_slip: float
+    motor_lag: float
+    delay: int
+    weights: RewardWeights
+    directions: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        robot = self.nominal.robot
+        view = np.radians(robot.field_of_view_deg)
+        object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
+
+    def constants(self) -> NDArray[np.float64]:
+        """`Robot.constants` of the nominal task."""
+        return constants_of(
+            self.nominal,
+            self.weights,
+            motor_lag=self.motor_lag,
+            delay=self.delay,
+            stops=self.on_collision == "terminate",
+        )
+
+    def world(self, task: Map2DTask) -> tuple[NDArray[Any], ...]:
+        """What the kernels `begin` and `drive` take beside the robot's memory."""
+        terrain = task.terrain
+        return terrain.leaps, terrain.padded_clear, task.field, self.directions
+
+    def draw(self, options: dict[str, Any], random: np.random.Generator) -> Map2DTask:
+        """The task of an episode.
+
+        Args:
+            options: Of `reset`: `start` and `goal`, which win over the variation.
+            random: Source of the variation.
+
+        Raises:
+            TaskError: The options name something else than a start and a goal, or
+                these are not feasible.
+        """
+        check_reset_options(options)
+        task = self.nominal
+        if options:
+            start = (*options.get("start", task.start), task.start.heading)[:3]
+            drawn = make_task(
+                task.terrain,
+                start,
+                options.get("goal", task.goal),
+                task.robot,
+                dt=task.dt,
+                goal_tolerance=task.goal_tolerance,
+                horizon=task.horizon,
+            )
+        elif self.variation == "random":
+            drawn = random_task(task, random)
+        elif self.variation == "mixed":
+            return task.moved(mixed_start(task, random))
+        elif self.variation == "jitter":
+            return task.moved(jittered_start(task, random))
+        else:
+            return task
+        if self.fixed_horizon or drawn.goal == task.goal:
+            return drawn
+        steps = default_horizon(drawn.shortest, drawn.robot, drawn.dt)
+        return replace(drawn, horizon=steps)
+
+
+def override(robot: RobotParams, **given: float | None) -> RobotParams:
+    """The robot with the options that were given.
+
+    Raises:
+        TaskError: One of them is not usable.
+    """
+    changes: dict[str, float] = {}
+    for name, value in given.items():
+        if value is None:
+            continue
+        if name == "n_rays":
+            changes[name] = whole_number(name, value, 1)
+        else:
+            key = "field_of_view_deg" if name == "field_of_view" else name
+            changes[key] = positive(name, value)
+    try:
+        return RobotParams.model_validate({**robot.model_dump(), **changes})
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0]).removesuffix("_deg")
+        raise TaskError(f"{name} {first['input']!r}: {first['msg']}") from None

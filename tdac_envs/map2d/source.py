@@ -1,0 +1,321 @@
+"""Where a Map2D task comes from: a bundled name, a file, a folder or an array."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.arguments import finite, finite_numbers, finite_point, positive
+from tdac_envs.core.errors import MapError, TaskError, hint
+from tdac_envs.core.intake import printable, read_array
+from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.grid.metric import Point, resolution_of, to_pixels
+from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
+from tdac_envs.mapping.image import check_size, load_image, read_bytes
+from tdac_envs.mapping.params import UNSAID, MapParams, RobotParams, Said
+from tdac_envs.mapping.score import nearest_free
+
+MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
+
+_YAML = {".yaml", ".yml"}
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A grid with the parameters that made it, start and goal filled in.
+
+    Attributes:
+        grid: The world.
+        params: Its parameters.
+        image: The map image, where there is one.
+    """
+
+    grid: OccupancyGrid
+    params: MapParams
+    image: Path | None
+
+
+def prepare(
+    source: MapSource,
+    start: Sequence[float] | None = None,
+    goal: Sequence[float] | None = None,
+    *,
+    heading: float | None = None,
+    robot_radius: float | None = None,
+    snap: bool = False,
+    said: Said = UNSAID,
+) -> Prepared:
+    """Reads a map and settles start, goal, heading and body radius on it.
+
+    Args:
+        source: Bundled name; path of an image, ROS `map.yaml`, MovingAI `.map` or
+            `.npy` grid; folder with `occupancy.npy` and `params.json`; or a bool
+            array `[y, x]`, True = occupied, also as nested lists of bools or 0 and 1.
+        start: (x, y) or (x, y, heading), px and rad; from the params if None.
+        goal: (x, y), px; from the params if None.
+        heading: rad; wins over `start[2]`.
+        robot_radius: px; default from the params, else 15.
+        snap: Move start and goal to the nearest place that holds the body.
+        said: Of an image, what is not to be found out.
+
+    Raises:
+        MapError: The map cannot be read or used.
+        TaskError: No start or goal is known, or a number is not usable.
+    """
+    if robot_radius is not None:
+        robot_radius = positive("robot_radius", robot_radius)
+    given = _Given.of(start, goal, heading, robot_radius, snap, said)
+    if not isinstance(source, str | Path):
+        _refuse(said, "a grid")
+        return _settled(_from_cells(_as_cells(source), "array"), given)
+    # A folder that happens to have a bundled map's name is `./maze`.
+    if isinstance(source, str) and source in bundled_maps():
+        bundled = bundled_map(source)
+        return _from_image(bundled.image, given.or_else(bundled))
+    path = Path(source)
+    if path.is_dir():
+        _check_is_map_folder(path)
+        _refuse(said, str(path))
+        return _settled(_from_folder(path), given)
+    if path.suffix == ".npy":
+        _refuse(said, str(path))
+        return _settled(_from_npy(path), given)
+    check_exists(path)
+    return _from_image(path, given)
+
+
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """What the caller says about the task; None where the map is to say it."""
+
+    start: Point | None
+    goal: Point | None
+    heading: float | None
+    robot_radius: float | None
+    snap: bool
+    said: Said
+
+    @classmethod
+    def of(
+        cls,
+        start: Sequence[float] | None,
+        goal: Sequence[float] | None,
+        heading: float | None,
+        robot_radius: float | None,
+        snap: bool,
+        said: Said,
+    ) -> _Given:
+        at = end = None
+        if start is not None:
+            count = 3 if np.size(start) == 3 else 2
+            numbers = finite_numbers("start", start, count)
+            at = (numbers[0], numbers[1])
+            heading = numbers[-1] if count == 3 and heading is None else heading
+        if goal is not None:
+            end = finite_point("goal", goal)
+        if heading is not None:
+            heading = finite("heading", heading)
+        return cls(at, end, heading, robot_radius, snap, said)
+
+    def or_else(self, bundled: BundledMap) -> _Given:
+        """The same with a bundled map's own task where nothing was given."""
+        return _Given(
+            self.start or bundled.start,
+            self.goal or bundled.goal,
+            bundled.heading if self.heading is None else self.heading,
+            self.robot_radius or bundled.robot_radius,
+            self.snap,
+            self.said,
+        )
+
+
+def _settled(prepared: Prepared, given: _Given) -> Prepared:
+    """Puts what was given in place of the params' own task."""
+    changes: dict[str, Any] = {
+        name: value
+        for name in ("start", "goal", "heading")
+        if (value := getattr(given, name)) is not None
+    }
+    robot, radius = prepared.params.robot, given.robot_radius
+    if radius is not None and radius != robot.radius:
+        body = {"radius": radius, "axle_length": 2 * radius}
+        changes["robot"] = RobotParams(**{**robot.model_dump(), **body})
+    params = prepared.params.model_copy(update=changes)
+    missing = [name for name in ("start", "goal") if getattr(params, name) is None]
+    if missing:
+        raise TaskError(
+            f"no {' and no '.join(missing)} for {params.source}: give start and goal "
+            "in pixels (`tdac map IMAGE` draws rulers to read them off)"
+        )
+    if given.snap:
+        params = _snapped(prepared.grid, params)
+    return Prepared(prepared.grid, params, prepared.image)
+
+
+def _snapped(grid: OccupancyGrid, params: MapParams) -> MapParams:
+    """Start and goal moved to the nearest pixels that hold the body."""
+    free = body_free(clearance(grid.cells), params.robot.radius)
+    changes: dict[str, Any] = {}
+    notes = list(params.notes)
+    for name in ("start", "goal"):
+        x, y = point = getattr(params, name)
+        if grid.is_occupied(x, y) or not free[math.floor(y + 0.5), math.floor(x + 0.5)]:
+            moved = nearest_free(free, round(x), round(y))
+            if moved is not None:
+                changes[name] = moved
+                notes.append(f"{name} {point} moved to {moved}")
+    return params.model_copy(update={**changes, "notes": tuple(notes)})
+
+
+def metres_to_pixels(
+    source: str | Path,
+    start: Point | None,
+    goal: Point | None,
+    robot_radius: float | None,
+) -> tuple[Point | None, Point | None, float | None]:
+    """Start, goal and body radius in pixels, from metres in the map's own frame.
+
+    Raises:
+        MapError: The map cannot be read, or has no resolution.
+    """
+    check_exists(Path(source))
+    if Path(source).is_dir():
+        _check_is_map_folder(Path(source))
+        grid = _from_folder(Path(source)).grid
+    else:
+        image = load_image(source)
+        empty = np.zeros(image.colour.shape[:2], np.bool_)
+        grid = OccupancyGrid(empty, image.resolution, image.origin)
+    scale = resolution_of(grid)
+    points = [None if p is None else to_pixels(grid, *p) for p in (start, goal)]
+    return points[0], points[1], None if robot_radius is None else robot_radius / scale
+
+
+def _from_image(image: Path, given: _Given) -> Prepared:
+    # Of a ROS map, the picture is in another file than the one that is named.
+    read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
+    radius = given.robot_radius or RobotParams().radius
+    ends = given.start, given.goal
+    prepared = read(image, _digest(image), *ends, radius, given.snap, given.said)
+    # A point that was snapped stays where preprocessing put it.
+    start, goal = (None, None) if given.snap else (given.start, given.goal)
+    return _settled(prepared, _Given(start, goal, given.heading, radius, False, UNSAID))
+
+
+# Preprocessing takes most of the time of `gym.make`; a grid has one byte a pixel.
+@lru_cache(maxsize=16)
+def _read_image(
+    image: Path,
+    digest: str,  # noqa: ARG001 - tells apart what one path held at different times
+    start: Point | None,
+    goal: Point | None,
+    radius: float,
+    snap: bool,
+    said: Said,
+) -> Prepared:
+    # A grid that is ready needs none of it.
+    from tdac_envs.mapping.preprocessing import preprocess
+
+    how: Any = {"snap": snap, "polarity": said.polarity, "threshold": said.threshold}
+    grid, params = preprocess(image, start, goal, robot_radius=radius, **how)
+    return Prepared(grid, params, image)
+
+
+def _refuse(said: Said, what: str) -> None:
+    """Refuses words on how to read a picture where there is none."""
+    if said != UNSAID:
+        raise TaskError(
+            f"{what} says itself which cells are obstacles; leave out polarity and "
+            "threshold"
+        )
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(read_bytes(path)).hexdigest()
+
+
+def _as_cells(source: NDArray[Any] | Sequence[Sequence[Any]]) -> NDArray[Any]:
+    """A map given as an array or, from JSON, as rows of bools or of 0 and 1."""
+    if isinstance(source, np.ndarray):
+        return source
+    try:
+        rows = np.array(source)
+    except ValueError:
+        raise MapError("expected a map of rows of the same length") from None
+    whole = rows.dtype.kind in "iu" and np.isin(rows, (0, 1)).all()
+    return rows.astype(np.bool_) if whole else rows
+
+
+def _from_folder(folder: Path) -> Prepared:
+    params = MapParams.load(folder / "params.json")
+    grid = _read_cells(folder / "occupancy.npy")
+    if (grid.width, grid.height) != (params.width, params.height):
+        raise MapError(
+            f"{folder}: occupancy.npy has {grid.width} x {grid.height} pixels, "
+            f"params.json says {params.width} x {params.height}"
+        )
+    return Prepared(
+        OccupancyGrid(grid.cells, params.resolution, params.origin), params, None
+    )
+
+
+def _from_npy(path: Path) -> Prepared:
+    return _from_cells(_read_cells(path).cells, printable(path.name))
+
+
+def _from_cells(cells: NDArray[Any], name: str) -> Prepared:
+    if cells.dtype != np.bool_:
+        raise MapError(f"expected a bool array (True = occupied), got {cells.dtype}")
+    grid = OccupancyGrid(cells)
+    params = MapParams(
+        source=name,
+        source_sha256=grid.sha256(),
+        width=grid.width,
+        height=grid.height,
+        polarity="given",
+        method="given",
+    )
+    return Prepared(grid, params, None)
+
+
+def _read_cells(path: Path) -> OccupancyGrid:
+    try:
+        cells = read_array(read_bytes(path))
+    except ValueError as error:
+        raise MapError(f"cannot read the grid {path}: {error}") from error
+    if cells.ndim == 2:
+        check_size(path.name, cells.shape[1], cells.shape[0])
+    if cells.dtype != np.bool_:
+        raise MapError(f"{path}: expected a bool array, got {cells.dtype}")
+    return OccupancyGrid(cells)
+
+
+def _check_is_map_folder(folder: Path) -> None:
+    if not (folder / "params.json").is_file():
+        raise MapError(
+            f"{folder} is a folder without a params.json: give a map file, or a folder "
+            "that `tdac map` wrote"
+        )
+
+
+def check_exists(path: Path) -> None:
+    """Refuses a map that is not there, with the bundled one that may be meant.
+
+    Raises:
+        MapError: There is no such file or folder.
+    """
+    if path.exists():
+        return
+    known = ""
+    if not path.suffix:
+        names = bundled_maps()
+        known = f"{hint(str(path), names)}; bundled maps: {', '.join(names)}"
+    raise MapError(f"no map {str(path)!r}: no such file{known}")

@@ -1,0 +1,38 @@
+"""Straight ways of a disc on a grid."""
+
+from __future__ import annotations
+
+import math
+
+from tdac_envs.core.compiled import kernel
+from tdac_envs.grid.grid import FloatGrid
+from tdac_envs.map2d.contact import first_contact
+
+# Short pieces: the contact test looks at all squares of a piece's bounding box.
+_SHORTEST_PIECE = 4.0
+
+
+@kernel
+def gets_straight(
+    clear: FloatGrid, x: float, y: float, to_x: float, to_y: float, radius: float
+) -> bool:
+    """Whether a disc touches nothing on the straight line between two points.
+
+    Args:
+        clear: Padded clearance, px.
+        x: Column of the one point, px.
+        y: Its row, px.
+        to_x: Column of the other.
+        to_y: Its row.
+        radius: Of the disc, px.
+    """
+    length = math.hypot(to_x - x, to_y - y)
+    heading = math.atan2(to_y - y, to_x - x)
+    pieces = max(math.ceil(length / max(radius, _SHORTEST_PIECE)), 1)
+    for k in range(pieces):
+        at_x = x + (to_x - x) * k / pieces
+        at_y = y + (to_y - y) * k / pieces
+        touch = first_contact(clear, at_x, at_y, heading, length / pieces, 0.0, radius)
+        if touch <= 1.0:
+            return False
+    return True

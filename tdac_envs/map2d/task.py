@@ -1,0 +1,286 @@
+"""What is wanted on a map: start, goal, body, and the shortest way between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.arguments import finite_numbers, finite_point, positive, steps_of
+from tdac_envs.core.errors import TaskError
+from tdac_envs.grid.grid import body_free
+from tdac_envs.grid.plan import Path, descend
+from tdac_envs.map2d.terrain import (
+    Terrain,
+    at_goal,
+    check_stands,
+    entry,
+    field_to,
+    may_start,
+    route,
+    way,
+    widest_connected_radius,
+)
+from tdac_envs.mapping.params import RobotParams
+
+__all__ = [
+    "Map2DTask",
+    "Pose",
+    "Terrain",
+    "at_goal",
+    "default_horizon",
+    "jittered_start",
+    "make_task",
+    "random_task",
+    "widest_connected_radius",
+]
+
+MAX_TOLERANCE = 20.0
+MIN_HORIZON = 2500
+JITTER_HEADING = 0.5
+MAX_DRAWS = 1000
+
+
+class Pose(NamedTuple):
+    """Where the robot is: x (column, px), y (row, px), heading (rad)."""
+
+    x: float
+    y: float
+    heading: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Map2DTask:
+    """A feasible task: drive the disc from start to goal and touch nothing.
+
+    Attributes:
+        terrain: The map.
+        start: Nominal start pose.
+        goal: Point (x, y), px.
+        robot: Body, wheels and sensor.
+        goal_tolerance: px.
+        dt: Duration of a step, s.
+        horizon: Steps before the episode is cut off.
+        field: Shape (height, width), float32: length of the shortest path for the
+            body from each pixel to the goal, px; inf where there is none.
+        shortest: d0, length of that path from the nominal start, px.
+    """
+
+    terrain: Terrain
+    start: Pose
+    goal: tuple[float, float]
+    robot: RobotParams
+    goal_tolerance: float
+    dt: float
+    horizon: int
+    field: NDArray[np.float32]
+    shortest: float
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        rest = (self.robot, self.goal_tolerance, self.dt, self.horizon)
+        return _restored, (self.terrain, self.start, self.goal, *rest)
+
+    @property
+    def body_radius(self) -> float:
+        """Of the disc, px."""
+        return self.robot.radius
+
+    @property
+    def full_step(self) -> float:
+        """Way of one step at full speed, px."""
+        return self.robot.max_wheel_speed * self.dt
+
+    def jittered(self, random: np.random.Generator) -> Pose:
+        """A start of the jitter variation; see `jittered_start`."""
+        return jittered_start(self, random)
+
+    def path_from(self, start: Pose) -> Path:
+        """Shortest path for the body, shape (n, 2); starts at the given point.
+
+        Empty where there is none.
+        """
+        radius = self.robot.radius
+        first = entry(self.terrain, self.field, start.x, start.y, radius)
+        if first is None:
+            return np.empty((0, 2))
+        free = body_free(self.terrain.clear, radius)
+        path = descend(free, np.asarray(self.field, np.float64), first)
+        return np.vstack([[start.x, start.y], path, self.goal])
+
+    def moved(self, start: Pose, goal: tuple[float, float] | None = None) -> Map2DTask:
+        """The same task with another start (and goal); horizon and tolerance kept.
+
+        Raises:
+            TaskError: No path joins the new start and goal.
+        """
+        field, radius = self.field, self.robot.radius
+        if goal is None or goal == self.goal:
+            goal = self.goal
+        else:
+            field = route(self.terrain, start[:2], goal, radius)
+        start = start._replace(heading=wrapped(start.heading))
+        shortest = way(self.terrain, field, start.x, start.y)
+        return replace(self, start=start, goal=goal, field=field, shortest=shortest)
+
+
+def make_task(
+    terrain: Terrain,
+    start: Sequence[float],
+    goal: Sequence[float],
+    robot: RobotParams,
+    *,
+    dt: float = 0.05,
+    goal_tolerance: float | None = None,
+    horizon: int | None = None,
+) -> Map2DTask:
+    """Checks that a task is feasible and completes it.
+
+    Args:
+        terrain: The map.
+        start: Pose, px and rad.
+        goal: Point (x, y), px.
+        robot: Body, wheels and sensor.
+        dt: Duration of a step, s.
+        goal_tolerance: px; by default min(20, d0 / 4).
+        horizon: Steps; by default max(2500, 6 * d0 / (v_max * dt)).
+
+    Raises:
+        TaskError: A number is not usable, start or goal cannot hold the body, no path
+            joins them, or the start is already within the tolerance; the message says
+            which and what to do.
+    """
+    begin = Pose(*finite_numbers("start", start, 3))
+    begin = begin._replace(heading=wrapped(begin.heading))
+    end = finite_point("goal", goal)
+    dt = positive("dt", dt)
+    check_stands(terrain, "start", begin.x, begin.y, robot.radius)
+    check_stands(terrain, "goal", *end, robot.radius)
+    field = route(terrain, begin[:2], end, robot.radius)
+    shortest = way(terrain, field, begin.x, begin.y)
+    if goal_tolerance is None:
+        tolerance = min(MAX_TOLERANCE, 0.25 * shortest)
+    else:
+        tolerance = positive("goal_tolerance", goal_tolerance)
+    if at_goal(terrain, end, tolerance, begin.x, begin.y):
+        raise TaskError(
+            f"the start is already at the goal: {math.dist(begin[:2], end):.1f} px "
+            f"apart with a tolerance of {tolerance:.1f} px; move one of them"
+        )
+    if horizon is None:
+        horizon = default_horizon(shortest, robot, dt)
+    steps = steps_of(horizon)
+    return Map2DTask(terrain, begin, end, robot, tolerance, dt, steps, field, shortest)
+
+
+def default_horizon(shortest: float, robot: RobotParams, dt: float) -> int:
+    """Steps in which to drive `shortest` px: six times what it takes, or 2500."""
+    return generous_horizon(shortest, robot.max_wheel_speed * dt)
+
+
+def generous_horizon(shortest: float, full_step: float) -> int:
+    """Six times the full-speed steps of a shortest path, or 2500; any one unit."""
+    return max(MIN_HORIZON, math.ceil(min(6.0 * shortest / full_step, 2.0**62)))
+
+
+def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
+    """A feasible start within one body radius of the nominal, heading +- 0.5 rad."""
+    return jittered_pose(
+        task.start, task.robot.radius, random, lambda pose: _may_start(task, pose)
+    )
+
+
+def jittered_pose(
+    nominal: Pose,
+    reach: float,
+    random: np.random.Generator,
+    may_start: Callable[[Pose], bool],
+) -> Pose:
+    """A pose within `reach` of the nominal one that may be a start, heading +- 0.5 rad.
+
+    The disc that is drawn from shrinks slowly; where the body fits nowhere but at the
+    nominal start, only the heading changes.
+    """
+    for _ in range(MAX_DRAWS):
+        distance = reach * math.sqrt(random.random())
+        bearing = random.uniform(-math.pi, math.pi)
+        turn = random.uniform(-JITTER_HEADING, JITTER_HEADING)
+        pose = Pose(
+            nominal.x + distance * math.cos(bearing),
+            nominal.y + distance * math.sin(bearing),
+            wrapped(nominal.heading + turn),
+        )
+        if may_start(pose):
+            return pose
+        reach *= 0.98
+    return nominal._replace(heading=pose.heading)
+
+
+def mixed_start(task: Map2DTask, random: np.random.Generator) -> Pose:
+    """A jittered start or, in every second episode on average, any feasible one.
+
+    These are drawn from the free pixels connected to the goal: who learns need not
+    first drive to what is to be learnt.
+    """
+    if random.random() < 0.5:
+        return jittered_start(task, random)
+    width = task.field.shape[1]
+    connected = np.flatnonzero(np.isfinite(task.field))
+    for _ in range(MAX_DRAWS):
+        y, x = divmod(int(random.choice(connected)), width)
+        heading = wrapped(random.uniform(-math.pi, math.pi))
+        if not at_goal(task.terrain, task.goal, task.goal_tolerance, x, y):
+            return Pose(x, y, heading)
+    return task.start
+
+
+def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
+    """The same map and robot with any feasible start and goal; horizon kept.
+
+    Both are drawn from the free pixels connected to the nominal goal. Where hardly
+    any two of them are farther apart than the tolerance, it is the nominal task.
+    """
+    width = task.field.shape[1]
+    connected = np.flatnonzero(np.isfinite(task.field))
+    for _ in range(MAX_DRAWS):
+        goal_y, goal_x = divmod(int(random.choice(connected)), width)
+        start_y, start_x = divmod(int(random.choice(connected)), width)
+        heading = wrapped(random.uniform(-math.pi, math.pi))
+        start, goal = Pose(start_x, start_y, heading), (float(goal_x), float(goal_y))
+        if not at_goal(task.terrain, goal, task.goal_tolerance, start_x, start_y):
+            field = field_to(task.terrain, (goal_x, goal_y), task.robot.radius)
+            shortest = float(field[start_y, start_x])
+            return replace(task, start=start, goal=goal, field=field, shortest=shortest)
+    return task
+
+
+def wrapped(heading: float) -> float:
+    """The same direction in (-pi, pi], for a heading of any size."""
+    turn = math.remainder(heading, 2.0 * math.pi)
+    return math.pi if turn <= -math.pi else turn
+
+
+def _may_start(task: Map2DTask, pose: Pose) -> bool:
+    terrain = task.terrain
+    return may_start(
+        terrain.padded_clear,
+        terrain.leaps,
+        task.field,
+        *map(float, (pose.x, pose.y, task.robot.radius)),
+        *map(float, (*task.goal, task.goal_tolerance)),
+    )
+
+
+def _restored(
+    terrain: Terrain, start: Pose, goal: tuple[float, float], *rest: Any
+) -> Map2DTask:
+    """A task from its pickle, which leaves out what can be computed."""
+    robot, tolerance, dt, horizon = rest
+    field = route(terrain, start[:2], goal, robot.radius)
+    shortest = way(terrain, field, start.x, start.y)
+    return Map2DTask(
+        terrain, start, goal, robot, tolerance, dt, horizon, field, shortest
+    )

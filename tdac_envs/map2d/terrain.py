@@ -1,0 +1,265 @@
+"""A map with what is computed from it once, and the body's ways over it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.compiled import constant, kernel
+from tdac_envs.core.errors import TaskError
+from tdac_envs.grid.grid import (
+    FloatGrid,
+    OccupancyGrid,
+    body_free,
+    clearance,
+    clearance_at,
+)
+from tdac_envs.grid.plan import distance_field
+from tdac_envs.map2d.contact import first_contact, has_room
+from tdac_envs.map2d.kernels import path_distance
+from tdac_envs.map2d.rays import LeapGrid, in_sight, leaps_of, sees
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Terrain:
+    """A grid and what is computed from it once; 9 bytes a pixel, read-only.
+
+    Attributes:
+        grid: The map.
+        clear: Shape (height, width), float32, from `grid.clearance`.
+        padded_clear: `clear` with a border of zeros, for the kernels.
+        leaps: Shape (4, height + 2, width + 2), uint8, from `rays.leaps_of`.
+    """
+
+    grid: OccupancyGrid
+    clear: FloatGrid
+    padded_clear: FloatGrid
+    leaps: LeapGrid
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Terrain.of, (self.grid,)
+
+    @classmethod
+    def of(cls, grid: OccupancyGrid) -> Terrain:
+        """The terrain of a grid; equal grids share the one used last."""
+        return _terrain(grid)
+
+
+# A map is often loaded by several envs, or again and again in one process.
+@lru_cache(maxsize=4)
+def _terrain(grid: OccupancyGrid) -> Terrain:
+    padded_clear = constant(np.pad(clearance(grid.cells), 1))
+    leaps = leaps_of(grid.cells)
+    return Terrain(grid, padded_clear[1:-1, 1:-1], padded_clear, leaps)
+
+
+def at_goal(
+    terrain: Terrain, goal: Point, tolerance: float, x: float, y: float
+) -> bool:
+    """Whether (x, y) is within the tolerance and no wall stands in between."""
+    if math.hypot(goal[0] - x, goal[1] - y) > tolerance:
+        return False
+    return bool(sees(terrain.leaps, *map(float, (x, y, *goal))))
+
+
+def _near(x: float, y: float, shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
+    """The pixels (i, j) within 2 columns and rows of a point."""
+    column, row = math.floor(x + 0.5), math.floor(y + 0.5)
+    for j in range(max(row - 2, 0), min(row + 3, shape[0])):
+        for i in range(max(column - 2, 0), min(column + 3, shape[1])):
+            yield i, j
+
+
+def entry(
+    terrain: Terrain, field: NDArray[np.float32], x: float, y: float, radius: float
+) -> tuple[int, int] | None:
+    """The pixel near (x, y) through which the shortest path goes, if any.
+
+    The body gets there from (x, y) in a straight line.
+    """
+    # The pixels around the point come first, as in `path_distance`.
+    found = [
+        (
+            max(abs(i - x), abs(j - y)) >= 1,
+            field[j, i] + math.dist((x, y), (i, j)),
+            i,
+            j,
+        )
+        for i, j in _near(x, y, field.shape)
+        if field[j, i] < math.inf
+    ]
+    for _, _, i, j in sorted(found):
+        if _may_hop(terrain, (x, y), (i, j), radius):
+            return i, j
+    return None
+
+
+def _may_hop(
+    terrain: Terrain,
+    begin: Point,
+    end: Point,
+    radius: float,
+) -> bool:
+    """Whether the body touches nothing on the straight line between two points."""
+    touch = first_contact(
+        terrain.padded_clear,
+        float(begin[0]),
+        float(begin[1]),
+        math.atan2(end[1] - begin[1], end[0] - begin[0]),
+        math.dist(begin, end),
+        0.0,
+        float(radius),
+    )
+    return bool(touch > 1.0)
+
+
+def check_stands(
+    terrain: Terrain, name: str, x: float, y: float, radius: float
+) -> None:
+    """Refuses a place, called `name`, where a disc of `radius` px cannot stand.
+
+    Raises:
+        TaskError: It is outside, in an obstacle or too near to one; says what is near.
+    """
+    grid = terrain.grid
+    point = f"{name} ({x:g}, {y:g})"
+    if not (-0.5 <= x < grid.width - 0.5 and -0.5 <= y < grid.height - 0.5):
+        raise TaskError(
+            f"{point} lies outside the map of {grid.width} x {grid.height} px"
+        )
+    if grid.is_occupied(x, y):
+        problem = "lies in an obstacle"
+    elif (room := clearance_at(grid.cells, x, y, radius)) < radius:
+        problem = f"is {room:.1f} px from a wall, too near for a body of {radius:g} px"
+    else:
+        return
+    raise TaskError(f"{point} {problem}; {_nearest_place(terrain, x, y, radius)}")
+
+
+def _nearest_place(terrain: Terrain, x: float, y: float, radius: float) -> str:
+    rows, columns = np.nonzero(body_free(terrain.clear, radius))
+    if rows.size == 0:
+        return (
+            f"the body fits nowhere; the widest place is {terrain.clear.max():.1f} px"
+        )
+    nearest = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
+    return f"the nearest free pixel is ({columns[nearest]}, {rows[nearest]})"
+
+
+@kernel
+def may_start(
+    clear: FloatGrid,
+    leaps: LeapGrid,
+    field: NDArray[np.float32],
+    x: float,
+    y: float,
+    radius: float,
+    goal_x: float,
+    goal_y: float,
+    tolerance: float,
+) -> bool:
+    """Whether an episode may start at (x, y): see the last three arguments.
+
+    Args:
+        clear: `Terrain.padded_clear`.
+        leaps: `Terrain.leaps`.
+        field: From `field_to`.
+        x: Column, px.
+        y: Row, px.
+        radius: Of the body, px, which has room there and gets to the goal.
+        goal_x: Column of the goal, px, which is not reached yet.
+        goal_y: Row of the goal, px.
+        tolerance: Of the goal, px.
+    """
+    body = math.sqrt(radius * radius + 0.5)
+    if not has_room(clear, x, y, body):
+        return False
+    near = math.hypot(goal_x - x, goal_y - y) <= tolerance
+    if near and in_sight(leaps, x, y, goal_x, goal_y):
+        return False
+    height, width = field.shape
+    column, row = math.floor(x + 0.5), math.floor(y + 0.5)
+    for j in range(max(row - 2, 0), min(row + 3, height)):
+        for i in range(max(column - 2, 0), min(column + 3, width)):
+            if field[j, i] < math.inf:
+                length, bearing = math.hypot(i - x, j - y), math.atan2(j - y, i - x)
+                if first_contact(clear, x, y, bearing, length, 0.0, radius) > 1.0:
+                    return True
+    return False
+
+
+def route(
+    terrain: Terrain, start: Point, goal: Point, radius: float
+) -> NDArray[np.float32]:
+    """Length of the shortest path to the goal from each pixel; see `field_to`.
+
+    Raises:
+        TaskError: The body cannot get from start to goal; says how wide one could be.
+    """
+    free = body_free(terrain.clear, radius)
+    # A goal that just holds the body may have no roomy pixel at its very centre.
+    near = [(math.dist(goal, pixel), *pixel) for pixel in _near(*goal, free.shape)]
+    for _, i, j in sorted(near):
+        if free[j, i] and _may_hop(terrain, goal, (i, j), radius):
+            field = _shared_field(terrain, (i, j), radius)
+            if entry(terrain, field, *start, radius) is not None:
+                return field
+            break
+    widest = widest_connected_radius(terrain.clear, start, goal)
+    reason = f"the widest body that gets through has a radius of {widest:.1f} px"
+    if widest <= 0.0:
+        reason = "they are in separate rooms"
+    raise TaskError(
+        f"no free path for a body of {radius:g} px from start ({start[0]:g}, "
+        f"{start[1]:g}) to goal ({goal[0]:g}, {goal[1]:g}): {reason}"
+    )
+
+
+def field_to(
+    terrain: Terrain, goal: tuple[int, int], radius: float
+) -> NDArray[np.float32]:
+    """Length of the shortest path for a disc of `radius` px to a pixel (x, y).
+
+    Returns:
+        Shape (height, width), float32, px, read-only; inf where there is no path.
+    """
+    free = body_free(terrain.clear, radius)
+    return constant(distance_field(free, goal), np.float32)
+
+
+_shared_field = lru_cache(maxsize=4)(field_to)
+
+
+def way(terrain: Terrain, field: NDArray[np.float32], x: float, y: float) -> float:
+    """Length of the shortest path from any point by a field of `field_to`, px."""
+    return float(path_distance(terrain.leaps, field, float(x), float(y), math.inf))
+
+
+def widest_connected_radius(clear: FloatGrid, start: Point, goal: Point) -> float:
+    """Largest disc, px, that gets from start to goal; 0 where nothing does.
+
+    By bisection over the connected components of the clearance.
+    """
+    ends = [(math.floor(y + 0.5), math.floor(x + 0.5)) for x, y in (start, goal)]
+    low, high = 0.0, float(min(clear[ends[0]], clear[ends[1]]))
+
+    def joined(radius: float) -> bool:
+        free = body_free(clear, radius).astype(np.uint8)
+        _, labels = cv2.connectedComponents(free, connectivity=4)
+        return bool(labels[ends[0]] == labels[ends[1]] != 0)
+
+    if not joined(0.0):
+        return 0.0
+    while high - low > 0.05:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if joined(middle) else (low, middle)
+    return low

@@ -1,0 +1,118 @@
+"""Readings of a picture: which pixels are dark, marked, unknown or unlike the floor."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.mapping.image import ColourImage, GreyImage
+
+MARK_CHROMA = 80
+"""Largest minus smallest RGB value from which a pixel counts as saturated colour."""
+
+
+def otsu(luminance: GreyImage) -> float:
+    """Otsu's threshold: pixels above it are light.
+
+    It lies in the middle of the empty stretch of the histogram where there is one,
+    so that a picture and its negative are cut at the same place.
+    """
+    low = int(cv2.threshold(luminance, 0, 255, cv2.THRESH_OTSU)[0])
+    counts = np.bincount(luminance.ravel(), minlength=256)
+    high = low
+    while high < 254 and counts[high + 1] == 0:
+        high += 1
+    return (low + high) / 2
+
+
+def saved_level(luminance: GreyImage) -> int | None:
+    """The "unknown" grey of a picture with a map saver's levels and no other, or None.
+
+    ROS `map_saver` writes 254 free, 205 unknown, 0 occupied; a negative has 1, 50, 255.
+    That holds however little of it has been seen.
+    """
+    share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
+    for unknown, free, occupied in ((205, (254, 255), 0), (50, (1, 0), 255)):
+        seen = share[list(free)].sum()
+        known = seen + share[occupied]
+        if seen > 0 and share[unknown] > 0.01 and known + share[unknown] > 0.98:
+            return unknown if share[occupied] > 0 or share[free[0]] > 0 else None
+    return None
+
+
+def unknown_level(luminance: GreyImage) -> int | None:
+    """The grey that a mapping tool wrote for "not seen", or None.
+
+    Map savers write about 205 (ROS `map_saver`) or 128 between black and white; a
+    negative has 50 or 127. It counts only as one large, flat level between the two.
+    """
+    share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
+    written = saved_level(luminance)
+    if written is not None:
+        return written
+    if min(share[:20].sum(), share[-20:].sum()) < 0.001:
+        return None
+    # Grey walls are often about 128, so that level must fill an area.
+    for usual, least in ((205, 0.01), (50, 0.01), (128, 0.12), (127, 0.12)):
+        level = usual - 2 + int(np.argmax(share[usual - 2 : usual + 3]))
+        around = share[level - 6 : level + 7].sum()
+        if share[level] >= least and share[level] > 0.8 * around:
+            return level
+    return None
+
+
+def outside(luminance: GreyImage, light_free: bool, ignored: BoolGrid) -> BoolGrid:
+    """The paper around a plan: what joins the border without crossing any faint line.
+
+    Half the contrast of Otsu's threshold makes a line here, so that a window drawn
+    in grey counts.
+
+    Args:
+        luminance: Shape (height, width), uint8.
+        light_free: Whether the paper is light.
+        ignored: Shape (height, width), bool; pixels that are no lines, e.g. marks.
+
+    Returns:
+        Shape (height, width), bool; all False where no such piece holds half of the
+        border.
+    """
+    grey = luminance if light_free else 255 - luminance
+    cut = otsu(grey)
+    paper = int(np.bincount(grey[grey > cut], minlength=256).argmax())
+    free = (grey > paper - 0.5 * (paper - cut)) | ignored
+    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    rim = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    held = np.bincount(rim)
+    held[0] = 0
+    largest = int(held.argmax())
+    if held[largest] < 0.5 * rim.size:
+        return np.zeros(labels.shape, np.bool_)
+    return np.asarray(labels == largest)
+
+
+def chroma(colour: ColourImage) -> GreyImage:
+    """Largest minus smallest of red, green and blue."""
+    red, green, blue = colour[..., 0], colour[..., 1], colour[..., 2]
+    largest = np.maximum(np.maximum(red, green), blue)
+    return np.asarray(largest - np.minimum(np.minimum(red, green), blue))
+
+
+def saturated(colour: ColourImage) -> BoolGrid:
+    """Pixels of strong colour, where marks and coloured lines are drawn."""
+    return np.asarray(chroma(colour) >= MARK_CHROMA)
+
+
+def disc(shape: tuple[int, ...], x: float, y: float, radius: float) -> BoolGrid:
+    """Pixels within `radius` px of (x, y), at least the pixel itself."""
+    rows, columns = np.ogrid[: shape[0], : shape[1]]
+    within = (columns - x) ** 2 + (rows - y) ** 2 <= max(radius, 0.71) ** 2
+    return np.asarray(within)
+
+
+def floor_distance(colour: ColourImage, floor: NDArray[np.float64]) -> GreyImage:
+    """How unlike the floor each pixel is: RGB distance, clipped to 255."""
+    gap = colour.astype(np.float32) - floor.astype(np.float32)
+    distance = np.rint(np.linalg.norm(gap, axis=2))
+    return np.asarray(np.clip(distance, 0, 255), np.uint8)

@@ -1,0 +1,188 @@
+"""Readings of a map with a planner's margin, looked for and ranked (Algorithm 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from operator import add
+from typing import Literal
+
+import numpy as np
+
+from tdac_envs.core.arguments import positive
+from tdac_envs.core.errors import TaskError
+from tdac_envs.grid.astar import Guide
+from tdac_envs.grid.grid import clearance
+from tdac_envs.mapping.cleanup import cleanings
+from tdac_envs.mapping.params import ScoreTerms
+from tdac_envs.mapping.readings import plain_reading, readings
+from tdac_envs.mapping.scene import Reading, Scene
+from tdac_envs.mapping.score import Ground, Trip, explain, guide_of, score, terms_of
+
+Preset = Literal["default", "paper"]
+
+INFLATIONS = (0, 1, 2, 3)
+PAPER_CLEANUPS = (0, 4, 8, 12, 16)
+MAX_DETOUR = 0.1
+"""Most that the planner's margin may lengthen the path, as a share."""
+THREADS = 2
+"""Readings judged at a time; compiled code and OpenCV let other threads run."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A reading of the map with a planner's margin, judged.
+
+    Attributes:
+        reading: Which pixels are obstacles.
+        inflation: Planner's margin around the body, px.
+        reason: Tells why the task is infeasible on it; None where it is feasible.
+            To find out what would work takes longer than the verdict.
+        terms: Terms of the score; None without a task or where it is infeasible.
+    """
+
+    reading: Reading
+    inflation: int = 0
+    reason: Callable[[], str] | None = None
+    terms: ScoreTerms | None = None
+
+    @property
+    def failure(self) -> str | None:
+        """Why the task is infeasible on it; None where it is feasible."""
+        return None if self.reason is None else self.reason()
+
+    @property
+    def score(self) -> float:
+        """Score of Algorithm 1; -inf where there is none."""
+        return -np.inf if self.terms is None else score(self.terms)
+
+
+def ranked(scene: Scene, preset: Preset) -> list[Candidate]:
+    """Every candidate that was looked at, the chosen one first.
+
+    Feasible ones come by falling score, then the infeasible ones in the order in
+    which they were tried, each with its failure.
+
+    Raises:
+        TaskError: Start, goal or robot make no task on any map.
+    """
+    if scene.start is not None and scene.start == scene.goal:
+        raise TaskError(
+            f"start and goal are the same pixel {scene.start}; give two places"
+        )
+    if not scene.radius > 0:
+        raise TaskError(f"expected a robot radius above 0 px, got {scene.radius:g}")
+    positive("robot_radius", scene.radius)  # nor too large to compute with
+    search = _paper_grid if preset == "paper" else _staged_search
+    tried = list(search(scene))
+    # The plainest reading's failure comes first: the others only explain more away.
+    return sorted(tried, key=lambda c: (c.reason is not None, -c.score))
+
+
+def _staged_search(scene: Scene) -> Iterator[Candidate]:
+    """Reading after reading, up to the first feasible one; its margins by score."""
+    for reading in readings(scene):
+        candidates = _with_margins(scene, reading)
+        yield candidates[0]
+        yield from (_without_detour(c, candidates[0]) for c in candidates[1:])
+        if candidates[0].reason is None:
+            return
+
+
+def _without_detour(candidate: Candidate, plain: Candidate) -> Candidate:
+    """Refuses a margin that sends the robot another way: clearance is not all."""
+    if candidate.terms is None or plain.terms is None:
+        return candidate
+    longer = candidate.terms.path_length / max(plain.terms.path_length, 1.0) - 1
+    if longer <= MAX_DETOUR:
+        return candidate
+    why = f"the margin of {candidate.inflation} px makes the path {longer:.0%} longer"
+    return replace(candidate, reason=lambda: why, terms=None)
+
+
+def _paper_grid(scene: Scene) -> list[Candidate]:
+    """Polarity x cleanup x inflation, literally, but nothing computed twice."""
+    given = scene.image.occupied
+    bases = (
+        [plain_reading(scene, polarity == "dark") for polarity in scene.polarities]
+        if given is None
+        else [Reading(given, "given", scene.image.method)]
+    )
+    with ThreadPoolExecutor(THREADS) as pool:
+        families = list(pool.map(partial(_family, scene), bases))
+        return [c for family in families for c in _judged(scene, family, pool)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Family:
+    """Readings of one polarity, and a guide for paths on all; None without any path."""
+
+    readings: list[Reading]
+    guide: Guide | None
+
+
+def _family(scene: Scene, base: Reading) -> _Family:
+    """The reading at each strength of cleanup."""
+    cleaned = cleanings(base.cells, PAPER_CLEANUPS)
+    family = [
+        replace(base, cells=cells, cleanup=strength)
+        for cells, strength in zip(cleaned, PAPER_CLEANUPS, strict=True)
+    ]
+    if scene.trip is None:
+        return _Family(family, None)
+    clear = clearance(np.logical_and.reduce(cleaned))
+    return _Family(family, guide_of(clear, scene.trip))
+
+
+def _judged(scene: Scene, family: _Family, pool: ThreadPoolExecutor) -> list[Candidate]:
+    """The readings with each margin, up to the first that is infeasible."""
+    trip, guide = scene.trip, family.guide
+    if trip is None:
+        return [Candidate(reading) for reading in family.readings]
+    if guide is None:
+        return [_candidate(reading, trip) for reading in family.readings]
+    # Readings of which cleanup has made the same share their array.
+    grids = {id(reading.cells): reading.cells for reading in family.readings}
+    grounds = list(pool.map(Ground.of, grids.values()))
+    halves = pool.map(
+        lambda margins: terms_of(grounds, trip, margins, guide),
+        (INFLATIONS[:2], INFLATIONS[2:]),
+    )
+    terms = dict(zip(grids, map(add, *halves), strict=True))
+    return [
+        candidate
+        for reading in family.readings
+        for candidate in _candidates(reading, trip, terms[id(reading.cells)])
+    ]
+
+
+def _with_margins(scene: Scene, reading: Reading) -> list[Candidate]:
+    """The reading with each margin, up to the first that is infeasible."""
+    if scene.trip is None:
+        return [Candidate(reading)]
+    ground = Ground.of(reading.cells)
+    guide = guide_of(ground.clear, scene.trip)
+    if guide is None:
+        return [_candidate(reading, scene.trip)]
+    (terms,) = terms_of([ground], scene.trip, INFLATIONS, guide)
+    return _candidates(reading, scene.trip, terms)
+
+
+def _candidates(
+    reading: Reading, trip: Trip, terms: Sequence[ScoreTerms | None]
+) -> list[Candidate]:
+    candidates = []
+    for inflation, each in zip(INFLATIONS, terms, strict=True):
+        candidates.append(_candidate(reading, trip, inflation, each))
+        if each is None:
+            break
+    return candidates
+
+
+def _candidate(
+    reading: Reading, trip: Trip, inflation: int = 0, terms: ScoreTerms | None = None
+) -> Candidate:
+    why = cache(partial(explain, reading.cells, trip, inflation))
+    return Candidate(reading, inflation, why if terms is None else None, terms)

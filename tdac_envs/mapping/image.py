@@ -1,0 +1,232 @@
+"""Map files: what is in the picture, before anybody decides what is an obstacle."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import warnings
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.errors import MapError
+from tdac_envs.core.intake import IMAGE_BYTES, one_line, printable, read_file
+from tdac_envs.grid.grid import BoolGrid
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+MAX_PIXELS = 64_000_000
+"""Largest picture that is decoded, px."""
+
+# Formats that decode without a helper program, so that no file starts a process.
+_FORMATS = ("PNG", "JPEG", "PPM", "BMP", "GIF", "TIFF", "WEBP")
+
+_BT709 = np.array([0.2126, 0.7152, 0.0722], np.float32)
+
+GreyImage = NDArray[np.uint8]
+ColourImage = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapImage:
+    """A decoded map.
+
+    Attributes:
+        colour: Shape (height, width, 3), uint8, RGB, alpha composited.
+        name: File name, or "array".
+        sha256: Hash of the file's bytes (of the array's, where there is no file).
+        occupied: Shape (height, width), bool, True = occupied, where the file itself
+            says which cells are obstacles; None where that has to be found out.
+        method: Which rule of the file gave `occupied`.
+        resolution: Metres per pixel, or None.
+        origin: Pose (x, y, yaw) in metres of the lower-left pixel.
+    """
+
+    colour: ColourImage
+    name: str
+    sha256: str
+    occupied: BoolGrid | None = None
+    method: str = ""
+    resolution: float | None = None
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        height, width = self.colour.shape[:2]
+        if height < 2 or width < 2:
+            raise MapError(
+                f"{self.name}: {width} x {height} pixels are no map; "
+                "expected at least 2 x 2"
+            )
+        flat = self.colour.reshape(-1, 3)
+        if self.occupied is None and np.array_equal(flat[1:], flat[:-1]):
+            raise MapError(
+                f"{self.name}: every pixel has the same colour "
+                f"{tuple(int(c) for c in flat[0])}, so there are no walls to see; "
+                "give an image with free space and obstacles"
+            )
+
+
+def luminance(colour: ColourImage) -> GreyImage:
+    """Luminance after ITU-R BT.709, rounded, shape (height, width), uint8."""
+    return np.asarray(np.rint(colour @ _BT709), np.uint8)
+
+
+def load_image(path: str | Path) -> MapImage:
+    """Reads a map file: a picture, a ROS `map.yaml` or a MovingAI `.map`.
+
+    Raises:
+        MapError: The file is missing, unreadable, too large or shows nothing.
+    """
+    from tdac_envs.mapping.map_files import read_movingai, read_ros_yaml
+
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix in {".yaml", ".yml"}:
+        return read_ros_yaml(path)
+    if suffix == ".map":
+        return read_movingai(path)
+    return read_picture(path)
+
+
+def read_picture(path: Path) -> MapImage:
+    """Reads a PNG, JPEG, PGM, BMP, GIF, TIFF or WebP file of any depth."""
+    data = read_bytes(path)
+    return MapImage(
+        decode(data, path.name), printable(path.name), hashlib.sha256(data).hexdigest()
+    )
+
+
+def from_array(array: NDArray[np.generic]) -> MapImage:
+    """A map from an array.
+
+    Args:
+        array: bool (height, width), True = occupied; or uint8 of shape
+            (height, width), (height, width, 3) RGB or (height, width, 4) RGBA.
+    """
+    digest = hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
+    if array.dtype == np.bool_ and array.ndim == 2:
+        occupied = np.asarray(array, np.bool_)
+        shade = np.where(occupied, 0, 255).astype(np.uint8)
+        return MapImage(_stack(shade), "array", digest, occupied, "given")
+    depth = array.shape[2] if array.ndim == 3 else 1
+    if array.dtype != np.uint8 or array.ndim not in {2, 3} or depth not in {1, 3, 4}:
+        raise MapError(
+            "expected a bool array (height, width) or a uint8 array (height, width), "
+            f"(height, width, 3) or (height, width, 4), got {array.dtype} {array.shape}"
+        )
+    pixels = np.asarray(array, np.uint8).reshape(*array.shape[:2], depth)
+    if depth == 4:
+        return MapImage(_composite(pixels), "array", digest)
+    return MapImage(pixels if depth == 3 else _stack(pixels[..., 0]), "array", digest)
+
+
+def read_bytes(path: Path, most: int = IMAGE_BYTES) -> bytes:
+    """The file's bytes, or a MapError that says why not."""
+    try:
+        return read_file(path, most)
+    except FileNotFoundError:
+        raise MapError(f"{path}: no such file; check the path") from None
+    except IsADirectoryError:
+        raise MapError(f"{path}: is a folder; give the map file in it") from None
+    except OSError as error:
+        raise MapError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def check_size(name: str, width: int, height: int) -> None:
+    """Refuses pictures above `MAX_PIXELS`."""
+    if width * height > MAX_PIXELS:
+        raise MapError(
+            f"{name}: {width} x {height} pixels are {width * height / 1e6:.0f} "
+            f"megapixels; the limit is {MAX_PIXELS / 1e6:.0f}: scale it down first"
+        )
+
+
+def decode(data: bytes, name: str) -> ColourImage:
+    """The picture in a file's bytes, RGB, alpha composited.
+
+    The size is checked from the header, before any pixel is decoded.
+    """
+    from PIL import ImageOps
+
+    with _opened(data, name) as picture:
+        return _to_rgb(ImageOps.exif_transpose(picture))
+
+
+def picture_size(data: bytes, name: str) -> tuple[int, int]:
+    """Width and height of the picture in a file's bytes, by its header."""
+    with _opened(data, name) as picture:
+        return picture.size
+
+
+@contextmanager
+def _opened(data: bytes, name: str) -> Generator[Image.Image]:
+    """The picture in a file's bytes, whatever is wrong with it as a MapError."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            # Pillow's own size warning comes before ours; its error is kept.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            picture = Image.open(io.BytesIO(data), formats=_FORMATS)
+            check_size(name, *picture.size)
+            yield picture
+    except Image.DecompressionBombError:
+        raise MapError(
+            f"{name}: more than {MAX_PIXELS / 1e6:.0f} megapixels: scale it down first"
+        ) from None
+    except UnidentifiedImageError:
+        raise MapError(
+            f"{name}: not an image; expected PNG, JPEG, PGM or BMP, a ROS map.yaml "
+            "or a MovingAI .map"
+        ) from None
+    except MapError:
+        raise
+    # Pillow has dozens of errors for a damaged file.
+    except Exception as error:
+        raise MapError(
+            f"{name}: the image is damaged ({one_line(error)}); save it again"
+        ) from error
+
+
+def _to_rgb(picture: Image.Image) -> ColourImage:
+    if picture.mode.startswith(("I", "F")):
+        return _stack(_to_eight_bits(np.asarray(picture, np.float64)))
+    if picture.mode in {"LA", "PA", "La", "RGBA", "RGBa"} or (
+        "transparency" in picture.info
+    ):
+        return _composite(np.asarray(picture.convert("RGBA"), np.uint8))
+    return np.array(picture.convert("RGB"), np.uint8)
+
+
+def _to_eight_bits(values: NDArray[np.float64]) -> GreyImage:
+    """Grey values of more than 8 bits; ones that use only 8 are taken as they are."""
+    low, high = float(values.min()), float(values.max())
+    if low < 0 or high > 65535:
+        values, high = values - low, high - low
+        return np.asarray(np.rint(values * (255.0 / max(high, 1.0))), np.uint8)
+    if 0 < high <= 1.0:
+        return np.asarray(np.rint(values * 255.0), np.uint8)
+    return np.asarray(np.rint(values if high <= 255 else values / 257.0), np.uint8)
+
+
+def _composite(rgba: NDArray[np.uint8]) -> ColourImage:
+    """Composites over white; over black where nothing could be seen on white.
+
+    Light walls drawn on a transparent sheet are the case for black.
+    """
+    alpha = rgba[..., 3:].astype(np.float32) / 255.0
+    inked = rgba[..., :3] * alpha
+    over_white = np.rint(inked + 255.0 * (1.0 - alpha)).astype(np.uint8)
+    if alpha.min() < 1.0 and int(np.ptp(luminance(over_white))) < 16:
+        return np.asarray(np.rint(inked), np.uint8)
+    return np.asarray(over_white, np.uint8)
+
+
+def _stack(grey: GreyImage) -> ColourImage:
+    return np.repeat(grey[..., None], 3, axis=2)

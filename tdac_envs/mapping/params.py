@@ -1,0 +1,141 @@
+"""`params.json`: what a map's preprocessing chose, and the task on it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tdac_envs.core.arguments import LARGEST, SMALLEST, positive
+from tdac_envs.core.errors import MapError, TaskError, first_problem
+from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+
+PIXELS_PER_METRE = 3779.52
+"""Pixels per metre of the paper's 2-D setting (96 dpi)."""
+
+Place = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+"""A coordinate."""
+Length = Annotated[float, Field(gt=0, ge=SMALLEST, le=LARGEST)]
+"""Above 0."""
+MOST_RAYS = 4096
+Shade = Literal["dark", "light"]
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What the user says of a picture; None where it is to be found out.
+
+    Attributes:
+        polarity: Which pixels are obstacles.
+        threshold: Luminance, 0..255, above which a pixel is light.
+    """
+
+    polarity: Shade | None = None
+    threshold: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.polarity not in (None, "dark", "light"):
+            raise TaskError(
+                f"unknown polarity {self.polarity!r}; expected 'dark' where dark "
+                "pixels are the obstacles, or 'light'"
+            )
+        if self.threshold is not None and not 0 <= self.threshold < 255:
+            raise TaskError(
+                f"expected a threshold from 0 to below 255, got {self.threshold:g}"
+            )
+
+
+UNSAID = Said()
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class RobotParams(_Record):
+    """The differential-drive robot: a disc with a fan of ultrasonic rays."""
+
+    radius: Length = Field(15.0, description="Body radius, px.")
+    axle_length: float = Field(
+        30.0,
+        gt=0,
+        ge=SMALLEST,
+        le=2 * LARGEST,
+        description="Distance of the wheels, px; that of a disc is its diameter.",
+    )
+    max_wheel_speed: Length = Field(75.59, description="Wheel limit, px/s.")
+    n_rays: int = Field(18, ge=1, le=MOST_RAYS, description="Number of range rays.")
+    field_of_view_deg: float = Field(
+        110.0, gt=0, le=360, description="Whole angle of the fan, degrees."
+    )
+    range_max: Length = Field(220.0, description="Range without a hit, px.")
+
+    @classmethod
+    def disc(cls, radius: float) -> RobotParams:
+        """The default robot with another body radius and its axle 2 x radius.
+
+        Raises:
+            TaskError: The radius is not usable.
+        """
+        radius = positive("robot_radius", radius)
+        return cls(radius=radius, axle_length=2 * radius)
+
+
+class ScoreTerms(_Record):
+    """The terms of the score of Algorithm 1."""
+
+    min_clearance: float = Field(description="Smallest clearance on the path, px.")
+    path_length: float = Field(description="Length of the path, px.")
+    sharpness: float = Field(description="Boundary sharpness of the grid.")
+
+
+class MapParams(_Record):
+    """Contents of `params.json`; points are (x, y) in pixels, headings in rad."""
+
+    schema_version: Literal[1] = 1
+    source: str = Field(description="File name of the map image.")
+    source_sha256: str = Field(
+        description="SHA-256 of the map image's bytes; of a grid, `grid.sha256()`."
+    )
+    width: int = Field(gt=0, description="px")
+    height: int = Field(gt=0, description="px")
+    start: tuple[Place, Place] | None = None
+    heading: Place = 0.0
+    goal: tuple[Place, Place] | None = None
+    robot: RobotParams = RobotParams()
+    polarity: Literal["dark", "light", "mixed", "given"] = Field(
+        description="Which pixels are obstacles; `given` where the file says so."
+    )
+    method: str = Field(description="How the image was made black and white.")
+    threshold: float | None = Field(None, description="Luminance, 0..255.")
+    cleanup: int = Field(0, ge=0, description="Strength of the noise removal, px.")
+    opening: int = Field(0, ge=0, description="Obstacle lines thinner are dropped, px.")
+    inflation: float = Field(0, ge=0, le=LARGEST, description="Planner's margin, px.")
+    score: float | None = None
+    score_terms: ScoreTerms | None = None
+    resolution: Length | None = Field(None, description="Metres per pixel.")
+    origin: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
+    notes: tuple[str, ...] = Field((), description="What was changed, e.g. by snap.")
+
+    def save(self, path: Path) -> None:
+        """Writes the file."""
+        path.write_text(json.dumps(self.model_dump(mode="json"), indent=2) + "\n")
+
+    @classmethod
+    def load(cls, path: Path) -> MapParams:
+        """Reads the file.
+
+        Raises:
+            MapError: It is missing, not JSON, or has a wrong or unknown field.
+        """
+        try:
+            return cls.model_validate(parse_json(read_file(path, TEXT_BYTES)))
+        except OSError as error:
+            raise MapError(f"cannot read {path}: {error.strerror}") from error
+        except ValidationError as error:
+            raise MapError(f"{path}: {first_problem(error)}") from error
+        except ValueError as error:
+            raise MapError(f"{path}: {error}") from error

@@ -1,0 +1,263 @@
+"""From a map picture to the occupancy grid that a task runs on (Algorithm 1)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.errors import PolarityError, TaskError
+from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.mapping.candidates import Candidate, Preset, ranked
+from tdac_envs.mapping.image import ColourImage, MapImage, from_array, load_image
+from tdac_envs.mapping.params import UNSAID, MapParams, RobotParams, Said, Shade
+from tdac_envs.mapping.readings import readings
+from tdac_envs.mapping.scene import Reading, Scene, unclear
+from tdac_envs.mapping.score import Point, nearest_free
+
+Source = str | Path | NDArray[np.generic] | MapImage
+
+_CLOSE_CALL = "dark and light obstacles are both likely"
+
+
+def preprocess(
+    image: Source,
+    start: tuple[float, float] | None = None,
+    goal: tuple[float, float] | None = None,
+    robot_radius: float = 15.0,
+    *,
+    preset: Preset = "default",
+    snap: bool = False,
+    heading: float = 0.0,
+    polarity: Shade | None = None,
+    threshold: float | None = None,
+) -> tuple[OccupancyGrid, MapParams]:
+    """The occupancy grid of a map picture, and what was chosen to get it.
+
+    Args:
+        image: Path of a picture, a ROS `map.yaml` or a MovingAI `.map`; or an array:
+            bool (True = occupied), or uint8 grey, RGB or RGBA.
+        start: Pixel (x, y), or None to judge by the picture alone.
+        goal: Pixel (x, y), or None.
+        robot_radius: Body radius, px.
+        preset: "default" searches from the plain reading outwards and stops at the
+            first that is feasible; "paper" is the literal grid of Algorithm 1.
+        snap: Move start and goal to the nearest pixel that is free for the body;
+            `MapParams.notes` says from where.
+        heading: Start heading, rad, from +x towards +y.
+        polarity: Which pixels are obstacles; found out from the picture if None.
+        threshold: Luminance, 0..255, above which a pixel is light; found out if None.
+
+    Raises:
+        MapError: The image cannot be used.
+        PolarityError: There is a task, and both polarities are likely.
+        TaskError: No reading of it makes the task feasible; says why.
+    """
+    source, said = as_image(image), Said(polarity, threshold)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, said)
+    candidates = ranked(scene, preset)
+    if unclear(scene, candidates[0].reading.polarity):
+        if scene.trip is not None:
+            raise _close_call(scene, source.colour, preset, heading)
+        notes.append(f"{_CLOSE_CALL}; give polarity='dark' or 'light'")
+    return _result(scene, candidates[0], preset, heading, notes)
+
+
+def examine(
+    image: Source,
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+    robot_radius: float,
+    *,
+    preset: Preset,
+    snap: bool,
+    heading: float,
+    said: Said,
+) -> tuple[OccupancyGrid, MapParams, list[Candidate]]:
+    """The same as `preprocess`, and every candidate that was looked at; see `ranked`.
+
+    Raises:
+        MapError: As `preprocess` does.
+        PolarityError: Both polarities are likely, also without a task.
+        TaskError: As `preprocess` does.
+    """
+    source = as_image(image)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, said)
+    candidates = ranked(scene, preset)
+    if unclear(scene, candidates[0].reading.polarity):
+        raise _close_call(scene, source.colour, preset, heading)
+    grid, params = _result(scene, candidates[0], preset, heading, notes)
+    return grid, params, candidates
+
+
+def _scene(
+    source: MapImage,
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+    robot_radius: float,
+    snap: bool,
+    said: Said,
+) -> tuple[Scene, list[str]]:
+    """The picture and what is asked of it, and notes on what was moved."""
+    if source.occupied is not None and said != UNSAID:
+        raise TaskError(
+            f"{source.name} says itself which cells are obstacles; leave out polarity "
+            "and threshold"
+        )
+    notes: list[str] = []
+    ends: list[Point | None] = []
+    for name, point in (("start", start), ("goal", goal)):
+        pixel = None if point is None else _to_pixel(source, name, point)
+        if pixel is not None and snap:
+            pixel = _snapped(source, name, pixel, robot_radius, said, notes)
+        ends.append(pixel)
+    return Scene.of(source, ends[0], ends[1], robot_radius, said), notes
+
+
+def _result(
+    scene: Scene, best: Candidate, preset: Preset, heading: float, notes: list[str]
+) -> tuple[OccupancyGrid, MapParams]:
+    """The chosen grid.
+
+    Raises:
+        TaskError: The task is infeasible on it.
+    """
+    if best.reason is not None:
+        raise TaskError(f"{scene.image.name}: {best.reason()}")
+    return _grid(scene, best), _params(
+        scene, best, heading, notes + _changed(best.reading, preset)
+    )
+
+
+def _grid(scene: Scene, best: Candidate) -> OccupancyGrid:
+    image = scene.image
+    return OccupancyGrid(best.reading.cells, image.resolution, image.origin)
+
+
+def _close_call(
+    scene: Scene, colour: ColourImage, preset: Preset, heading: float
+) -> PolarityError:
+    """The error that names both readings of a picture, and has what shows them.
+
+    Args:
+        scene: The picture as it was judged.
+        colour: The picture as it came.
+        preset: As for `preprocess`.
+        heading: As for `preprocess`.
+    """
+    told: list[str] = []
+    pictures: dict[str, Any] = {}
+    for polarity in scene.polarities:
+        one = replace(scene, said=replace(scene.said, polarity=polarity))
+        best = ranked(one, preset)[0]
+        free = float(1 - best.reading.cells.mean())
+        told.append(f"{polarity} obstacles leave {free:.0%} free{_way(best)}")
+        params = _params(one, best, heading, [])
+        pictures[polarity] = (colour, _grid(one, best), params)
+    message = f"{scene.image.name}: {_CLOSE_CALL}: {', '.join(told)}"
+    advice = "give polarity='dark' or 'light' (--polarity dark or --polarity light)"
+    return PolarityError(f"{message}; {advice}", scene.image.name, pictures)
+
+
+def _way(best: Candidate) -> str:
+    """How far it is to the goal on a reading, as a remark."""
+    if best.terms is not None:
+        return f" and a path of {best.terms.path_length:.0f} px"
+    return "" if best.reason is None else " and no path"
+
+
+def rank_candidates(
+    image: Source,
+    start: Point | None,
+    goal: Point | None,
+    robot_radius: float = 15.0,
+    *,
+    preset: Preset = "default",
+) -> list[Candidate]:
+    """Every candidate that was looked at, the chosen one first; see `ranked`."""
+    return ranked(Scene.of(as_image(image), start, goal, robot_radius), preset)
+
+
+def as_image(image: Source) -> MapImage:
+    """The decoded map of a path, an array, or itself."""
+    if isinstance(image, MapImage):
+        return image
+    if isinstance(image, np.ndarray):
+        return from_array(image)
+    return load_image(image)
+
+
+def _to_pixel(image: MapImage, name: str, point: tuple[float, float]) -> Point:
+    """The pixel that holds the point; refused outside the map."""
+    height, width = image.colour.shape[:2]
+    if not np.isfinite(point).all():
+        raise TaskError(f"expected {name} to be two finite numbers, got {point}")
+    x, y = int(np.floor(point[0] + 0.5)), int(np.floor(point[1] + 0.5))
+    if not (0 <= x < width and 0 <= y < height):
+        raise TaskError(
+            f"{name} ({point[0]:g}, {point[1]:g}) lies outside the map; expected "
+            f"0 <= x < {width} and 0 <= y < {height}"
+        )
+    return x, y
+
+
+def _snapped(
+    image: MapImage,
+    name: str,
+    point: Point,
+    radius: float,
+    said: Said,
+    notes: list[str],
+) -> Point:
+    """The point moved to the nearest pixel that is free for the body."""
+    reading = next(readings(Scene.of(image, None, None, radius, said)))
+    free = body_free(clearance(reading.cells), radius)
+    moved = nearest_free(free, *point)
+    if moved is None or moved == point:
+        return point
+    notes.append(f"{name} moved from {point} to {moved}")
+    return moved
+
+
+def _changed(reading: Reading, preset: Preset) -> list[str]:
+    """In what the reading goes beyond the picture."""
+    if not (reading.opening or reading.cleanup):
+        return []
+    if preset == "paper":
+        what = f"pieces and holes under {reading.cleanup} px removed, gaps closed"
+        return [f"cleaned with strength {reading.cleanup}: {what}; look at the preview"]
+    what = f"specks up to {reading.cleanup} px"
+    if reading.opening:
+        what = f"lines under {reading.opening} px and {what}"
+    return [f"taken for free space in the picture: {what}; look at the preview"]
+
+
+def _params(
+    scene: Scene, best: Candidate, heading: float, notes: list[str]
+) -> MapParams:
+    image, reading = scene.image, best.reading
+    height, width = scene.luminance.shape
+    return MapParams(
+        source=image.name,
+        source_sha256=image.sha256,
+        width=width,
+        height=height,
+        start=scene.start,
+        heading=heading,
+        goal=scene.goal,
+        robot=RobotParams.disc(scene.radius),
+        polarity=reading.polarity,
+        method=reading.method,
+        threshold=reading.threshold,
+        cleanup=reading.cleanup,
+        opening=reading.opening,
+        inflation=best.inflation,
+        score=None if best.terms is None else best.score,
+        score_terms=best.terms,
+        resolution=image.resolution,
+        origin=image.origin,
+        notes=tuple(notes),
+    )

@@ -1,0 +1,240 @@
+"""Readings of a map picture, from the plain one outwards.
+
+A reading says which pixels are occupied. Later readings explain more of the picture
+away, and each does so only where the picture itself gives a reason: a strong colour,
+pieces too small for walls, lines too thin for this map's walls. None removes a stroke
+of the walls' own colour and thickness, so that a closed map stays closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.mapping.binarize import (
+    chroma,
+    disc,
+    floor_distance,
+    otsu,
+    outside,
+)
+from tdac_envs.mapping.cleanup import thick_share, without_lines, without_specks
+from tdac_envs.mapping.image import GreyImage, luminance
+from tdac_envs.mapping.lighting import LEVEL
+from tdac_envs.mapping.params import UNSAID
+from tdac_envs.mapping.scene import Reading, Scene, decide_light_free, touches
+
+SLIVER = 6.0
+"""Widest strip along the outside of a plan that belongs to it, px."""
+_FAINT = 0.3
+"""From half-way between wall and floor towards the floor, where photographs are cut."""
+
+
+def readings(scene: Scene) -> Iterator[Reading]:
+    """Readings of the likelier polarity, the plainest first.
+
+    Without start and goal there is only one, marks ignored: nothing could tell
+    whether a bolder one is needed.
+    """
+    given = scene.image.occupied
+    if given is not None:
+        yield Reading(given, "given", scene.image.method)
+        return
+    light_free = decide_light_free(scene)
+    plain = plain_reading(scene, light_free)
+    unmarked = _without_marks(scene, plain)
+    if not scene.ends:
+        yield unmarked or plain
+        return
+    beyond = _beyond_the_plan(scene, plain)
+    for reading in _outwards(scene, plain, unmarked):
+        yield _walled_in(reading, beyond)
+
+
+def _outwards(
+    scene: Scene, plain: Reading, unmarked: Reading | None
+) -> Iterator[Reading]:
+    mixed = _mixed(scene) if scene.said == UNSAID else None
+    if mixed is not None:
+        yield mixed
+        for extent in (4, 8, 16):
+            yield _without(mixed, extent)
+        return
+    yield plain
+    base = unmarked or plain
+    if unmarked is not None:
+        yield unmarked
+    if scene.unknown is not None:
+        # A mapping tool's output: what is dark was measured, and none of it drawn.
+        yield _without(base, 4)
+        return
+    yield from _bolder(base)
+
+
+def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
+    """The outside, where start and goal are inside; empty otherwise."""
+    strong = scene.saturated
+    ignored = strong if _are_marks(scene, strong, plain) else np.zeros_like(strong)
+    region = outside(scene.luminance, plain.polarity == "dark", ignored)
+    if touches(region, scene.ends):
+        return np.zeros_like(region)
+    return region
+
+
+def _walled_in(reading: Reading, beyond: BoolGrid) -> Reading:
+    """The reading with the paper around the building closed.
+
+    Windows are drawn with thin or grey lines, and no robot leaves through them.
+    """
+    if reading.polarity == "mixed" or not (beyond & ~reading.cells).any():
+        return reading
+    note = f"{reading.method}, outside of the plan closed"
+    cells = reading.cells | beyond
+    return replace(reading, cells=cells | _slivers(cells, beyond), method=note)
+
+
+def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
+    """Free pieces that cling to the outside: blurred edges, gaps within letters."""
+    count, labels = cv2.connectedComponents((~cells).astype(np.uint8), connectivity=4)
+    apart = cv2.distanceTransform((~beyond).astype(np.uint8), cv2.DIST_L2, 3) > SLIVER
+    deep = np.bincount(labels[apart], minlength=count) > 0
+    deep[0] = True
+    return np.asarray(~deep[labels])
+
+
+def plain_reading(scene: Scene, light_free: bool) -> Reading:
+    """One threshold, with two things that it cannot know.
+
+    A map saver's "unknown" grey counts as occupied, and where most walls are drawn in
+    strong colours, the light ones among these (green, yellow) are walls as well.
+    """
+    threshold, method = scene.threshold, "otsu"
+    if scene.said.threshold is not None:
+        method = "threshold as given"
+    elif scene.photo:
+        method = "light evened"
+    if scene.said.polarity is not None:
+        method += ", polarity as given"
+    level = scene.unknown
+    if level is not None:
+        threshold = _beside(level, threshold, light_free)
+        method = f"otsu, unknown grey {level} not free"
+    reading = _cut(scene.luminance, threshold, light_free, method)
+    if scene.photo:
+        reading = _of_photo(scene, light_free, method)
+    strong = scene.saturated
+    coloured = int((strong & reading.cells).sum()) > 0.5 * int(reading.cells.sum())
+    if coloured and strong.mean() < 0.3 and not touches(strong, scene.ends):
+        method = f"{method}, coloured walls"
+        return replace(reading, cells=reading.cells | strong, method=method)
+    return reading
+
+
+def _of_photo(scene: Scene, light_free: bool, method: str) -> Reading:
+    """A photograph cut nearer to the floor: blur makes thin walls faint."""
+    grey = scene.luminance
+    floor = float(np.median(grey[(grey > scene.threshold) == light_free]))
+    cut = scene.threshold + _FAINT * (floor - scene.threshold)
+    # The threshold is none of the picture as it came.
+    return replace(_cut(grey, cut, light_free, method), threshold=None)
+
+
+def _beside(level: int, threshold: float, light_free: bool) -> float:
+    """A threshold that leaves the unknown grey on the occupied side.
+
+    Whatever is more free than a map saver's 205 is free by its own rule.
+    """
+    safe = level + 0.5 if light_free else level - 0.5
+    if level > 190 or level < 65:
+        return safe
+    return max(threshold, safe) if light_free else min(threshold, safe)
+
+
+def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Reading:
+    light = grey > threshold
+    cells = ~light if light_free else light
+    return Reading(cells, "dark" if light_free else "light", method, threshold)
+
+
+def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
+    """Whether strong colours are marks: few, and most walls of another colour."""
+    on_walls = int((strong & plain.cells).sum())
+    allowed = 0.05 if touches(strong, scene.ends) else 0.02
+    few = float(strong.mean()) <= allowed
+    return few and on_walls <= 0.4 * float(plain.cells.sum())
+
+
+def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
+    """Saturated marks and lines dropped; None where there are none."""
+    colour = scene.image.colour
+    strong = scene.saturated
+    marks = strong & plain.cells
+    if not marks.any() or not _are_marks(scene, strong, plain):
+        return None
+    near = cv2.dilate(marks.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    cells = plain.cells & ~(near & (chroma(colour) >= 30))
+    return replace(plain, cells=cells, method=f"{plain.method}, marks ignored")
+
+
+def _mixed(scene: Scene) -> Reading | None:
+    """What is unlike the floor at start and goal, where that is of a middle tone.
+
+    Only where much of the floor's rim is darker and much of it lighter: then no
+    threshold separates it.
+    """
+    shape, colour = scene.luminance.shape, scene.image.colour
+    spots = [disc(shape, x, y, scene.radius / 2) for x, y in scene.ends]
+    floors = np.array([np.median(colour[spot], axis=0) for spot in spots])
+    if float(np.ptp(floors, axis=0).max()) > 16:
+        return None
+    floor = floors.mean(axis=0)
+    grey = int(luminance(np.rint(floor).astype(np.uint8)[None, None])[0, 0])
+    gap = scene.luminance.astype(np.int16) - grey
+    like = (np.abs(gap) < 8).astype(np.uint8)
+    # Noise makes the floor of a photograph darker and lighter, too, but not by so much.
+    far = max(20.0, abs(grey - LEVEL)) if scene.photo else 20.0
+    rim = (cv2.dilate(like, np.ones((5, 5), np.uint8)) > 0) & (np.abs(gap) >= far)
+    darker = float((gap[rim] < 0).mean()) if rim.any() else 0.0
+    if like.mean() < 0.02 or not 0.2 <= darker <= 0.8:
+        return None
+    distance = floor_distance(colour, floor)
+    cells = np.asarray(distance > otsu(distance))
+    return Reading(cells, "mixed", "colour unlike the floor")
+
+
+def _bolder(base: Reading) -> Iterator[Reading]:
+    """Drops specks, then lines that are thin beside this map's walls."""
+    shape = base.cells.shape
+    for extent in (4, 8, 16, 32):
+        if extent <= 0.04 * min(shape):
+            yield _without(base, extent)
+    for width in (3, 5) if min(shape) >= 1500 else (3,):
+        if thick_share(base.cells, 2 * width) < 0.5:
+            return
+        opened = without_lines(base.cells, width)
+        for extent in (8, 16, 32):
+            if extent <= 0.04 * min(shape):
+                cells = without_specks(opened, extent)
+                note = f"lines under {width} px and specks up to {extent} px ignored"
+                yield _note(base, cells, note, extent, width)
+
+
+def _without(base: Reading, extent: int) -> Reading:
+    cells = without_specks(base.cells, extent)
+    return _note(base, cells, f"specks up to {extent} px ignored", extent, 0)
+
+
+def _note(
+    base: Reading, cells: BoolGrid, note: str, cleanup: int, opening: int
+) -> Reading:
+    return replace(
+        base,
+        cells=cells,
+        method=f"{base.method}, {note}",
+        cleanup=cleanup,
+        opening=opening,
+    )

@@ -1,0 +1,162 @@
+"""A picture with what is asked of it, and what a reading of it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.mapping.binarize import disc, otsu, saturated, unknown_level
+from tdac_envs.mapping.image import GreyImage, MapImage, luminance
+from tdac_envs.mapping.lighting import LEVEL, evened, photographed
+from tdac_envs.mapping.params import UNSAID, Said, Shade
+from tdac_envs.mapping.polarity import light_free_evidence
+from tdac_envs.mapping.score import Point, Trip
+
+Polarity = Shade | Literal["mixed", "given"]
+
+# Start and goal of a real task are free with the body's disc around them, so two
+# clean discs outweigh a doubtful picture but not a clear one.
+_W_TASK = 2.5
+CLOSE = 0.5
+"""Log-odds below which the user is asked; public maps with a task are above 5."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """One way to tell obstacles from free space.
+
+    Attributes:
+        cells: Shape (height, width), bool, True = occupied.
+        polarity: Which pixels are obstacles.
+        method: What was done, in words.
+        threshold: Luminance at which the picture was cut, 0..255.
+        cleanup: Strength of `cleanup.clean` or largest speck dropped, px.
+        opening: Lines thinner than this were dropped, px.
+    """
+
+    cells: BoolGrid
+    polarity: Polarity
+    method: str
+    threshold: float | None = None
+    cleanup: int = 0
+    opening: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A picture with what is asked of it, and what all its readings need.
+
+    Attributes:
+        image: The map; a photograph with its light evened.
+        luminance: Of its colours.
+        start: Pixel (x, y), or None.
+        goal: Pixel (x, y), or None.
+        radius: Of the body, px.
+        said: What the user says of it.
+        photo: Whether it is a photograph whose light was evened.
+    """
+
+    image: MapImage
+    luminance: GreyImage
+    start: Point | None
+    goal: Point | None
+    radius: float
+    said: Said = UNSAID
+    photo: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        image: MapImage,
+        start: Point | None,
+        goal: Point | None,
+        radius: float,
+        said: Said = UNSAID,
+    ) -> Scene:
+        """The scene of an image and a task; start and goal may be missing."""
+        grey, task = luminance(image.colour), (start, goal, radius, said)
+        by_itself = image.occupied is None and said.threshold is None
+        even = evened(image.colour, grey) if by_itself and photographed(grey) else None
+        if even is None:
+            return cls(image, grey, *task)
+        return cls(replace(image, colour=even.colour), even.luminance, *task, True)
+
+    @property
+    def ends(self) -> list[Point]:
+        """Start and goal, as far as given."""
+        return [point for point in (self.start, self.goal) if point is not None]
+
+    @property
+    def polarities(self) -> tuple[Shade, ...]:
+        """Those that may be: both, unless the user says which."""
+        said = self.said.polarity
+        return ("dark", "light") if said is None else (said,)
+
+    @property
+    def trip(self) -> Trip | None:
+        """What the body has to do; None unless both start and goal are given."""
+        if self.start is None or self.goal is None:
+            return None
+        return Trip(self.start, self.goal, self.radius)
+
+    @cached_property
+    def threshold(self) -> float:
+        """Above it a pixel is light: as given, of evened light, or Otsu's."""
+        if self.said.threshold is not None:
+            return self.said.threshold
+        return LEVEL if self.photo else otsu(self.luminance)
+
+    @cached_property
+    def evidence(self) -> float:
+        """Log-odds that the light side is free, start and goal considered."""
+        light = self.luminance > self.threshold
+        found = light_free_evidence(self.luminance, light, self.photo)
+        # A mark may cover start or goal; paper may be coloured all over.
+        neutral = ~self.saturated
+        neutral = neutral if neutral.mean() > 0.5 else np.ones_like(neutral)
+        for x, y in self.ends:
+            judged = disc(light.shape, x, y, self.radius) & neutral
+            if not judged.any():
+                continue
+            found += _W_TASK * (2 * float(light[judged].mean()) - 1)
+        return found
+
+    @cached_property
+    def saturated(self) -> BoolGrid:
+        """Pixels of strong colour."""
+        return saturated(self.image.colour)
+
+    @cached_property
+    def unknown(self) -> int | None:
+        """The "unknown" grey, unless start and goal both stand on it."""
+        by_itself = self.said.threshold is None and not self.photo
+        level = unknown_level(self.luminance) if by_itself else None
+        if level is None:
+            return None
+        shades = [abs(int(self.luminance[y, x]) - level) for x, y in self.ends]
+        return None if shades and max(shades) <= 3 else level
+
+
+def decide_light_free(scene: Scene) -> bool:
+    """Whether the light side is free: as given, or from picture, start and goal."""
+    if scene.said.polarity is not None:
+        return scene.said.polarity == "dark"
+    return scene.evidence > 0
+
+
+def unclear(scene: Scene, polarity: Polarity) -> bool:
+    """Whether the other polarity is nearly as likely as this one, or likelier."""
+    settled = scene.image.occupied is not None or scene.said.polarity is not None
+    if settled or polarity not in ("dark", "light"):
+        return False
+    towards = scene.evidence if polarity == "dark" else -scene.evidence
+    return towards < CLOSE
+
+
+def touches(mask: BoolGrid, points: list[Point]) -> bool:
+    """Whether any of the points lies on the mask."""
+    return any(bool(mask[y, x]) for x, y in points)

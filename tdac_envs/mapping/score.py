@@ -1,0 +1,225 @@
+"""Is a grid feasible for the body, and how good is it (Algorithm 1)?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.grid.astar import Guide
+from tdac_envs.grid.grid import BoolGrid, FloatGrid, body_free, clearance
+from tdac_envs.grid.plan import Path, guide_between, path_length, plan_paths
+from tdac_envs.mapping.params import ScoreTerms
+
+Point = tuple[int, int]
+
+_WEIGHTS = (2.5, -0.02, -1.2)
+
+
+def sharpness(cells: BoolGrid) -> float:
+    """Changes between free and occupied among neighbouring pixels, per pixel.
+
+    The boundary term of Algorithm 1 (the paper favours "boundary smoothness" and
+    leaves it undefined): 0 for an empty map, 2 for a chessboard.
+    """
+    flips = np.count_nonzero(cells[1:] != cells[:-1])
+    flips += np.count_nonzero(cells[:, 1:] != cells[:, :-1])
+    return flips / cells.size
+
+
+def score(terms: ScoreTerms) -> float:
+    """`2.5 min_clearance - 0.02 path_length - 1.2 sharpness`."""
+    values = (terms.min_clearance, terms.path_length, terms.sharpness)
+    return sum(w * v for w, v in zip(_WEIGHTS, values, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """What the body has to do: pixels (x, y), and its radius in px."""
+
+    start: Point
+    goal: Point
+    radius: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """A grid with what its score needs of it.
+
+    Attributes:
+        clear: `clearance` of its cells.
+        sharpness: Of its cells.
+    """
+
+    clear: FloatGrid
+    sharpness: float
+
+    @classmethod
+    def of(cls, cells: BoolGrid) -> Ground:
+        """That of cells, shape (height, width), bool, True = occupied."""
+        return cls(clearance(cells), sharpness(cells))
+
+
+def terms_of(
+    grounds: Sequence[Ground], trip: Trip, margins: Sequence[int], guide: Guide
+) -> list[list[ScoreTerms | None]]:
+    """Terms of the score with each margin that the planner keeps around the body.
+
+    Args:
+        grounds: Of the same size, best with fewer obstacles towards the end.
+        trip: Start, goal and body.
+        margins: In rising order, px.
+        guide: From `guide_of`, for a grid without obstacles that a ground has not.
+
+    Returns:
+        For each ground a list as long as `margins`; None where the body does not get
+        to the goal.
+    """
+    paths: list[Path] = [np.empty((0, 2))] * len(grounds)
+    found: list[list[ScoreTerms | None]] = [[] for _ in grounds]
+    for margin in margins:
+        spaces = {
+            number: body_free(ground.clear, trip.radius + margin)
+            for number, ground in enumerate(grounds)
+            # Where a narrower body does not get to the goal, this one does not.
+            if margin == margins[0] or len(paths[number])
+        }
+        spaces = {n: s for n, s in spaces.items() if not _leads_over(paths[n], s)}
+        planned = plan_paths(list(spaces.values()), trip.start, trip.goal, guide)
+        for number, path in zip(spaces, planned, strict=True):
+            paths[number] = path
+        for terms, ground, path in zip(found, grounds, paths, strict=True):
+            terms.append(_terms(ground, path))
+    return found
+
+
+def _terms(ground: Ground, path: Path) -> ScoreTerms | None:
+    if len(path) == 0:
+        return None
+    columns, rows = path.astype(np.intp).T
+    return ScoreTerms(
+        min_clearance=float(ground.clear[rows, columns].min()),
+        path_length=path_length(path),
+        sharpness=ground.sharpness,
+    )
+
+
+def guide_of(clear: FloatGrid, trip: Trip) -> Guide | None:
+    """What speeds up `terms_of` a grid, or of one with more obstacles.
+
+    Args:
+        clear: Clearance of the grid.
+        trip: Start, goal and body.
+
+    Returns:
+        None where the body does not get from start to goal.
+    """
+    return guide_between(body_free(clear, trip.radius), trip.start, trip.goal)
+
+
+def _leads_over(path: Path, free: BoolGrid) -> bool:
+    """Whether a path of single steps is still one where fewer pixels are free.
+
+    Then it is still the shortest one, and the one that `plan_path` takes.
+    """
+    columns, rows = path.astype(np.intp).T
+    over = free[rows, columns].all() and free[rows[1:], columns[:-1]].all()
+    return bool(len(path) and over and free[rows[:-1], columns[1:]].all())
+
+
+def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
+    """Why the body does not get from start to goal with a margin, and what would do.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        trip: Start, goal and body.
+        inflation: Margin that the planner keeps around the body, px.
+    """
+    clear = clearance(cells)
+    free = body_free(clear, trip.radius + inflation)
+    start, goal, radius = trip.start, trip.goal, trip.radius
+    for name, (x, y), other in (("start", start, goal), ("goal", goal, start)):
+        if free[y, x]:
+            continue
+        what = (
+            "lies in an obstacle"
+            if cells[y, x]
+            else f"is {clear[y, x]:.1f} px from an obstacle, too near"
+        )
+        near = _nearest_text(_joined(free, other), x, y, radius)
+        return f"{name} ({x}, {y}) {what}; {near}{_narrower(clear, trip)}"
+    widest = widest_radius(clear, start, goal)
+    advice = (
+        "no robot gets through: a wall closes the way"
+        if widest < 0.5
+        else f"the largest radius that gets through is {widest:.1f} px"
+    )
+    return (
+        f"start {start} and goal {goal} are not connected for a robot of "
+        f"{radius:g} px radius; {advice}"
+    )
+
+
+def _joined(free: BoolGrid, point: Point) -> BoolGrid:
+    """The pixels that are joined with a point; all where it is not free itself."""
+    labels = _labels(free)
+    label = labels[point[::-1]]
+    joined: BoolGrid = labels == label
+    return joined if label else free
+
+
+def _narrower(clear: FloatGrid, trip: Trip) -> str:
+    """What would do without another start or goal; empty where nothing would."""
+    widest = widest_radius(clear, trip.start, trip.goal)
+    if widest < 0.5:
+        return ""
+    return f"; from this start to this goal a radius of {widest:.1f} px gets through"
+
+
+def _nearest_text(free: BoolGrid, x: int, y: int, radius: float) -> str:
+    nearest = nearest_free(free, x, y)
+    if nearest is None:
+        return f"a robot of {radius:g} px radius fits nowhere on this map"
+    return f"the nearest free pixel for a robot of {radius:g} px radius is {nearest}"
+
+
+def nearest_free(free: BoolGrid, x: int, y: int) -> Point | None:
+    """The free pixel nearest to (x, y), or None where there is none."""
+    rows, columns = np.nonzero(free)
+    if rows.size == 0:
+        return None
+    best = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
+    return int(columns[best]), int(rows[best])
+
+
+def connected(free: BoolGrid, start: Point, goal: Point) -> bool:
+    """Whether two free pixels are joined, without cutting a corner.
+
+    A diagonal step needs both pixels beside it, so 4-connectivity decides.
+    """
+    labels = _labels(free)
+    at_start, at_goal = labels[start[::-1]], labels[goal[::-1]]
+    return bool(at_start == at_goal and at_start > 0)
+
+
+def _labels(free: BoolGrid) -> NDArray[np.int32]:
+    """Of each free pixel the piece that it is in, from 1; 0 of the others."""
+    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    return labels.astype(np.int32, copy=False)
+
+
+def widest_radius(clear: FloatGrid, start: Point, goal: Point) -> float:
+    """Largest body radius that gets from start to goal, to 0.1 px; -1 if none."""
+    if not connected(body_free(clear, 0.0), start, goal):
+        return -1.0
+    low, high = 0.0, float(min(clear[start[::-1]], clear[goal[::-1]]))
+    while high - low > 0.1:
+        middle = (low + high) / 2
+        if connected(body_free(clear, middle), start, goal):
+            low = middle
+        else:
+            high = middle
+    return float(np.floor(low * 10) / 10)

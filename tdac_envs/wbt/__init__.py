@@ -1,1 +1,0 @@
-"""Webots world files: text → nodes → frames → prisms → `tdac_envs.world.World`."""

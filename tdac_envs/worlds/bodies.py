@@ -1,0 +1,84 @@
+"""What of a world stands in the way of its e-puck, and on which ground."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from tdac_envs.worlds.footprint import Disc
+from tdac_envs.worlds.world import EPuck, Obstacle, Part, World
+
+BODY_RADIUS = 0.037
+BODY_BOTTOM, BODY_TOP = 0.0025, 0.0475
+"""Of an e-puck above the ground, m."""
+
+_STEP_DOWN = 0.01
+"""How far above the robot's origin the ground under it may be, m."""
+_NEAR = 0.005
+"""Gap up to which a thing stands on what is below it, m."""
+
+
+def bodies(world: World) -> tuple[Obstacle, ...]:
+    """Obstacles, walls of the arenas, and the e-pucks that are not driven.
+
+    First the obstacles, in their order; those with a mass that hang in the air have
+    fallen.
+    """
+    floor = floor_under(world)
+    fallen = [_fallen(thing, world.obstacles, floor) for thing in world.obstacles]
+    walls = [arena.wall() for arena in world.arenas if arena.has_wall]
+    return (*fallen, *walls, *map(standing_robot, world.robots[1:]))
+
+
+def floor_under(world: World) -> float:
+    """Height of the ground under the driven robot, m.
+
+    It may stand on an obstacle (a table, a plank); otherwise on an arena, or at 0.
+    """
+    if not world.robots:
+        return 0.0
+    x, y, reach = world.robot.x, world.robot.y, world.robot.z + _STEP_DOWN
+    under = [part for thing in world.obstacles for part in thing.solid]
+    tops = [part.top for part in under if part.shape.contains(x, y)]
+    tops += [arena.z for arena in world.arenas if arena.inside.contains(x, y)]
+    return max((top for top in tops if top <= reach), default=0.0)
+
+
+def at_body_height(parts: Iterable[Part], floor: float) -> tuple[Part, ...]:
+    """The parts that an e-puck which stands on `floor` can hit."""
+    low, high = floor + BODY_BOTTOM, floor + BODY_TOP
+    return tuple(part for part in parts if part.top > low and part.bottom < high)
+
+
+def standing_robot(robot: EPuck) -> Obstacle:
+    """An e-puck that is not driven, as an obstacle."""
+    disc = Disc(robot.x, robot.y, BODY_RADIUS)
+    part = Part(disc, robot.z + BODY_BOTTOM, robot.z + BODY_TOP)
+    return Obstacle(robot.name, "E-puck", robot.x, robot.y, (part,), (part,))
+
+
+def _fallen(thing: Obstacle, others: Iterable[Obstacle], floor: float) -> Obstacle:
+    """An obstacle with a mass, let down onto the floor or what is below it."""
+    if thing.mass is None or not thing.solid:
+        return thing
+    bottom = min(part.bottom for part in thing.solid)
+    below = [
+        p.top for o in others if o is not thing for p in o.solid if _above(thing, p)
+    ]
+    drop = bottom - max([floor, *(top for top in below if top <= bottom + _NEAR)])
+    if drop <= _NEAR:
+        return thing
+    solid, visible = (
+        tuple(replace(p, bottom=p.bottom - drop, top=p.top - drop) for p in parts)
+        for parts in (thing.solid, thing.visible)
+    )
+    return replace(thing, solid=solid, visible=visible)
+
+
+def _above(thing: Obstacle, part: Part) -> bool:
+    """Whether some of a thing is over a part, as far as their bounds say."""
+    left, low, right, high = part.shape.bounds
+    return any(
+        a <= right and left <= c and b <= high and low <= d
+        for a, b, c, d in (own.shape.bounds for own in thing.solid)
+    )

@@ -1,0 +1,37 @@
+"""The Webots worlds that ship with the package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tdac_envs.core.errors import WorldError, hint
+
+_FOLDER = Path(__file__).parent / "files"
+_DEFAULT = "arena"
+
+
+def bundled_worlds() -> tuple[str, ...]:
+    """Names of the bundled worlds: the default one first, the others sorted."""
+    names = {path.stem for path in _FOLDER.glob("*.wbt")}
+    return (_DEFAULT, *sorted(names - {_DEFAULT}))
+
+
+def world_file(source: str | Path) -> Path:
+    """The file of a bundled world, or of a path.
+
+    Where there is no such file, `maze.wbt` is the bundled world `maze`.
+
+    Raises:
+        WorldError: There is neither; the message offers the closest name.
+    """
+    path = Path(source)
+    name = str(source).removesuffix(".wbt") if not path.exists() else str(source)
+    if isinstance(source, str) and name in bundled_worlds():
+        return _FOLDER / f"{name}.wbt"
+    if path.exists() or path.suffix or len(path.parts) != 1:
+        return path
+    names = bundled_worlds()
+    raise WorldError(
+        f"no bundled world is called {str(source)!r}{hint(str(source), names)}; "
+        f"there are {', '.join(names)}"
+    )

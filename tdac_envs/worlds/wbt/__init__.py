@@ -1,0 +1,1 @@
+"""Webots world files: text → nodes → frames → prisms → `World`."""

@@ -1,0 +1,48 @@
+"""How well infra-red light is reflected, as Webots' distance sensors see it."""
+
+from __future__ import annotations
+
+from tdac_envs.worlds.wbt.fields import child, number, numbers
+from tdac_envs.worlds.wbt.tree import Node
+
+DARKEST = 0.2
+_MAPS = ("baseColorMap", "roughnessMap", "occlusionMap")
+
+
+def reflectance(shape: Node) -> float:
+    """The factor `f` of a Shape: a sensor sees it at its distance divided by `f`.
+
+    f = 0.2 + 0.8 red (1 - roughness / 2) (1 - occlusion / 2). What hangs on pictures
+    (textures, and appearances that are PROTOs) is not known, and taken as 1.
+
+    Args:
+        shape: A Shape node.
+
+    Raises:
+        WorldError: A field of its appearance is broken.
+    """
+    look = child(shape, "appearance")
+    if look is None:
+        return 1.0
+    if look.kind == "PBRAppearance" and not any(name in look.fields for name in _MAPS):
+        red = numbers(look, "baseColor", (1.0, 1.0, 1.0))[0]
+        red *= 1.0 - _share(number(look, "transparency", 0.0))
+        return _factor(red * (1.0 - 0.5 * _share(number(look, "roughness", 0.0))))
+    material = child(look, "material") if look.kind == "Appearance" else None
+    if material is not None and "texture" not in look.fields:
+        red = numbers(material, "diffuseColor", (0.8, 0.8, 0.8))[0]
+        return _factor(red * (1.0 - _share(number(material, "transparency", 0.0))))
+    return 1.0
+
+
+def red_of(factor: float) -> float:
+    """The red of a Material that has this factor."""
+    return (factor - DARKEST) / (1.0 - DARKEST)
+
+
+def _factor(red: float) -> float:
+    return DARKEST + (1.0 - DARKEST) * _share(red)
+
+
+def _share(value: float) -> float:
+    return min(max(value, 0.0), 1.0)

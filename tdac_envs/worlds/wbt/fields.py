@@ -1,0 +1,92 @@
+"""What a node's fields say, as the type that is wanted."""
+
+from __future__ import annotations
+
+from tdac_envs.worlds.wbt.tree import Node
+
+LARGEST = 1e6
+"""Bound of every length and coefficient; a world is some metres large."""
+
+
+def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+    """As many numbers as the default has.
+
+    Raises:
+        WorldError: The field holds something else, or a number beyond `LARGEST`.
+    """
+    if name not in node.fields:
+        return default
+    items = node.fields[name].items
+    found = tuple(n for n in items if isinstance(n, float))
+    if len(found) != len(items) or len(found) != len(default):
+        wanted = "1 number" if len(default) == 1 else f"{len(default)} numbers"
+        raise node.error(f"expected {wanted} for {name} of {node.kind}", name)
+    if any(abs(number) > LARGEST for number in found):
+        raise node.error(f"{name} of {node.kind} is beyond {LARGEST:g}", name)
+    return found
+
+
+def number(node: Node, name: str, default: float) -> float:
+    """One number; raises as `numbers` does."""
+    return numbers(node, name, (default,))[0]
+
+
+def number_list(node: Node, name: str) -> tuple[float, ...]:
+    """Any number of numbers; raises as `numbers` does."""
+    count = len(node.fields[name].items) if name in node.fields else 0
+    return numbers(node, name, (0.0,) * count)
+
+
+def text(node: Node, name: str, default: str = "") -> str:
+    """A string.
+
+    Raises:
+        WorldError: The field holds something else.
+    """
+    if name not in node.fields:
+        return default
+    items = node.fields[name].items
+    if len(items) != 1 or not isinstance(items[0], str):
+        raise node.error(f"expected a string for {name} of {node.kind}", name)
+    return items[0]
+
+
+def flag(node: Node, name: str, default: bool) -> bool:
+    """TRUE or FALSE.
+
+    Raises:
+        WorldError: The field holds something else.
+    """
+    if name not in node.fields:
+        return default
+    items = node.fields[name].items
+    if len(items) != 1 or not isinstance(items[0], bool):
+        raise node.error(f"expected TRUE or FALSE for {name} of {node.kind}", name)
+    return items[0]
+
+
+def child(node: Node, name: str) -> Node | None:
+    """A node, or None for NULL or where the field is not there.
+
+    Raises:
+        WorldError: The field holds something else.
+    """
+    found = children(node, name)
+    if len(found) > 1:
+        raise node.error(f"expected one node for {name} of {node.kind}", name)
+    return found[0] if found else None
+
+
+def children(node: Node, name: str = "children") -> tuple[Node, ...]:
+    """Nodes, without NULLs.
+
+    Raises:
+        WorldError: The field holds something else.
+    """
+    if name not in node.fields:
+        return ()
+    items = [item for item in node.fields[name].items if item is not None]
+    found = tuple(item for item in items if isinstance(item, Node))
+    if len(found) != len(items):
+        raise node.error(f"expected nodes for {name} of {node.kind}", name)
+    return found

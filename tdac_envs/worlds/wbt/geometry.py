@@ -1,0 +1,150 @@
+"""Geometry nodes, and what bounds a Solid, as prisms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tdac_envs.worlds.wbt.fields import child, children, number, number_list, numbers
+from tdac_envs.worlds.wbt.frames import Frame, flu_size
+from tdac_envs.worlds.wbt.meshes import mesh
+from tdac_envs.worlds.wbt.placing import placed
+from tdac_envs.worlds.wbt.prisms import box, capsule, cone, cylinder, plane, sphere
+from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.world import Part
+
+GROUPS = {"Group", "Transform", "Pose"}
+_FLAT = 0.02
+"""Tilt up to which a Plane is the ground, rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """Some geometry.
+
+    Attributes:
+        parts: Its prisms.
+        volume: m³, as Webots takes it for a mass from a density: overlaps count
+            twice.
+        missing: What has no prisms, and why.
+    """
+
+    parts: tuple[Part, ...] = ()
+    volume: float = 0.0
+    missing: tuple[str, ...] = ()
+
+    def __add__(self, other: Pieces) -> Pieces:
+        return Pieces(
+            self.parts + other.parts,
+            self.volume + other.volume,
+            self.missing + other.missing,
+        )
+
+
+def bounds(node: Node, frame: Frame) -> Pieces:
+    """A boundingObject: a geometry, or a Shape, Group, Transform or Pose with some.
+
+    Args:
+        node: The node.
+        frame: Of the Solid.
+
+    Raises:
+        WorldError: A field of it is broken.
+    """
+    if node.kind in GROUPS:
+        inner = frame if node.kind == "Group" else placed(node, frame, scaled=True)
+        return sum((bounds(part, inner) for part in children(node)), Pieces())
+    if node.kind == "Shape":
+        shape = child(node, "geometry")
+        return Pieces() if shape is None else bounds(shape, frame)
+    if not _is_plane(node):
+        return geometry(node, frame)
+    level = abs(frame.flu().tilt) < _FLAT
+    return Pieces(missing=() if level else ("a Plane that is not the ground",))
+
+
+def _is_plane(node: Node) -> bool:
+    """Whether it is a Plane, or a grid of equal elevations."""
+    if node.kind == "ElevationGrid":
+        return len(set(number_list(node, "height"))) <= 1
+    return node.kind == "Plane"
+
+
+def geometry(node: Node, frame: Frame) -> Pieces:
+    """A geometry node.
+
+    Args:
+        node: The node.
+        frame: Its frame, in the file's own axes.
+
+    Raises:
+        WorldError: A field of it is broken.
+    """
+    if node.kind == "IndexedFaceSet":
+        found = mesh(node, frame)
+        if isinstance(found, str):
+            return Pieces(missing=(found,))
+        # A mesh that is pushed is rare; its prisms are as heavy as it gets.
+        volume = sum(p.shape.area * (p.top - p.bottom) for p in found)
+        return Pieces(found, volume)
+    if node.kind not in _PRIMITIVES:
+        return Pieces(missing=(node.kind,))
+    parts, volume = _PRIMITIVES[node.kind](node, frame.flu(), frame.y_up)
+    return Pieces(parts, volume * abs(float(np.linalg.det(frame.matrix))))
+
+
+_Made = tuple[tuple[Part, ...], float]
+
+
+def _box(node: Node, frame: Frame, y_up: bool) -> _Made:
+    size = flu_size(numbers(node, "size", (2.0, 2.0, 2.0)), y_up)
+    if min(size) <= 0.0:
+        size = (1.0, 1.0, 1.0)  # as Webots does
+    return box(frame, size), math.prod(size)
+
+
+def _sphere(node: Node, frame: Frame, _: bool) -> _Made:
+    radius = _positive(node, "radius", 1.0)
+    return sphere(frame, radius), 4.0 / 3.0 * math.pi * radius**3
+
+
+def _cylinder(node: Node, frame: Frame, _: bool) -> _Made:
+    radius, height = _positive(node, "radius", 1.0), _positive(node, "height", 2.0)
+    return cylinder(frame, radius, height), math.pi * radius**2 * height
+
+
+def _capsule(node: Node, frame: Frame, _: bool) -> _Made:
+    radius, height = _positive(node, "radius", 1.0), _positive(node, "height", 2.0)
+    volume = math.pi * radius**2 * (height + 4.0 / 3.0 * radius)
+    return capsule(frame, radius, height), volume
+
+
+def _cone(node: Node, frame: Frame, _: bool) -> _Made:
+    radius = _positive(node, "bottomRadius", 1.0)
+    height = _positive(node, "height", 2.0)
+    return cone(frame, radius, height), math.pi * radius**2 * height / 3.0
+
+
+def _plane(node: Node, frame: Frame, y_up: bool) -> _Made:
+    size = numbers(node, "size", (1.0, 1.0))
+    length, width = size[::-1] if y_up else size
+    return plane(frame, abs(length), abs(width)), 0.0
+
+
+_PRIMITIVES: dict[str, Callable[[Node, Frame, bool], _Made]] = {
+    "Box": _box,
+    "Capsule": _capsule,
+    "Cone": _cone,
+    "Cylinder": _cylinder,
+    "Plane": _plane,
+    "Sphere": _sphere,
+}
+
+
+def _positive(node: Node, name: str, default: float) -> float:
+    """A length; Webots puts 1 for one that is not above 0."""
+    length = number(node, name, default)
+    return length if length > 0.0 else 1.0

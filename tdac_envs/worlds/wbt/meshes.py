@@ -1,0 +1,157 @@
+"""IndexedFaceSets as prisms."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.worlds.footprint import THINNEST
+from tdac_envs.worlds.wbt.fields import child, number_list
+from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.prisms import hull
+from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.world import Part
+
+MOST_FACES = 1000
+"""Faces of a mesh that is not convex, at most."""
+MOST_CORNERS = 100
+"""Corners of a face that is not convex, at most; of all such faces ten times that."""
+
+Points = NDArray[np.float64]
+Face = NDArray[np.int64]
+
+
+def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
+    """The prisms of an IndexedFaceSet.
+
+    A convex mesh is one prism. Any other is a prism over each of its faces, as high
+    as the whole mesh: what is below an overhang counts as filled.
+
+    Args:
+        node: The IndexedFaceSet.
+        frame: Its frame, in the file's own axes.
+
+    Returns:
+        The parts, or why it has none.
+
+    Raises:
+        WorldError: Its points or indices are broken.
+    """
+    points = frame.at(_points(node))
+    faces = _faces(node, len(points))
+    if not faces:
+        return ()
+    used = points[np.unique(np.concatenate(faces))]
+    if len(faces) * len(used) > MOST_FACES**2:
+        return f"a mesh with {len(faces)} faces"
+    if not _is_flat(used) and _is_convex(points, faces, used):
+        return hull(used)
+    return _over_faces(points, faces, used)
+
+
+def _over_faces(
+    points: Points, faces: list[Face], used: Points
+) -> tuple[Part, ...] | str:
+    """A prism over each face, as high as the mesh."""
+    bent = [len(face) for face in faces if not _is_flat_convex(points[face])]
+    if max(bent, default=0) > MOST_CORNERS or sum(bent) > 10 * MOST_CORNERS:
+        return "a mesh with many faces that are not convex"
+    if len(faces) > MOST_FACES:
+        return f"a mesh with {len(faces)} faces that is not convex"
+    low, high = float(used[:, 2].min()), float(used[:, 2].max())
+    pieces = [piece for face in faces for piece in _convex_pieces(points[face])]
+    shapes = [hull(piece)[0].shape for piece in pieces if _casts(piece)]
+    parts = tuple(Part(shape, low, high) for shape in dict.fromkeys(shapes))
+    return parts or hull(used)
+
+
+def _points(node: Node) -> Points:
+    coordinate = child(node, "coord")
+    flat = () if coordinate is None else number_list(coordinate, "point")
+    if coordinate is not None and len(flat) % 3:
+        raise coordinate.error("expected x, y and z of each point", "point")
+    return np.array(flat, np.float64).reshape(-1, 3)
+
+
+def _faces(node: Node, count: int) -> list[Face]:
+    """Indices of the points of each face, without those of less than three."""
+    flat = np.array(number_list(node, "coordIndex"), np.float64)
+    index = flat.astype(np.int64)
+    if (index != flat).any() or (index < -1).any() or (index >= count).any():
+        raise node.error(
+            f"expected whole numbers below {count}, or -1, in coordIndex", "coordIndex"
+        )
+    pieces = np.split(index, np.flatnonzero(index == -1))
+    faces = [piece[piece >= 0] for piece in pieces]
+    return [face for face in faces if len(face) >= 3]
+
+
+def _is_flat(points: Points) -> bool:
+    """Whether all points lie in a plane."""
+    return bool(np.linalg.svd(points - points.mean(axis=0))[1][-1] < THINNEST)
+
+
+def _is_convex(points: Points, faces: list[Face], used: Points) -> bool:
+    """Whether no point stands out of the plane of a face, on either side of it."""
+    for face in faces:
+        normal = _normal(points[face])
+        length = float(np.linalg.norm(normal))
+        if length > 0.0:
+            height = (used - points[face[0]]) @ (normal / length)
+            if height.max() > THINNEST and height.min() < -THINNEST:
+                return False
+    return True
+
+
+def _normal(corners: Points) -> Points:
+    """Newell's normal; its length is twice the area."""
+    at = corners - corners[0]
+    return np.asarray(np.cross(at, np.roll(at, -1, axis=0)).sum(axis=0))
+
+
+def _is_flat_convex(corners: Points) -> bool:
+    """Whether all turns along a flat face go the same way."""
+    normal = _normal(corners)
+    edge = np.roll(corners, -1, axis=0) - corners
+    turns = np.cross(edge, np.roll(edge, -1, axis=0)) @ normal
+    return bool((turns >= -1e-9 * float(normal @ normal)).all())
+
+
+def _convex_pieces(corners: Points) -> list[Points]:
+    """A flat face as it is where it is convex, or cut into triangles."""
+    if len(corners) == 3 or _is_flat_convex(corners):
+        return [corners]
+    flat = np.delete(corners, int(np.abs(_normal(corners)).argmax()), axis=1)
+    return [corners[list(triangle)] for triangle in _ears(flat)]
+
+
+def _ears(outline: Points) -> list[tuple[int, int, int]]:
+    """Triangles of a polygon, shape (n, 2), by cutting off ears."""
+    (x, y), (u, v) = outline.T, np.roll(outline, -1, axis=0).T
+    left = list(range(len(outline)))
+    if (x * v - u * y).sum() < 0.0:
+        left.reverse()
+    triangles = []
+    while len(left) >= 3:
+        ear = next((k for k in range(len(left)) if _is_ear(outline, left, k)), 0)
+        before, after = left[ear - 1], left[(ear + 1) % len(left)]
+        triangles.append((before, left.pop(ear), after))
+    return triangles
+
+
+def _is_ear(outline: Points, left: list[int], k: int) -> bool:
+    """Whether a corner can be cut off: it turns left, and no other corner is in it."""
+    a, b, c = outline[[left[k - 1], left[k], left[(k + 1) % len(left)]]]
+    others = outline[left]
+    sides = [
+        (q[0] - p[0]) * (others[:, 1] - p[1]) - (q[1] - p[1]) * (others[:, 0] - p[0])
+        for p, q in ((a, b), (b, c), (c, a))
+    ]
+    turn = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+    inside = (np.array(sides) > 0.0).all(axis=0)
+    return bool(turn >= 0.0 and not inside.any())
+
+
+def _casts(corners: Points) -> bool:
+    """Whether a face has an area as seen from above."""
+    return bool(abs(_normal(corners)[2]) > 2.0 * THINNEST**2)

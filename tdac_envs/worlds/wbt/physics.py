@@ -1,0 +1,29 @@
+"""Masses."""
+
+from __future__ import annotations
+
+from tdac_envs.worlds.wbt.fields import child, number
+from tdac_envs.worlds.wbt.tree import Node
+
+_LIGHTEST = 1e-6
+_DENSITY = 1000.0
+
+
+def mass_of(node: Node, volume: float) -> float | None:
+    """The mass of a Solid by its `physics` field, kg; None where it is fixed.
+
+    Args:
+        node: The Solid.
+        volume: Of its boundingObject, m³.
+
+    Raises:
+        WorldError: A field of its Physics is broken.
+    """
+    physics = child(node, "physics")
+    if physics is None:
+        return None
+    mass = number(physics, "mass", -1.0)
+    if mass <= 0.0:
+        density = number(physics, "density", _DENSITY)
+        mass = volume * (density if density > 0.0 else _DENSITY)
+    return max(mass, _LIGHTEST) if volume or mass > 0.0 else 1.0

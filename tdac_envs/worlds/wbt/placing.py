@@ -1,0 +1,39 @@
+"""Where a node says it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tdac_envs.worlds.wbt.fields import LARGEST, numbers
+from tdac_envs.worlds.wbt.frames import Frame, own_axes
+from tdac_envs.worlds.wbt.tree import Node
+
+Point = tuple[float, float, float]
+
+_ORIGIN = (0.0, 0.0, 0.0)
+_NO_TURN = (0.0, 0.0, 1.0, 0.0)
+_NO_SCALE = (1.0, 1.0, 1.0)
+
+
+def placed(
+    node: Node, frame: Frame, default: Point = _ORIGIN, *, scaled: bool = False
+) -> Frame:
+    """The frame of a node with translation and rotation.
+
+    Args:
+        node: The node.
+        frame: That of its parent.
+        default: Its translation where it gives none; forward, left, up.
+        scaled: It may have a `scale`, too.
+
+    Raises:
+        WorldError: A field is not what it should be, or the place is too far away.
+    """
+    translation = numbers(node, "translation", own_axes(default, frame.y_up))
+    rotation = numbers(node, "rotation", _NO_TURN)
+    scale = numbers(node, "scale", _NO_SCALE) if scaled else _NO_SCALE
+    found = frame.inside(translation, rotation, scale)
+    reach = max(np.abs(found.matrix).max(), np.abs(found.origin).max())
+    if not reach <= LARGEST:
+        raise node.error(f"{node.kind} is placed or scaled beyond {LARGEST:g} m")
+    return found

@@ -1,0 +1,183 @@
+"""Reads Webots worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from tdac_envs.core.arguments import finite_point
+from tdac_envs.core.errors import WorldError, WorldFileError
+from tdac_envs.core.intake import printable, read_file
+from tdac_envs.worlds.bodies import bodies, floor_under
+from tdac_envs.worlds.wbt.fields import number, numbers, text
+from tdac_envs.worlds.wbt.found import Found
+from tdac_envs.worlds.wbt.frames import Frame, world_frame
+from tdac_envs.worlds.wbt.tree import Document, Node, parse
+from tdac_envs.worlds.wbt.walk import walk
+from tdac_envs.worlds.world import EPuck, World
+
+LARGEST_FILE = 2_000_000
+"""Bytes."""
+
+_FLU_SINCE = (2022, 1)
+_ENU_SINCE = (2020, 2)
+_Z_UP = {"ENU": True, "NUE": False, "EUN": False}
+_STEP = 32.0
+_RAISED = 0.005
+
+
+def load_world(
+    path: str | Path,
+    *,
+    robot: str | None = None,
+    goal: Sequence[float] | None = None,
+) -> World:
+    """Reads a `.wbt` file of Webots V6 to R2025a.
+
+    Everything in the file becomes part of the world, or is listed in its `unmodelled`
+    or `notes`.
+
+    Args:
+        path: The file.
+        robot: Name of the e-puck to drive; by default the first.
+        goal: Point (x, y) in metres, ENU; by default that of the node named GOAL.
+
+    Raises:
+        WorldError: The file cannot be read; what is wrong in it is said with line
+            and column.
+    """
+    file = Path(path)
+    return read_world(read_text(file), printable(file.name), robot=robot, goal=goal)
+
+
+def read_world(
+    content: str,
+    name: str = "world.wbt",
+    *,
+    robot: str | None = None,
+    goal: Sequence[float] | None = None,
+) -> World:
+    """Reads the text of a `.wbt` file; see `load_world`."""
+    document = parse(content, name)
+    info, frame = _world_info(document), frame_of(document)
+    found = Found()
+    for node in document.nodes:
+        try:
+            walk(node, frame, found)
+        except WorldFileError:
+            raise
+        except WorldError as error:  # a value that no shape can have
+            raise node.error(str(error)) from None
+    world = World(
+        robots=_driven_first(found.robots, robot, name),
+        goal=found.goals[0] if found.goals else None,
+        arenas=tuple(found.arenas),
+        obstacles=tuple(found.obstacles),
+        time_step=_time_step(info, found),
+        unmodelled=tuple(found.unmodelled),
+        source=name,
+        version=document.version,
+    )
+    if goal is not None:
+        world = with_goal(world, finite_point("goal", goal))
+    return replace(world, notes=(*found.notes, *_notes(world, found)))
+
+
+def with_goal(world: World, goal: tuple[float, float]) -> World:
+    """The world with another goal; a mark that it had is then no longer one."""
+    marks = tuple(replace(thing, is_goal=False) for thing in world.obstacles)
+    return replace(world, goal=goal, obstacles=marks)
+
+
+def read_text(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        WorldError: It cannot be read, or is too large.
+    """
+    try:
+        data = read_file(path, LARGEST_FILE)
+    except FileNotFoundError:
+        raise WorldError(f"{path}: no such file; check the path") from None
+    except IsADirectoryError:
+        raise WorldError(f"{path}: is a folder; give the .wbt file in it") from None
+    except OSError as error:
+        raise WorldError(f"{path}: cannot be read: {error.strerror}") from error
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")  # comments of old files
+
+
+def frame_of(document: Document) -> Frame:
+    """The frame of the nodes at the top of a file.
+
+    Raises:
+        WorldFileError: It names an unknown system of coordinates.
+    """
+    info = _world_info(document)
+    z_up = document.release >= _ENU_SINCE
+    if info is not None and "coordinateSystem" in info.fields:
+        system = text(info, "coordinateSystem")
+        if system not in _Z_UP:
+            raise info.error(
+                f"expected a coordinateSystem of {', '.join(_Z_UP)}, got {system!r}",
+                "coordinateSystem",
+            )
+        z_up = _Z_UP[system]
+    elif info is not None and not z_up and len(_items(info, "gravity")) == 3:
+        # Old files say which way is down by a vector.
+        x, y, z = numbers(info, "gravity", (0.0, -9.81, 0.0))
+        z_up = -z > max(abs(x), abs(y))
+    return world_frame(z_up, y_up_objects=document.release < _FLU_SINCE)
+
+
+def _world_info(document: Document) -> Node | None:
+    return next((node for node in document.nodes if node.kind == "WorldInfo"), None)
+
+
+def _items(node: Node, name: str) -> tuple[object, ...]:
+    return node.fields[name].items if name in node.fields else ()
+
+
+def _time_step(info: Node | None, found: Found) -> float:
+    step = _STEP if info is None else number(info, "basicTimeStep", _STEP)
+    if step >= 0.001:
+        return step
+    found.notes.append(f"basicTimeStep {step:g} taken as {_STEP:g}, as Webots does")
+    return _STEP
+
+
+def _driven_first(
+    robots: list[EPuck], wanted: str | None, name: str
+) -> tuple[EPuck, ...]:
+    if wanted is None:
+        return tuple(robots)
+    chosen = [robot for robot in robots if robot.name == wanted]
+    if not chosen:
+        there = ", ".join(repr(robot.name) for robot in robots) or "none"
+        raise WorldError(f"{name}: no e-puck named {wanted!r}; there are {there}")
+    return (chosen[0], *(robot for robot in robots if robot is not chosen[0]))
+
+
+def _notes(world: World, found: Found) -> list[str]:
+    """What a reader of the world should know."""
+    notes = []
+    if len(world.robots) > 1:
+        names = ", ".join(repr(robot.name) for robot in world.robots[1:])
+        notes.append(f"{world.robot.name!r} is driven; {names} stand still")
+    if len(set(found.goals)) > 1:
+        notes.append(f"{len(found.goals)} nodes are named GOAL; the first is taken")
+    floor = floor_under(world)
+    if abs(floor) > _RAISED:
+        notes.append(
+            f"the robot stands {floor:.3g} m above the ground; falling off is not "
+            "modelled"
+        )
+    for thing, fallen in zip(world.obstacles, bodies(world), strict=False):
+        if fallen != thing:
+            drop = thing.solid[0].top - fallen.solid[0].top
+            name = thing.name or thing.kind
+            notes.append(f"{name} hangs {drop:.3g} m up; it is taken as fallen")
+    return notes

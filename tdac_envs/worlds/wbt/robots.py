@@ -1,0 +1,88 @@
+"""Which nodes are e-pucks, and how they stand."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from tdac_envs.worlds.wbt.fields import child, children, numbers, text
+from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.placing import placed
+from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.world import EPuck
+
+ROBOTS = {"Robot", "Supervisor", "DifferentialWheels", "CustomRobot"}
+_WITHIN = ("children", "endPoint", "device", "boundingObject")
+_EPUCK = re.compile(r"e[-_ ]?puck", re.IGNORECASE)
+
+
+def is_epuck(node: Node) -> bool:
+    """Whether a node is an e-puck: its PROTO, or a Robot that is written out."""
+    if node.kind not in ROBOTS:
+        return _EPUCK.fullmatch(node.kind) is not None
+    if _EPUCK.search(text(node, "model")):
+        return True
+    names = {text(part, "name") for part in inside(node) if "name" in part.fields}
+    return {f"ps{k}" for k in range(8)} <= names
+
+
+def epuck(node: Node, frame: Frame) -> EPuck:
+    """The pose of an e-puck.
+
+    Raises:
+        WorldError: A field is broken.
+    """
+    own = placed(node, frame)
+    ahead = _ahead(node, own) if node.kind in ROBOTS else None
+    x, y, z = own.origin.tolist()
+    return EPuck(
+        name=text(node, "name", "e-puck"),
+        x=x,
+        y=y,
+        heading=own.flu().heading if ahead is None else math.atan2(ahead[1], ahead[0]),
+        z=z,
+        version="2" if text(node, "version") == "2" else "1",
+        controller=text(node, "controller"),
+    )
+
+
+def inside(node: Node) -> Iterator[Node]:
+    """All nodes of a robot or a Solid, itself included; the body's, not the looks'."""
+    stack, seen = [node], set()
+    while stack:
+        part = stack.pop()
+        if id(part) not in seen:
+            seen.add(id(part))
+            yield part
+            for name in _WITHIN:
+                stack.extend(children(part, name))
+
+
+def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
+    """Direction of the axis towards its two front sensors, ps0 and ps7.
+
+    A robot that is written out keeps the axes of the version that it was made with,
+    whatever the file's version.
+    """
+    front = {
+        text(part, "name"): numbers(part, "translation", (0.0, 0.0, 0.0))
+        for part in inside(node)
+        if "translation" in part.fields and text(part, "name") in {"ps0", "ps7"}
+    }
+    if len(front) != 2:
+        return None
+    away = frame.matrix @ np.array(list(front.values())).sum(axis=0)
+    ways = np.vstack([frame.matrix[:2].T, -frame.matrix[:2].T])
+    x, y = ways[int((ways @ away[:2]).argmax())].tolist()
+    return (x, y) if math.hypot(x, y) > 0.5 else None
+
+
+def has_body(node: Node) -> bool:
+    """Whether a robot may be hit: it, or a part of it, has a boundingObject."""
+    return any(
+        "boundingObject" in part.fields and child(part, "boundingObject") is not None
+        for part in inside(node)
+    )

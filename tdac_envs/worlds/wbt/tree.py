@@ -1,0 +1,244 @@
+"""The nodes of a `.wbt` file, as written: every type and every field is kept."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from tdac_envs.core.errors import WorldFileError
+from tdac_envs.worlds.wbt.tokens import Kind, Source, Token, tokens
+
+DEEPEST = 100
+"""Nodes within nodes at most, so that no file exhausts the stack."""
+MOST_NODES = 5_000
+"""Nodes at most, each USE counted as what it stands for."""
+
+_HEADER = re.compile(r"#VRML(?:_\w+)? +(\S+)(?: +utf8)?[^\S\n]*(?:\n|$)")
+_VERSION = re.compile(r"[RV]?(\d{1,6})(?:\.(\d{1,6})|([a-z]))?")
+_KEYWORDS = {"IS", "PROTO", "EXTERNPROTO", "IMPORTABLE", "DEF", "USE"}
+_CONSTANTS = {"TRUE": True, "FALSE": False, "NULL": None}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """The value of a field.
+
+    Attributes:
+        items: What it holds; a single value is a list of one, a vector a list of
+            numbers.
+        offset: Where it begins in the text.
+    """
+
+    items: tuple[Item, ...]
+    offset: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Node:
+    """A node.
+
+    Attributes:
+        kind: Node or PROTO type.
+        define: Its DEF name, or empty.
+        fields: By name.
+        source: The text.
+        offset: Where it begins in the text.
+        size: Number of nodes in it, itself included.
+    """
+
+    kind: str
+    define: str
+    fields: dict[str, Field]
+    source: Source
+    offset: int
+    size: int
+
+    def error(self, message: str, field: str = "") -> WorldFileError:
+        """An error at one of its fields, or at the node."""
+        at = self.fields[field].offset if field in self.fields else self.offset
+        return self.source.error(at, message)
+
+    @property
+    def line(self) -> int:
+        """Where it stands, from 1."""
+        return self.source.line(self.offset)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Document:
+    """A file.
+
+    Attributes:
+        nodes: Those at the top.
+        version: As in the header, e.g. "R2025a".
+        release: Its numbers, which can be compared: (2025, 1), (8, 6).
+    """
+
+    nodes: tuple[Node, ...]
+    version: str
+    release: tuple[int, int]
+
+
+def parse(text: str, name: str) -> Document:
+    """Reads a file's text.
+
+    Args:
+        text: Lines may end in LF, CR or both.
+        name: What errors call it.
+
+    Raises:
+        WorldFileError: The text is not a Webots world; it says line and column.
+    """
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    source = Source(name, text)
+    header = _HEADER.match(text)
+    found = _VERSION.match(header[1]) if header else None
+    if header is None or found is None:
+        raise source.error(
+            0, "expected a header such as '#VRML_SIM R2025a utf8' on the first line"
+        )
+    minor = int(found[2] or 0) if not found[3] else ord(found[3]) - ord("a") + 1
+    nodes = _Parser(source, tokens(source, header.end())).world()
+    return Document(nodes, header[1], (int(found[1]), minor))
+
+
+Item = float | str | bool | Node | None
+
+
+class _Parser:
+    """A recursive descent; keeps the next token and the DEF names so far."""
+
+    def __init__(self, source: Source, stream: Iterator[Token]) -> None:
+        self._source, self._stream = source, stream
+        self._next = next(stream)
+        self._defined: dict[str, Node] = {}
+
+    def world(self) -> tuple[Node, ...]:
+        nodes, size = list[Node](), 0
+        while self._next.kind != "end":
+            if self._next.text in {"EXTERNPROTO", "IMPORTABLE"}:
+                self._extern()
+                continue
+            node = self._node(0)
+            if node is not None:
+                nodes.append(node)
+                size += node.size
+                self._bounded(size, node)
+        return tuple(nodes)
+
+    def _extern(self) -> None:
+        if self._take().text == "IMPORTABLE" and self._next.text != "EXTERNPROTO":
+            raise self._unexpected("EXTERNPROTO after IMPORTABLE")
+        if self._next.kind == "word":
+            self._take()
+        if self._next.kind != "string":
+            raise self._unexpected("the URL of a PROTO in quotes")
+        self._take()
+
+    def _node(self, depth: int) -> Node | None:
+        """A node, a USE of one, or NULL."""
+        begin = self._next
+        if depth > DEEPEST:
+            raise self._unexpected(f"at most {DEEPEST} nodes within each other")
+        if self._skip("word", "NULL"):
+            return None
+        if self._skip("word", "USE"):
+            return self._used(self._name("the name of a node after USE"))
+        define = ""
+        if self._skip("word", "DEF"):
+            define = self._name("a name after DEF").text
+        kind = self._name("a node").text
+        before = self._defined.get(define)
+        fields = self._body(kind, depth)
+        size = 1 + sum(
+            item.size
+            for field in fields.values()
+            for item in field.items
+            if isinstance(item, Node)
+        )
+        node = Node(kind, define, fields, self._source, begin.offset, size)
+        self._bounded(size, node)
+        # A node within, of the same name, comes later than the beginning of this one.
+        if define and self._defined.get(define) is before:
+            self._defined[define] = node
+        return node
+
+    def _bounded(self, size: int, node: Node) -> None:
+        if size > MOST_NODES:
+            raise node.error(f"expected at most {MOST_NODES} nodes, got {size}")
+
+    def _used(self, name: Token) -> Node:
+        if name.text not in self._defined:
+            raise self._source.error(
+                name.offset, f"USE {name.text}: there is no DEF {name.text} above"
+            )
+        return self._defined[name.text]
+
+    def _body(self, kind: str, depth: int) -> dict[str, Field]:
+        if not self._skip("mark", "{"):
+            raise self._unexpected(f"'{{' after {kind}")
+        fields: dict[str, Field] = {}
+        while self._next.kind == "word":
+            name = self._take()
+            if name.text in _KEYWORDS or name.text in _CONSTANTS:
+                raise self._source.error(
+                    name.offset, f"expected a field of {kind}, got {name.text}"
+                )
+            if name.text == "hidden":
+                hidden = self._name("a field after 'hidden'")
+                self._field(hidden.text, depth)
+            else:
+                fields[name.text] = self._field(name.text, depth)
+        if not self._skip("mark", "}"):
+            raise self._unexpected(f"a field of {kind} or '}}'")
+        return fields
+
+    def _field(self, name: str, depth: int) -> Field:
+        offset, items = self._next.offset, []
+        if self._skip("mark", "["):
+            while not self._skip("mark", "]"):
+                items.append(self._item(f"a value of {name} or ']'", depth))
+        elif self._next.kind == "number":
+            while self._next.kind == "number":
+                items.append(self._item("a number", depth))
+        else:
+            items.append(self._item(f"a value of {name}", depth))
+        return Field(tuple(items), offset)
+
+    def _item(self, wanted: str, depth: int) -> Item:
+        token = self._next
+        if token.kind == "number":
+            return float(self._take().text)
+        if token.kind == "string":
+            return self._take().text
+        if token.kind == "word" and token.text in {"TRUE", "FALSE"}:
+            return _CONSTANTS[self._take().text]
+        if token.kind == "word" and token.text == "IS":
+            raise self._unexpected(f"{wanted}; IS belongs into .proto files")
+        if token.kind == "word":
+            return self._node(depth + 1)
+        raise self._unexpected(wanted)
+
+    def _name(self, wanted: str) -> Token:
+        if self._next.kind != "word" or self._next.text in _CONSTANTS.keys() | {"IS"}:
+            raise self._unexpected(wanted)
+        return self._take()
+
+    def _skip(self, kind: Kind, text: str) -> bool:
+        """Takes the next token if it is this one."""
+        if self._next.kind != kind or self._next.text != text:
+            return False
+        self._take()
+        return True
+
+    def _take(self) -> Token:
+        token = self._next
+        if token.kind != "end":
+            self._next = next(self._stream)
+        return token
+
+    def _unexpected(self, wanted: str) -> WorldFileError:
+        got = self._next.text if self._next.kind == "end" else repr(self._next.text)
+        got = got if len(got) <= 50 else got[:47] + "…'"
+        return self._source.error(self._next.offset, f"expected {wanted}, got {got}")

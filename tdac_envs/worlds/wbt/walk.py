@@ -1,0 +1,202 @@
+"""From nodes to what they are: e-pucks, floors, obstacles, or not modelled."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from tdac_envs.core.errors import WorldError
+from tdac_envs.worlds.wbt.appearance import reflectance
+from tdac_envs.worlds.wbt.arenas import ARENAS, arena
+from tdac_envs.worlds.wbt.fields import child, children
+from tdac_envs.worlds.wbt.found import Found, is_goal, name_of
+from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.geometry import GROUPS, Pieces, bounds, geometry
+from tdac_envs.worlds.wbt.physics import mass_of
+from tdac_envs.worlds.wbt.placing import placed
+from tdac_envs.worlds.wbt.protos import PROTOS
+from tdac_envs.worlds.wbt.robots import ROBOTS, epuck, has_body, is_epuck
+from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.world import Obstacle
+
+_NEVER_SOLID = {
+    "Background", "Billboard", "DirectionalLight", "Fog", "PointLight", "SpotLight",
+    "TexturedBackground", "TexturedBackgroundLight", "Viewpoint", "WorldInfo",
+}  # fmt: skip
+_JOINTS = {"BallJoint", "Hinge2Joint", "HingeJoint", "SliderJoint", "Slot"}
+_DEVICES = {
+    "Accelerometer", "Altimeter", "Camera", "Charger", "Compass", "Connector",
+    "Display", "DistanceSensor", "Emitter", "GPS", "Gyro", "InertialUnit", "LED",
+    "Lidar", "LightSensor", "Microphone", "Pen", "Radar", "Radio", "RangeFinder",
+    "Receiver", "Servo", "Speaker", "TouchSensor", "VacuumGripper",
+}  # fmt: skip
+
+
+def walk(node: Node, frame: Frame, found: Found) -> None:
+    """Adds a node, and what is in it, to what has been found.
+
+    Args:
+        node: Any node of the scene.
+        frame: That of its parent.
+        found: Where to put it.
+
+    Raises:
+        WorldError: A field is broken; it says line and column.
+    """
+    if node.kind in _NEVER_SOLID:
+        return
+    if is_epuck(node):
+        found.robots.append(epuck(node, frame))
+    elif node.kind in ROBOTS:
+        _other_robot(node, frame, found)
+    elif node.kind in ARENAS:
+        _arena(node, frame, found)
+    elif node.kind in PROTOS:
+        _proto(node, frame, found)
+    elif node.kind == "Solid" or node.kind in _DEVICES:
+        _solid(node, placed(node, frame, scaled=True), found)
+    elif node.kind in GROUPS:
+        _group(node, frame, found)
+    elif node.kind == "Shape":
+        _shape(node, frame, found, node)
+    elif node.kind in _JOINTS:
+        _joint(node, frame, found)
+    else:
+        _unknown(node, frame, found)
+
+
+def _other_robot(node: Node, frame: Frame, found: Found) -> None:
+    own = placed(node, frame, scaled=True)
+    if is_goal(node):
+        found.goal(own)
+    body = has_body(node)
+    why = "a robot that may move" if body else "a robot without a body"
+    found.left_out(node, own, why, solid=body)
+
+
+def _arena(node: Node, frame: Frame, found: Found) -> None:
+    made = arena(node, frame)
+    if isinstance(made, str):
+        found.left_out(node, placed(node, frame), made)
+    else:
+        found.arenas.append(made)
+
+
+def _proto(node: Node, frame: Frame, found: Found) -> None:
+    body = PROTOS[node.kind](node, frame)
+    if is_goal(node):
+        found.goal(body.frame)
+    x, y, _ = body.frame.origin.tolist()
+    obstacle = Obstacle(
+        name_of(node), node.kind, x, y, body.solid, body.visible, body.mass,
+        body.reflectance, is_goal(node),
+    )  # fmt: skip
+    found.obstacle(node, obstacle)
+
+
+def _solid(node: Node, own: Frame, found: Found) -> None:
+    """A Solid: what bounds it is solid, its Shapes are visible, Solids in it follow."""
+    if is_goal(node):
+        found.goal(own)
+    place, looks = len(found.obstacles), list[tuple[Pieces, float]]()
+    _look(children(node), own, found, looks)
+    bounding = child(node, "boundingObject")
+    body = Pieces() if bounding is None else bounds(bounding, own)
+    for missing in dict.fromkeys(body.missing):
+        found.left_out(node, own, f"its boundingObject is {missing}")
+    visible = sum((pieces for pieces, _ in looks), Pieces())
+    if visible.missing:
+        seen = "what bounds it" if body.parts else "nothing of it"
+        _unseen(node, visible, seen, found)
+        visible += Pieces(body.parts)
+    if node.kind != "Solid" and not body.parts and not visible.parts:
+        return
+    x, y, _ = own.origin.tolist()
+    obstacle = Obstacle(
+        name_of(node), _kind(node), x, y, body.parts, visible.parts,
+        mass_of(node, body.volume), looks[0][1] if looks else 1.0, is_goal(node),
+    )  # fmt: skip
+    found.obstacle(node, obstacle, place)
+
+
+def _kind(node: Node) -> str:
+    """The type, or what a Solid's `model` says that it is."""
+    model = node.fields.get("model")
+    if model is None or len(model.items) != 1 or not isinstance(model.items[0], str):
+        return node.kind
+    return model.items[0] or node.kind
+
+
+def _unseen(node: Node, looks: Pieces, instead: str, found: Found) -> None:
+    what = ", ".join(dict.fromkeys(looks.missing))
+    name = name_of(node) or node.kind
+    found.notes.append(f"line {node.line}: {name} is {what}; sensors see {instead}")
+
+
+def _look(
+    nodes: tuple[Node, ...],
+    frame: Frame,
+    found: Found,
+    looks: list[tuple[Pieces, float]],
+) -> None:
+    """Gathers the Shapes of a Solid; everything else in it is walked."""
+    for node in nodes:
+        if node.kind == "Shape":
+            shape = child(node, "geometry")
+            if shape is not None:
+                looks.append((geometry(shape, frame), reflectance(node)))
+        elif node.kind in GROUPS:
+            _look(children(node), _inside(node, frame), found, looks)
+        else:
+            walk(node, frame, found)
+
+
+def _inside(node: Node, frame: Frame) -> Frame:
+    return frame if node.kind == "Group" else placed(node, frame, scaled=True)
+
+
+def _group(node: Node, frame: Frame, found: Found) -> None:
+    own = _inside(node, frame)
+    if is_goal(node):
+        found.goal(own)
+    for part in children(node):
+        if part.kind == "Shape":
+            _shape(part, own, found, node)
+        else:
+            walk(part, own, found)
+
+
+def _shape(node: Node, frame: Frame, found: Found, named: Node) -> None:
+    """A Shape outside of Solids: sensors see it, nothing hits it."""
+    shape = child(node, "geometry")
+    if shape is None:
+        return
+    looks = geometry(shape, frame)
+    if looks.missing:
+        _unseen(node, looks, "nothing of it", found)
+    x, y, _ = frame.origin.tolist()
+    name = name_of(node) or name_of(named)
+    mark = is_goal(node) or is_goal(named)
+    if mark and not is_goal(named):
+        found.goal(frame)
+    obstacle = Obstacle(
+        name, "Shape", x, y, (), looks.parts, None, reflectance(node), mark
+    )
+    found.obstacle(node, obstacle)
+
+
+def _joint(node: Node, frame: Frame, found: Found) -> None:
+    end = child(node, "endPoint")
+    if end is not None:
+        walk(end, frame, found)
+        if node.kind != "Slot":
+            name = name_of(end) or end.kind
+            found.notes.append(f"{name}: taken as fixed, though on a {node.kind}")
+
+
+def _unknown(node: Node, frame: Frame, found: Found) -> None:
+    # An unknown node may mean something else by these fields.
+    with suppress(WorldError):
+        frame = placed(node, frame)
+    if is_goal(node):
+        found.goal(frame)
+    found.left_out(node, frame, "an unknown node or PROTO")

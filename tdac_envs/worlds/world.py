@@ -1,0 +1,310 @@
+"""What a Webots world holds for an e-puck: robots, goal, arena, obstacles.
+
+Lengths are metres, angles radians. The frame is ENU whatever the file's was: x and y
+in the ground plane, z up, headings counter-clockwise from +x. Numbers are kept to
+1e-9, so that a world that is written to a file and read again is equal.
+
+Obstacles are prisms. A `Part` is a disc or a convex polygon, exactly as a 2D physics
+engine takes it, between two heights; it is the projection of one convex piece of the
+3D shape. What the robot's body can hit (boundingObjects) and what infra-red rays hit
+(graphical Shapes) are kept apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tdac_envs.core.errors import WorldError
+from tdac_envs.worlds.footprint import (
+    THINNEST,
+    Disc,
+    Footprint,
+    Rectangle,
+    frame,
+    metres,
+    ring,
+    wrapped,
+)
+
+MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A prism, at least 0.1 mm high (a flat one grows downwards).
+
+    Attributes:
+        shape: Its footprint.
+        bottom: Lowest z, m.
+        top: Highest z, m.
+    """
+
+    shape: Footprint
+    bottom: float
+    top: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bottom", metres("bottom", self.bottom))
+        object.__setattr__(self, "top", metres("top", self.top))
+        if self.bottom > self.top:
+            raise WorldError(
+                f"expected a bottom below the top, got {self.bottom} and {self.top}"
+            )
+        if self.top - self.bottom < THINNEST:
+            object.__setattr__(self, "bottom", metres("bottom", self.top - THINNEST))
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """A thing in the world; it may be solid, visible to the sensors, or both.
+
+    Attributes:
+        name: Its `name` field, or its DEF name, or empty.
+        kind: Node or PROTO type.
+        x: Of its origin.
+        y: Of its origin.
+        solid: What bodies hit; empty for a mere marker.
+        visible: What infra-red rays hit.
+        mass: kg, of what can be pushed; None is fixed.
+        reflectance: Factor by which Webots divides the distance that a sensor
+            measures, in [0.2, 1]; 1 where it is not known, or nothing is seen.
+        is_goal: It marks the goal.
+    """
+
+    name: str
+    kind: str
+    x: float
+    y: float
+    solid: tuple[Part, ...] = ()
+    visible: tuple[Part, ...] = ()
+    mass: float | None = None
+    reflectance: float = 1.0
+    is_goal: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "x", metres("x", self.x))
+        object.__setattr__(self, "y", metres("y", self.y))
+        object.__setattr__(self, "reflectance", metres("f", self.reflectance))
+        if self.mass is not None:
+            object.__setattr__(self, "mass", metres("mass", self.mass))
+            if self.mass <= 0.0:
+                raise WorldError(f"expected a mass above 0, got {self.mass}")
+        if not 0.2 <= self.reflectance <= 1.0:
+            raise WorldError(f"expected 0.2 <= f <= 1, got {self.reflectance}")
+        if not self.visible:
+            object.__setattr__(self, "reflectance", 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class EPuck:
+    """An e-puck.
+
+    Attributes:
+        name: Its `name` field.
+        x: Of the middle of the axle.
+        y: Of the middle of the axle.
+        heading: Direction in which it drives, in (-pi, pi].
+        z: Of the point below, where the wheels touch the ground.
+        version: "1" or "2".
+        controller: Name of the file's controller.
+    """
+
+    name: str
+    x: float
+    y: float
+    heading: float
+    z: float = 0.0
+    version: Literal["1", "2"] = "1"
+    controller: str = ""
+
+    def __post_init__(self) -> None:
+        for key in ("x", "y", "z"):
+            object.__setattr__(self, key, metres(key, getattr(self, key)))
+        object.__setattr__(self, "heading", wrapped(self.heading))
+        if self.version not in MAX_WHEEL_SPEED:
+            raise WorldError(f'expected version "1" or "2", got {self.version!r}')
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """(x, y, heading)."""
+        return self.x, self.y, self.heading
+
+    @property
+    def max_wheel_speed(self) -> float:
+        """rad/s."""
+        return MAX_WHEEL_SPEED[self.version]
+
+
+@dataclass(frozen=True, slots=True)
+class Arena:
+    """A floor, most often with a wall around it.
+
+    Attributes:
+        inside: The floor. A disc has a wall; a rectangle may have none.
+        wall_thickness: Of the wall, which stands outside the floor; 0 without one.
+        wall_height: Above the floor; 0 without a wall.
+        z: Of the floor.
+        facets: Flat pieces of a round wall; each touches the disc.
+    """
+
+    inside: Disc | Rectangle
+    wall_thickness: float = 0.0
+    wall_height: float = 0.0
+    z: float = 0.0
+    facets: int = 48
+
+    def __post_init__(self) -> None:
+        for key in ("wall_thickness", "wall_height", "z"):
+            object.__setattr__(self, key, metres(key, getattr(self, key)))
+        wall = (self.wall_thickness, self.wall_height)
+        if min(wall) < 0.0 or (min(wall) == 0.0) != (max(wall) == 0.0):
+            raise WorldError(f"expected a wall with thickness and height, got {wall}")
+        if isinstance(self.inside, Disc) and (not self.has_wall or self.facets < 8):
+            raise WorldError("expected a round arena with a wall of 8 facets or more")
+        if isinstance(self.inside, Rectangle):
+            object.__setattr__(self, "facets", 48)
+
+    @property
+    def kind(self) -> str:
+        """PROTO type."""
+        if isinstance(self.inside, Disc):
+            return "CircleArena"
+        return "RectangleArena" if self.has_wall else "Floor"
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether there is a wall around the floor."""
+        return self.wall_height > 0.0
+
+    def wall(self) -> Obstacle:
+        """The wall, in convex pieces; without pieces where there is none."""
+        shape, thickness = self.inside, self.wall_thickness
+        if not self.has_wall:
+            return Obstacle("", self.kind, shape.x, shape.y)
+        if isinstance(shape, Disc):
+            outer = shape.radius + thickness
+            pieces = ring(shape.x, shape.y, shape.radius, outer, self.facets)
+        else:
+            pieces = frame(shape, thickness)
+        parts = tuple(Part(p, self.z, self.z + self.wall_height) for p in pieces)
+        return Obstacle("", self.kind, shape.x, shape.y, parts, parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Unmodelled:
+    """A node of the file that is not in the model.
+
+    Attributes:
+        name: Its `name` field, or its DEF name, or empty.
+        kind: Node or PROTO type.
+        x: Of its origin.
+        y: Of its origin.
+        why: Why it is left out.
+        may_be_solid: Whether a robot might hit it.
+        line: Where it stands in the file.
+    """
+
+    name: str
+    kind: str
+    x: float
+    y: float
+    why: str
+    may_be_solid: bool = True
+    line: int = 0
+
+    def is_called(self, name: str) -> bool:
+        """Whether `name` means this node: its name or its type."""
+        return name in (self.name, self.kind)
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """A world.
+
+    Attributes:
+        robots: The e-pucks; the first is the one that is driven, the others stand.
+        goal: Point (x, y), or None where the file names none.
+        arenas: Floors, with or without walls.
+        obstacles: Everything else; without the walls of the arenas.
+        time_step: Of the physics, ms.
+        unmodelled: Nodes of the file that are not in the model.
+        source: Name of the file.
+        version: Of Webots, as the file says.
+        notes: What the reader supposed.
+    """
+
+    robots: tuple[EPuck, ...] = ()
+    goal: tuple[float, float] | None = None
+    arenas: tuple[Arena, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+    time_step: float = 32.0
+    unmodelled: tuple[Unmodelled, ...] = ()
+    source: str = field(default="", compare=False)
+    version: str = field(default="", compare=False)
+    notes: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time_step", metres("time_step", self.time_step))
+        if self.time_step <= 0.0:
+            raise WorldError(f"expected a time step above 0, got {self.time_step}")
+        if self.goal is not None:
+            point = (metres("x", self.goal[0]), metres("y", self.goal[1]))
+            object.__setattr__(self, "goal", point)
+        elif any(obstacle.is_goal for obstacle in self.obstacles):
+            raise WorldError("a world with a mark of the goal needs a goal")
+
+    @property
+    def robot(self) -> EPuck:
+        """The e-puck that is driven.
+
+        Raises:
+            WorldError: There is none.
+        """
+        if not self.robots:
+            raise WorldError(f"{self.source or 'the world'}: there is no e-puck in it")
+        return self.robots[0]
+
+    @property
+    def arena(self) -> Arena | None:
+        """The walled floor that the robot is in, or the first walled one, or None."""
+        walled = [arena for arena in self.arenas if arena.has_wall]
+        for arena in walled:
+            if self.robots and arena.inside.contains(self.robot.x, self.robot.y):
+                return arena
+        return walled[0] if walled else None
+
+
+def check_modelled(world: World, ignore: Iterable[str] = ()) -> tuple[Unmodelled, ...]:
+    """The nodes that may be solid and are left out because `ignore` names them.
+
+    Args:
+        world: The world.
+        ignore: Names or types of nodes that the user accepts to be missing.
+
+    Raises:
+        WorldError: There are others, or a name fits none.
+    """
+    names = tuple(ignore)
+    open_ = [node for node in world.unmodelled if node.may_be_solid]
+    left = [n for n in open_ if not any(n.is_called(name) for name in names)]
+    where = world.source or "the world"
+    if left:
+        kinds = sorted({node.kind for node in left})
+        first = left[0]
+        raise WorldError(
+            f"{where}: {len(left)} node{'s' * (len(left) > 1)} may be solid but "
+            f"{'are' if len(left) > 1 else 'is'} not modelled "
+            f"({', '.join(kinds)}; the first at ({first.x:g}, {first.y:g}): "
+            f"{first.why}); leave them out with --ignore NAME or TYPE "
+            "(ignore=[...] in Python)"
+        )
+    for name in names:
+        if not any(node.is_called(name) for node in world.unmodelled):
+            known = sorted({node.kind for node in open_}) or ["nothing"]
+            raise WorldError(
+                f"{where}: no node called {name!r} to ignore; not modelled: "
+                f"{', '.join(known)}"
+            )
+    return tuple(open_)

@@ -1,0 +1,123 @@
+"""`tdac world`: a table, a picture, clean JSON, one clear line for each mistake."""
+
+import json
+import signal
+
+import cv2
+import pytest
+
+from tdac_agent.cli.main import main
+from tdac_envs import read_world
+from tdac_envs.worlds.bundled import bundled_worlds, world_file
+from tdac_envs.worlds.wbt.reader import load_world
+
+WORLD = """#VRML_SIM R2025a utf8
+WorldInfo { basicTimeStep 16 }
+CircleArena { radius 0.8 }
+E-puck { translation -0.4 0.1 0 rotation 0 0 1 0.5 }
+WoodenBox { translation 0.2 0.3 0.05 name "box [1]" size 0.2 0.1 0.1 mass 0.5 }
+Dragon { name "Smaug" translation 0.1 0 0 }
+DEF GOAL Solid { translation 0.5 0.2 0 }
+"""
+
+
+@pytest.fixture
+def tdac(monkeypatch, capsys, tmp_path):
+    """Runs `tdac world`; gives exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    (tmp_path / "small.wbt").write_text(WORLD)
+    handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
+
+    def run(*words):
+        monkeypatch.setattr("sys.argv", ["tdac", "world", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return (ended.value.code, *capsys.readouterr())
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+def test_it_shows_what_is_in_a_world(tdac):
+    """Robot, goal, arena, obstacles, and what is not modelled with its line."""
+    code, out, err = tdac("small.wbt")
+    assert (code, err) == (0, "")
+    for said in (
+        "Webots R2025a, step 16 ms", "(-0.4, 0.1), heading 0.5 rad, version 1",
+        "(0.5, 0.2)", "radius 0.8 m", "box [1]", "(0.2, 0.3)  0.2 x 0.1", "Smaug",
+        "an unknown node or PROTO", "--ignore NAME",
+    ):  # fmt: skip
+        assert said in out
+
+
+@pytest.mark.parametrize("world", bundled_worlds())
+def test_a_thing_has_a_line(tdac, monkeypatch, world):
+    """In a terminal of 80 columns, too."""
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = tdac(world)
+    _, _, table = out.partition("obstacles (m, rad, kg)")
+    _, _, *rows, mark = [line for line in table.splitlines() if line.strip()]
+    assert mark.strip() == "* is seen, and not solid"
+    assert len(rows) == len(load_world(world_file(world)).obstacles)
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_it_draws(tdac, tmp_path):
+    """A PNG, in a folder that is made if need be."""
+    code, out, _ = tdac("small.wbt", "--png", "new/small.png")
+    assert code == 0
+    assert "new/small.png" in out
+    assert cv2.imread(str(tmp_path / "new" / "small.png")).shape[2] == 3
+
+
+def test_its_json_is_complete(tdac):
+    """All numbers of the world, and nothing else on stdout."""
+    code, out, _ = tdac("small.wbt", "--json")
+    record, world = json.loads(out), read_world(WORLD)
+    assert code == 0
+    assert record["goal"] == [0.5, 0.2]
+    assert record["time_step"] == 16
+    assert record["floor"] == 0
+    assert record["robots"][0]["max_wheel_speed"] == 6.28
+    assert record["arenas"][0]["kind"] == "CircleArena"
+    assert record["unmodelled"][0]["line"] == 6
+    box = record["obstacles"][0]
+    assert (box["kind"], box["mass"]) == ("WoodenBox", 0.5)
+    (part,) = box["solid"]
+    assert part["kind"] == "rectangle"
+    assert part["vertices"] == world.obstacles[0].solid[0].shape.vertices.tolist()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nope.wbt"], "error: nope.wbt: no such file; check the path"),
+        (["broken.wbt"], "error: broken.wbt, line 1, column 1: expected a header"),
+        (["small.wbt", "--png", "x.jpg"], "error: --png: expected a file that ends in"),
+    ],
+)
+def test_mistakes_are_one_line(tdac, tmp_path, words, said):
+    """Exit 2, nothing on stdout."""
+    (tmp_path / "broken.wbt").write_text("WorldInfo {")
+    code, out, err = tdac(*words)
+    assert (code, out) == (2, "")
+    assert err.startswith(said)
+    assert err.count("\n") == 1
+
+
+def test_help_has_an_example(tdac):
+    """`--help` shows how it is called."""
+    code, out, _ = tdac("--help")
+    assert code == 0
+    assert "Example: tdac world maze.wbt --png maze.png" in " ".join(out.split())
+
+
+@pytest.mark.parametrize("name", ["arena", "arena.wbt"])
+def test_a_bundled_world(tdac, name):
+    """It goes by its name, and by that of its file where there is no such file."""
+    code, out, err = tdac(name)
+    assert (code, err) == (0, "")
+    assert "arena.wbt" in out
+    assert "WoodenBox" in out

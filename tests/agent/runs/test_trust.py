@@ -1,0 +1,204 @@
+"""One's own folders need no permission; what is somebody else's needs one each time."""
+
+import json
+import os
+import py_compile
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+from small import write_small_task
+
+from tdac_agent.prompting.prompt import PromptError, PromptTemplate, generate_prompt
+from tdac_agent.runs.ownership import is_own, is_own_folder
+from tdac_agent.runs.records import load_run
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.tasks.installation import lasting_secret
+from tdac_agent.tasks.task import called, load_task
+from tdac_agent.tasks.trust import NotTrustedError, tree_sha256
+from tdac_agent.verification.verify import verify
+
+TEST = "def test_own(rollout):\n    assert rollout('nominal').reached\n"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory, warm):
+    """A run that was begun here, with tests of one's own."""
+    folder = tmp_path_factory.mktemp("own")
+    task = load_task(write_small_task(folder / "task", profile="policy"))
+    (folder / "tests").mkdir()
+    (folder / "tests" / "test_own.py").write_text(TEST)
+    task = replace(task, suite=folder / "tests")
+    run = synthesize(task, out=folder / "run", iterations=1, judge=warm)
+    assert run.verified
+    return run.folder
+
+
+@pytest.fixture
+def run(made, tmp_path):
+    """A copy of it, elsewhere."""
+    return Path(shutil.copytree(made, tmp_path / "elsewhere" / "moved"))
+
+
+@pytest.fixture
+def secret(monkeypatch, tmp_path):
+    """Makes this another installation."""
+
+    def change():
+        monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "another"))
+        lasting_secret.cache_clear()
+
+    yield change
+    monkeypatch.undo()
+    lasting_secret.cache_clear()
+
+
+def test_own_folders_need_nothing(tdac, run):
+    """Verified again and gone on with as it was, wherever it lies; tests are named."""
+    code, out, err = tdac("verify", run)
+    assert (code, err) == (0, "")
+    known = json.loads((run / "report.json").read_text())
+    digest = known["provenance"]["own_suite"]
+    assert f"with the tests suite ({digest})," in " ".join(out.split())
+    assert tdac("synth", "--resume", run)[0] == 0
+
+
+def test_a_permission_holds_once(tdac, run):
+    """`--suite` or `--trust`, which lists what it allows; nothing of it is kept."""
+    test = run / "suite" / "test_own.py"
+    test.write_text(f"{TEST}\n\ndef test_more():\n    pass\n")
+    before = {p: p.read_bytes() for p in run.rglob("*.*") if p.is_file()}
+    refused = tdac("verify", run)
+    assert (refused[0], refused[1]) == (2, "")
+    assert refused[2].count("\n") == 1
+    short = tree_sha256(run / "suite")[:12]
+    wish = f"run the tests in {run}/suite (sha256 {short})"
+    assert (
+        f"wants to {wish}: allow it with --suite {run}/suite, or with --trust"
+        in (refused[2])
+    )
+    code, _, err = tdac("verify", run, "--trust")
+    assert (code, err) == (0, f"trusted for this once: {run} may {wish}\n")
+    assert tdac("verify", run, "--suite", run / "suite")[0] == 0
+    assert tdac("verify", run) == refused
+    assert {p: p.read_bytes() for p in run.rglob("*.*") if p.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"learner": "command:true"},
+        {"optimizer": "command:true"},
+        {"base_url": "http://127.0.0.1:1/v1"},
+        {"seed": 0},
+        {"max_cost": 1000.0},
+        {"mark": ""},
+        {"mark": "é"},
+    ],
+    ids=str,
+)
+def test_a_change_of_what_may_run_makes_it_foreign(run, change):
+    """As does one of its template or its tests, and a mark of another run."""
+    known = load_run(run)
+    assert is_own_folder(known)
+    assert not is_own_folder(known.model_copy(update=change))
+
+
+@pytest.mark.parametrize("file", ["prompt.j2", "suite/conftest.py", "suite/data.json"])
+def test_a_new_file_makes_it_foreign(run, file):
+    """A template where there was none; anything beside the tests."""
+    (run / file).write_text("")
+    assert not is_own_folder(load_run(run))
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+def test_tests_are_plain_files(run, kind):
+    """A link could lead elsewhere by the time it is read."""
+    odd = run / "suite" / "odd"
+    if kind == "link":
+        odd.symlink_to(run)
+    else:
+        os.mkfifo(odd)
+    assert tree_sha256(run / "suite") is None
+    assert not is_own_folder(load_run(run))
+    with pytest.raises(NotTrustedError):
+        verify("x = 1\n", load_task(run))
+
+
+def test_another_installation_does_not_know_it(run, secret):
+    """Each has its own secret."""
+    secret()
+    assert not is_own_folder(load_run(run))
+    with pytest.raises(NotTrustedError, match="wants to run the tests"):
+        verify(run / "controller.py", load_task(run))
+
+
+def test_what_was_allowed_stays_somebody_elses(tmp_path, run, secret, warm):
+    """A run that goes on with a permission has no mark of this installation."""
+    record = json.loads((run / "run.json").read_text())
+    record |= {"status": "interrupted", "attempts": []}
+    (run / "run.json").write_text(json.dumps(record))
+    secret()
+    again = synthesize(load_task(run, trust=True), out=run, iterations=1, judge=warm)
+    assert again.verified
+    assert not is_own(load_run(run), run / "suite")
+
+
+def test_byte_code_beside_tests_is_not_used(tmp_path, small_task, good_source):
+    """It need not be what the tests were compiled to, and has no part in their hash."""
+    suite, canary = tmp_path / "suite", tmp_path / "canary"
+    suite.mkdir()
+    test = suite / "test_own.py"
+    evil = f"open({str(canary)!r}, 'w')\n\n\ndef test_own():\n    pass\n"
+    test.write_text(evil)
+    compiled = Path(py_compile.compile(str(test)))
+    honest = TEST.ljust(len(evil) - 1, "#") + "\n"
+    stamp = test.stat()
+    test.write_text(honest)
+    os.utime(test, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+    assert compiled.is_file()
+    assert test.stat().st_size == stamp.st_size
+    report = verify(good_source, small_task, profile="policy", suite=suite)
+    assert report.tests["own/test_own.py::test_own"] == "passed"
+    assert not canary.exists()
+
+
+def test_a_template_computes_nothing(small_task, tmp_path):
+    """It is filled in within Jinja's sandbox: one line, and nothing has run."""
+    canary = tmp_path / "canary"
+    code = f"cycler.__init__.__globals__.os.system('touch {canary}')"
+    for text in (f"{{{{ {code} }}}}", "{{ ''.__class__.__mro__ }}"):
+        template = PromptTemplate("evil.j2", "{{ rules_block }}" + text)
+        with pytest.raises(PromptError, match="unsafe"):
+            generate_prompt(small_task, (), template)
+    assert not canary.exists()
+
+
+def test_a_task_is_called_by_what_it_is(tmp_path):
+    """Only the bundled maze is called maze and nothing else."""
+    assert called(load_task("maze")) == "maze"
+    empty = load_task(write_small_task(tmp_path / "a", name="maze"))
+    digest = empty.setting.world_sha256()[:8]
+    tolerance = f"{empty.nominal.goal_tolerance:.0f}"
+    about = f"(map {digest}, goal within {tolerance} px)"
+    assert called(empty) == f"maze, not the bundled one {about}"
+    folder = tmp_path / "b"
+    folder.mkdir()
+    content = {"schema": 1, "map": "maze", "tolerance": 900.0}
+    (folder / "maze.yaml").write_text(yaml.safe_dump(content))
+    near = called(load_task(folder / "maze.yaml"))
+    assert near.startswith("maze, changed (map ")
+    assert near.endswith("goal within 900 px)")
+
+
+def test_the_verdict_names_the_folder(tdac, good):
+    """With the hash of its map and how near the goal has to be come."""
+    content = yaml.safe_load((good / "task.yaml").read_text())
+    (good / "task.yaml").write_text(yaml.safe_dump({**content, "name": "maze"}))
+    code, out, _ = tdac("verify", good / "controller.py", "--profile", "policy")
+    assert code == 0
+    words = " ".join(out.split())
+    assert "(task maze, not the bundled one (map " in words
+    assert f"px) of {good}, profile policy" in words

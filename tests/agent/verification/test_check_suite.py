@@ -1,0 +1,286 @@
+"""A suite proves itself, or is found out: by the reference, by bad ones, by repeats."""
+
+import json
+
+import pytest
+from small import SHORT, write_small_task
+
+from tdac_agent.errors import ControllerFileError, Fault
+from tdac_agent.models.provider import Reply
+from tdac_agent.runs.records import load_run
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.tasks.installation import seed_of
+from tdac_agent.tasks.task import load_task
+from tdac_agent.verification.suite.privileged import (
+    BAD,
+    REFERENCE,
+    SLOW,
+    privileged_controller,
+    reference_ways,
+)
+from tdac_agent.verification.suite.proof import SuiteCheck
+from tdac_agent.verification.suite_check import check_suite, prove_suite
+from tdac_agent.verification.verify import verify
+from tdac_envs.mapping.bundled import bundled_maps
+
+IMPOSSIBLE = """
+def test_flies(rollout):
+    assert rollout("nominal").trajectory.steps < 3, "it took 3 steps or more"
+"""
+VACUOUS = "def test_anything(controller):\n    assert controller.source\n"
+
+
+@pytest.fixture
+def task(tmp_path):
+    """The small room with a short way."""
+    return load_task(write_small_task(tmp_path / "task", **SHORT))
+
+
+@pytest.fixture
+def suite_of(tmp_path):
+    """Makes a suite folder of one file."""
+
+    def make(text):
+        folder = tmp_path / "mine"
+        folder.mkdir()
+        (folder / "test_mine.py").write_text(text)
+        return folder
+
+    return make
+
+
+def assert_proven(check, repeats):
+    """The reference always passed, the others never, and the repeats agree."""
+    assert check.problems == ()
+    assert check.proven
+    for row in check.rows:
+        assert row.repeats == (1 if row.controller == SLOW else repeats)
+        assert row.passed == (row.repeats if row.controller == REFERENCE else 0)
+        assert row.disagreements == ()
+        assert bool(row.failures) != (row.controller == REFERENCE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["paper", "policy"])
+def test_the_shipped_suite_proves_itself(task, profile, warm):
+    """The reference passes, each bad controller fails, twice alike; all is reported.
+
+    The bad ones fail for what they do: what is read from the file, and each function
+    but the policy, is right.
+    """
+    told = []
+    check = check_suite(
+        task, profile=profile, repeats=2, judge=warm, on_progress=told.append
+    )
+    assert_proven(check, 2)
+    assert [row.controller for row in check.rows] == [REFERENCE, *BAD]
+    assert (check.profile, check.task) == (profile, "small")
+    assert check.seed == seed_of(b"", task)
+    assert check.notes == ()
+    assert SuiteCheck.model_validate_json(check.model_dump_json()) == check
+    assert told[:3] == ["reference, 1 of 2", "reference, 2 of 2", "do-nothing, 1 of 2"]
+    assert told[-1] == "slow"
+    failures = [test for row in check.rows for test in row.failures]
+    assert all(test.startswith("test_end_to_end.py::") for test in failures)
+    assert "test_end_to_end.py::test_policy_is_fast_enough" in check.rows[-1].failures
+
+
+@pytest.mark.slow
+def test_five_repeats_agree(small_task, warm):
+    """As the command does it by default, with another seed."""
+    assert_proven(check_suite(small_task, seed=7, judge=warm), 5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["paper", "policy"])
+@pytest.mark.parametrize("name", bundled_maps())
+def test_every_bundled_task(name, profile, warm):
+    """The shipped suite proves itself on each, from a seed of its own."""
+    bad = tuple(other for other in BAD if other != SLOW)
+    seed = 1 + bundled_maps().index(name)
+    check = check_suite(
+        load_task(name), profile=profile, seed=seed, repeats=1, bad=bad, judge=warm
+    )
+    assert_proven(check, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", bundled_maps())
+def test_the_nominal_start_alone(name, warm):
+    """The reference passes with `paper`, too."""
+    task = load_task(name)
+    ways = reference_ways(task.nominal, 0)
+    source = privileged_controller(task.nominal, ways)
+    assert verify(source, task, paper=True, judge=warm).failures == ()
+
+
+def test_the_impossible_is_found_out(task, suite_of, warm):
+    """A test that the reference fails is named, with its message."""
+    check = check_suite(task, suite=suite_of(IMPOSSIBLE), repeats=1, bad=(), judge=warm)
+    assert not check.proven
+    told = "the reference fails own/test_mine.py::test_flies: it took 3 steps or more"
+    assert check.problems == (told,)
+
+
+@pytest.mark.slow
+def test_a_suite_that_tests_nothing_is_found_out(task, suite_of, warm):
+    """Whatever bad controller passes is named."""
+    check = check_suite(
+        task,
+        shipped=suite_of(VACUOUS),
+        repeats=2,
+        bad=("do-nothing", "raising"),
+        judge=warm,
+    )
+    assert not check.proven
+    assert [row.passed for row in check.rows] == [2, 2, 2]
+    assert check.problems == (
+        "do-nothing passes in 2 of 2 repeats: nothing that is tested needs more",
+        "raising passes in 2 of 2 repeats: nothing that is tested needs more",
+    )
+
+
+@pytest.mark.slow
+def test_a_task_that_needs_no_control_is_found_out(tmp_path, warm):
+    """Where driving straight on is enough, the suite proves nothing about steering."""
+    changes = {"start": [95, 60, 0.0], "goal": [140, 60], "tolerance": 30}
+    easy = load_task(write_small_task(tmp_path / "easy", **changes))
+    bad = ("do-nothing", "constant")
+    check = check_suite(easy, profile="policy", repeats=1, bad=bad, judge=warm)
+    assert check.problems == ("constant passes: nothing that is tested needs more",)
+
+
+@pytest.mark.slow
+def test_repeats_that_disagree_are_found_out(task, suite_of, tmp_path, warm):
+    """A test with a mood of its own is named, with what it said each time."""
+    moods = tmp_path / "moods.txt"
+    moods.write_text("1")
+    text = f"""
+from pathlib import Path
+
+def test_mood():
+    moods = Path({str(moods)!r})
+    moods.write_text(moods.read_text() + "1")
+    assert len(moods.read_text()) % 2 == 0, "not now"
+"""
+    suite = suite_of(text)
+    check = check_suite(
+        task, profile="policy", suite=suite, repeats=3, bad=(), judge=warm
+    )
+    assert [row.passed for row in check.rows] == [2]
+    name = "own/test_mine.py::test_mood"
+    assert check.problems == (
+        f"the reference fails {name}: not now",
+        f"the repeats of reference disagree: {name} is passed, failed, passed",
+    )
+
+
+@pytest.mark.slow
+def test_own_tests_that_nothing_fails_are_noted(task, suite_of, warm):
+    """They may be right, so they are no problem; one that tells controllers apart is
+    not mentioned."""
+    keeps = """
+def test_hears_no_error(rollout):
+    episode = rollout("nominal")
+    assert episode.error is None, episode.error
+"""
+    bad = ("do-nothing", "raising")
+    suite = suite_of(VACUOUS + keeps)
+    check = check_suite(
+        task, profile="policy", suite=suite, repeats=1, bad=bad, judge=warm
+    )
+    assert check.proven
+    assert check.notes == (
+        "every bad controller passes own/test_mine.py::test_anything",
+    )
+
+
+def test_a_suite_that_cannot_be_collected_is_a_fault(task, suite_of, warm):
+    """Neither proven nor not."""
+    suite = suite_of("import nosuchmodule\n")
+    with pytest.raises(Fault, match="suite is broken"):
+        check_suite(task, suite=suite, judge=warm)
+
+
+def test_arguments_that_make_no_sense(task, tmp_path, warm):
+    """No repeats, no suite."""
+    with pytest.raises(ValueError, match="at least 1 repeat, got 0"):
+        check_suite(task, repeats=0, judge=warm)
+    with pytest.raises(ControllerFileError, match="no suite"):
+        check_suite(task, suite=tmp_path / "nothing", judge=warm)
+
+
+def test_the_short_form(task, suite_of, warm):
+    """A proof, or one clear line that says what is wrong."""
+    proof = prove_suite(task, profile="policy", judge=warm)
+    assert [row.controller for row in proof.rows] == [REFERENCE, "do-nothing"]
+    assert_proven(proof, 1)
+    long = IMPOSSIBLE.replace("more", "more\\n" + "and more " * 100)
+    with pytest.raises(Fault, match="did not prove itself: the reference") as fault:
+        prove_suite(task, suite=suite_of(long), judge=warm)
+    assert "\n" not in str(fault.value)
+    assert len(str(fault.value)) < 400
+
+
+class Paid:
+    """A provider that costs money, and counts how often."""
+
+    name = "paid"
+    paid = True
+
+    def __init__(self, source):
+        self.source = source
+        self.calls = 0
+
+    def complete(self, request):
+        self.calls += 1
+        return Reply(f"```python\n{self.source}```\n")
+
+
+def events(folder):
+    lines = (folder / "journal.jsonl").read_text().splitlines()
+    return [json.loads(line) for line in lines]
+
+
+@pytest.mark.slow
+def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
+    """It ends as a fault, with the reason on record, before the first call."""
+    folder = write_small_task(tmp_path / "task", suite="mine", profile="policy")
+    (folder / "mine").mkdir()
+    (folder / "mine" / "test_mine.py").write_text(IMPOSSIBLE)
+    learner, out = Paid(good_source), tmp_path / "run"
+    task = load_task(folder, trust=True)
+    with pytest.raises(Fault, match=r"own/test_mine\.py::test_flies: it took 3 steps"):
+        synthesize(task, learner, out=out, judge=warm)
+    assert learner.calls == 0
+    assert load_run(out).status == "fault"
+    records = events(out)
+    assert [r["event"] for r in records] == ["run.start", "prove.start", "run.end"]
+    assert "did not prove itself" in records[-1]["reason"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("who", ["learner", "optimizer"])
+def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
+    """Whoever of the two is paid; it is on record before the first call."""
+    task = load_task(write_small_task(tmp_path / "task", profile="policy"))
+    paid, out = Paid(good_source), tmp_path / "run"
+    providers = {"learner": "builtin", who: paid}
+    told = []
+    run = synthesize(task, **providers, out=out, judge=warm, on_event=told.append)
+    assert run.verified
+    doing = [record["doing"] for record in told if record["event"] == "prove.step"]
+    assert doing == ["reference", "do-nothing"]
+    assert paid.calls == (who == "learner")
+    records = events(out)
+    begun = [record["event"] for record in records][:4]
+    assert begun == ["run.start", "prove.start", "prove.end", "call.intent"]
+    assert records[2]["proven"] is True
+    assert records[2]["suite"] == "map2d"
+
+
+def test_what_costs_nothing_needs_no_proof(tmp_path, warm):
+    """A run of the builtin learner loses no time."""
+    task = load_task(write_small_task(tmp_path / "task", profile="policy"))
+    assert synthesize(task, out=tmp_path / "run", judge=warm).verified
+    assert not any(r["event"].startswith("prove") for r in events(tmp_path / "run"))

@@ -1,0 +1,29 @@
+"""Actions for batched environments, and whether two of these agree."""
+
+import numpy as np
+
+
+def assert_same(one, two):
+    """Equal to the last bit, types included."""
+    if isinstance(one, dict):
+        assert one.keys() == two.keys()
+        for key in one:
+            assert_same(one[key], two[key])
+    elif one is None:
+        assert two is None
+    elif one.dtype == object:
+        for a, b in zip(one, two, strict=True):
+            assert_same(a, b)
+    else:
+        assert one.dtype == two.dtype
+        np.testing.assert_array_equal(one, two)
+
+
+def actions(count, steps, seed=0):
+    """Random actions, now and then straight ahead or out of range."""
+    random = np.random.default_rng(seed)
+    drawn = random.uniform(-1.2, 1.2, (steps, count, 2)).astype(np.float32)
+    for k in range(0, steps, 3):
+        drawn[k : k + 2, k % count] = 1.0
+    drawn[steps // 2 :, : count // 2] = 1.0
+    return drawn

@@ -1,0 +1,1 @@
+"""Beside this file lie the helpers that tests of several rooms import."""

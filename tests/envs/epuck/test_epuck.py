@@ -1,0 +1,493 @@
+"""Promises of TDAC-EPuck-v0 beyond those of every registered env."""
+
+import hashlib
+import json
+import math
+import subprocess
+import sys
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from world_texts import text
+
+from tdac_envs import TaskError, WorldError, bundled_worlds, read_world
+from tdac_envs.epuck.env import EPuckEnv
+
+FULL = np.ones(2, np.float32)
+LEFT_TURN = np.array([-1.0, 1.0], np.float32)
+SPEED, RATE = 6.28 * 0.02, 2 * 6.28 * 0.02 / 0.052
+TEN_SECONDS = 313
+
+
+def open_env(*nodes, start=(0.0, 0.0, 0.3), goal=(3.0, 3.0), **options):
+    """A plain without walls, but for some nodes."""
+    world = read_world(text("E-puck { }", *nodes))
+    return EPuckEnv(world, start, goal, **options)
+
+
+def walled_env(thickness=0.002, **options):
+    """A thin wall across the way from (0, 0) to (0.6, 0), open at its ends."""
+    wall = f"Wall {{ translation 0.3 0 0 size {thickness} 0.4 0.1 }}"
+    options = {"start": (0.0, 0.0, 0.0), "goal": (0.6, 0.0), **options}
+    return open_env(wall, **options)
+
+
+def drive(env, action, steps=10_000):
+    """The last step of some with one action, up to the end of the episode."""
+    for _ in range(steps):
+        result = env.step(action)
+        if result[2] or result[3]:
+            break
+    return result
+
+
+class TestMotion:
+    """Closed forms over 10 s, within 1e-6 m and rad."""
+
+    @pytest.mark.parametrize("speed", [1.0, 0.37, -0.5])
+    def test_straight(self, speed):
+        floor = "RectangleArena { floorSize 6 6 }"
+        env = open_env(floor, start=(1.0, 1.0, 0.3), goal=(2.0, 2.0))
+        env.reset(seed=0)
+        for k in range(1, TEN_SECONDS + 1):
+            env.step(np.full(2, speed, np.float32))
+            way = float(np.float32(speed)) * SPEED * 0.032 * k
+            x, y = 1.0 + way * math.cos(0.3), 1.0 + way * math.sin(0.3)
+            assert env.pose() == pytest.approx([x, y, 0.3], abs=1e-6)
+
+    @pytest.mark.parametrize(
+        "wheels", [(0.5, 0.75), (0.75, 0.5), (-0.5, 0.25), (-1.0, -0.25), (0.0, 1.0)]
+    )
+    def test_arc(self, wheels):
+        """A circle of radius axle / 2 (right + left) / (right - left)."""
+        left, right = wheels
+        rate = (right - left) * SPEED / 0.052
+        radius = 0.026 * (right + left) / (right - left)
+        env = open_env(start=(1.0, 1.0, 0.3))
+        env.reset(seed=0)
+        for k in range(1, TEN_SECONDS + 1):
+            env.step(np.array(wheels, np.float32))
+            heading = 0.3 + rate * 0.032 * k
+            x = 1.0 + radius * (math.sin(heading) - math.sin(0.3))
+            y = 1.0 - radius * (math.cos(heading) - math.cos(0.3))
+            at = env.pose()
+            assert at[:2] == pytest.approx([x, y], abs=1e-6)
+            assert math.remainder(at[2] - heading, 2 * math.pi) == pytest.approx(
+                0.0, abs=1e-6
+            )
+
+    def test_turn_in_place(self):
+        """The right wheel forward turns left: the heading grows."""
+        env = open_env()
+        env.reset(seed=0)
+        for k in range(1, TEN_SECONDS + 1):
+            env.step(LEFT_TURN)
+            x, y, heading = env.pose()
+            assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-12)
+            off = math.remainder(heading - 0.3 - RATE * 0.032 * k, 2 * math.pi)
+            assert off == pytest.approx(0.0, abs=1e-6)
+        assert -math.pi < heading <= math.pi
+
+    def test_wheel_positions_follow_the_wheels(self):
+        env = open_env()
+        env.reset(seed=0)
+        for _ in range(100):
+            observation, *_ = env.step(np.array([0.5, -0.25], np.float32))
+        turned = 100 * 0.032 * 6.28 * np.array([0.5, -0.25])
+        np.testing.assert_allclose(observation["wheel_positions"], turned, rtol=1e-6)
+
+    def test_an_epuck_of_version_2_is_faster(self):
+        world = read_world(text('E-puck { version "2" }'), goal=(1.0, 1.0))
+        assert EPuckEnv(world).task.max_wheel_speed == 7.536
+        assert EPuckEnv(world, max_wheel_speed=3).task.max_wheel_speed == 3.0
+
+
+class TestContact:
+    @pytest.mark.parametrize("dt", [0.008, 0.032, 0.5])
+    @pytest.mark.parametrize("slant", [-0.4, -0.1, 0.0, 0.25])
+    def test_no_tunnel_through_a_wall_of_2_mm(self, slant, dt):
+        """At full speed and any step it stops within 1 mm of touching."""
+        env = walled_env(start=(0.0, 0.0, slant), dt=dt)
+        env.reset(seed=0)
+        _, _, terminated, _, info = drive(env, FULL)
+        assert terminated
+        assert info["collision"]
+        x, y, _ = env.pose()
+        assert 0.0 <= 0.299 - 0.037 - x < 1e-3
+        assert abs(y - x * math.tan(slant)) < 1e-9
+        assert 0.037 <= info["clearance"] < 0.038
+
+    def test_a_corner_is_met_where_it_is(self):
+        """The end of the wall, at (0.299, 0.2)."""
+        env = walled_env(start=(0.0, 0.22, 0.0))
+        env.reset(seed=0)
+        drive(env, FULL)
+        assert math.dist(env.pose()[:2], (0.299, 0.2)) == pytest.approx(0.037, abs=1e-6)
+
+    def test_blocked_it_stays_out_is_counted_and_may_leave(self):
+        env = walled_env(on_collision="block")
+        env.reset(seed=0)
+        for _ in range(300):
+            _, _, terminated, _, info = env.step(FULL)
+            assert not terminated
+        assert 0.0 <= 0.262 - env.pose()[0] < 1e-6
+        assert 200 < info["collisions"] < 300
+        for _ in range(20):
+            assert not env.step(-FULL)[4]["collision"]
+        assert env.pose()[0] == pytest.approx(0.262 - 20 * 0.032 * SPEED, abs=1e-6)
+
+    def test_the_fence_around_a_plain_stops_the_robot(self):
+        """Half a metre beyond everything; all poses are in their space."""
+        env = open_env(start=(0.0, 0.0, math.pi), on_collision="block")
+        env.reset(seed=0)
+        for _ in range(200):
+            observation, *_ = env.step(FULL)
+            assert observation in env.observation_space
+        assert env.pose()[0] == pytest.approx(-0.5 + 0.037, abs=1e-6)
+
+    def test_other_epucks_stand_in_the_way(self):
+        other = 'E-puck { name "other" translation 0.3 0 0 }'
+        env = open_env(other, start=(0, 0, 0), goal=(0.6, 0.0))
+        env.reset(seed=0)
+        drive(env, FULL)
+        assert env.pose()[0] == pytest.approx(0.3 - 0.074, abs=1e-6)
+
+    def test_low_and_high_things_are_driven_under_or_over(self):
+        low = "Solid { translation .2 0 0 boundingObject Box { size .05 1 .002 } }"
+        high = "Solid { translation .3 0 .1 boundingObject Box { size .05 1 .05 } }"
+        env = open_env(low, high, start=(0, 0, 0), goal=(0.6, 0.0))
+        env.reset(seed=0)
+        assert drive(env, FULL)[4]["is_success"]
+
+
+class TestEnds:
+    def test_the_goal_ends_the_episode(self):
+        env = open_env(start=(0, 0, 0), goal=(0.5, 0.0))
+        env.reset(seed=0)
+        _, reward, terminated, truncated, info = drive(env, FULL)
+        assert (terminated, truncated, info["is_success"]) == (True, False, True)
+        assert info["distance_to_goal"] <= 0.02
+        assert reward > 9
+
+    def test_a_goal_behind_a_wall_is_not_reached(self):
+        env = walled_env(goal=(0.35, 0.0), goal_tolerance=0.2, on_collision="block")
+        env.reset(seed=0)
+        _, _, terminated, _, info = drive(env, FULL, 300)
+        assert not terminated
+        assert info["distance_to_goal"] < 0.1
+
+    def test_a_contact_costs_and_ends(self):
+        env = walled_env()
+        env.reset(seed=0)
+        _, reward, terminated, truncated, info = drive(env, FULL)
+        assert (terminated, truncated) == (True, False)
+        assert (info["collision"], info["collisions"]) == (True, 1)
+        assert reward < -9
+
+    def test_the_default_horizon(self):
+        env = walled_env(dt=0.004)
+        formula = math.ceil(6 * env.task.shortest / (SPEED * 0.004))
+        assert env.task.horizon == formula > 2500
+        assert walled_env().task.horizon == 2500
+
+
+class TestPath:
+    def test_its_length_is_that_of_the_true_shortest_or_a_little_more(self):
+        """Around the end of a wall: tangent, arc, tangent; at most 8.3 % + 10 mm."""
+        env = walled_env()
+        reach = math.hypot(0.299, 0.2)
+        turn = math.atan2(0.2, 0.299) + math.asin(0.037 / reach)
+        true = 2 * (math.sqrt(reach**2 - 0.037**2) + 0.037 * turn) + 0.002
+        assert true - 1e-3 < env.task.shortest < 1.083 * true + 0.01
+
+    def test_on_the_grid_it_is_straight(self):
+        env = open_env(start=(0.0, 0.0, 0.0), goal=(1.0, 0.0))
+        assert env.task.shortest == pytest.approx(1.0, abs=0.006)
+        env = open_env(start=(0.0, 0.0, 0.0), goal=(1.0, 1.0))
+        assert env.task.shortest == pytest.approx(2**0.5, abs=0.006)
+
+    def test_a_full_step_towards_the_goal_is_one_unit_of_progress(self):
+        env = open_env(start=(0.0, 0.0, 0.0), goal=(1.0, 0.0))
+        env.reset(seed=0)
+        rewards = [env.step(FULL)[1] for _ in range(100)]
+        assert np.mean(rewards) == pytest.approx(0.1 - 0.01, abs=2e-3)
+
+    def test_no_point_of_a_path_is_too_near(self):
+        for name in bundled_worlds():
+            task = EPuckEnv(name).task
+            path = task.path_from(task.start)
+            assert min(task.ground.gap(x, y) for x, y in path) >= 0.037
+
+
+class TestInfo:
+    def test_keys_and_types(self):
+        expected = {
+            "is_success": bool,
+            "collision": bool,
+            "collisions": int,
+            "clipped": int,
+            "distance_to_goal": float,
+            "path_distance": float,
+            "clearance": float,
+        }
+        env = walled_env()
+        infos = [env.reset(seed=0)[1], env.step(FULL)[4], drive(env, FULL)[4]]
+        for info in infos:
+            assert {key: type(value) for key, value in info.items()} == expected
+
+    def test_values_at_the_start(self):
+        info = walled_env().reset(seed=0)[1]
+        assert info["distance_to_goal"] == pytest.approx(0.6)
+        assert info["path_distance"] > 0.72
+        assert info["clearance"] == pytest.approx(0.299)
+
+    def test_types_of_a_step(self):
+        env = walled_env()
+        env.reset(seed=0)
+        observation, reward, terminated, truncated, _ = env.step([2.0, 0.5])
+        assert [type(v) for v in (reward, terminated, truncated)] == [float, bool, bool]
+        assert {v.dtype for v in observation.values()} == {np.dtype(np.float32)}
+        assert observation["wheel_speeds"].tolist() == [1.0, 0.5]
+        assert env.step(FULL)[4]["clipped"] == 1
+
+    @pytest.mark.parametrize("given", [None, 0.5, (1, 2, 3), (math.nan, 0), "ab"])
+    def test_what_is_no_action_is_refused(self, given):
+        env = walled_env()
+        env.reset(seed=0)
+        with pytest.raises(ValueError, match="expected an action of two finite"):
+            env.step(given)
+
+
+class TestVariations:
+    def test_jitter_starts_near_and_differs(self):
+        env = EPuckEnv("clutter", variation="jitter")
+        nominal = env.nominal.start
+        poses = np.array([env.reset(seed=s)[0]["pose"] for s in range(40)])
+        off = np.hypot(poses[:, 0] - nominal.x, poses[:, 1] - nominal.y)
+        assert off.max() <= 0.037 + 1e-6
+        assert np.abs(poses[:, 2] - nominal.heading).max() <= 0.5 + 1e-6
+        assert len(np.unique(poses[:, 0])) == 40
+
+    def test_mixed_starts_near_or_all_over_the_world_and_keeps_the_goal(self):
+        env = EPuckEnv("room", variation="mixed")
+        left, low, right, high = env.nominal.ground.bounds
+        poses = []
+        for seed in range(60):
+            observation, info = env.reset(seed=seed)
+            poses.append(observation["pose"])
+            assert 0.0 < info["path_distance"] < math.inf
+            assert info["clearance"] >= 0.037
+            assert env.task.goal == env.nominal.goal
+            assert env.task.horizon == env.nominal.horizon
+        x, y, heading = np.array(poses).T
+        assert np.ptp(x) > (right - left) / 2
+        assert np.ptp(y) > (high - low) / 2
+        assert np.ptp(heading) > 6.0
+        start = env.nominal.start
+        assert 15 < (np.hypot(x - start.x, y - start.y) <= 0.037).sum() < 45
+
+    def test_random_draws_feasible_starts_and_goals(self):
+        env = EPuckEnv("room", variation="random")
+        for seed in range(30):
+            observation, info = env.reset(seed=seed)
+            assert observation in env.observation_space
+            assert 0.0 < info["path_distance"] < math.inf
+            assert info["clearance"] >= 0.037
+            assert env.task.ground.gap(*env.task.goal) >= 0.037
+
+    def test_options_set_start_and_goal(self):
+        env = EPuckEnv("arena")
+        options = {"start": (0.0, 0.8, 7.0), "goal": [0.5, 0.6]}
+        observation, _ = env.reset(options=options)
+        np.testing.assert_allclose(
+            observation["pose"], [0.0, 0.8, 7.0 - 2 * math.pi], rtol=1e-6
+        )
+        np.testing.assert_allclose(observation["goal"], [0.5, 0.6], rtol=1e-6)
+        with pytest.raises(TaskError, match="unknown reset options"):
+            env.reset(options={"pose": 1})
+        with pytest.raises(TaskError, match=r"start .* lies outside the world"):
+            env.reset(options={"start": (5, 5)})
+
+    def test_delay_lag_and_slip(self):
+        env = open_env(delay=2)
+        env.reset(seed=0)
+        speeds = [env.step(FULL)[0]["wheel_speeds"][0] for _ in range(4)]
+        assert speeds == [0, 0, 1, 1]
+        env = open_env(motor_lag=0.1)
+        env.reset(seed=0)
+        speeds = [env.step(FULL)[0]["wheel_speeds"][1] for _ in range(5)]
+        expected = 1 - np.exp(-0.32 * np.arange(1, 6))
+        np.testing.assert_allclose(speeds, expected, rtol=1e-5)
+        env = open_env(wheel_slip=0.2)
+        env.reset(seed=0)
+        observation, *_ = env.step(0.5 * FULL)
+        assert observation["wheel_speeds"].tolist() == [0.5, 0.5]
+        assert env.pose()[2] != 0.3
+
+
+class TestArguments:
+    @pytest.mark.parametrize(
+        ("given", "error", "message"),
+        [
+            ({"world": "areno"}, WorldError, "did you mean 'arena'"),
+            ({"world": "missing.wbt"}, WorldError, "no such file"),
+            (
+                {"start": (5, 5)},
+                TaskError,
+                "no free path .* the start is outside the arena's wall",
+            ),
+            (
+                {"start": (0.3, -0.14, 0)},
+                TaskError,
+                "start .* lies in an obstacle; the",
+            ),
+            (
+                {"start": (0.145, 0.3)},
+                TaskError,
+                "mm from an obstacle, too near for a b",
+            ),
+            ({"start": (1,)}, TaskError, "expected start to be 3 finite numbers"),
+            ({"goal": (-0.5, -0.12)}, TaskError, "goal .* lies in an obstacle"),
+            ({"goal": (-0.62, 0.41)}, TaskError, "the start is already at the goal"),
+            ({"goal": "ab"}, TaskError, "expected goal to be 2 finite numbers"),
+            ({"goal_tolerance": 0}, TaskError, "expected goal_tolerance above 0"),
+            ({"dt": 0}, TaskError, "expected dt above 0"),
+            ({"horizon": 0}, TaskError, "expected horizon to be a whole number from 1"),
+            ({"max_wheel_speed": -1}, TaskError, "expected max_wheel_speed above 0"),
+            ({"on_collision": "stop"}, TaskError, "on_collision to be one of 'termin"),
+            ({"variation": "wild"}, TaskError, "variation to be one of 'nominal', 'j"),
+            ({"reflectance": 0.5}, TaskError, "reflectance to be one of 'ideal', 'we"),
+            ({"sensor_noise": -1}, TaskError, "expected sensor_noise of at least 0"),
+            ({"wheel_slip": math.nan}, TaskError, "expected wheel_slip to be"),
+            ({"motor_lag": -1}, TaskError, "expected motor_lag of at least 0"),
+            ({"delay": 0.5}, TaskError, "expected delay to be a whole number from 0"),
+            ({"ignore": "Wall"}, TaskError, "expected ignore to be a list of names"),
+            ({"ignore": ["Wal"]}, WorldError, "no node called 'Wal' to ignore"),
+            ({"render_mode": "ansi"}, TaskError, "render_mode to be one of None, 'rg"),
+        ],
+    )
+    def test_what_cannot_be_used_is_named(self, given, error, message):
+        with pytest.raises(error, match=message):
+            EPuckEnv(**given)
+
+    def test_a_world_without_goal_or_robot_asks_for_them(self):
+        empty = read_world(text("RectangleArena { floorSize 2 2 }"))
+        with pytest.raises(TaskError, match="names no goal; give goal="):
+            EPuckEnv(empty)
+        with pytest.raises(TaskError, match="no e-puck in it; give start="):
+            EPuckEnv(empty, goal=(0.5, 0.5))
+        assert EPuckEnv(empty, (-0.5, 0, 0), (0.5, 0.5)).task.shortest > 1.0
+
+    def test_separate_rooms_and_narrow_ways_are_refused(self):
+        walls = [
+            f'Wall {{ name "{k}" translation 0 {y} 0 size 0.02 0.97 0.1 }}'
+            for k, y in enumerate((0.515, -0.515))
+        ]
+        arena = "RectangleArena { floorSize 2 2 }"
+        world = read_world(text(arena, "E-puck { translation -.5 0 0 }", *walls))
+        message = "the widest body that gets through has a radius of 30.. mm"
+        with pytest.raises(TaskError, match=message):
+            EPuckEnv(world, goal=(0.5, 0.0))
+        whole = "Wall { size 0.02 2 0.1 }"
+        world = read_world(text(arena, "E-puck { translation -.5 0 0 }", whole))
+        with pytest.raises(TaskError, match="they are in separate rooms"):
+            EPuckEnv(world, goal=(0.5, 0.0))
+
+    def test_what_is_not_modelled_is_refused_unless_ignored(self):
+        world = read_world(text("E-puck { }", "Castle { }"), goal=(1.0, 0.0))
+        with pytest.raises(WorldError, match="1 node may be solid but is not modelled"):
+            EPuckEnv(world)
+        assert EPuckEnv(world, ignore=["Castle"]).task.goal == (1.0, 0.0)
+
+    def test_the_step_is_that_of_the_file(self):
+        world = read_world(text("E-puck { }", info="basicTimeStep 16"), goal=(1, 0))
+        assert EPuckEnv(world).task.dt == 0.016
+        assert EPuckEnv(world).metadata["render_fps"] == 62
+
+    def test_a_file_by_its_path(self, tmp_path):
+        file = tmp_path / "mine.wbt"
+        goal = "DEF GOAL Pose { translation 0.5 0 0 }"
+        file.write_text(text("E-puck { }", goal))
+        env = gym.make("TDAC-EPuck-v0", world=str(file), start=[0, 0.1])
+        assert env.unwrapped.task.goal == (0.5, 0.0)
+        assert env.unwrapped.task.start == (0.0, 0.1, 0.0)
+        json.loads(env.spec.to_json())
+
+
+TRAJECTORY = """
+import hashlib, numpy as np
+from tdac_envs.epuck.env import EPuckEnv
+env = EPuckEnv({world!r}, on_collision="block", variation="jitter", sensor_noise=1.0,
+               wheel_slip=0.1, motor_lag=0.05, delay=1)
+digest, rng = hashlib.sha256(), np.random.default_rng(4)
+observation, _ = env.reset(seed=11)
+for _ in range(40):
+    action = rng.uniform(-0.2, 1.0, 2)
+    for _ in range(10):
+        observation, reward, *_ = env.step(action)
+        for value in observation.values():
+            digest.update(value.tobytes())
+        digest.update(np.float64(reward).tobytes())
+        digest.update(env.pose().tobytes())
+print(digest.hexdigest())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("world", ["crates", "arena"])
+def test_equal_seeds_give_equal_bits_in_separate_processes(world):
+    """Observations, rewards and poses, with all noise, pushing things."""
+    command = [sys.executable, "-c", TRAJECTORY.format(world=world)]
+    runs = [
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert len(runs[0].strip()) == len(hashlib.sha256().hexdigest())
+    assert runs[0] == runs[1]
+
+
+def test_importing_the_package_imports_no_physics():
+    """Nor anything else that is heavy; making an env that pushes nothing neither."""
+    source = """
+import sys, tdac_envs
+heavy = {"pymunk", "numba", "cv2", "scipy", "torch"} & set(sys.modules)
+import gymnasium
+gymnasium.make("TDAC-EPuck-v0", on_collision="block").reset()
+print(sorted(heavy), "pymunk" in sys.modules)
+"""
+    command = [sys.executable, "-c", source]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["[]", "False"]
+
+
+def wander(env, steps, seed=0):
+    """Random actions, each held for a while; every observation is in its space."""
+    rng = np.random.default_rng(seed)
+    observation, _ = env.reset(seed=seed)
+    space = env.observation_space
+    for k in range(steps):
+        if k % 25 == 0:
+            action = rng.uniform(-1, 1, 2).astype(np.float32)
+        observation, reward, terminated, truncated, info = env.step(action)
+        values = np.concatenate(list(observation.values()))
+        assert np.isfinite(values).all()
+        assert math.isfinite(reward + info["clearance"] + info["path_distance"])
+        assert info["clearance"] > 0.036
+        if k % 100 == 0:
+            assert observation in space
+        if terminated or truncated:
+            env.reset()
+
+
+@pytest.mark.slow_after(2)
+@pytest.mark.parametrize("name", bundled_worlds())
+def test_random_steps_are_finite_and_stay_out_of_things(name):
+    """In the space, and no deeper than 1 mm in anything."""
+    wander(EPuckEnv(name, on_collision="block", sensor_noise=1.0), 3000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "steps"), [("arena", 900_000), ("crates", 100_000)])
+def test_a_million_random_steps(name, steps):
+    wander(EPuckEnv(name, on_collision="block", sensor_noise=1.0), steps, seed=1)
