@@ -1,0 +1,24 @@
+"""What may be spent: the worst case of a call is reserved before the call is made.
+
+The public face of `tdac_agent.models.budget`.
+"""
+
+from tdac_agent.models.budget import (
+    NOTHING,
+    ROUNDING,
+    Amount,
+    Budget,
+    BudgetExhausted,
+    Limit,
+    told_usd,
+)
+
+__all__ = [
+    "NOTHING",
+    "ROUNDING",
+    "Amount",
+    "Budget",
+    "BudgetExhausted",
+    "Limit",
+    "told_usd",
+]

@@ -1,0 +1,19 @@
+"""TDAC-Map2D-v0: contact → rays → terrain → task → kernels → env."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tdac_envs.map2d.env import Map2DEnv
+
+__all__ = ["Map2DEnv"]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports the environment on first use: it loads compiled code."""
+    if name != "Map2DEnv":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from tdac_envs.map2d.env import Map2DEnv
+
+    return Map2DEnv

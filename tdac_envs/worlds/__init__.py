@@ -1,0 +1,1 @@
+"""Webots worlds: what they hold, their files, pictures of them."""
