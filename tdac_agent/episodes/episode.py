@@ -22,7 +22,7 @@ from tdac_agent.sandbox.waiting import Line
 from tdac_agent.storage.plain import shown
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_envs.drive.env import Observation
-from tdac_envs.map2d.task import Pose
+from tdac_envs.drive.task import Pose
 
 # A policy is cut off when its mean call is this many times too slow.
 SLOW_FACTOR = 2.0

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tdac_agent.tasks.units import Units
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import Path as Way
-from tdac_envs.map2d.task import Pose
 
 
 class Nominal(Protocol):

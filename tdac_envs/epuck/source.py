@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tdac_envs.core.arguments import finite_numbers, finite_point
 from tdac_envs.core.errors import TaskError
-from tdac_envs.map2d.task import Pose
+from tdac_envs.drive.task import Pose
 from tdac_envs.worlds.bundled import world_file
 from tdac_envs.worlds.wbt.reader import load_world
 from tdac_envs.worlds.world import EPuck, World, check_modelled

@@ -12,6 +12,13 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import finite_numbers, finite_point, positive, steps_of
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.task import (
+    MAX_DRAWS,
+    Pose,
+    generous_horizon,
+    jittered_pose,
+    wrapped,
+)
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.epuck.paths import (
@@ -23,13 +30,6 @@ from tdac_envs.epuck.paths import (
     route,
 )
 from tdac_envs.grid.plan import Path
-from tdac_envs.map2d.task import (
-    MAX_DRAWS,
-    Pose,
-    generous_horizon,
-    jittered_pose,
-    wrapped,
-)
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 TOLERANCE = 0.02

@@ -15,12 +15,13 @@ from tdac_envs.core.addresses import Addresses
 from tdac_envs.core.arguments import not_negative, one_of
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
+from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.kernels import begin, drive
 from tdac_envs.map2d.picture import Scene, Status
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
 from tdac_envs.map2d.source import MapSource, prepare
-from tdac_envs.map2d.task import Map2DTask, Pose, Terrain, make_task
+from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import Said, Shade
 
 VARIATIONS = ("nominal", "jitter", "mixed", "random")

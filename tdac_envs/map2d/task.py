@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import finite_numbers, finite_point, positive, steps_of
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.task import (
+    MAX_DRAWS,
+    Pose,
+    generous_horizon,
+    jittered_pose,
+    wrapped,
+)
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.plan import Path, descend
 from tdac_envs.map2d.terrain import (
@@ -29,7 +36,6 @@ from tdac_envs.mapping.params import RobotParams
 
 __all__ = [
     "Map2DTask",
-    "Pose",
     "Terrain",
     "at_goal",
     "default_horizon",
@@ -40,17 +46,6 @@ __all__ = [
 ]
 
 MAX_TOLERANCE = 20.0
-MIN_HORIZON = 2500
-JITTER_HEADING = 0.5
-MAX_DRAWS = 1000
-
-
-class Pose(NamedTuple):
-    """Where the robot is: x (column, px), y (row, px), heading (rad)."""
-
-    x: float
-    y: float
-    heading: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,42 +176,11 @@ def default_horizon(shortest: float, robot: RobotParams, dt: float) -> int:
     return generous_horizon(shortest, robot.max_wheel_speed * dt)
 
 
-def generous_horizon(shortest: float, full_step: float) -> int:
-    """Six times the full-speed steps of a shortest path, or 2500; any one unit."""
-    return max(MIN_HORIZON, math.ceil(min(6.0 * shortest / full_step, 2.0**62)))
-
-
 def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
     """A feasible start within one body radius of the nominal, heading +- 0.5 rad."""
     return jittered_pose(
         task.start, task.robot.radius, random, lambda pose: _may_start(task, pose)
     )
-
-
-def jittered_pose(
-    nominal: Pose,
-    reach: float,
-    random: np.random.Generator,
-    may_start: Callable[[Pose], bool],
-) -> Pose:
-    """A pose within `reach` of the nominal one that may be a start, heading +- 0.5 rad.
-
-    The disc that is drawn from shrinks slowly; where the body fits nowhere but at the
-    nominal start, only the heading changes.
-    """
-    for _ in range(MAX_DRAWS):
-        distance = reach * math.sqrt(random.random())
-        bearing = random.uniform(-math.pi, math.pi)
-        turn = random.uniform(-JITTER_HEADING, JITTER_HEADING)
-        pose = Pose(
-            nominal.x + distance * math.cos(bearing),
-            nominal.y + distance * math.sin(bearing),
-            wrapped(nominal.heading + turn),
-        )
-        if may_start(pose):
-            return pose
-        reach *= 0.98
-    return nominal._replace(heading=pose.heading)
 
 
 def mixed_start(task: Map2DTask, random: np.random.Generator) -> Pose:
@@ -255,12 +219,6 @@ def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
             shortest = float(field[start_y, start_x])
             return replace(task, start=start, goal=goal, field=field, shortest=shortest)
     return task
-
-
-def wrapped(heading: float) -> float:
-    """The same direction in (-pi, pi], for a heading of any size."""
-    turn = math.remainder(heading, 2.0 * math.pi)
-    return math.pi if turn <= -math.pi else turn
 
 
 def _may_start(task: Map2DTask, pose: Pose) -> bool:

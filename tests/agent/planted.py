@@ -36,8 +36,8 @@ from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.report import Cause, Diagnosis
 from tdac_agent.verification.suite.starts import spread_starts
+from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.task import Pose
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,13 @@ from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import METRES, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_agent.verification.suite.reference import taut
+from tdac_envs.drive.task import Pose
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.gaps import part_gap
 from tdac_envs.epuck.infrared import PLACES
 from tdac_envs.epuck.prisms import Owned, Prisms
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.grid.plan import Path, first_beyond
-from tdac_envs.map2d.task import Pose
 from tdac_envs.worlds.bodies import BODY_RADIUS, at_body_height
 from tdac_envs.worlds.world import Obstacle
 

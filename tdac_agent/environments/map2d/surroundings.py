@@ -12,9 +12,10 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.units import PIXELS, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch, nearest_touch
 from tdac_agent.verification.suite.reference import pull
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.plan import Path, descend, first_beyond
-from tdac_envs.map2d.task import Map2DTask, Pose
+from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import entry
 
 Point = tuple[float, float]

@@ -13,11 +13,12 @@ from tdac_agent.tasks.task_file import RobotSpec, TaskFile
 from tdac_agent.tasks.units import PIXELS, Units
 from tdac_envs.core.errors import MapError, TaskError
 from tdac_envs.drawing.canvas import Image
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.picture import ROBOT_IMAGE
 from tdac_envs.map2d.source import prepare
-from tdac_envs.map2d.task import Map2DTask, Pose, Terrain, make_task
+from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.image import picture_size, read_bytes
 from tdac_envs.mapping.map_folder import preview_of, write_grid

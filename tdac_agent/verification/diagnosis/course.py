@@ -9,8 +9,8 @@ import numpy as np
 
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.verification.diagnosis.surroundings import Surroundings
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import Path
-from tdac_envs.map2d.task import Pose
 
 _PATH_AHEAD = 400
 _LAST_POSES = 20

@@ -25,7 +25,7 @@ from tdac_agent.verification.diagnosis.surroundings import (
     surroundings_of,
 )
 from tdac_agent.verification.diagnosis.touch import side_of, where_on_the_wall
-from tdac_envs.map2d.task import Pose
+from tdac_envs.drive.task import Pose
 
 LAST_POSES = 4
 # Share of turns away from the path, and their number, from which it is no accident.

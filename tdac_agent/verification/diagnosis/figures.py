@@ -22,7 +22,7 @@ from tdac_agent.verification.diagnosis.surroundings import (
 )
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.closeup import Event, run_picture
-from tdac_envs.map2d.task import Pose
+from tdac_envs.drive.task import Pose
 
 MAX_FACT = 240
 

@@ -12,8 +12,8 @@ from tdac_agent.episodes.trajectory import Outcome, Rollout
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.verification.diagnosis.surroundings import surroundings_of
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import path_length
-from tdac_envs.map2d.task import Pose
 
 # Of the spectral arc length, as its authors have them.
 _HIGHEST, _FAINT, _PADDING = 10.0, 0.05, 4

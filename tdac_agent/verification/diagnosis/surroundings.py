@@ -10,8 +10,9 @@ from tdac_agent.episodes.trajectory import Rollout, Trajectory
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import Path
-from tdac_envs.map2d.task import Map2DTask, Pose
+from tdac_envs.map2d.task import Map2DTask
 
 Point = tuple[float, float]
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.tasks.units import PIXELS, Units
-from tdac_envs.map2d.task import Map2DTask, Pose
+from tdac_envs.drive.task import Pose
+from tdac_envs.map2d.task import Map2DTask
 
 Point = tuple[float, float]
 

@@ -35,7 +35,7 @@ from tdac_agent.verification.judge.time_limit import time_limit
 from tdac_agent.verification.judge.turns import Turns
 from tdac_agent.verification.judge.workers import SIZE, Crew
 from tdac_agent.verification.suite.starts import spread_starts
-from tdac_envs.map2d.task import Pose
+from tdac_envs.drive.task import Pose
 
 JITTERS = 5
 NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))

@@ -18,7 +18,7 @@ from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.verification.judge.blame import ours
 from tdac_agent.verification.judge.children import Nursery
 from tdac_agent.verification.judge.workers import Crew
-from tdac_envs.map2d.task import Pose
+from tdac_envs.drive.task import Pose
 
 SHOWN_JITTERS = 2
 

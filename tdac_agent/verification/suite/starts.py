@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tdac_agent.tasks.setting import Nominal
-from tdac_envs.map2d.task import JITTER_HEADING, Pose
+from tdac_envs.drive.task import JITTER_HEADING, Pose
 
 DRAWS = 64
 # Signs of the offset in x, in y and of the turn. Each pair of two signs comes once, so

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid, clearance_at
 from tdac_envs.grid.plan import path_length
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.task import (
-    Pose,
     Terrain,
     at_goal,
     jittered_start,

@@ -16,8 +16,8 @@ from tdac_agent.verification.diagnosis.touch import (
     side_of,
     where_on_the_wall,
 )
+from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.task import Pose
 
 
 def room(start=(60, 60, 0), goal=(170, 60), walls=(), radius=8.0, **arguments):

@@ -11,8 +11,8 @@ from driving import drive
 from tdac_agent.tasks.units import METRES, PIXELS
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.surroundings import surroundings_of
+from tdac_envs.drive.task import Pose
 from tdac_envs.epuck.env import EPuckEnv
-from tdac_envs.map2d.task import Pose
 from tdac_envs.worlds.footprint import Disc, Rectangle
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, World
 
