@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from numbers import Integral
 from typing import Any
 
-import numpy as np
-
 from tdac_envs.core.errors import TaskError
 
 LARGEST = 1e9
@@ -138,24 +136,3 @@ def check_reset_options(options: dict[str, Any]) -> None:
     unknown = sorted(map(str, options.keys() - {"start", "goal"}))
     if unknown:
         raise TaskError(f"unknown reset options {unknown}; expected 'start' and 'goal'")
-
-
-def wheel_speeds(action: Any) -> tuple[float, float]:
-    """The wheel speeds of an action, which may be out of [-1, 1].
-
-    Raises:
-        ValueError: The action is not two finite numbers.
-    """
-    try:
-        array = action if type(action) is np.ndarray else np.asarray(action)
-        left, right = array.tolist()
-        # NaN and infinity times 0 are not 0.
-        if 0.0 * left + 0.0 * right == 0.0:
-            return float(left), float(right)
-    except (TypeError, ValueError):
-        pass
-    raise ValueError(_not_an_action(action)) from None
-
-
-def _not_an_action(action: Any) -> str:
-    return f"expected an action of two finite numbers in [-1, 1], got {action!r}"

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import not_negative, one_of, wheel_speeds, whole_number
+from tdac_envs.core.arguments import not_negative, one_of, whole_number
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import (
     HEADING,
@@ -137,3 +137,24 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._status = ending(reached, collided, truncated) or self._status
         if self.render_mode == "human":
             self.render()
+
+
+def wheel_speeds(action: Any) -> tuple[float, float]:
+    """The wheel speeds of an action, which may be out of [-1, 1].
+
+    Raises:
+        ValueError: The action is not two finite numbers.
+    """
+    try:
+        array = action if type(action) is np.ndarray else np.asarray(action)
+        left, right = array.tolist()
+        # NaN and infinity times 0 are not 0.
+        if 0.0 * left + 0.0 * right == 0.0:
+            return float(left), float(right)
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(_not_an_action(action)) from None
+
+
+def _not_an_action(action: Any) -> str:
+    return f"expected an action of two finite numbers in [-1, 1], got {action!r}"

@@ -1,4 +1,4 @@
-"""What the compiled steps of all environments share: memory, wheels, reward and ends.
+"""What the compiled steps of all environments share: memory, motion, reward, ends.
 
 A robot's memory is a few arrays, in which the environments have these entries in
 common; see `tdac_envs.epuck.robot.Robot` for what they mean.
@@ -6,15 +6,17 @@ common; see `tdac_envs.epuck.robot.Robot` for what they mean.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Words, block, line, plane
-from tdac_envs.core.compiled import subkernel
+from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.rewards import RewardWeights, step_reward
 
+_TWO_PI = 2.0 * math.pi
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -160,3 +162,46 @@ def info_of(outcome: list[float]) -> dict[str, Any]:
         "path_distance": remaining,
         "clearance": room,
     }
+
+
+@kernel
+def wrap_angle(angle: float) -> float:
+    """The same direction in (-pi, pi]."""
+    wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
+    return math.pi if wrapped <= -math.pi else wrapped
+
+
+@subkernel
+def move(
+    x: float, y: float, heading: float, forward: float, turn: float
+) -> tuple[float, float, float]:
+    """Pose after the exact arc of `forward` px and `turn` rad; heading unwrapped.
+
+    The chord of the arc points along the middle heading.
+    """
+    half = 0.5 * turn
+    # Below 1e-4 rad the series is exact to the last bit.
+    shrink = math.sin(half) / half if abs(half) > 1e-4 else 1.0 - half * half / 6.0
+    chord, middle = forward * shrink, heading + half
+    return (
+        x + chord * math.cos(middle),
+        y + chord * math.sin(middle),
+        heading + turn,
+    )
+
+
+@subkernel
+def free_way(rest: float, approach: float, curvature: float) -> float:
+    """Way that is surely free: to the root of `rest + approach h - curvature h^2 / 2`.
+
+    Args:
+        rest: Distance to the body.
+        approach: Rate at which it grows along the tangent, in [-1, 1].
+        curvature: Of the arc.
+    """
+    root = math.sqrt(approach * approach + 2.0 * curvature * rest)
+    if approach < 0.0:
+        return 2.0 * rest / (root - approach)
+    if curvature > 0.0:
+        return (approach + root) / curvature
+    return math.inf

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.drive.stepping import free_way, move, wrap_angle
 from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, Array, Index
-from tdac_envs.map2d.contact import free_way, move, wrap_angle
 
 # As in `tdac_envs.map2d.contact`, but in metres: a disc in touch may get this much
 # deeper  in a step, and no deeper than that in all; a search ends this near.

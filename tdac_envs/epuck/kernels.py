@@ -36,15 +36,16 @@ from tdac_envs.drive.stepping import (
     clear,
     copy_row,
     give_command,
+    move,
     settle,
     within,
+    wrap_angle,
 )
 from tdac_envs.epuck.contact import advance
 from tdac_envs.epuck.gaps import nearest_of
 from tdac_envs.epuck.infrared import in_sight, sense
 from tdac_envs.epuck.nearby import listed_at
 from tdac_envs.epuck.prisms import Array, Index
-from tdac_envs.map2d.contact import move, wrap_angle
 
 WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
 """Of an e-puck, m."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.drive.stepping import free_way, move
 from tdac_envs.grid.grid import FloatGrid
 
 # A disc that starts in touch is stopped when it gets this much deeper, px: driving
@@ -19,33 +20,6 @@ DEEPEST = 1e-7
 _CLOSE = 1e-9
 # For the float32 rounding of the clearance field, px.
 _ROUNDING = 1e-3
-_TWO_PI = 2.0 * math.pi
-
-
-@kernel
-def wrap_angle(angle: float) -> float:
-    """The same direction in (-pi, pi]."""
-    wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
-    return math.pi if wrapped <= -math.pi else wrapped
-
-
-@subkernel
-def move(
-    x: float, y: float, heading: float, forward: float, turn: float
-) -> tuple[float, float, float]:
-    """Pose after the exact arc of `forward` px and `turn` rad; heading unwrapped.
-
-    The chord of the arc points along the middle heading.
-    """
-    half = 0.5 * turn
-    # Below 1e-4 rad the series is exact to the last bit.
-    shrink = math.sin(half) / half if abs(half) > 1e-4 else 1.0 - half * half / 6.0
-    chord, middle = forward * shrink, heading + half
-    return (
-        x + chord * math.cos(middle),
-        y + chord * math.sin(middle),
-        heading + turn,
-    )
 
 
 @kernel
@@ -199,23 +173,6 @@ def _is_edge(clear: FloatGrid, i: int, j: int) -> bool:
         or (i + 1 < width and clear[j, i + 1] > 0.0)
         or (j + 1 < height and clear[j + 1, i] > 0.0)
     )
-
-
-@subkernel
-def free_way(rest: float, approach: float, curvature: float) -> float:
-    """Way that is surely free: to the root of `rest + approach h - curvature h^2 / 2`.
-
-    Args:
-        rest: Distance to the body.
-        approach: Rate at which it grows along the tangent, in [-1, 1].
-        curvature: Of the arc.
-    """
-    root = math.sqrt(approach * approach + 2.0 * curvature * rest)
-    if approach < 0.0:
-        return 2.0 * rest / (root - approach)
-    if curvature > 0.0:
-        return (approach + root) / curvature
-    return math.inf
 
 
 @subkernel

@@ -38,12 +38,14 @@ from tdac_envs.drive.stepping import (
     batch_at,
     copy_row,
     give_command,
+    move,
     settle,
     within,
+    wrap_angle,
 )
 from tdac_envs.drive.stepping import clear as forget
 from tdac_envs.grid.grid import FloatGrid
-from tdac_envs.map2d.contact import contact_before, move, wrap_angle
+from tdac_envs.map2d.contact import contact_before
 from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
 
 # A body that was stopped by an obstacle goes back by this much of its way, px, so

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import constant
+from tdac_envs.drive.stepping import wrap_angle
 from tdac_envs.grid.grid import BoolGrid, body_free
 from tdac_envs.grid.plan import Path, descend, distance_field
-from tdac_envs.map2d.contact import wrap_angle
 from tdac_envs.map2d.straight import gets_straight
 from tdac_envs.map2d.task import Map2DTask
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tdac_envs.drive.stepping import move
 from tdac_envs.epuck.contact import advance, first_touch
 from tdac_envs.epuck.gaps import clear_grid, nearest_gap
 from tdac_envs.epuck.infrared import sees
 from tdac_envs.epuck.prisms import Owned, Prisms
-from tdac_envs.map2d.contact import move
 from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle
 from tdac_envs.worlds.world import Part
 

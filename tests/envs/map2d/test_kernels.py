@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_envs.core.compiled import constant
+from tdac_envs.drive.stepping import move, wrap_angle
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.grid.plan import distance_field
-from tdac_envs.map2d.contact import first_contact, move, wrap_angle
+from tdac_envs.map2d.contact import first_contact
 from tdac_envs.map2d.kernels import advance, path_distance
 from tdac_envs.map2d.rays import cast_ray, cast_rays, fan, leaps_of, sees
 from tdac_envs.map2d.terrain import Terrain

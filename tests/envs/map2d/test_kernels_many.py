@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from tdac_envs.core.compiled import constant
+from tdac_envs.drive.stepping import move
 from tdac_envs.grid.grid import clearance
-from tdac_envs.map2d.contact import first_contact, move
+from tdac_envs.map2d.contact import first_contact
 from tdac_envs.map2d.rays import cast_ray, leaps_of
 
 MAPS = 20
