@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import not_negative, one_of, whole_number
+from tdac_envs.drawing.runs import ending
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import (
     HEADING,
@@ -19,7 +20,6 @@ from tdac_envs.drive.stepping import (
     SLIP_RIGHT,
     info_of,
 )
-from tdac_envs.map2d.picture import ending
 
 if TYPE_CHECKING:
     from tdac_envs.drawing.window import Window

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Addresses
 from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import TOUCHED, info_of
 from tdac_envs.epuck import kernels
@@ -28,7 +29,6 @@ from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.setup import Setup
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
-from tdac_envs.map2d.picture import Status
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 if TYPE_CHECKING:

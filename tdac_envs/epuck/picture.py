@@ -21,10 +21,10 @@ from tdac_envs.drawing.canvas import (
     Image,
 )
 from tdac_envs.drawing.marks import OUTCOMES, draw_outcome
+from tdac_envs.drawing.runs import Status
 from tdac_envs.epuck.infrared import ELEVATION, N_SENSORS, PLACES
 from tdac_envs.epuck.prisms import FIXED, Array, Prisms
 from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.map2d.picture import Status
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.footprint import Disc
 from tdac_envs.worlds.picture import View, colour_of, draw_things

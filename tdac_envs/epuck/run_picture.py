@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tdac_envs.drawing.backdrop import CLOSE_UP, Window
 from tdac_envs.drawing.canvas import Canvas, Image
+from tdac_envs.drawing.runs import Legend, draw_runs
 from tdac_envs.epuck.ground import Bounds
 from tdac_envs.epuck.picture import SMALLEST_BODY, draw_wish
 from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.map2d.picture import Legend, draw_runs
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.picture import SIDE, View, draw_things
 

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Addresses
 from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.kernels import begin, drive
-from tdac_envs.map2d.picture import Scene, Status
+from tdac_envs.map2d.picture import Scene
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
 from tdac_envs.map2d.source import MapSource, prepare

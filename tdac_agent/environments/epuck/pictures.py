@@ -13,10 +13,10 @@ from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.units import Points
 from tdac_envs.drawing.canvas import Image
+from tdac_envs.drawing.runs import Status
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.picture import EPuckScene
 from tdac_envs.epuck.run_picture import WorldBackground, trajectory_picture
-from tdac_envs.map2d.picture import Status
 
 
 def world_pictures(setting: Setting) -> WorldPictures:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from tdac_agent.environments.map2d.task import Map2DSetting
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.units import Points
-from tdac_envs.drawing.backdrop import Background
 from tdac_envs.drawing.canvas import Image
-from tdac_envs.map2d.picture import Scene, Status, trajectory_picture
+from tdac_envs.drawing.runs import Status
+from tdac_envs.map2d.picture import Scene
+from tdac_envs.map2d.run_picture import Background, trajectory_picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)

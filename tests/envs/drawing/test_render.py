@@ -13,8 +13,10 @@ from tdac_envs.controller_kit.sensors import Ultrasonic
 from tdac_envs.core.extras import install_command
 from tdac_envs.drawing.canvas import FREE, GREEN, RED, TRAIL, WALL, Canvas, frame_scale
 from tdac_envs.drawing.marks import LEFT_RAYS, OUTCOMES, RIGHT_RAYS
+from tdac_envs.drawing.runs import Status
 from tdac_envs.drawing.window import Window
-from tdac_envs.map2d.picture import Scene, Status, trajectory_picture
+from tdac_envs.map2d.picture import Scene
+from tdac_envs.map2d.run_picture import trajectory_picture
 from tdac_envs.mapping.params import RobotParams
 
 MAP = np.zeros((400, 500), bool)

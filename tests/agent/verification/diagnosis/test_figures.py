@@ -15,9 +15,10 @@ from tdac_agent.verification.diagnosis.figures import event_of
 from tdac_agent.verification.diagnosis.report import Episode, Report
 from tdac_agent.verification.suite.reference import Reference
 from tdac_agent.verification.verify import verify
-from tdac_envs.drawing.backdrop import CLOSE_UP, Background
+from tdac_envs.drawing.backdrop import CLOSE_UP
 from tdac_envs.drawing.canvas import TRAIL
 from tdac_envs.drawing.closeup import COLUMN, EVENT, MARGIN, run_picture
+from tdac_envs.map2d.run_picture import Background
 
 WALL = "def policy(obs):\n    return 1.0, 1.0\n"
 
