@@ -20,7 +20,8 @@ from tdac_agent.tasks.task import Task, write_workdir
 from tdac_agent.verification.judge.children import Nursery
 from tdac_agent.verification.judge.contenders import Contender
 from tdac_agent.verification.judge.driving import Driven, Stage, drive_seed
-from tdac_agent.verification.judge.judge import JITTERS, Judge
+from tdac_agent.verification.judge.judge import Judge
+from tdac_agent.verification.suite.starts import JITTERS
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.video import write_video

@@ -34,10 +34,9 @@ from tdac_agent.verification.judge.suite_episode import (
 from tdac_agent.verification.judge.time_limit import time_limit
 from tdac_agent.verification.judge.turns import Turns
 from tdac_agent.verification.judge.workers import SIZE, Crew
-from tdac_agent.verification.suite.starts import spread_starts
+from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_envs.drive.task import Pose
 
-JITTERS = 5
 NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))
 # As many as a suite has: the nominal one, the jittered ones, those of `run_episode`.
 EPISODES = 1 + JITTERS + 3

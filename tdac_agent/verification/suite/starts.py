@@ -7,6 +7,7 @@ import numpy as np
 from tdac_agent.tasks.setting import Nominal
 from tdac_envs.drive.task import JITTER_HEADING, Pose
 
+JITTERS = 5
 DRAWS = 64
 # Signs of the offset in x, in y and of the turn. Each pair of two signs comes once, so
 # that what fails at one end of two of them is met, whatever the third is.

@@ -10,10 +10,9 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from tdac_agent.tasks.setting import Nominal
-from tdac_agent.verification.judge.judge import JITTERS
 from tdac_agent.verification.suite.contract import time_step
 from tdac_agent.verification.suite.reference import Point, oracle_path, pull
-from tdac_agent.verification.suite.starts import spread_starts
+from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_envs.map2d.task import Map2DTask
 
 if TYPE_CHECKING:
