@@ -9,7 +9,6 @@ nothing of a verification is left for the next one.
 from __future__ import annotations
 
 import os
-import re
 import select
 import signal
 import subprocess
@@ -23,6 +22,7 @@ from pathlib import Path
 
 from tdac_agent.errors import Fault
 from tdac_agent.storage.locks import wait_for
+from tdac_agent.storage.secrets import SECRET
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.verification.judge.children import Nursery
 from tdac_agent.verification.judge.workers import end_with_parent
@@ -32,9 +32,6 @@ from tdac_agent.verification.judge.workers import end_with_parent
 KEPT_VARIABLES = frozenset(
     ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
 )
-# The judge starts the controllers, so it holds no keys: on the weakest tier they may
-# read its environment.
-SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
 # One that has died is noticed at once; a starved machine may take minutes.
 START_SECONDS = 600.0
 FAREWELL_SECONDS = 5.0
