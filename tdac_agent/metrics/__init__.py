@@ -4,36 +4,42 @@ Everything goes in and out as pandas frames with one row per thing (`RUN_COLUMNS
 `CANDIDATE_COLUMNS`); each interval says what it assumes in `ASSUMPTIONS`.
 """
 
-from tdac_agent.metrics.compare import (
-    Comparison,
-    best_of_n,
-    compare_paired,
-    pass_at_n,
-)
-from tdac_agent.metrics.cumulative import cumulative_success
-from tdac_agent.metrics.exact import exact_interval
-from tdac_agent.metrics.frames import (
-    CANDIDATE_COLUMNS,
-    RUN_COLUMNS,
-    Frames,
-    find_runs,
-    frames_from_tau,
-    frames_of,
-    iterations_of,
-    join_frames,
-    load_frames,
-)
-from tdac_agent.metrics.rates import (
-    ASSUMPTIONS,
-    Rate,
-    candidate_rate,
-    first_pass,
-    rate_of_runs,
-    success_rate,
-    unbiased_success_rate,
-)
-from tdac_agent.metrics.reported import load_reported
-from tdac_agent.metrics.table import summarise
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tdac_agent.metrics.compare import (
+        Comparison,
+        best_of_n,
+        compare_paired,
+        pass_at_n,
+    )
+    from tdac_agent.metrics.cumulative import cumulative_success
+    from tdac_agent.metrics.exact import exact_interval
+    from tdac_agent.metrics.frames import (
+        CANDIDATE_COLUMNS,
+        RUN_COLUMNS,
+        Frames,
+        find_runs,
+        frames_from_tau,
+        frames_of,
+        iterations_of,
+        join_frames,
+        load_frames,
+    )
+    from tdac_agent.metrics.rates import (
+        ASSUMPTIONS,
+        Rate,
+        candidate_rate,
+        first_pass,
+        rate_of_runs,
+        success_rate,
+        unbiased_success_rate,
+    )
+    from tdac_agent.metrics.reported import load_reported
+    from tdac_agent.metrics.table import summarise
 
 __all__ = [
     "ASSUMPTIONS",
@@ -61,3 +67,42 @@ __all__ = [
     "summarise",
     "unbiased_success_rate",
 ]
+
+_HOME = {
+    "ASSUMPTIONS": "rates",
+    "CANDIDATE_COLUMNS": "frames",
+    "Comparison": "compare",
+    "Frames": "frames",
+    "RUN_COLUMNS": "frames",
+    "Rate": "rates",
+    "best_of_n": "compare",
+    "candidate_rate": "rates",
+    "compare_paired": "compare",
+    "cumulative_success": "cumulative",
+    "exact_interval": "exact",
+    "find_runs": "frames",
+    "first_pass": "rates",
+    "frames_from_tau": "frames",
+    "frames_of": "frames",
+    "iterations_of": "frames",
+    "join_frames": "frames",
+    "load_frames": "frames",
+    "load_reported": "reported",
+    "pass_at_n": "compare",
+    "rate_of_runs": "rates",
+    "success_rate": "rates",
+    "summarise": "table",
+    "unbiased_success_rate": "rates",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Imports a part on first use: most of them load pandas."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """What there is, imported yet or not."""
+    return sorted({*globals(), *__all__})
