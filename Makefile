@@ -9,7 +9,7 @@
 #                     versions, other Pythons, another user, other processors, a busy
 #                     machine. A table says what could not be tried, and why. Some rows:
 #                     make portability ROWS="lowest wheel-user"
-#   make lint         Style and types.
+#   make lint         Style, types, and who may import whom.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -46,6 +46,7 @@ lint: $(VENV)/.lint-installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
