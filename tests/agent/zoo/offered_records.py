@@ -11,7 +11,7 @@ from offers import Maker, Offer
 
 import tdac_agent
 
-DEMO = Path(tdac_agent.__file__).parent / "demo"
+DEMO = Path(tdac_agent.__file__).parent / "runs" / "demo"
 
 
 def run(**changes: object) -> Maker:
