@@ -36,6 +36,8 @@ from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.mapping.map_folder import png
 
+MOST_LINES = 5000
+"""Of a source that is compared with the last one: the time grows with their square."""
 PREVIEW_FILE = "preview.png"
 """How map or world was read, for people."""
 Event = Callable[[dict[str, Any]], None]
@@ -217,13 +219,7 @@ class Recorder:
         """Keeps a candidate's source and its difference from the last one."""
         folder = self._folder(k, j)
         keep(folder / "controller.py", source)
-        difference = difflib.unified_diff(
-            self._previous.splitlines(keepends=True),
-            source.splitlines(keepends=True),
-            "previous",
-            "controller.py",
-        )
-        keep(folder / "controller.diff", "".join(difference))
+        keep(folder / "controller.diff", difference(self._previous, source))
         self._previous = source
         return folder
 
@@ -308,3 +304,11 @@ class Recorder:
 def _about(request: Request, key: str) -> dict[str, Any]:
     _, k, j = request.sample
     return {"kind": request.kind, "k": k, "j": j, "key": key}
+
+
+def difference(before: str, after: str) -> str:
+    """The unified difference of two sources; a note where it would take too long."""
+    old, new = before.splitlines(keepends=True), after.splitlines(keepends=True)
+    if max(len(old), len(new)) > MOST_LINES:
+        return f"(not compared: more than {MOST_LINES} lines)\n"
+    return "".join(difflib.unified_diff(old, new, "previous", "controller.py"))

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.provider import Reply
+from tdac_agent.runs.recorder import difference
 from tdac_agent.runs.records import Attempt, Run, load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.loop import synthesize
@@ -72,6 +73,13 @@ def test_writing_is_atomic(tmp_path, monkeypatch):
     monkeypatch.setattr("os.fsync", full)
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_long_sources_are_not_compared():
+    """A model's answer cannot keep a run busy with its own record."""
+    assert "-a\n+b\n" in difference("a\nc\n", "b\nc\n")
+    long = "x = 1\n" * 66_000
+    assert difference(long, f"{long}y = 2\n").startswith("(not compared")
 
 
 @pytest.mark.parametrize(
