@@ -255,7 +255,7 @@ def _was_called(listener: socket.socket) -> bool:
 def _code_hash() -> str:
     """Hash of the suite and of what runs in the child."""
     digest = hashlib.sha256()
-    for folder in ("suites", "sandbox/inner"):
+    for folder in ("verification/suite", "sandbox/inner"):
         for path in sorted((PACKAGE / folder).rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.hexdigest()

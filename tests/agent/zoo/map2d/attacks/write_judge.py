@@ -16,7 +16,11 @@ def writable(path):
         return path
 
 
-FILES = ["suites/map2d/test_static.py", "report.py", "sandbox/inner/serve.py"]
+FILES = [
+    "verification/suite/shipped/map2d/test_static.py",
+    "verification/diagnosis/report.py",
+    "sandbox/inner/serve.py",
+]
 for name in FILES:
     attempt("package", writable, f"@PACKAGE@/{name}")
 attempt("target", lambda: open("@TARGET@/kept.txt", "w").write("overwritten"))
