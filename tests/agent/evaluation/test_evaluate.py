@@ -417,7 +417,9 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
     words = ["evaluate", "reference", "go-to-goal", "--task", folder, "--episodes", 4]
     code, text, errors = tdac(*words, "--out", out, "--csv", tmp_path / "all.csv")
     assert code == 0, errors
-    assert "small: 4 episodes each, moved starts, seed 0" in text
+    told = " ".join(text.split())
+    assert told.startswith("small (map ")
+    assert "): 4 episodes each, moved starts, seed 0 " in told
     assert "reference ~ go-to-goal" in text or "reference > go-to-goal" in text
     frame = pd.read_csv(tmp_path / "all.csv")
     assert frame["success"].tolist() == [True] * 4 + [False] * 4

@@ -121,12 +121,13 @@ def check_line(usual: tuple[str, ...], examples: int, command) -> None:
         here.mkdir()
         temporary.mkdir()
         furnish(here)
+        before = _children()
         try:
             code, errors = command(words, here, temporary)
             seen[not is_usage(code, errors)] += 1
             assert problem_of(code, errors) == ""
             assert sorted(temporary.iterdir()) == []
-            assert _gone(_children())
+            assert _gone(_children() - before)
         finally:
             os.chdir("/")
             shutil.rmtree(folder)
@@ -151,7 +152,7 @@ def _gone(pids: set[int]) -> bool:
     """Whether all of some processes end within five seconds."""
     deadline = time.monotonic() + 5.0
     while pids & _children() and time.monotonic() < deadline:
-        os.sched_yield()
+        time.sleep(0.01)
     return not pids & _children()
 
 
