@@ -15,11 +15,14 @@ from tdac_agent.verification.verify import SHIPPED_SUITES, verify
 
 PARSE = ["test_parse_world"]
 GRIDS = ["test_build_grid[0.0]", "test_build_grid[0.04]"]
+HERE = "test_build_grid_of_this_world"
+ALL_GRIDS = [*GRIDS, HERE]
 THIS = "test_astar_on_this_world"
 FORWARD = ["test_drives_forward[blind]", "test_drives_forward[nothing near]"]
 SIDES, MIRROR = "test_turns_to_the_side", "test_mirrored_waypoint"
 AROUND, SAME, BLOCKED = "test_turns_around", "test_same_wherever_it_is", "test_blocked"
-TRACKS = [f"test_tracks_a_waypoint[{angle}]" for angle in (0.0, 0.6, -1.5, 3.0)]
+ANGLES = (0.0, 0.6, -1.5, 3.0, "drawn")
+TRACKS = [f"test_tracks_a_waypoint[{angle}]" for angle in ANGLES]
 WHEELS = [*FORWARD, SIDES, MIRROR, AROUND, SAME, BLOCKED, *TRACKS]
 ROBOT, FILE = "test_robot_constants", "test_file_constant"
 
@@ -101,42 +104,42 @@ WRONG = {
     ),
     "boxes not turned": (
         unread(r"(Solid \{\n.*\n  rotation 0 0 1) .*", r"\1 0"),
-        GRIDS,
+        ALL_GRIDS,
     ),
     "arena not turned": (
         unread(r"(RectangleArena \{\n.*\n  rotation 0 0 1) .*", r"\1 0"),
         GRIDS,
     ),
     "no rocks": (unread("boundingObject Indexed", "unknown Indexed"), GRIDS),
-    "no barrels": (unread("boundingObject Cyl", "unknown Cyl"), GRIDS),
+    "no barrels": (unread("boundingObject Cyl", "unknown Cyl"), ALL_GRIDS),
     "no pipes": (unread("boundingObject Group", "unknown Group"), GRIDS),
     "no things with a DEF": (
         unread(r"^DEF THING_[0-9]+ Solid \{(.|\n)*?^\}", ""),
         GRIDS,
     ),
     "a wider than it is deep": (unread(r"size (\S+) (\S+)", r"size \2 \1"), GRIDS),
-    "grid as [x, y]": (grid("return occ.T.copy(), (x0, y0)"), [*GRIDS, THIS]),
-    "grid upside down": (grid("return occ[::-1].copy(), (x0, y0)"), GRIDS),
-    "no inflation": (grid("return _build(world, resolution, 0.0)"), GRIDS[1:]),
+    "grid as [x, y]": (grid("return occ.T.copy(), (x0, y0)"), [*ALL_GRIDS, THIS]),
+    "grid upside down": (grid("return occ[::-1].copy(), (x0, y0)"), ALL_GRIDS),
+    "no inflation": (grid("return _build(world, resolution, 0.0)"), ALL_GRIDS[1:]),
     "always inflated": (
         grid("return _build(world, resolution, inflation + 0.04)"),
-        GRIDS,
+        ALL_GRIDS,
     ),
     "grid beside its corner": (
         grid("return occ, (x0 + 3 * resolution, y0)"),
-        GRIDS,
+        ALL_GRIDS,
     ),
     "free outside": (
         grid(
             "occ = np.pad(occ, 20, constant_values=False)\n"
             "    return occ, (x0 - 20 * resolution, y0 - 20 * resolution)"
         ),
-        GRIDS,
+        ALL_GRIDS,
     ),
-    "grid of int": (grid("return occ.astype(int), (x0, y0)"), [*GRIDS, THIS]),
+    "grid of int": (grid("return occ.astype(int), (x0, y0)"), [*ALL_GRIDS, THIS]),
     "path without start": (path("return path[1:]"), ["test_astar", THIS]),
     "None for no path": (path("return path or None"), ["test_astar"]),
-    "four directions": (path(FOUR), ["test_astar"]),
+    "four directions": (path(FOUR), ["test_astar", THIS]),
     "wheels swapped": (
         wheels("return right, left"),
         [SIDES, *TRACKS[1:]],
