@@ -14,6 +14,7 @@ from typing import Any
 from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import PermanentFault, Reply, Request
+from tdac_agent.prompting.rules import BEGIN
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.past import reply_of
 from tdac_agent.runs.records import JOURNAL, load_run
@@ -117,7 +118,7 @@ class Replay:
         Raises:
             PermanentFault: It names the first line that differs.
         """
-        asked, stable = request.prompt, request.stable
+        asked = request.prompt
         if recorded == asked:
             return ()
         pairs = zip(recorded.split("\n"), asked.split("\n"), strict=False)
@@ -125,7 +126,9 @@ class Replay:
             1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
         )
         line = f"line {same + 1} differs"
-        if self._reworded and recorded[:stable] == asked[:stable]:
+        # What is said before the question, to whom it is put, may have changed.
+        question = recorded.partition(BEGIN)[0]
+        if self._reworded and asked.partition(BEGIN)[0].endswith(question):
             return (f"recorded when this question was worded otherwise: {line}",)
         raise PermanentFault(f"another question than {where}: {line}")
 
