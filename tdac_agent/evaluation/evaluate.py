@@ -34,6 +34,7 @@ from tdac_agent.tasks.provenance import VERSIONED, sha256_of
 from tdac_agent.tasks.task import Task, called, lay_out, load_task
 from tdac_agent.verification.diagnosis.measures import Measured
 from tdac_agent.verification.judge.seeded import CALLS_FILE, POSES_FILE, SeededJob
+from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
@@ -92,7 +93,7 @@ def evaluate(
         ControllerFileError: A policy's file cannot be read.
         Fault: The sandbox is broken.
     """
-    whole_number("episodes", episodes, 1)
+    whole_number("episodes", episodes, 1, MOST_EPISODES)
     whole_number("seed", seed, 0)
     one_of("variation", variation, VARIATIONS)
     entrants = entrants_of(policies, wrappers)

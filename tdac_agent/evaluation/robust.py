@@ -21,7 +21,11 @@ from tdac_agent.tasks.provenance import origin
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.verification.judge.contenders import Contender
 from tdac_agent.verification.judge.seeded import SeededEpisode, SeededJob
-from tdac_agent.verification.judge.sequential import MARGIN, SequentialTest
+from tdac_agent.verification.judge.sequential import (
+    MARGIN,
+    MOST_EPISODES,
+    SequentialTest,
+)
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import whole_number
@@ -71,7 +75,7 @@ def verify_robust(
         Fault: The sandbox is broken: neither pass nor fail.
     """
     began = time.monotonic()
-    whole_number("episodes", episodes, 1)
+    whole_number("episodes", episodes, 1, MOST_EPISODES)
     if first_seed is not None:
         whole_number("first seed", first_seed, 0)
     test = None if accept_at is None else SequentialTest(accept_at, episodes, margin)

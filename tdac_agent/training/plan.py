@@ -19,12 +19,16 @@ from tdac_agent.training.hyperparameters import (
     config_file,
     read_hyperparameters,
 )
+from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, why
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.learning.wrappers import check_wrappers
 
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
+MOST_ROBOTS = 100_000
+"""That are driven at a time; an evaluation drives all its episodes so."""
+MOST_SEED = 2**31
 
 
 class TrainingPlan(BaseModel):
@@ -82,9 +86,12 @@ def make_plan(
         config: File with hyperparameters, in the form of rl-zoo3.
 
     Raises:
-        TaskError: A task or a wrapper cannot be used, or the tasks are of several
-            environments.
+        TaskError: A task, a wrapper or a number cannot be used, or the tasks are of
+            several environments.
     """
+    whole_number("seed", seed, 0, MOST_SEED)
+    for name, robots in (("n_envs", n_envs or 1), ("episodes", episodes)):
+        whole_number(name, robots, 1, MOST_ROBOTS)
     loaded = [load_task(name) for name in tasks]
     if len({task.spec.env for task in loaded}) != 1:
         raise TaskError("expected tasks of one environment: all maps, or all worlds")

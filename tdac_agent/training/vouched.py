@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import hmac
 import os
 from pathlib import Path
 
 from tdac_agent.storage.files import sync_folder, write_atomic
 from tdac_agent.tasks.installation import keyed, lasting_secret
-from tdac_agent.tasks.trust import Wish, file_sha256, permit
+from tdac_agent.tasks.trust import Wish, permit
 
 CHECKPOINT, REPLAY = "checkpoint.zip", "replay.pkl"
 MARKS = "checkpoint.mark"
@@ -42,7 +43,7 @@ def check(folder: Path, *, trust: bool) -> None:
     permit(
         folder,
         [
-            Wish(f"load {file}, which may run anything", (), file_sha256(file))
+            Wish(f"load {file}, which may run anything", (), _sha256(file))
             for file in files
             if file.is_file() and not _is_own(file)
         ],
@@ -58,7 +59,13 @@ def _is_own(file: Path) -> bool:
 
 
 def _mark(name: str, file: Path) -> str:
-    return keyed(f"checkpoint|{name}|{file_sha256(file)}".encode()).hex()
+    return keyed(f"checkpoint|{name}|{_sha256(file)}".encode()).hex()
+
+
+def _sha256(file: Path) -> str:
+    """Hash of a file of any size: steps to learn from again may take gigabytes."""
+    with file.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 def _lines(marks: Path) -> list[str]:

@@ -99,16 +99,20 @@ def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
         raise TaskError(f"expected {name} to be one of {choices}, got {value!r}")
 
 
-def whole_number(name: str, value: float, least: int) -> int:
+def whole_number(name: str, value: float, least: int, most: int | None = None) -> int:
     """The value as an int.
 
     Raises:
-        TaskError: It is not a whole number, or below `least`.
+        TaskError: It is not a whole number, below `least`, or above `most`.
     """
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
-        raise TaskError(
-            f"expected {name} to be a whole number from {least}, got {value!r}"
-        )
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, Integral)
+        or value < least
+        or (most is not None and value > most)
+    ):
+        limits = f"from {least}" if most is None else f"from {least} to {most}"
+        raise TaskError(f"expected {name} to be a whole number {limits}, got {value!r}")
     return int(value)
 
 

@@ -14,6 +14,8 @@ from tdac_envs.core.errors import TaskError
 Decision = Literal["accepted", "rejected", "undecided"]
 ALPHA = BETA = 0.05
 MARGIN = 0.05
+MOST_EPISODES = 1_000_000
+"""Of one run; each takes hundreds of bytes, and at the very least milliseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,7 @@ class SequentialTest:
             )
         if not (0.0 < self.alpha < 0.5 and 0.0 < self.beta < 0.5):
             raise TaskError("expected alpha and beta between 0 and 0.5")
-        whole_number("episodes", self.limit, 1)
+        whole_number("episodes", self.limit, 1, MOST_EPISODES)
         if self.limit < self.fewest_to_accept:
             raise TaskError(
                 f"to accept at {self.accept_at:g} with a margin of {self.margin:g} "

@@ -481,6 +481,7 @@ def test_it_is_there_from_python(tmp_path):
         ({"policies": [], "tasks": [task]}, "at least one policy"),
         ({"policies": ["random"], "tasks": []}, "at least one task"),
         ({"policies": ["random"], "tasks": [task], "episodes": 0}, "episodes"),
+        ({"policies": ["random"], "tasks": [task], "episodes": 10**18}, "to 1000000"),
         ({"policies": ["random"], "tasks": [task], "variation": "x"}, "variation"),
     ):
         with pytest.raises(TaskError, match=match):

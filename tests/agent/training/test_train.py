@@ -354,6 +354,9 @@ def test_wrong_hyperparameters_are_refused(tmp_path, small, config):
     plan = make_plan((small,), **given, config=config(env_kwargs={"walls": 3}))
     with pytest.raises(TaskError, match=r"env_kwargs .*: got an unexpected .*'walls'"):
         train(plan, tmp_path / "walls")
+    for name in ("episodes", "n_envs", "seed"):
+        with pytest.raises(TaskError, match=f"expected {name} to be a whole number"):
+            make_plan((small,), config=config(), **{name: 10**18})
     file = tmp_path / "empty.yml"
     file.write_text("{}")
     with pytest.raises(TaskError, match="no hyperparameters for TDAC-Map2D-v0"):
