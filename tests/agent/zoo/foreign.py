@@ -208,11 +208,17 @@ def program_as_optimizer(place: Place) -> list[str | Path]:
 
 
 @attack(
-    r"run the program `true -c \[2J\[Hverified: 41 of 41` as its learner", works=False
+    r"run the program `true -c .\[2J.\[Hverified: 41 of 41` as its learner", works=False
 )
 def program_that_draws_on_the_terminal(place: Place) -> list[str | Path]:
-    program = "command:true -c \x1b[2J\x1b[Hverified: 41 of 41\udc1b"
-    place.change(learner=program, optimizer=program, mark="\udc1b")
+    program = "command:true -c \x1b[2J\x1b[Hverified: 41 of 41"
+    place.change(learner=program, optimizer=program, mark="\x1b[2J")
+    return ["synth", "--resume", place.run]
+
+
+@attack("run.json: a text has half of a surrogate pair", works=False)
+def half_of_a_character(place: Place) -> list[str | Path]:
+    place.change(learner="command:true \udc1b")
     return ["synth", "--resume", place.run]
 
 
