@@ -33,7 +33,7 @@ IMAGE_BYTES = 512_000_000
 
 _MOST_NODES = 20_000
 _DEEPEST = 64
-_LONGEST_INTEGER = 63  # bits
+_INTEGERS = range(-(2**63), 2**63)
 _MOST_DIGITS = 100
 _MOST_FILES = 10_000
 # Others are unpacked as a whole, however little of it is asked for.
@@ -228,7 +228,7 @@ def _parts(value: Any, any_text: bool) -> Iterator[Any]:
         yield from value
     elif isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{value} is not a finite number")
-    elif isinstance(value, int) and value.bit_length() > _LONGEST_INTEGER:
+    elif isinstance(value, int) and value not in _INTEGERS:
         raise ValueError("a whole number has more than 64 bits")
     elif isinstance(value, str) and not any_text and not _is_unicode(value):
         raise ValueError("a text has half of a surrogate pair, which is no character")

@@ -154,3 +154,10 @@ def test_a_lock_ends_with_its_process(tmp_path):
     assert not is_held(file)
     with hold(file) as mine:
         assert mine
+
+
+def test_numbers_have_64_bits(tmp_path):
+    """The least and the greatest are read; a line with a longer one is none."""
+    numbers = [-(2**63), 2**63 - 1, 2**63]
+    (tmp_path / "j").write_text("".join(f'{{"n": {n}}}\n' for n in numbers))
+    assert [record["n"] for record in read_records(tmp_path / "j")] == numbers[:2]
