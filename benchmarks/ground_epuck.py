@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.mutants import Original, originals_in
-from tdac_agent.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.tasks.task import Task, load_task
-from tdac_agent.tasks.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.epuck.task import EPuckTask
 
 ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "epuck"
@@ -19,7 +20,9 @@ def small_world() -> Task:
     Headings around pi are the robot's way, and it looks away from its goal at first.
     """
     world = str(ZOO / "world.wbt")
-    return load_task(TaskFile(env=EPUCK, world=world, name="two walls", horizon=1600))
+    return load_task(
+        TaskFile(env=EPUCK.id, world=world, name="two walls", horizon=1600)
+    )
 
 
 def good_drivers(task: Task) -> list[Original]:

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from benchmarks.mutants import Original, originals_in
-from tdac_agent.builtin import Parameters, render_controller
+from tdac_agent.environments.map2d.builtin import Parameters, render_controller
 from tdac_agent.tasks.task import Task, load_task
 from tdac_envs.grid.grid import BoolGrid
 

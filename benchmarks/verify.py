@@ -47,7 +47,7 @@ from tdac_agent.verification.suite.privileged import (
     DO_NOTHING,
     REFERENCE,
     privileged_controller,
-    reference_ways,
+    reference_paths,
 )
 from tdac_envs import TdacError
 
@@ -122,7 +122,7 @@ def main() -> int:
 def _controllers(task: Task, folder: Path) -> dict[str, str]:
     run = synthesize(task, out=folder / "run")
     assert run.verified
-    ways = reference_ways(task.nominal, 0)
+    ways = reference_paths(task.nominal, 0)
     return {
         "builtin": run.controller.read_text(),
         REFERENCE: privileged_controller(task.nominal, ways),

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar, Protocol, TypeVar
+from dataclasses import field, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from tdac_agent.builtin.remedies import Remedies
 
 
 class Tuned(Protocol):
     """Values of the tuning constants of a template; the defaults are neutral.
 
-    The constants in the file have the same names, in capitals.
+    The constants in the file have the same names, in capitals. `remedies` says which
+    of them answer which failure.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
+    remedies: ClassVar[Remedies]
 
     @property
     def inflation_margin(self) -> float:
@@ -24,7 +29,7 @@ class Tuned(Protocol):
 P = TypeVar("P", bound=Tuned)
 
 
-def _tunable(
+def tunable(
     neutral: float,
     low: float,
     high: float,
@@ -48,94 +53,6 @@ def _tunable(
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Parameters:
-    """Constants of the controller for maps; the defaults are neutral."""
-
-    inflation_margin: float = _tunable(
-        0.0,
-        0.0,
-        12.0,
-        "px",
-        "room wanted beside the body where the map has it",
-        step=2.0,
-    )
-    lookahead: float = _tunable(
-        120.0,
-        20.0,
-        240.0,
-        "px",
-        "length of way in which a point to aim at is looked for",
-    )
-    cruise_speed: float = _tunable(
-        1.0, 0.25, 1.0, "", "share of the wheel limit on a free way"
-    )
-    slow_dist: float = _tunable(
-        0.0, 0.0, 80.0, "px", "free length ahead below which it slows down"
-    )
-    stop_dist: float = _tunable(
-        0.0, 0.0, 40.0, "px", "free length ahead below which it lines up before driving"
-    )
-    turn_gain: float = _tunable(
-        0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
-    )
-    turn_in_place: float = _tunable(
-        0.8, 0.05, 1.2, "rad", "heading error above which it turns in place"
-    )
-    unstick_after: float = _tunable(
-        0.0, 0.0, 400.0, "steps", "without progress until an unstick manoeuvre; 0: none"
-    )
-
-    def __post_init__(self) -> None:
-        _check(self)
-
-    def changed(self, **values: float) -> Parameters:
-        """A copy with some values replaced, each moved into its bounds."""
-        return changed(self, values)
-
-
-@dataclass(frozen=True, slots=True)
-class EPuckParameters:
-    """Constants of the controller for the e-puck; the defaults are neutral."""
-
-    inflation_margin: float = _tunable(
-        0.0,
-        0.0,
-        0.03,
-        "m",
-        "room wanted beside the body where the world has it",
-        step=0.002,
-    )
-    cruise_speed: float = _tunable(
-        1.0, 0.25, 1.0, "", "share of the wheel limit on a free way"
-    )
-    slow_dist: float = _tunable(
-        0.0, 0.0, 0.06, "m", "free length ahead below which it slows down"
-    )
-    blocked: float = _tunable(
-        1000.0, 300.0, 1900.0, "", "reading of ps0 or ps7 at which it does not drive on"
-    )
-    turn_gain: float = _tunable(
-        0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
-    )
-    turn_in_place: float = _tunable(
-        0.8, 0.05, 1.2, "rad", "heading error above which it turns in place"
-    )
-    look_steps: float = _tunable(
-        5.0, 1.0, 40.0, "steps", "from one look whether the way is clear to the next"
-    )
-    unstick_after: float = _tunable(
-        0.0, 0.0, 400.0, "steps", "without progress until it trusts the map alone"
-    )
-
-    def __post_init__(self) -> None:
-        _check(self)
-
-    def changed(self, **values: float) -> EPuckParameters:
-        """A copy with some values replaced, each moved into its bounds."""
-        return changed(self, values)
-
-
 def changed(parameters: P, values: Mapping[str, float]) -> P:
     """A copy with some values replaced, each moved into its bounds."""
     bounded: dict[str, Any] = {
@@ -146,7 +63,12 @@ def changed(parameters: P, values: Mapping[str, float]) -> P:
     return replace(parameters, **bounded)
 
 
-def _check(parameters: Tuned) -> None:
+def check(parameters: Tuned) -> None:
+    """Refuses values outside their bounds.
+
+    Raises:
+        ValueError: A value is.
+    """
     for item in fields(parameters):
         value = getattr(parameters, item.name)
         low, high = item.metadata["low"], item.metadata["high"]

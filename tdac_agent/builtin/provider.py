@@ -1,14 +1,21 @@
-"""`builtin`: no language model; see `tdac_agent.builtin`."""
+"""`builtin`: no language model; a template is tuned by what failed."""
 
 from __future__ import annotations
 
-from tdac_agent.builtin import builtin_for
+import json
+from typing import Any, Generic
+
+from tdac_agent.builtin.parameters import P, read_parameters
+from tdac_agent.builtin.repair import learn_bounds, read_rules, repair, write_rules
+from tdac_agent.builtin.template import Template
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
-from tdac_agent.models.provider import Provider
+from tdac_agent.models.provider import Reply, Request
+from tdac_agent.tasks.registry import environment
+from tdac_agent.tasks.setting import Setting
 
 
-def make_builtin(words: str, options: Options) -> Provider:
+def make_builtin(words: str, options: Options) -> Builtin[Any]:
     """The template that is tuned by what failed.
 
     Raises:
@@ -16,4 +23,63 @@ def make_builtin(words: str, options: Options) -> Provider:
     """
     if words:
         raise ProviderError(f"'builtin' has no models; got 'builtin:{words}'")
-    return builtin_for(options.setting)
+    return Builtin(template_of(options.setting))
+
+
+def template_of(setting: Setting) -> Template[Any]:
+    """The parametrised controller for a task's setting."""
+    return environment(setting.nominal.env_id).template(setting)
+
+
+class Builtin(Generic[P]):
+    """Learner and optimizer that fill in and tune a parametrised controller.
+
+    It sees what a model sees: the question, the rules, the controller and the
+    report. Everything it learns passes through the rules.
+
+    Args:
+        template: The controller.
+    """
+
+    name = "builtin"
+    paid = False
+
+    def __init__(self, template: Template[P]) -> None:
+        self.template = template
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`."""
+        if request.kind == "generate":
+            parameters, _ = read_rules(request.rules, self.template.kind)
+            return Reply(self._file(parameters), notes=(_describe(parameters),))
+        if request.report is None:
+            raise ValueError(f"a request to {request.kind} needs a report")
+        remembered, bounds = read_rules(request.rules, self.template.kind)
+        known = read_parameters(request.controller or "", self.template.kind)
+        failed = remembered if known is None else known
+        bounds = learn_bounds(bounds, failed, request.report)
+        _, k, j = request.sample
+        parameters, changes = repair(failed, request.report, bounds, 100 * k + j)
+        notes = [str(change) for change in changes]
+        if known is None:
+            notes.insert(0, "the controller is not from the template: replaced by it")
+        if not changes:
+            notes.append("no parameter answers these failures")
+        if request.kind == "summarise":
+            rules = write_rules(parameters, changes, bounds, k)
+            return Reply(_operations(rules), notes=tuple(notes))
+        return Reply(self._file(parameters), notes=tuple(notes))
+
+    def _file(self, parameters: P) -> str:
+        return f"```python\n{self.template.render(parameters)}```\n"
+
+
+def _operations(rules: list[str]) -> str:
+    """The answer of an optimizer that adds rules for this task."""
+    operations = [{"op": "add", "scope": "task", "text": rule} for rule in rules]
+    return f"```json\n{json.dumps(operations, indent=1)}\n```\n"
+
+
+def _describe(parameters: P) -> str:
+    neutral = parameters == type(parameters)()
+    return "neutral parameters" if neutral else f"{parameters}"

@@ -1,21 +1,13 @@
-"""The repair tables: which parameters of a template answer which failure."""
+"""Remedies: how the parameters of a template answer a cause of failure."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Literal
 
-from tdac_agent.builtin.parameters import (
-    EPuckParameters,
-    P,
-    Parameters,
-    Tuned,
-    about,
-    changed,
-)
+from tdac_agent.builtin.parameters import P, about, changed
 from tdac_agent.verification.diagnosis.report import Cause
 
 MARGIN = "inflation_margin"
@@ -75,76 +67,3 @@ def _narrower(margin: float, bounds: Bounds, step: float) -> float:
 
 Remedies = Mapping[Cause, Remedy]
 """Most telling cause first: of two that want the same parameter the first wins."""
-
-_HELD_UP = Remedy(
-    scale={"unstick_after": 0.5, "lookahead": 0.5}, switch_on={"unstick_after": 100.0}
-)
-_RESTLESS = Remedy(scale={"turn_gain": 0.6, "turn_in_place": 1.5})
-
-MAP2D: Remedies = MappingProxyType(
-    {
-        "collision": Remedy(
-            margin="wider",
-            add={"turn_gain": 0.3, "slow_dist": 10.0, "stop_dist": 4.0},
-            scale={"lookahead": 0.5, "turn_in_place": 0.5},
-        ),
-        "no motion": Remedy(margin="narrower", scale={"stop_dist": 0.5}),
-        "stuck": _HELD_UP,
-        "looping": _HELD_UP,
-        "spinning": _RESTLESS,
-        "oscillating": _RESTLESS,
-        "missed goal": Remedy(scale={"lookahead": 0.5, "turn_in_place": 0.5}),
-        "too slow": Remedy(
-            scale={
-                "cruise_speed": 1.4,
-                "turn_in_place": 1.4,
-                "slow_dist": 0.5,
-                "stop_dist": 0.5,
-            }
-        ),
-        "time-out": Remedy(scale={"lookahead": 0.5}),
-        "held out": Remedy(
-            margin="wider",
-            add={"turn_gain": 0.15},
-            scale={"lookahead": 0.7, "turn_in_place": 0.7},
-        ),
-    }
-)
-
-# What holds an e-puck up that has a plan is what its sensors take for an obstacle.
-_DISTRUSTED = Remedy(
-    scale={"unstick_after": 0.5, "blocked": 1.5}, switch_on={"unstick_after": 100.0}
-)
-_UNSTEADY = Remedy(scale={"turn_gain": 0.6, "turn_in_place": 1.5, "blocked": 1.5})
-
-EPUCK: Remedies = MappingProxyType(
-    {
-        "collision": Remedy(
-            margin="wider",
-            add={"turn_gain": 0.3, "slow_dist": 0.01},
-            scale={"turn_in_place": 0.5, "blocked": 0.8},
-        ),
-        "no motion": Remedy(margin="narrower", scale={"blocked": 1.5}),
-        "stuck": _DISTRUSTED,
-        "looping": _DISTRUSTED,
-        "spinning": _UNSTEADY,
-        "oscillating": _UNSTEADY,
-        "missed goal": Remedy(scale={"turn_in_place": 0.5, "cruise_speed": 0.7}),
-        "too slow": Remedy(
-            scale={"cruise_speed": 1.4, "turn_in_place": 1.4, "slow_dist": 0.5}
-        ),
-        "time-out": Remedy(scale={"look_steps": 2.0}),
-        "held out": Remedy(
-            margin="wider", add={"turn_gain": 0.15}, scale={"turn_in_place": 0.7}
-        ),
-    }
-)
-
-_TABLES: Mapping[type[Tuned], Remedies] = MappingProxyType(
-    {Parameters: MAP2D, EPuckParameters: EPUCK}
-)
-
-
-def remedies_for(kind: type[Tuned]) -> Remedies:
-    """The table of a template."""
-    return _TABLES[kind]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tdac_agent.builtin.parameters import P, Tuned, about, changed, names_of
-from tdac_agent.builtin.remedies import MARGIN, Bounds, remedies_for
+from tdac_agent.builtin.remedies import MARGIN, Bounds
 from tdac_agent.prompting.rules import MAX_RULE_CHARS
 from tdac_agent.verification.diagnosis.report import Cause, Report
 
@@ -51,7 +51,7 @@ def repair(
     """
     changes: dict[str, Change] = {}
     tests = first_tests(report)
-    for cause, remedy in remedies_for(type(parameters)).items():
+    for cause, remedy in parameters.remedies.items():
         if cause in tests:
             wanted = remedy.apply(parameters, bounds)
             for change in _compare(parameters, wanted, tests[cause], cause):

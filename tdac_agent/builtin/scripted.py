@@ -10,13 +10,13 @@ from __future__ import annotations
 import json
 import zlib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from tdac_agent.builtin import builtin_for
-from tdac_agent.builtin.parameters import names_of
+from tdac_agent.builtin.parameters import changed, names_of
+from tdac_agent.builtin.provider import template_of
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Kind, Reply, Request
@@ -144,12 +144,11 @@ def _source(choice: Choice, script: Path, setting: Setting) -> str:
 
 def _filled_in(values: dict[str, float], script: Path, setting: Setting) -> str:
     """The template of `builtin` with some parameters."""
-    template: Any = builtin_for(setting)
+    template = template_of(setting)
     known = names_of(template.kind)
     for name in set(values) - set(known):
         raise ProviderError(
             f"{script}: the template has no parameter {name!r}{hint(name, known)}; "
             f"known: {', '.join(known)}"
         )
-    source: str = template.render(template.kind().changed(**values))
-    return source
+    return template.render(changed(template.kind(), values))

@@ -10,8 +10,9 @@ from typing import Literal
 import numpy as np
 
 from tdac_agent.sandbox import TIERS
+from tdac_agent.tasks.registry import environment_with_key
 from tdac_agent.tasks.task import Task, load_task
-from tdac_agent.tasks.task_file import EPUCK, TaskFile, checked
+from tdac_agent.tasks.task_file import TaskFile, checked
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 from tdac_envs.grid.grid import OccupancyGrid
@@ -111,7 +112,7 @@ class TaskFlags:
                 raise TaskError("--heading needs --start X Y")
             start = (*start, self.heading)
         given = {
-            "env": EPUCK,
+            "env": environment_with_key("world").id,
             "world": world,
             "ignore": self.ignore,
             "start": start,

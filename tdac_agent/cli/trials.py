@@ -85,14 +85,13 @@ def compiled_step() -> str:
 
 def verification() -> str:
     """Has a good controller judged, in the sandbox tier in use."""
-    from tdac_agent.builtin import Parameters, render_controller
-    from tdac_agent.environments.map2d.task import map_setting
+    from tdac_agent.builtin.provider import template_of
     from tdac_agent.tasks.task import load_task
     from tdac_agent.verification.verify import verify
 
     task = load_task("maze")
-    own = map_setting(task.setting)
-    source = render_controller(Parameters(), own.params.robot, own.nominal.dt)
+    template = template_of(task.setting)
+    source = template.render(template.kind())
     report = verify(source, task, paper=True)
     if not report.passed:
         failed = report.failures[0]

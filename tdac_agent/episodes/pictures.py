@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from tdac_agent.environments.map2d.task import Map2DSetting
 from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.units import Points
 from tdac_envs.drawing.backdrop import Backdrop
@@ -29,11 +29,5 @@ class Pictures(Protocol):
 
 
 def pictures_of(setting: Setting) -> Pictures:
-    """The pictures of a setting of either kind."""
-    if isinstance(setting, Map2DSetting):
-        from tdac_agent.environments.map2d.pictures import MapPictures
-
-        return MapPictures(setting)
-    from tdac_agent.environments.epuck.pictures import world_pictures
-
-    return world_pictures(setting)
+    """The pictures of a setting."""
+    return environment(setting.nominal.env_id).pictures(setting)

@@ -38,7 +38,7 @@ from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.map2d.env import VARIATIONS
+from tdac_envs.drive.task import VARIATIONS
 
 EPISODES = 100
 NO_DISTURBANCE = Disturbance(0.0, 0.0, 0.0, 0)

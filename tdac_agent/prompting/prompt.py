@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -17,6 +18,7 @@ from tdac_agent.prompting.context import context_of
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.rule_answer import MAX_OPERATIONS
 from tdac_agent.prompting.rules import MAX_RULE_CHARS, RepairRule, render_block
+from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
@@ -67,10 +69,14 @@ def load_template(given: str) -> PromptTemplate:
 
 
 @functools.cache
-def _templates() -> jinja2.Environment:
+def _templates(env_id: str | None = None) -> jinja2.Environment:
+    """The shipped templates, with those of an environment."""
+    folders = [Path(__file__).with_name("templates")]
+    if env_id is not None:
+        folders.append(environment(env_id).folder / "prompts")
     # A template of the user's own is text to be filled in, and no program.
     return ImmutableSandboxedEnvironment(
-        loader=jinja2.PackageLoader("tdac_agent", "prompting/templates"),
+        loader=jinja2.FileSystemLoader(folders),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -94,7 +100,7 @@ def generate_prompt(
             of rules.
     """
     context = {**context_of(task), "rules_block": render_block(rules)}
-    text = _render(template, task.setting.suite, context)
+    text = _render(template, task.spec.env, context)
     if text.count(context["rules_block"]) != 1:
         raise PromptError(
             f"the prompt {template.name} must hold {{{{ rules_block }}}} once: the "
@@ -103,12 +109,12 @@ def generate_prompt(
     return text
 
 
-def _render(template: PromptTemplate, suite: str, context: dict[str, Any]) -> str:
+def _render(template: PromptTemplate, env_id: str, context: dict[str, Any]) -> str:
+    templates = _templates(env_id)
     try:
         if template.text is not None:
-            return _templates().from_string(template.text).render(context)
-        kind = suite if template.name == "full" else template.name
-        return _templates().get_template(f"{kind}.md.j2").render(context)
+            return templates.from_string(template.text).render(context)
+        return templates.get_template(f"{template.name}.md.j2").render(context)
     except jinja2.UndefinedError as error:
         known = ", ".join(sorted(context))
         raise PromptError(

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
+from tdac_agent.tasks.environment import Environment
 from tdac_envs.core.code_cache import cache_folder, has_code
 
 
-def compile_first(package: str) -> None:
-    """Compiles the kernels of an environment on its first run of all, where it is said.
+def compile_first(environment: Environment) -> None:
+    """Compiles an environment's kernels on its first run, where progress is reported.
 
-    Else the judge would do most of it, where nobody sees why it takes so long.
-
-    Args:
-        package: That has its kernels: `tdac_envs.map2d` or `tdac_envs.epuck`.
+    Else the judge would compile most of them, and nothing would say why it takes long.
     """
-    if not has_code(package) and cache_folder() is not None:
-        from tdac_agent.environments import kernels_used
-
-        if package == "tdac_envs.map2d":
-            kernels_used.use_map_kernels()
-        else:
-            kernels_used.use_world_kernels()
+    if not has_code(environment.kernels) and cache_folder() is not None:
+        environment.use_kernels()

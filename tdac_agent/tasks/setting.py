@@ -20,6 +20,10 @@ class Nominal(Protocol):
     """A feasible task: `Map2DTask` in pixels, `EPuckTask` in metres."""
 
     @property
+    def env_id(self) -> str:
+        """Gymnasium id of the environment, for the registry."""
+
+    @property
     def start(self) -> Pose:
         """Nominal start pose."""
 
@@ -46,6 +50,10 @@ class Nominal(Protocol):
     @property
     def body_radius(self) -> float:
         """Of the disc."""
+
+    @property
+    def axle_length(self) -> float:
+        """Distance between the wheels."""
 
     @property
     def full_step(self) -> float:
@@ -139,10 +147,6 @@ class Setting(Protocol):
     @property
     def units(self) -> Units:
         """Of places and lengths."""
-
-    @property
-    def suite(self) -> str:
-        """Name of the shipped suite."""
 
     @property
     def left_out(self) -> tuple[str, ...]:

@@ -14,11 +14,11 @@ import yaml
 
 from tdac_agent.errors import RunError
 from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.environment import Environment
 from tdac_agent.tasks.first_run import compile_first
+from tdac_agent.tasks.registry import environment, own_environments
 from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.tasks.task_file import (
-    EPUCK,
-    OWN_KEYS,
     TASK_FILE,
     TaskFile,
     bundled_task,
@@ -50,6 +50,11 @@ class Task:
     suite: Path | None = None
     trusted: bool = True
     folder: Path | None = None
+
+    @property
+    def environment(self) -> Environment:
+        """The registry's entry of the task's environment."""
+        return environment(self.spec.env)
 
     @property
     def params(self) -> Params:
@@ -141,16 +146,10 @@ def _resolve(name: str | None, spec: TaskFile, base: Path) -> Task:
 
 
 def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:
-    """Name and setting of a task; the one place where an environment is chosen."""
-    if spec.env == EPUCK:
-        compile_first("tdac_envs.epuck")
-        from tdac_agent.environments.epuck.task import open_epuck
-
-        return open_epuck(spec, base)
-    compile_first("tdac_envs.map2d")
-    from tdac_agent.environments.map2d.task import open_map
-
-    return open_map(spec, base)
+    """Name and setting of a task."""
+    about = environment(spec.env)
+    compile_first(about)
+    return about.open(spec, base)
 
 
 def called(task: Task) -> str:
@@ -200,9 +199,10 @@ def portable_task_file(task: Task, own_suite: str | None = None) -> str:
         own_suite: Name of the subfolder that holds the task's suite, if it has one.
     """
     nominal = task.nominal
-    own_keys = {key for keys in OWN_KEYS.values() for key in keys}
+    own_keys = (key for one in own_environments() for key in one.keys)
+    excluded = {"suite", *own_keys, *task.environment.keys}
     spec = task.spec.model_dump(
-        mode="json", exclude_none=True, exclude={"suite", *own_keys}, by_alias=True
+        mode="json", exclude_none=True, exclude=excluded, by_alias=True
     )
     spec["name"] = task.name
     spec.update(task.setting.portable())

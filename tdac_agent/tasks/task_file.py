@@ -7,25 +7,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
 from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
-from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.params import MOST_RAYS, Length, Place
-from tdac_envs.worlds.bundled import bundled_worlds
 
 TASK_FILE = "task.yaml"
 """Its name in the folder of a task or a run."""
 
 Profile = Literal["policy", "paper"]
-EnvName = Literal["TDAC-Map2D-v0", "TDAC-EPuck-v0"]
-MAP2D: EnvName = "TDAC-Map2D-v0"
-EPUCK: EnvName = "TDAC-EPuck-v0"
-OWN_KEYS: dict[EnvName, tuple[str, ...]] = {
-    MAP2D: ("map", "robot", "snap", "polarity", "threshold"),
-    EPUCK: ("world", "ignore", "left_out"),
-}
-"""Keys of a task file that mean something in one environment only."""
 Steps = Annotated[int, Field(gt=0, le=MOST_STEPS)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 
@@ -67,7 +58,7 @@ class TaskFile(_Strict):
     name: Annotated[Name, AfterValidator(_names_a_file)] | None = Field(
         None, description="For people; names files, too."
     )
-    env: EnvName = MAP2D
+    env: Name = DEFAULT
     map: str = Field("maze", description="Bundled name, or a path beside this file.")
     world: str = Field("arena", description="The same of a Webots world.")
     ignore: tuple[Name, ...] = Field(
@@ -139,30 +130,29 @@ def checked(data: dict[str, Any], source: str) -> TaskFile:
         spec = TaskFile.model_validate(data)
     except ValidationError as error:
         raise TaskError(f"{source}: {first_problem(error)}") from error
-    for env, keys in OWN_KEYS.items():
-        for key in spec.model_fields_set.intersection(keys):
-            if env != spec.env:
-                raise TaskError(f"{source}: {key}: only with env: {env}")
+    try:
+        own = environment(spec.env).keys
+    except TaskError as error:
+        raise TaskError(f"{source}: env: {error}") from error
+    for other in own_environments():
+        for key in spec.model_fields_set.intersection(other.keys).difference(own):
+            raise TaskError(f"{source}: {key}: only with env: {other.id}")
     return spec
 
 
 def bundled_tasks() -> tuple[str, ...]:
     """Names of the bundled tasks: the maps, then the e-puck's worlds."""
-    return (*bundled_maps(), *_worlds())
+    return tuple(name for one in own_environments() for name in one.bundled())
 
 
 def bundled_task(name: str) -> TaskFile | None:
-    """Contents of a bundled task, or None where there is none of that name.
+    """Contents of a bundled task, or None if there is none of that name.
 
     A map's task is called as the map; `epuck` is the world `arena`, `epuck-maze` the
     world `maze`.
     """
-    if name in bundled_maps():
-        return TaskFile(map=name)
-    world = _worlds().get(name)
-    return None if world is None else TaskFile(env=EPUCK, world=world)
-
-
-def _worlds() -> dict[str, str]:
-    default, *others = bundled_worlds()
-    return {"epuck": default, **{f"epuck-{name}": name for name in others}}
+    for one in own_environments():
+        about = one.bundled().get(name)
+        if about is not None:
+            return TaskFile.model_validate({"env": one.id, one.keys[0]: about})
+    return None

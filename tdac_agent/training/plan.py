@@ -5,13 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
+import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.errors import RunError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task, load_task
-from tdac_agent.tasks.task_file import EPUCK, bundled_task
+from tdac_agent.tasks.task_file import bundled_task
 from tdac_agent.training.curve import PLAN_FILE
 from tdac_agent.training.hyperparameters import (
     Algo,
@@ -180,7 +182,9 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
         varied = {**options, **noise, "variation": plan.variation, **own}
         each.append({**task.env_kwargs(), **varied})
     try:
-        batch = _batch_class(tasks[0])(count, autoreset_mode="SameStep", each=each)
+        name = str(gym.spec(tasks[0].spec.env).vector_entry_point)
+        make: Any = load_env_creator(name)
+        batch = make(count, autoreset_mode="SameStep", each=each)
     except TypeError as error:
         told = str(error).partition("() ")[2]
         raise TaskError(f"env_kwargs of the hyperparameters: {told}") from error
@@ -199,16 +203,6 @@ def _env_kwargs(
         if name in task.env_kwargs():
             raise TaskError(f"env_kwargs: {name} is the task's; leave it out")
     return given.env | ({} if variation is None else {"variation": variation})
-
-
-def _batch_class(task: Task) -> Any:
-    if task.spec.env == EPUCK:
-        from tdac_envs.epuck.vector import EPuckVectorEnv
-
-        return EPuckVectorEnv
-    from tdac_envs.map2d.vector import Map2DVectorEnv
-
-    return Map2DVectorEnv
 
 
 def _policy(given: Hyperparameters, wrappers: tuple[str, ...]) -> str:

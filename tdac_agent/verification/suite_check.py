@@ -22,7 +22,7 @@ from tdac_agent.verification.suite.privileged import (
     REFERENCE,
     SLOW,
     privileged_controller,
-    reference_ways,
+    reference_paths,
 )
 from tdac_agent.verification.suite.proof import SuiteCheck, row_of, verdict_on_suite
 from tdac_agent.verification.verify import verify
@@ -82,7 +82,7 @@ def check_suite(
             seed=seed,
             judge=warm,
         )
-        ways = reference_ways(task.nominal, seed)
+        ways = reference_paths(task.nominal, seed)
         reports: dict[str, list[Report]] = {}
         for name in (REFERENCE, *bad):
             source = privileged_controller(task.nominal, ways, name)

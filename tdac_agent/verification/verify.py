@@ -28,9 +28,7 @@ from tdac_agent.verification.judge.report_log import (
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
-SHIPPED_SUITES = Path(__file__).parent / "suite" / "shipped"
-SHIPPED_SUITE = SHIPPED_SUITES / "map2d"
-EVERY_TASK = SHIPPED_SUITES.parent / "every_task.py"
+EVERY_TASK = Path(__file__).parent / "suite" / "every_task.py"
 DEADLINE_SECONDS = 900.0
 MAX_FILE_BYTES = 64_000_000
 
@@ -150,7 +148,7 @@ def _suites(
     task: Task, suite: Path | None = None, shipped: Path | None = None
 ) -> dict[str, Path]:
     """The folders of tests: the shipped ones, and further ones where there are any."""
-    suites = {SHIPPED: _suite_folder(shipped or SHIPPED_SUITES / task.setting.suite)}
+    suites = {SHIPPED: _suite_folder(shipped or task.environment.suite)}
     extra = suite or task.suite
     if suite is None:
         allowed(task, None, trust=False)

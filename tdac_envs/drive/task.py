@@ -8,13 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+VARIATIONS = ("nominal", "jitter", "mixed", "random")
+"""How starts, and for the last one goals, are drawn."""
 MIN_HORIZON = 2500
 JITTER_HEADING = 0.5
 MAX_DRAWS = 1000
 
 
 class Pose(NamedTuple):
-    """Where the robot is: x (column, px), y (row, px), heading (rad)."""
+    """Place and heading of the robot, in the frame and units of its environment."""
 
     x: float
     y: float

@@ -15,6 +15,7 @@ from tdac_envs.core.arguments import not_negative, one_of
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import TOUCHED, info_of
+from tdac_envs.drive.task import VARIATIONS
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.nearby import surroundings
@@ -33,8 +34,6 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
-
-VARIATIONS = ("nominal", "jitter", "mixed", "random")
 
 
 class EPuckEnv(DrivenEnv):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from tdac_envs.drive.task import (
     wrapped,
 )
 from tdac_envs.epuck.ground import Ground, Point
-from tdac_envs.epuck.kernels import WHEEL_RADIUS
+from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.paths import (
     at_goal,
     check_stands,
@@ -53,6 +53,8 @@ class EPuckTask:
         shortest: d0, length of that path from the nominal start, m.
     """
 
+    env_id: ClassVar = "TDAC-EPuck-v0"
+
     ground: Ground
     start: Pose
     goal: Point
@@ -71,6 +73,11 @@ class EPuckTask:
     def body_radius(self) -> float:
         """Of the disc, m."""
         return BODY_RADIUS
+
+    @property
+    def axle_length(self) -> float:
+        """Distance between the wheels, m."""
+        return AXLE_LENGTH
 
     @property
     def full_step(self) -> float:

@@ -16,7 +16,7 @@ from tdac_envs.core.arguments import not_negative, one_of
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.task import VARIATIONS, Pose
 from tdac_envs.map2d.kernels import begin, drive
 from tdac_envs.map2d.picture import Scene
 from tdac_envs.map2d.robot import Robot
@@ -24,8 +24,6 @@ from tdac_envs.map2d.setup import Setup, override
 from tdac_envs.map2d.source import MapSource, prepare
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import Said, Shade
-
-VARIATIONS = ("nominal", "jitter", "mixed", "random")
 
 
 class Map2DEnv(DrivenEnv):

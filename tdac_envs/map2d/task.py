@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,8 @@ class Map2DTask:
         shortest: d0, length of that path from the nominal start, px.
     """
 
+    env_id: ClassVar = "TDAC-Map2D-v0"
+
     terrain: Terrain
     start: Pose
     goal: tuple[float, float]
@@ -83,6 +85,11 @@ class Map2DTask:
     def body_radius(self) -> float:
         """Of the disc, px."""
         return self.robot.radius
+
+    @property
+    def axle_length(self) -> float:
+        """Distance between the wheels, px."""
+        return self.robot.axle_length
 
     @property
     def full_step(self) -> float:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from small import QUICK, write_small_task
 
-from tdac_agent.builtin import Parameters, render_controller
 from tdac_agent.cli.main import main
+from tdac_agent.environments.map2d.builtin import Parameters, render_controller
 from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.judge.warm import WarmJudge
 

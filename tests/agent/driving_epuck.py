@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from driving import drive, import_from
 
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.tasks.task import Task, load_task, write_workdir
-from tdac_agent.tasks.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs import bundled_worlds, write_world
 from tdac_envs.core.errors import TdacError
 from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle
@@ -22,10 +23,10 @@ WORLDS = (*bundled_worlds(), "paper")
 def world_task(name: str) -> Task | None:
     """The task of a bundled world, or of the paper's, where that file is there."""
     if name != "paper":
-        return load_task(TaskFile(env=EPUCK, world=name))
+        return load_task(TaskFile(env=EPUCK.id, world=name))
     if not PAPER_WORLD.is_file():
         return None
-    return load_task(TaskFile(env=EPUCK, world=str(PAPER_WORLD)))
+    return load_task(TaskFile(env=EPUCK.id, world=str(PAPER_WORLD)))
 
 
 def random_world(random) -> World:
@@ -77,7 +78,7 @@ def random_task(random, folder) -> Task:
         file = folder / "drawn.wbt"
         file.write_text(write_world(random_world(random)))
         try:
-            return load_task(TaskFile(env=EPUCK, world=str(file)))
+            return load_task(TaskFile(env=EPUCK.id, world=str(file)))
         except TdacError:
             continue
 

@@ -7,12 +7,11 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tdac_agent.environments.epuck.task import WORLD_FILE
+from tdac_agent.environments.epuck.setting import WORLD_FILE
 from tdac_agent.errors import RunError
 from tdac_agent.runs.records import load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task, load_task
-from tdac_agent.tasks.task_file import EPUCK
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.epuck.task import EPuckTask
@@ -64,8 +63,10 @@ def export_webots(run_folder: Path, out: Path) -> Project:
             "exported"
         )
     task = load_task(run_folder)
-    if task.spec.env != EPUCK or not isinstance(task.nominal, EPuckTask):
-        raise RunError(f"{run_folder} is about {task.spec.env}; Webots needs {EPUCK}")
+    if not isinstance(task.nominal, EPuckTask):
+        raise RunError(
+            f"{run_folder} is about {task.spec.env}; Webots needs {EPuckTask.env_id}"
+        )
     source = _read(run.controller)
     beside = {file: _read(run_folder / file) for file in WORKING_FILES}
     if out.exists() and (not out.is_dir() or any(out.iterdir())):

@@ -8,22 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.environments.epuck.task import EPuckSetting
+from tdac_agent.environments.epuck.setting import EPuckSetting
 from tdac_agent.episodes.trajectory import Rollout
-from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.units import Points
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.runs import Status
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.picture import EPuckScene
 from tdac_envs.epuck.run_picture import WorldBackground, trajectory_picture
-
-
-def world_pictures(setting: Setting) -> WorldPictures:
-    """The pictures of an e-puck's setting."""
-    if not isinstance(setting, EPuckSetting):
-        raise TypeError(f"expected an EPuckSetting, got {type(setting).__name__}")
-    return WorldPictures(setting)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

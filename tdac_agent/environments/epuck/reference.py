@@ -1,6 +1,6 @@
 """The privileged reference for the e-puck: the oracle's path in the exact world.
 
-As `tdac_agent.verification.suite.reference` for maps, in metres.
+As `tdac_agent.environments.map2d.reference` for maps, in metres.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from tdac_agent.verification.suite.reference import Point, taut
+from tdac_agent.verification.suite.reference import Point, taut, without_flat_points
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.paths import entry, open_field
 from tdac_envs.epuck.task import EPuckTask
@@ -44,10 +44,10 @@ def oracle_path(task: EPuckTask, x: float, y: float) -> Path:
     return ends
 
 
-def epuck_way(task: EPuckTask, x: float, y: float) -> list[Point]:
-    """The oracle's path from (x, y), after every shortcut that keeps the body clear."""
+def reference_path(task: EPuckTask, x: float, y: float) -> list[Point]:
+    """The oracle's path from (x, y) to the goal, after shortcuts; ends included."""
     path = oracle_path(task, x, y)
-    return taut(path, lambda begin, end: _free(task, begin, end))
+    return without_flat_points(taut(path, lambda a, b: _free(task, a, b)))
 
 
 def _free(task: EPuckTask, begin: Point, end: Point) -> bool:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import METRES, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_agent.verification.suite.reference import taut
@@ -31,13 +30,6 @@ FENCE = "fence around the world"
 _OFF = 0.3
 # A blunter corner is none to the body.
 BLUNTEST = math.radians(135.0)
-
-
-def world_surroundings(task: Nominal) -> WorldSurroundings:
-    """The surroundings of an e-puck's task."""
-    if not isinstance(task, EPuckTask):
-        raise TypeError(f"expected an EPuckTask, got {type(task).__name__}")
-    return WorldSurroundings(task)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Copies of a world that nobody can have by heart."""
+"""Copies of a world that no controller can have memorised."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from tdac_agent.environments.epuck.moved_world import Motion, reordered, turned_groups
 from tdac_agent.environments.epuck.oracle import Point, WorldCase, gap_to, prisms_of
+from tdac_agent.verification.suite.oracle import Oracle
 from tdac_envs.worlds.bodies import bodies
 from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle, ring
 from tdac_envs.worlds.wbt.writer import write_world
@@ -19,6 +20,16 @@ from tdac_envs.worlds.world import Obstacle, Part, World
 ANGLES = (2.3, -0.7, 1.1)
 _APART, _KEEP_OFF = 0.05, 0.12
 _TRIES = 400
+
+
+class WorldOracle(Oracle):
+    """An oracle that knows about worlds, too."""
+
+    def world_cases(
+        self, world: World, random: np.random.Generator | None = None
+    ) -> list[WorldCase]:
+        """See the function `world_cases`."""
+        return world_cases(world, random)
 
 
 def world_cases(

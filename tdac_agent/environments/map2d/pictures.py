@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from tdac_agent.environments.map2d.task import Map2DSetting
+from tdac_agent.environments.map2d.setting import Map2DSetting
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.units import Points
 from tdac_envs.drawing.canvas import Image

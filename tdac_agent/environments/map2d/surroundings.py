@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tdac_agent.environments.map2d.reference import pull
+from tdac_agent.environments.map2d.touch import nearest_touch
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.units import PIXELS, Points, Units
-from tdac_agent.verification.diagnosis.touch import Touch, nearest_touch
-from tdac_agent.verification.suite.reference import pull
+from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.plan import Path, descend, first_beyond

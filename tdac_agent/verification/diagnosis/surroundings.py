@@ -7,12 +7,12 @@ from dataclasses import replace
 from typing import Protocol
 
 from tdac_agent.episodes.trajectory import Rollout, Trajectory
+from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import Path
-from tdac_envs.map2d.task import Map2DTask
 
 Point = tuple[float, float]
 
@@ -52,14 +52,8 @@ class Surroundings(Protocol):
 
 
 def surroundings_of(task: Nominal) -> Surroundings:
-    """The surroundings of a task of either kind."""
-    if isinstance(task, Map2DTask):
-        from tdac_agent.environments.map2d.surroundings import MapSurroundings
-
-        return MapSurroundings(task)
-    from tdac_agent.environments.epuck.surroundings import world_surroundings
-
-    return world_surroundings(task)
+    """The surroundings of a task."""
+    return environment(task.env_id).surroundings(task)
 
 
 def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:

@@ -11,14 +11,12 @@ from typing import Any, Literal
 import numpy as np
 
 from tdac_agent.episodes.episode import Driver
+from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import JudgedEnv
-from tdac_agent.verification.suite.privileged.controllers import reference_way
 from tdac_agent.verification.suite.reference import Point, steer
 from tdac_envs.drive.env import Observation
-from tdac_envs.epuck.kernels import AXLE_LENGTH
 from tdac_envs.learning.guidance import Route, route_to_goal
 from tdac_envs.learning.wrappers import Frame
-from tdac_envs.map2d.task import Map2DTask
 
 Kind = Literal[
     "controller", "sb3", "reference", "random", "go-to-goal", "follow-guidance"
@@ -65,27 +63,26 @@ class Reference:
 
     def __init__(self, env: JudgedEnv) -> None:
         self._env = env
-        self._up = not isinstance(env.nominal, Map2DTask)
-        self._way: list[Point] = []
+        self._about = environment(env.nominal.env_id)
+        self._path: list[Point] = []
 
     def reset(self, observation: Observation) -> None:  # noqa: ARG002
         """Plans from where the robot really is."""
         x, y, _ = self._env.pose().tolist()
-        self._way = reference_way(self._env.task, x, y)[1:]
+        self._path = self._about.reference_path(self._env.task, x, y)[1:]
 
     def policy(self, observation: Observation) -> tuple[float, float]:  # noqa: ARG002
         """A turn in place, or a straight drive."""
         x, y, heading = self._env.pose().tolist()
         task = self._env.task
-        axle = task.robot.axle_length if isinstance(task, Map2DTask) else AXLE_LENGTH
         near = _ARRIVED * task.body_radius
-        while len(self._way) > 1 and math.dist((x, y), self._way[0]) < near:
-            self._way.pop(0)
-        to_x, to_y = self._way[0]
+        while len(self._path) > 1 and math.dist((x, y), self._path[0]) < near:
+            self._path.pop(0)
+        to_x, to_y = self._path[0]
         # Steering is told with y down.
-        sign = -1.0 if self._up else 1.0
+        sign = -1.0 if self._about.units.up else 1.0
         pose = (x, sign * y, sign * heading)
-        return steer(pose, (to_x, sign * to_y), task.full_step, axle)
+        return steer(pose, (to_x, sign * to_y), task.full_step, task.axle_length)
 
     def waited(self) -> float:
         """It waits for nothing."""

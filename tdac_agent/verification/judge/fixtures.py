@@ -84,9 +84,9 @@ def controller(pytestconfig: pytest.Config) -> Controller:
 
 
 @pytest.fixture(scope="session")
-def oracle() -> Oracle:
-    """Exact answers to planning questions."""
-    return Oracle()
+def oracle(task: Task) -> Oracle:
+    """Exact answers to planning questions, and to those of the task's environment."""
+    return task.environment.oracle()
 
 
 @pytest.fixture(scope="session")

@@ -26,12 +26,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import cv2
-import gymnasium as gym
 import numpy as np
 
 from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
+from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
 from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.judge.children import Nursery
 from tdac_agent.verification.judge.jobs import SUITE, Job
@@ -41,7 +41,6 @@ from tdac_agent.verification.judge.workers import Crew, end_with_parent
 from tdac_agent.verification.suite.starts import spread_starts
 from tdac_envs.core.code_cache import has_code
 from tdac_envs.drive.env import Observation
-from tdac_envs.map2d.env import Map2DEnv
 
 FAREWELL_SECONDS = 1.0
 # Exit codes of a worker; a suite may well end it with another one.
@@ -181,10 +180,9 @@ def _rehearse() -> None:
     for name in LOADED_LATE:
         importlib.import_module(name)
     # A job would wait for the compiling of an environment that it has no use for.
-    if has_code("tdac_envs.map2d"):
-        _rehearse_episode(_small_env())
-    if has_code("tdac_envs.epuck"):
-        _rehearse_episode(gym.make("tdac_envs:TDAC-EPuck-v0").unwrapped)
+    for one in own_environments():
+        if has_code(one.kernels):
+            _rehearse_episode(one.small_env())
     _run_a_test()
 
 
@@ -205,11 +203,6 @@ def _run_a_test() -> None:
             run_tests([folder], folder / "report.jsonl")
 
 
-def _small_env() -> Map2DEnv:
-    cells = np.zeros((40, 60), np.bool_)
-    return Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
-
-
 def _ready_crew(nursery: Nursery) -> SuiteCrew:
     """Processes that have used what an episode uses: forks share it until then."""
     work = partial(drive_known, nursery)
@@ -217,7 +210,7 @@ def _ready_crew(nursery: Nursery) -> SuiteCrew:
 
 
 def _drive_a_little() -> None:
-    record = Record(_small_env(), None, max_steps=20)
+    record = Record(environment(DEFAULT).small_env(), None, max_steps=20)
     rollout = run_policy(_Still(), record, "nominal", held_out=False, deadline=inf)
     pickle.dumps(rollout)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import functools
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 ALLOWED_IMPORTS = frozenset(
     [
@@ -34,58 +33,7 @@ _HIDDEN_MODULES = frozenset(
         *("socket", "subprocess", "sys", "threading"),
     ]
 )
-CONSTANTS_2D = (
-    "MAP_IMG",
-    "PARAMS_JSON",
-    "ROBOT_IMG",
-    "AXLE_LENGTH_PX",
-    "SENSOR_RANGE_PX",
-    "SENSOR_FOV_DEG",
-    "N_RAYS",
-    "LOOKAHEAD",
-    "STOP_DIST",
-    "SLOW_DIST",
-)
-CONSTANTS_EPUCK = (
-    "WORLD_FILE",
-    "TIME_STEP",
-    "MAX_WHEEL_SPEED",
-    "SENSOR_RANGE",
-    "GOAL_TOLERANCE",
-)
 MAX_SOURCE_BYTES = 200_000
-
-
-@dataclass(frozen=True, slots=True)
-class Names:
-    """What a file of the profile `paper` must define at its top level.
-
-    Attributes:
-        constants: Assigned names.
-        functions: Plain functions.
-        classes: Classes.
-    """
-
-    constants: tuple[str, ...]
-    functions: tuple[str, ...]
-    classes: tuple[str, ...] = ()
-
-
-NAMES = {
-    "map2d": Names(
-        CONSTANTS_2D,
-        ("nearest_free", "plan_path", "run_episode", "main"),
-        ("OccMap2D",),
-    ),
-    "epuck": Names(
-        CONSTANTS_EPUCK,
-        (
-            *("parse_world", "build_grid", "astar", "compute_wheel_speeds"),
-            *("run_episode", "main"),
-        ),
-    ),
-}
-"""By the shipped suite that asks for them."""
 
 
 def time_step(dt: float) -> int | float:

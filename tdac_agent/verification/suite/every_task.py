@@ -37,7 +37,7 @@ def test_policy_is_defined(controller):
 def test_constants(controller, task):
     """The constants of the contract are assigned at the top level."""
     names = contract.top_level_names(controller.tree)
-    wanted = contract.NAMES[task.setting.suite].constants
+    wanted = task.environment.names.constants
     missing = [name for name in wanted if name not in names]
     assert not missing, f"missing constants: {', '.join(missing)}"
 
@@ -46,7 +46,7 @@ def test_constants(controller, task):
 def test_entry_points(controller, task):
     """`run_episode`, `main` and the functions and classes of the contract are there."""
     names = contract.top_level_names(controller.tree)
-    wanted = contract.NAMES[task.setting.suite]
+    wanted = task.environment.names
     missing = [
         f for f in wanted.functions if not isinstance(names.get(f), ast.FunctionDef)
     ]

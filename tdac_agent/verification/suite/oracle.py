@@ -6,17 +6,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.plan import path_length, plan_path
-
-if TYPE_CHECKING:
-    from tdac_agent.environments.epuck.oracle import WorldCase
-    from tdac_envs.worlds.world import World
 
 Point = tuple[int, int]
 
@@ -152,19 +147,6 @@ class Oracle:
             cases.append(self._random_case(seed, occ, free_ends=bool(seed % 4)))
         detours = (self._random_case(s, self.grid(s, 30, 22, 0.3)) for s in DETOURS)
         return [*cases, *detours]
-
-    def world_cases(
-        self, world: World, random: np.random.Generator | None = None
-    ) -> list[WorldCase]:
-        """The file of a world, and of copies that are moved, turned and fuller.
-
-        Args:
-            world: Of a task.
-            random: Draws one of the copies, and the points to be looked at.
-        """
-        from tdac_agent.environments.epuck.world_copies import world_cases
-
-        return world_cases(world, random)
 
     def _random_case(
         self, seed: int, occ: BoolGrid, *, free_ends: bool = True

@@ -5,14 +5,15 @@ from dataclasses import replace
 
 import pytest
 
-from tdac_agent.builtin import (
-    Builtin,
-    Parameters,
-    read_parameters,
-    render_controller,
-)
+from tdac_agent.builtin.parameters import read_parameters
+from tdac_agent.builtin.provider import Builtin
 from tdac_agent.builtin.remedies import Bounds
 from tdac_agent.builtin.repair import read_rules, repair
+from tdac_agent.environments.map2d.builtin import (
+    Parameters,
+    render_controller,
+    template_for,
+)
 from tdac_agent.models.provider import Request
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.prompting.rule_answer import apply, parse_operations
@@ -50,9 +51,7 @@ def report(*failures):
 
 @pytest.fixture(scope="module")
 def builtin():
-    return Builtin(
-        Parameters, lambda chosen: render_controller(chosen, RobotParams(), 0.05)
-    )
+    return Builtin(template_for(RobotParams(), 0.05))
 
 
 def source_of(reply):

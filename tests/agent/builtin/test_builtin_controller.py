@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from driving import drive, import_controller, random_env
 
-from tdac_agent.builtin import Parameters, read_parameters, render_controller
+from tdac_agent.builtin.parameters import read_parameters
+from tdac_agent.environments.map2d.builtin import Parameters, render_controller
+from tdac_agent.environments.map2d.entry import MAP2D
 from tdac_agent.episodes.episode import Record
 from tdac_agent.verification.suite import contract
 from tdac_agent.verification.suite.hygiene import HYGIENE
@@ -60,7 +62,7 @@ def test_static_contract(source):
     assert contract.import_problems(tree) == []
     assert [problem for find in HYGIENE.values() for problem in find(tree)] == []
     wanted = {"OccMap2D", "nearest_free", "plan_path", "policy", "reset", "run_episode"}
-    assert wanted | {"main"} | set(contract.CONSTANTS_2D) <= set(names)
+    assert wanted | {"main"} | set(MAP2D.names.constants) <= set(names)
     assert contract.has_main_guard(tree)
 
 

@@ -14,15 +14,15 @@ from driving_epuck import (
     world_task,
 )
 
-from tdac_agent.builtin import (
-    EPuckParameters,
-    builtin_for,
-    read_parameters,
-    render_epuck,
-)
-from tdac_agent.builtin.remedies import EPUCK, MAP2D, Bounds
+from tdac_agent.builtin.parameters import read_parameters
+from tdac_agent.builtin.provider import Builtin, template_of
+from tdac_agent.builtin.remedies import Bounds
 from tdac_agent.builtin.repair import read_rules, repair, write_rules
+from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.oracle import occupied_at
+from tdac_agent.environments.epuck.world_copies import WorldOracle
+from tdac_agent.environments.map2d.builtin import Parameters
 from tdac_agent.episodes.episode import Record
 from tdac_agent.models.provider import Request
 from tdac_agent.prompting.extract import extract_source
@@ -30,12 +30,10 @@ from tdac_agent.prompting.rule_answer import MAX_OPERATIONS, apply, parse_operat
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import load_task
-from tdac_agent.tasks.task_file import EPUCK as EPUCK_ENV
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
 from tdac_agent.verification.suite import contract
 from tdac_agent.verification.suite.hygiene import HYGIENE
-from tdac_agent.verification.suite.oracle import Oracle
 from tdac_agent.verification.verify import verify
 from tdac_envs import write_world
 from tdac_envs.worlds.footprint import Disc
@@ -69,14 +67,14 @@ def test_static_contract(crates):
     names = contract.top_level_names(tree)
     assert contract.import_problems(tree) == []
     assert [problem for find in HYGIENE.values() for problem in find(tree)] == []
-    wanted = contract.NAMES["epuck"]
+    wanted = EPUCK.names
     assert {"policy", "reset", *wanted.constants, *wanted.functions} <= set(names)
     assert contract.has_main_guard(tree)
 
 
 def test_constants(tmp_path):
     """Clock, wheel limit and tolerance are the task's."""
-    spec = TaskFile(env=EPUCK_ENV, world="maze", dt=0.0125, tolerance=0.031)
+    spec = TaskFile(env=EPUCK.id, world="maze", dt=0.0125, tolerance=0.031)
     task = load_task(spec)
     tree = ast.parse(render_epuck(EPuckParameters(), task.nominal))
     values = {
@@ -113,11 +111,11 @@ def test_parameters_are_read_back(seed, crates):
 
 def test_the_repair_tables_know_their_parameters():
     """Every parameter that a remedy names exists in its own template."""
-    for table, kind in ((EPUCK, EPuckParameters),):
+    for table, kind in ((EPuckParameters.remedies, EPuckParameters),):
         names = {item.name for item in fields(kind)}
         for remedy in table.values():
             assert {*remedy.add, *remedy.scale, *remedy.switch_on} <= names
-    assert set(EPUCK) == set(MAP2D)
+    assert set(EPuckParameters.remedies) == set(Parameters.remedies)
 
 
 @pytest.mark.parametrize(
@@ -162,7 +160,7 @@ def failed(cause):
 )
 def test_never_tries_the_same_twice(crates, cause):
     """Ten iterations that all fail in the same way are twenty different candidates."""
-    builtin, book, tried = builtin_for(crates.setting), RuleBook(), []
+    builtin, book, tried = Builtin(template_of(crates.setting)), RuleBook(), []
     for k in range(1, 11):
         told = tuple(rule.text for rule in book.in_force)
         reply = builtin.complete(Request("generate", "", rules=told, sample=(0, k, 0)))
@@ -182,7 +180,7 @@ def test_it_reads_worlds(name, module, tmp_path):
         task = random_task(np.random.default_rng(4), tmp_path)
     else:
         task = world_task(name) or pytest.skip("the paper's world is not here")
-    for case in Oracle().world_cases(task.nominal.ground.world):
+    for case in WorldOracle().world_cases(task.nominal.ground.world):
         world = module.parse_world(case.text)
         assert world["start"] == pytest.approx(case.start)
         assert world["goal"] == pytest.approx(case.goal)
@@ -241,7 +239,7 @@ def test_gap_of_a_line(module, crates):
             assert found <= least + 1e-9
 
 
-@pytest.mark.parametrize("case", Oracle().plan_cases(), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", WorldOracle().plan_cases(), ids=lambda case: case.name)
 def test_astar(module, case):
     """As short as any path."""
     path = module.astar(case.occ, case.start, case.goal)
@@ -250,8 +248,8 @@ def test_astar(module, case):
         return
     assert (path[0], path[-1]) == (case.start, case.goal)
     assert {type(value) for cell in path for value in cell} == {int}
-    assert Oracle().path_error(case.occ, path) is None
-    assert Oracle().path_length(path) == pytest.approx(case.length)
+    assert WorldOracle().path_error(case.occ, path) is None
+    assert WorldOracle().path_length(path) == pytest.approx(case.length)
 
 
 def test_what_is_right_ahead_stops_it(module):
@@ -364,7 +362,7 @@ def test_a_collision_is_repaired(crates, tmp_path):
     causes = {failure.diagnosis.cause for failure in report.failures}
     assert causes == {"collision"}
     text = careless.replace("BODY_RADIUS = 0.034", "BODY_RADIUS = 0.037")
-    builtin = builtin_for(crates.setting)
+    builtin = Builtin(template_of(crates.setting))
     reply = builtin.complete(Request("edit", "", controller=text, report=report))
     after = read_parameters(extract_source(reply.text), EPuckParameters)
     assert after.inflation_margin == 0.002

@@ -8,6 +8,8 @@ import pytest
 from gymnasium import spaces
 from small import write_small_task
 
+from tdac_agent.environments.epuck.entry import EPUCK
+from tdac_agent.environments.map2d.entry import MAP2D
 from tdac_agent.prompting.manual import ManualError, interface_of
 from tdac_agent.prompting.prompt import (
     PromptError,
@@ -25,12 +27,12 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.infrared import TABLE
 
 CONTRACT = (
-    *contract.CONSTANTS_2D,
+    *MAP2D.names.constants,
     *("OccMap2D", "is_occupied", "nearest_free", "plan_path", "run_episode", "main"),
     *("positions", "speeds", "collisions", "goal", "dt", "sensors.show"),
 )
 EPUCK_CONTRACT = (
-    *contract.CONSTANTS_EPUCK,
+    *EPUCK.names.constants,
     *("parse_world", "build_grid", "astar", "compute_wheel_speeds", "run_episode"),
     *("start", "goal", "arena", "obstacles", "resolution", "inflation", "prox"),
     *("positions", "speeds", "collisions", "dt", "main", "sensors.show"),
@@ -276,7 +278,7 @@ def test_the_underspecified_prompt(name, request):
     """The goal and the interface, names and types; no figures, tests or advice."""
     task = request.getfixturevalue(name)
     text = generate_prompt(task, (), load_template("underspecified"))
-    names = contract.NAMES[task.setting.suite]
+    names = task.environment.names
     for word in (*names.constants, *names.functions, *names.classes, "policy(obs)"):
         assert word in text
     assert text.count(BEGIN) == 1

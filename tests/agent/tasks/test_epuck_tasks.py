@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import yaml
 
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.flat_world import flat_world
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import load_task, portable_task_file, write_workdir
-from tdac_agent.tasks.task_file import EPUCK, TaskFile, bundled_tasks
+from tdac_agent.tasks.task_file import TaskFile, bundled_tasks
 from tdac_envs import bundled_maps, bundled_worlds, load_world, read_world
 from tdac_envs.core.errors import TaskError, WorldError
 from tdac_envs.epuck.ground import Ground
@@ -44,7 +45,7 @@ def room(**changes) -> World:
 def in_file(folder, world, **spec):
     """The task of a world that was written to a file."""
     (folder / "w.wbt").write_text(write_world(world))
-    return load_task(TaskFile(env=EPUCK, world="w.wbt", **spec), base=folder)
+    return load_task(TaskFile(env=EPUCK.id, world="w.wbt", **spec), base=folder)
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -164,9 +165,9 @@ def test_what_is_not_modelled_is_refused_or_listed(tmp_path):
     """A node that may be solid is refused; left out by name, it is told for good."""
     (tmp_path / "w.wbt").write_text(write_world(room()) + LEGO)
     with pytest.raises(WorldError, match=r"LegoTallWall.*--ignore"):
-        load_task(TaskFile(env=EPUCK, world="w.wbt"), base=tmp_path)
+        load_task(TaskFile(env=EPUCK.id, world="w.wbt"), base=tmp_path)
     for name in ("LegoTallWall", "north"):
-        spec = TaskFile(env=EPUCK, world="w.wbt", ignore=(name,))
+        spec = TaskFile(env=EPUCK.id, world="w.wbt", ignore=(name,))
         task = load_task(spec, base=tmp_path)
         assert task.setting.left_out == ("LegoTallWall 'north' at (0.1, 0.7)",)
         folder = tmp_path / name
@@ -207,22 +208,22 @@ def test_the_hash_tells_tasks_apart(tmp_path, changes):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"env": EPUCK, "map": "maze"}, "map: only with env: TDAC-Map2D-v0"),
-        ({"env": EPUCK, "snap": True}, "snap: only with env: TDAC-Map2D-v0"),
+        ({"env": EPUCK.id, "map": "maze"}, "map: only with env: TDAC-Map2D-v0"),
+        ({"env": EPUCK.id, "snap": True}, "snap: only with env: TDAC-Map2D-v0"),
         ({"world": "arena"}, "world: only with env: TDAC-EPuck-v0"),
         ({"map": "maze", "ignore": ["x"]}, "ignore: only with env: TDAC-EPuck-v0"),
-        ({"env": "TDAC-Car-v0"}, "env: Input should be"),
-        ({"env": EPUCK, "world": "arena", "ignore": ["x"]}, "no node called 'x'"),
-        ({"env": EPUCK, "world": "nothing.wbt"}, "no such file"),
+        ({"env": "TDAC-Car-v0"}, "env: unknown environment .*known: TDAC-Map2D"),
+        ({"env": EPUCK.id, "world": "arena", "ignore": ["x"]}, "no node called 'x'"),
+        ({"env": EPUCK.id, "world": "nothing.wbt"}, "no such file"),
         (
-            {"env": EPUCK, "goal": [0.0, 3.0]},
+            {"env": EPUCK.id, "goal": [0.0, 3.0]},
             r"the goal is outside the arena's wall, .* to \(1, 1\)",
         ),
         (
-            {"env": EPUCK, "start": [1.5, 0.0, 0.0]},
+            {"env": EPUCK.id, "start": [1.5, 0.0, 0.0]},
             "the start is outside the arena's wall",
         ),
-        ({"env": EPUCK, "start": [0.6, -0.38]}, "already at the goal"),
+        ({"env": EPUCK.id, "start": [0.6, -0.38]}, "already at the goal"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_refused(tmp_path, content, message):

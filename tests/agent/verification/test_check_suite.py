@@ -16,7 +16,7 @@ from tdac_agent.verification.suite.privileged import (
     REFERENCE,
     SLOW,
     privileged_controller,
-    reference_ways,
+    reference_paths,
 )
 from tdac_agent.verification.suite.proof import SuiteCheck
 from tdac_agent.verification.suite_check import check_suite, prove_suite
@@ -109,7 +109,7 @@ def test_every_bundled_task(name, profile, warm):
 def test_the_nominal_start_alone(name, warm):
     """The reference passes with `paper`, too."""
     task = load_task(name)
-    ways = reference_ways(task.nominal, 0)
+    ways = reference_paths(task.nominal, 0)
     source = privileged_controller(task.nominal, ways)
     assert verify(source, task, paper=True, judge=warm).failures == ()
 

@@ -4,15 +4,16 @@ import json
 
 import pytest
 
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.errors import Fault
 from tdac_agent.tasks.task import load_task
-from tdac_agent.tasks.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.suite.privileged import (
     BAD,
     REFERENCE,
     SLOW,
     privileged_controller,
-    reference_ways,
+    reference_paths,
 )
 from tdac_agent.verification.suite.proof import SuiteCheck
 from tdac_agent.verification.suite_check import check_suite, prove_suite
@@ -68,7 +69,7 @@ def test_a_slow_controller_is_found_out(task, warm):
 def test_every_bundled_world(name, profile, warm):
     """The shipped suite proves itself in each, from a seed of its own."""
     seed = 1 + bundled_worlds().index(name)
-    world = load_task(TaskFile(env=EPUCK, world=name))
+    world = load_task(TaskFile(env=EPUCK.id, world=name))
     check = check_suite(
         world, profile=profile, seed=seed, repeats=1, bad=QUICK_BAD, judge=warm
     )
@@ -79,8 +80,8 @@ def test_every_bundled_world(name, profile, warm):
 @pytest.mark.parametrize("name", bundled_worlds())
 def test_the_nominal_start_alone(name, warm):
     """The reference passes with `paper`, too."""
-    world = load_task(TaskFile(env=EPUCK, world=name))
-    source = privileged_controller(world.nominal, reference_ways(world.nominal, 0))
+    world = load_task(TaskFile(env=EPUCK.id, world=name))
+    source = privileged_controller(world.nominal, reference_paths(world.nominal, 0))
     assert verify(source, world, paper=True, judge=warm).failures == ()
 
 
@@ -89,7 +90,7 @@ def test_a_task_that_needs_no_control_is_found_out(warm):
     """Where driving straight on is enough, the suite proves nothing about steering."""
     easy = load_task(
         TaskFile(
-            env=EPUCK,
+            env=EPUCK.id,
             world="crates",
             start=[-0.6, 0.2, 0.0],
             goal=[-0.3, 0.2],

@@ -9,8 +9,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tdac_agent.builtin import EPuckParameters, render_epuck
 from tdac_agent.cli.play import drive_disturbed
+from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.pictures import reaches
 from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.evaluation.policy import load_controller
@@ -19,7 +20,7 @@ from tdac_agent.runs.records import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import load_task
-from tdac_agent.tasks.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.suite.starts import spread_starts
 from tdac_agent.verification.verify import load_trajectories, verify
@@ -229,10 +230,10 @@ def test_tasks_of_files_name_their_world(tmp_path, controller, tdac):
     """A task.yaml names a world beside it, and the profile that it wants."""
     (tmp_path / "mine.wbt").write_text(world_file("crates").read_text())
     (tmp_path / "my.yaml").write_text(
-        f"env: {EPUCK}\nworld: mine.wbt\nprofile: policy\ngoal: [0.6, 0.1]\n"
+        f"env: {EPUCK.id}\nworld: mine.wbt\nprofile: policy\ngoal: [0.6, 0.1]\n"
     )
     code, out, _ = tdac("verify", controller, "--task", tmp_path / "my.yaml", "--json")
     assert json.loads(out)["provenance"]["profile"] == "policy"
     assert code == 0
-    spec = TaskFile(env=EPUCK, world="mine.wbt", goal=(0.6, 0.1))
+    spec = TaskFile(env=EPUCK.id, world="mine.wbt", goal=(0.6, 0.1))
     assert load_task(spec, base=tmp_path).nominal.goal == (0.6, 0.1)

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from worlds_for_controllers import OPEN
 
-from tdac_agent.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
 from tdac_agent.environments.epuck.export import POLICY, export_webots, project_name
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.runs.records import Run

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 import yaml
 
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.tasks.task import Task, load_task
-from tdac_agent.tasks.task_file import EPUCK, TaskFile
+from tdac_agent.tasks.task_file import TaskFile
 
 WORLD = Path(__file__).parent / "epuck" / "world.wbt"
 
@@ -50,7 +51,7 @@ def write_map_task(folder: Path, **changes: object) -> Path:
 
 def world_task() -> Task:
     """Two walls to drive around, in an arena that is turned and off the origin."""
-    return load_task(TaskFile(env=EPUCK, world=str(WORLD), name="zoo"))
+    return load_task(TaskFile(env=EPUCK.id, world=str(WORLD), name="zoo"))
 
 
 KINDS = {"map2d": map_task, "epuck": world_task}

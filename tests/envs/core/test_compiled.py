@@ -265,9 +265,9 @@ def test_warming_uses_every_kernel():
     """After `tdac warm` nobody waits for a compiler; each has one set of types."""
     script = (
         "import importlib, pkgutil, tdac_envs\n"
-        "from tdac_agent.environments import kernels_used\n"
-        "kernels_used.use_map_kernels()\n"
-        "kernels_used.use_world_kernels()\n"
+        "from tdac_agent.tasks.registry import own_environments\n"
+        "for one in own_environments():\n"
+        "    one.use_kernels()\n"
         "for found in pkgutil.walk_packages(tdac_envs.__path__, 'tdac_envs.'):\n"
         "    if not any(p in found.name for p in ('.webots', '.sb3')):\n"
         "        importlib.import_module(found.name)\n"

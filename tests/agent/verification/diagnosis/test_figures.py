@@ -9,11 +9,11 @@ import pytest
 from driving import drive
 from planted import PLANTS, fail
 
+from tdac_agent.environments.map2d.reference import Reference
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.figures import event_of
 from tdac_agent.verification.diagnosis.report import Episode, Report
-from tdac_agent.verification.suite.reference import Reference
 from tdac_agent.verification.verify import verify
 from tdac_envs.drawing.backdrop import CLOSE_UP
 from tdac_envs.drawing.canvas import TRAIL

@@ -7,6 +7,7 @@ from damage import altered_json, shuffled, torn
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tdac_agent.environments.map2d.entry import MAP2D
 from tdac_agent.errors import Fault
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
@@ -19,7 +20,6 @@ from tdac_agent.verification.judge.report_log import (
     read_outcomes,
     verdict_of,
 )
-from tdac_agent.verification.verify import SHIPPED_SUITE
 
 FEW = settings(
     deadline=None,
@@ -67,7 +67,7 @@ def test_half_a_character(controller):
 def judged(warm, task, folder, source, suite=None):
     """The files that the judge left of a real verification."""
     folder.mkdir()
-    suites = {"shipped": SHIPPED_SUITE} | ({"own": suite} if suite else {})
+    suites = {"shipped": MAP2D.suite} | ({"own": suite} if suite else {})
     job = Job(
         task=folder / "work",
         controller=folder / "controller.py",

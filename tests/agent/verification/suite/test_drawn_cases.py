@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tdac_agent.verification.suite.oracle import Oracle
+from tdac_agent.environments.epuck.world_copies import WorldOracle
 from tdac_envs import load_world
 from tdac_envs.worlds.bundled import world_file
 
@@ -14,7 +14,7 @@ from tdac_envs.worlds.bundled import world_file
 @pytest.mark.parametrize("density", [0.0, 0.1, 0.3])
 def test_walks_are_steps_apart_and_joined(cell, density):
     """Free ends, a whole number of steps from each other, with a path between them."""
-    oracle = Oracle()
+    oracle = WorldOracle()
     for seed in range(20):
         occ = oracle.grid(seed, 90, 70, density / cell)
         for start, goal in oracle.walks(occ, cell, np.random.default_rng(seed)):
@@ -27,13 +27,13 @@ def test_walks_are_steps_apart_and_joined(cell, density):
 def test_a_map_without_room_has_no_walks():
     """Nothing is asked where there is nothing to ask."""
     random = np.random.default_rng(0)
-    assert list(Oracle().walks(np.ones((20, 30), np.bool_), 1, random)) == []
-    assert list(Oracle().walks(np.zeros((3, 3), np.bool_), 5, random)) == []
+    assert list(WorldOracle().walks(np.ones((20, 30), np.bool_), 1, random)) == []
+    assert list(WorldOracle().walks(np.zeros((3, 3), np.bool_), 5, random)) == []
 
 
 def test_what_is_drawn_follows_from_the_seed():
     """The same seed draws the same walks and copy of a world, another one others."""
-    oracle, occ = Oracle(), np.zeros((50, 60), np.bool_)
+    oracle, occ = WorldOracle(), np.zeros((50, 60), np.bool_)
     world = load_world(world_file("arena"))
 
     def drawn(seed):

@@ -14,17 +14,17 @@ from driving_epuck import (
     world_task,
 )
 
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.oracle import occupied_at
+from tdac_agent.environments.epuck.world_copies import WorldOracle
 from tdac_agent.verification.suite import contract
 from tdac_agent.verification.suite.hygiene import HYGIENE
-from tdac_agent.verification.suite.oracle import Oracle
 from tdac_agent.verification.suite.privileged import (
     BAD,
     POLICIES,
     privileged_controller,
-    reference_ways,
+    reference_paths,
 )
-from tdac_agent.verification.suite.privileged.controllers import reference_way
 from tdac_agent.verification.suite.starts import spread_starts
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -41,7 +41,7 @@ def task_of(tmp_path):
 def drive_from(task, starts, folder, monkeypatch):
     """Episodes of a reference that knows the ways from some starts."""
     nominal = task.nominal
-    ways = [reference_way(nominal, start.x, start.y) for start in starts]
+    ways = [EPUCK.reference_path(nominal, start.x, start.y) for start in starts]
     source = privileged_controller(nominal, ways)
     module = import_into(task, source, folder, monkeypatch)
     env = task.make_env()
@@ -105,7 +105,7 @@ def test_many_random_worlds(block, tmp_path, monkeypatch):
 def test_the_way_is_clear_and_no_detour(name, task_of):
     """Along all of it the body has room; it is as long as the grid's path at most."""
     nominal = task_of(name).nominal
-    way = reference_way(nominal, *nominal.start[:2])
+    way = EPUCK.reference_path(nominal, *nominal.start[:2])
     assert way[0] == nominal.start[:2]
     assert way[-1] == nominal.goal
     for begin, end in pairwise(way):
@@ -119,7 +119,7 @@ def test_the_way_is_clear_and_no_detour(name, task_of):
 def test_only_the_policy_differs(task_of):
     """Each bad controller is the reference but for `policy` and what that one needs."""
     nominal = task_of("crates").nominal
-    ways = reference_ways(nominal, 3)
+    ways = reference_paths(nominal, 3)
     sources = {name: privileged_controller(nominal, ways, name) for name in POLICIES}
     assert all(text.startswith('"""PRIVILEGED: ') for text in sources.values())
     rests = {
@@ -137,7 +137,7 @@ def test_static_contract(task_of):
         tree = ast.parse(privileged_controller(nominal, [], name))
         assert contract.import_problems(tree) == []
         assert [problem for find in HYGIENE.values() for problem in find(tree)] == []
-        wanted = contract.NAMES["epuck"]
+        wanted = EPUCK.names
         found = set(contract.top_level_names(tree))
         assert {"policy", *wanted.constants, *wanted.functions} <= found
         assert contract.has_main_guard(tree)
@@ -147,7 +147,7 @@ def test_static_contract(task_of):
 def test_bad_ones_do_not_arrive(name, task_of, tmp_path, monkeypatch):
     """Who stands, drives straight on or rolls dice does not get around the crates."""
     task = task_of("crates")
-    source = privileged_controller(task.nominal, reference_ways(task.nominal, 1), name)
+    source = privileged_controller(task.nominal, reference_paths(task.nominal, 1), name)
     module = import_into(task, source, tmp_path, monkeypatch)
     for start in (task.nominal.start, *spread_starts(task.nominal, 1, 2)):
         assert not episode(module, task.make_env(), start).reached
@@ -162,7 +162,7 @@ def test_it_reads_worlds(name, task_of, tmp_path, monkeypatch):
         task = task_of(name)
     source = privileged_controller(task.nominal, [])
     module = import_into(task, source, tmp_path, monkeypatch)
-    for case in Oracle().world_cases(task.nominal.ground.world):
+    for case in WorldOracle().world_cases(task.nominal.ground.world):
         world = module.parse_world(case.text)
         assert world["start"] == pytest.approx(case.start)
         assert world["goal"] == pytest.approx(case.goal)
@@ -177,11 +177,11 @@ def test_astar(task_of, tmp_path, monkeypatch):
     task = task_of("crates")
     source = privileged_controller(task.nominal, [])
     module = import_into(task, source, tmp_path, monkeypatch)
-    for case in Oracle().plan_cases():
+    for case in WorldOracle().plan_cases():
         path = module.astar(case.occ, case.start, case.goal)
         if math.isinf(case.length):
             assert path == []
             continue
         assert (path[0], path[-1]) == (case.start, case.goal)
-        assert Oracle().path_error(case.occ, path) is None
-        assert Oracle().path_length(path) == pytest.approx(case.length)
+        assert WorldOracle().path_error(case.occ, path) is None
+        assert WorldOracle().path_length(path) == pytest.approx(case.length)

@@ -9,9 +9,10 @@ from functools import partial
 
 import pytest
 
-from tdac_agent.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.tasks.task import load_task
-from tdac_agent.verification.verify import SHIPPED_SUITES, verify
+from tdac_agent.verification.verify import verify
 
 PARSE = ["test_parse_world"]
 GRIDS = ["test_build_grid[0.0]", "test_build_grid[0.04]"]
@@ -190,7 +191,7 @@ def rows(tmp_path_factory):
     """The shipped suite but for its episodes, which say nothing about the rows."""
     folder = tmp_path_factory.mktemp("rows")
     for name in ("test_static.py", "test_unit.py"):
-        shutil.copy(SHIPPED_SUITES / "epuck" / name, folder)
+        shutil.copy(EPUCK.suite / name, folder)
     return folder
 
 

@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 from driving import drive, import_controller, random_env
 
+from tdac_agent.environments.map2d.entry import MAP2D
 from tdac_agent.verification.suite.privileged import (
     BAD,
     POLICIES,
     privileged_controller,
-    reference_ways,
+    reference_paths,
 )
-from tdac_agent.verification.suite.privileged.controllers import (
-    reference_way,
-    without_flat_points,
-)
+from tdac_agent.verification.suite.reference import without_flat_points
 from tdac_agent.verification.suite.starts import spread_starts
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.map2d.env import Map2DEnv
@@ -26,7 +24,7 @@ from tdac_envs.map2d.env import Map2DEnv
 
 def episodes(env, seed, folder, monkeypatch, name="reference"):
     """The six episodes of a verification, each in a fresh module."""
-    ways = reference_ways(env.nominal, seed)
+    ways = reference_paths(env.nominal, seed)
     source = privileged_controller(env.nominal, ways, name)
     for start in (env.nominal.start, *spread_starts(env.nominal, seed, 5)):
         module = import_controller(source, env, folder, monkeypatch)
@@ -72,7 +70,7 @@ def test_the_reference_passes_where_the_body_just_fits(gap, tmp_path, monkeypatc
 def test_only_the_policy_differs():
     """Each bad controller is the reference but for `policy` and what that one needs."""
     env = Map2DEnv(np.zeros((60, 90), bool), (15, 15, 0), (70, 40), robot_radius=5)
-    ways = reference_ways(env.nominal, 3)
+    ways = reference_paths(env.nominal, 3)
     trees = {
         name: ast.parse(privileged_controller(env.nominal, ways, name))
         for name in POLICIES
@@ -99,7 +97,7 @@ def test_only_the_policy_differs():
 def test_it_says_that_it_is_privileged():
     """The first words of the file: no one shall take it for an example."""
     env = Map2DEnv(np.zeros((60, 90), bool), (15, 15, 0), (70, 40), robot_radius=5)
-    ways = reference_ways(env.nominal, 0)
+    ways = reference_paths(env.nominal, 0)
     for name in POLICIES:
         source = privileged_controller(env.nominal, ways, name)
         assert source.startswith('"""PRIVILEGED: ')
@@ -147,7 +145,7 @@ def test_the_way_is_no_detour():
     cells = np.zeros((120, 120), bool)
     cells[40:80, 55:65] = True
     env = Map2DEnv(cells, (20, 60, 0), (100, 60), robot_radius=8)
-    way = reference_way(env.nominal, 20.0, 60.0)
+    way = MAP2D.reference_path(env.nominal, 20.0, 60.0)
     assert way[0] == (20.0, 60.0)
     assert way[-1] == (100.0, 60.0)
     length = sum(math.dist(a, b) for a, b in pairwise(way))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from driving import drive, random_env
 
-from tdac_agent.verification.suite.reference import Reference, oracle_path, pull
+from tdac_agent.environments.map2d.reference import Reference, oracle_path, pull
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.task import jittered_start
 from tdac_envs.mapping.bundled import bundled_maps

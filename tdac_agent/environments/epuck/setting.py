@@ -11,7 +11,7 @@ from typing import Any
 
 from tdac_agent.environments.epuck.flat_world import flat_world
 from tdac_agent.environments.epuck.params import EPuckParams, params_of
-from tdac_agent.tasks.setting import Original
+from tdac_agent.tasks.setting import Original, Setting
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.units import METRES, Units
 from tdac_envs.core.errors import TaskError
@@ -57,11 +57,6 @@ class EPuckSetting:
     def units(self) -> Units:
         """Metres."""
         return METRES
-
-    @property
-    def suite(self) -> str:
-        """Table II."""
-        return "epuck"
 
     def remarks(self) -> list[str]:
         """What stands in the world."""
@@ -121,7 +116,14 @@ class EPuckSetting:
         return own
 
 
-def open_epuck(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
+def world_setting(setting: Setting) -> EPuckSetting:
+    """The setting, which must be a world's."""
+    if not isinstance(setting, EPuckSetting):
+        raise TypeError(f"expected an EPuckSetting, got {type(setting).__name__}")
+    return setting
+
+
+def open_world_task(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
     """The world's name, and the feasible task in it.
 
     Args:

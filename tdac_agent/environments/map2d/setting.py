@@ -59,11 +59,6 @@ class Map2DSetting:
         return PIXELS
 
     @property
-    def suite(self) -> str:
-        """Table I."""
-        return "map2d"
-
-    @property
     def left_out(self) -> tuple[str, ...]:
         """Nothing: a map is all there is."""
         return ()
@@ -144,7 +139,7 @@ def map_setting(setting: Setting) -> Map2DSetting:
     return setting
 
 
-def open_map(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
+def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     """The map's name, and the feasible task on it.
 
     Args:

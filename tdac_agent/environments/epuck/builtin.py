@@ -1,0 +1,103 @@
+"""The parametrised controller for the e-puck, and how failures change it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import ClassVar
+
+from tdac_agent.builtin.parameters import changed, check, tunable
+from tdac_agent.builtin.remedies import Remedies, Remedy
+from tdac_agent.builtin.template import Template
+from tdac_agent.verification.suite.contract import time_step
+from tdac_envs.epuck.task import EPuckTask
+
+# What holds an e-puck up that has a plan is what its sensors take for an obstacle.
+_DISTRUSTED = Remedy(
+    scale={"unstick_after": 0.5, "blocked": 1.5}, switch_on={"unstick_after": 100.0}
+)
+_UNSTEADY = Remedy(scale={"turn_gain": 0.6, "turn_in_place": 1.5, "blocked": 1.5})
+
+REMEDIES: Remedies = MappingProxyType(
+    {
+        "collision": Remedy(
+            margin="wider",
+            add={"turn_gain": 0.3, "slow_dist": 0.01},
+            scale={"turn_in_place": 0.5, "blocked": 0.8},
+        ),
+        "no motion": Remedy(margin="narrower", scale={"blocked": 1.5}),
+        "stuck": _DISTRUSTED,
+        "looping": _DISTRUSTED,
+        "spinning": _UNSTEADY,
+        "oscillating": _UNSTEADY,
+        "missed goal": Remedy(scale={"turn_in_place": 0.5, "cruise_speed": 0.7}),
+        "too slow": Remedy(
+            scale={"cruise_speed": 1.4, "turn_in_place": 1.4, "slow_dist": 0.5}
+        ),
+        "time-out": Remedy(scale={"look_steps": 2.0}),
+        "held out": Remedy(
+            margin="wider", add={"turn_gain": 0.15}, scale={"turn_in_place": 0.7}
+        ),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class EPuckParameters:
+    """Constants of the controller for the e-puck; the defaults are neutral."""
+
+    remedies: ClassVar = REMEDIES
+
+    inflation_margin: float = tunable(
+        0.0,
+        0.0,
+        0.03,
+        "m",
+        "room wanted beside the body where the world has it",
+        step=0.002,
+    )
+    cruise_speed: float = tunable(
+        1.0, 0.25, 1.0, "", "share of the wheel limit on a free way"
+    )
+    slow_dist: float = tunable(
+        0.0, 0.0, 0.06, "m", "free length ahead below which it slows down"
+    )
+    blocked: float = tunable(
+        1000.0, 300.0, 1900.0, "", "reading of ps0 or ps7 at which it does not drive on"
+    )
+    turn_gain: float = tunable(
+        0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
+    )
+    turn_in_place: float = tunable(
+        0.8, 0.05, 1.2, "rad", "heading error above which it turns in place"
+    )
+    look_steps: float = tunable(
+        5.0, 1.0, 40.0, "steps", "from one look whether the way is clear to the next"
+    )
+    unstick_after: float = tunable(
+        0.0, 0.0, 400.0, "steps", "without progress until it trusts the map alone"
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def changed(self, **values: float) -> EPuckParameters:
+        """A copy with some values replaced, each moved into its bounds."""
+        return changed(self, values)
+
+
+def template_for(task: EPuckTask) -> Template[EPuckParameters]:
+    """The controller with a task's wheel limit, clock and tolerance."""
+    facts = {
+        "time_step": time_step(task.dt),
+        "max_wheel_speed": task.max_wheel_speed,
+        "goal_tolerance": task.goal_tolerance,
+    }
+    file = Path(__file__).with_name("controller.py.j2")
+    return Template(EPuckParameters, file, facts)
+
+
+def render_epuck(parameters: EPuckParameters, task: EPuckTask) -> str:
+    """Source of the controller with these parameters; see `template_for`."""
+    return template_for(task).render(parameters)

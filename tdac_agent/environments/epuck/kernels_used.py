@@ -1,0 +1,20 @@
+"""Calls of every kernel that a world needs, so that all of them are compiled."""
+
+from __future__ import annotations
+
+from tdac_agent.environments.epuck.surroundings import WorldSurroundings
+from tdac_agent.environments.kernels_used import use_robot
+from tdac_envs.epuck import infrared, kernels
+
+
+def use_kernels() -> None:
+    """Calls each kernel by the function that calls it in use, in a bundled world."""
+    epuck = use_robot("TDAC-EPuck-v0", world="arena", ground_sensors=True)
+    around, pose = WorldSurroundings(epuck.nominal), epuck.nominal.start
+    around.touch(pose, 10.0)
+    around.pull(around.path_from(pose))
+    points, first, extent = epuck.nominal.ground.solid.arrays()
+    infrared.sees(points, first, extent, 0.0, 0.0, 1.0, 1.0)
+    (words,) = epuck.addresses.words
+    kernels.turn_wheels(words)
+    kernels.finish(words)

@@ -1,0 +1,112 @@
+"""The parametrised controller for maps, and how failures change it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import ClassVar
+
+from tdac_agent.builtin.parameters import changed, check, tunable
+from tdac_agent.builtin.remedies import Remedies, Remedy
+from tdac_agent.builtin.template import Template
+from tdac_envs.mapping.params import RobotParams
+
+_HELD_UP = Remedy(
+    scale={"unstick_after": 0.5, "lookahead": 0.5}, switch_on={"unstick_after": 100.0}
+)
+_RESTLESS = Remedy(scale={"turn_gain": 0.6, "turn_in_place": 1.5})
+
+REMEDIES: Remedies = MappingProxyType(
+    {
+        "collision": Remedy(
+            margin="wider",
+            add={"turn_gain": 0.3, "slow_dist": 10.0, "stop_dist": 4.0},
+            scale={"lookahead": 0.5, "turn_in_place": 0.5},
+        ),
+        "no motion": Remedy(margin="narrower", scale={"stop_dist": 0.5}),
+        "stuck": _HELD_UP,
+        "looping": _HELD_UP,
+        "spinning": _RESTLESS,
+        "oscillating": _RESTLESS,
+        "missed goal": Remedy(scale={"lookahead": 0.5, "turn_in_place": 0.5}),
+        "too slow": Remedy(
+            scale={
+                "cruise_speed": 1.4,
+                "turn_in_place": 1.4,
+                "slow_dist": 0.5,
+                "stop_dist": 0.5,
+            }
+        ),
+        "time-out": Remedy(scale={"lookahead": 0.5}),
+        "held out": Remedy(
+            margin="wider",
+            add={"turn_gain": 0.15},
+            scale={"lookahead": 0.7, "turn_in_place": 0.7},
+        ),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """Constants of the controller for maps; the defaults are neutral."""
+
+    remedies: ClassVar = REMEDIES
+
+    inflation_margin: float = tunable(
+        0.0,
+        0.0,
+        12.0,
+        "px",
+        "room wanted beside the body where the map has it",
+        step=2.0,
+    )
+    lookahead: float = tunable(
+        120.0,
+        20.0,
+        240.0,
+        "px",
+        "length of way in which a point to aim at is looked for",
+    )
+    cruise_speed: float = tunable(
+        1.0, 0.25, 1.0, "", "share of the wheel limit on a free way"
+    )
+    slow_dist: float = tunable(
+        0.0, 0.0, 80.0, "px", "free length ahead below which it slows down"
+    )
+    stop_dist: float = tunable(
+        0.0, 0.0, 40.0, "px", "free length ahead below which it lines up before driving"
+    )
+    turn_gain: float = tunable(
+        0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
+    )
+    turn_in_place: float = tunable(
+        0.8, 0.05, 1.2, "rad", "heading error above which it turns in place"
+    )
+    unstick_after: float = tunable(
+        0.0, 0.0, 400.0, "steps", "without progress until an unstick manoeuvre; 0: none"
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def changed(self, **values: float) -> Parameters:
+        """A copy with some values replaced, each moved into its bounds."""
+        return changed(self, values)
+
+
+def template_for(robot: RobotParams, dt: float) -> Template[Parameters]:
+    """The controller of a robot.
+
+    Args:
+        robot: Values of the robot's constants.
+        dt: Duration of a step, s.
+    """
+    file = Path(__file__).with_name("controller.py.j2")
+    return Template(Parameters, file, {"robot": robot, "dt": dt})
+
+
+def render_controller(parameters: Parameters, robot: RobotParams, dt: float) -> str:
+    """Source of the controller with these parameters; see `template_for`."""
+    return template_for(robot, dt).render(parameters)

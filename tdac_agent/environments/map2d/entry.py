@@ -1,0 +1,119 @@
+"""The registry entry of TDAC-Map2D-v0."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tdac_agent.tasks.environment import Environment, Names, Point
+from tdac_agent.tasks.setting import Nominal, Setting
+from tdac_agent.tasks.units import PIXELS
+
+if TYPE_CHECKING:
+    from tdac_agent.builtin.template import Template
+    from tdac_agent.environments.map2d.pictures import MapPictures
+    from tdac_agent.environments.map2d.surroundings import MapSurroundings
+    from tdac_agent.tasks.task import Task
+    from tdac_agent.tasks.task_file import TaskFile
+    from tdac_agent.verification.suite.oracle import Oracle
+    from tdac_envs.map2d.env import Map2DEnv
+
+
+class Map2D(Environment):
+    """A disc-shaped robot with range rays on a map; px. See `Environment`."""
+
+    id = "TDAC-Map2D-v0"
+    folder = Path(__file__).parent
+    units = PIXELS
+    keys = ("map", "robot", "snap", "polarity", "threshold")
+    names = Names(
+        constants=(
+            *("MAP_IMG", "PARAMS_JSON", "ROBOT_IMG", "AXLE_LENGTH_PX"),
+            *("SENSOR_RANGE_PX", "SENSOR_FOV_DEG", "N_RAYS", "LOOKAHEAD"),
+            *("STOP_DIST", "SLOW_DIST"),
+        ),
+        functions=("nearest_free", "plan_path", "run_episode", "main"),
+        classes=("OccMap2D",),
+    )
+    kernels = "tdac_envs.map2d"
+
+    def bundled(self) -> dict[str, str]:
+        """The bundled maps; a task has the name of its map."""
+        from tdac_envs.mapping.bundled import bundled_maps
+
+        return {name: name for name in bundled_maps()}
+
+    def open(self, spec: TaskFile, base: Path) -> tuple[str, Setting]:
+        """See `open_map_task`."""
+        from tdac_agent.environments.map2d.setting import open_map_task
+
+        return open_map_task(spec, base)
+
+    def small_env(self) -> Map2DEnv:
+        """An empty map of 60 x 40 px."""
+        import numpy as np
+
+        from tdac_envs.map2d.env import Map2DEnv
+
+        cells = np.zeros((40, 60), np.bool_)
+        return Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
+
+    def use_kernels(self) -> None:
+        """Reads a small map, and drives on it."""
+        from tdac_agent.environments.map2d.kernels_used import use_kernels
+
+        use_kernels()
+
+    def pictures(self, setting: Setting) -> MapPictures:
+        """The map, with what was driven."""
+        from tdac_agent.environments.map2d.pictures import MapPictures
+        from tdac_agent.environments.map2d.setting import map_setting
+
+        return MapPictures(map_setting(setting))
+
+    def surroundings(self, task: Nominal) -> MapSurroundings:
+        """The map's walls."""
+        from tdac_agent.environments.map2d.surroundings import MapSurroundings
+        from tdac_envs.map2d.task import Map2DTask
+
+        assert isinstance(task, Map2DTask)
+        return MapSurroundings(task)
+
+    def oracle(self) -> Oracle:
+        """It knows about grids alone."""
+        from tdac_agent.verification.suite.oracle import Oracle
+
+        return Oracle()
+
+    def reference_path(self, task: Nominal, x: float, y: float) -> list[Point]:
+        """See `Environment`."""
+        from tdac_agent.environments.map2d.reference import reference_path
+        from tdac_envs.map2d.task import Map2DTask
+
+        assert isinstance(task, Map2DTask)
+        return reference_path(task, x, y)
+
+    def privileged_facts(self, task: Nominal) -> dict[str, Any]:
+        """See `Environment`."""
+        from tdac_envs.map2d.task import Map2DTask
+
+        assert isinstance(task, Map2DTask)
+        largest = max(task.terrain.grid.cells.shape)
+        return {"largest": largest, "robot": task.robot, "dt": task.dt}
+
+    def prompt_facts(self, task: Task) -> dict[str, Any]:
+        """See `Environment`."""
+        from tdac_agent.environments.map2d.prompt import facts_of
+
+        return facts_of(task)
+
+    def template(self, setting: Setting) -> Template[Any]:
+        """See `template_for`."""
+        from tdac_agent.environments.map2d.builtin import template_for
+        from tdac_agent.environments.map2d.setting import map_setting
+
+        own = map_setting(setting)
+        return template_for(own.params.robot, own.nominal.dt)
+
+
+MAP2D = Map2D()

@@ -1,0 +1,149 @@
+"""The privileged reference: drives the oracle's path on the true pose.
+
+It shows that a task and its suite can be passed at all, so it may know what no
+controller knows. It turns in place and drives straight, and both end with an exact
+fractional step; nothing of it is shared with `builtin`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_agent.verification.suite.reference import (
+    Point,
+    steer,
+    taut,
+    without_flat_points,
+)
+from tdac_envs.core.compiled import constant
+from tdac_envs.grid.grid import BoolGrid, body_free
+from tdac_envs.grid.plan import Path, descend, distance_field
+from tdac_envs.map2d.straight import gets_straight
+from tdac_envs.map2d.task import Map2DTask
+
+# Room beyond the body that is tried for the path, px, widest first. The last but one
+# keeps a float32 action clear of a corner that the path would graze at exactly 0.
+MARGINS = (4.0, 2.0, 1.0, 0.5, 0.05, 0.0)
+_ARRIVED = 1e-4  # px
+_SAFE = 1e-3  # px kept beyond the body on a shortcut
+# The same in the files of privileged controllers: many times what float32 rounds away.
+_SAFE_IN_FLOAT32 = 0.02
+
+
+class Reference:
+    """Solves a feasible task without contact.
+
+    Args:
+        task: The task; its start is not used, any pose may be given to `act`.
+    """
+
+    def __init__(self, task: Map2DTask) -> None:
+        self.task = task
+        self._waypoints: list[Point] = []
+
+    def reset(self, pose: Sequence[float]) -> None:
+        """Plans from a pose (x, y, heading), px and rad."""
+        path = oracle_path(self.task, float(pose[0]), float(pose[1]))
+        self._waypoints = pull(self.task, path)[1:]
+
+    def act(self, pose: Sequence[float]) -> tuple[float, float]:
+        """Wheel fractions (left, right) for the next step at the true pose."""
+        x, y, heading = (float(value) for value in pose)
+        while self._waypoints and math.dist((x, y), self._waypoints[0]) < _ARRIVED:
+            self._waypoints.pop(0)
+        if not self._waypoints:
+            return 0.0, 0.0
+        step, axle = self.task.full_step, self.task.robot.axle_length
+        return steer((x, y, heading), self._waypoints[0], step, axle)
+
+
+def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
+    """Path from (x, y) to the goal at the widest margin that still connects them.
+
+    Returns:
+        Shape (n, 2), px; both ends included; only the ends where nothing connects.
+    """
+    ends = np.array([[x, y], task.goal])
+    for margin in MARGINS:
+        free = _roomy(task, (x, y), margin)
+        last = _nearest(free, *task.goal)
+        if last is None:
+            continue
+        field = distance_field(free, last)
+        first = _entry(task, field, x, y)
+        if first is not None:
+            return np.vstack([ends[:1], descend(free, field, first), ends[1:]])
+    return ends
+
+
+def reference_path(task: Map2DTask, x: float, y: float) -> list[Point]:
+    """The oracle's path from (x, y) to the goal, after shortcuts; ends included."""
+    return without_flat_points(pull(task, oracle_path(task, x, y), _SAFE_IN_FLOAT32))
+
+
+def pull(task: Map2DTask, path: Path, safe: float = _SAFE) -> list[Point]:
+    """Corners of the path after every shortcut that keeps the disc clear.
+
+    Args:
+        task: Gives the map and the body.
+        path: Shape (n, 2), px.
+        safe: Room that a shortcut keeps beyond the body, px.
+    """
+    return taut(path, lambda begin, end: _free(task, begin, end, safe))
+
+
+def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
+    """Whether the body, grown by `safe` px, gets straight from one point to another."""
+    clear = task.terrain.padded_clear
+    numbers = (*begin, *end, task.robot.radius + safe)
+    return gets_straight(constant(clear), *map(float, numbers))
+
+
+def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:
+    """Pixels with room for the body and `margin` px, less of it near both ends."""
+    clear, radius = task.terrain.clear, task.robot.radius
+    free = body_free(clear, radius + margin)
+    if margin == 0.0:
+        return free
+    reach = math.ceil(radius + margin) + 2
+    for x, y in (start, task.goal):
+        column, row = math.floor(x + 0.5), math.floor(y + 0.5)
+        window = np.s_[
+            max(row - reach, 0) : row + reach + 1,
+            max(column - reach, 0) : column + reach + 1,
+        ]
+        free[window] = body_free(clear[window], radius + min(margin, 0.05))
+    return free
+
+
+def _near(x: float, y: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """The pixels (i, j) within 3 px of a point, nearest first."""
+    column, row = math.floor(x + 0.5), math.floor(y + 0.5)
+    pixels = [
+        (i, j)
+        for j in range(max(row - 3, 0), min(row + 4, shape[0]))
+        for i in range(max(column - 3, 0), min(column + 4, shape[1]))
+    ]
+    pixels.sort(key=lambda pixel: math.dist(pixel, (x, y)))
+    return np.array(pixels, np.int64).reshape(-1, 2)
+
+
+def _nearest(free: BoolGrid, x: float, y: float) -> tuple[int, int] | None:
+    for i, j in _near(x, y, free.shape):
+        if free[j, i]:
+            return int(i), int(j)
+    return None
+
+
+def _entry(
+    task: Map2DTask, field: NDArray[np.float64], x: float, y: float
+) -> tuple[int, int] | None:
+    """The nearest pixel with a way to the goal that the body can hop to."""
+    for i, j in _near(x, y, field.shape):
+        if np.isfinite(field[j, i]) and _free(task, (x, y), (i, j), 0.0):
+            return int(i), int(j)
+    return None

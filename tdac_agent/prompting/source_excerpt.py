@@ -1,0 +1,28 @@
+"""The part of `sensors.py` that a prompt shows."""
+
+from __future__ import annotations
+
+import ast
+
+FOR_PEOPLE = ("Graphics", "show")
+"""What `sensors.py` has to show a drive: names and documentation are enough."""
+
+
+def needed_part(source: str) -> str:
+    """The part of `sensors.py` that a controller may use, as it stands in the file."""
+    lines, kept = source.splitlines(), []
+    module = ast.parse(source)
+    for node in module.body:
+        first, last = node.lineno, node.end_lineno
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            if node.name.startswith("_"):
+                continue
+            kept.append("\n")
+            if node.name in FOR_PEOPLE:
+                last = node.body[0].end_lineno
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        kept.append("\n".join(lines[first - 1 : last]))
+        if getattr(node, "name", "") in FOR_PEOPLE:
+            kept.append("    ...")
+    return "\n".join(kept)
