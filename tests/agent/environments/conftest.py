@@ -1,0 +1,3 @@
+"""The toy's own tests are for the judge."""
+
+collect_ignore = ["toy"]
