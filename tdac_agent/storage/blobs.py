@@ -1,4 +1,4 @@
-"""Texts by their hash: each is there as a whole, or not at all."""
+"""Texts stored under their hash, each completely or not at all."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 @dataclass(frozen=True, slots=True)
 class Blobs:
-    """A folder of texts, each in a file that is named by its SHA-256.
+    """A folder of texts, each in a file named by its SHA-256 hash.
 
     Attributes:
-        folder: Made when the first text is put.
+        folder: The folder; created when the first text is stored.
     """
 
     folder: Path
 
     def put(self, text: str) -> str:
-        """Keeps a text; returns its hash."""
+        """Stores a text and returns its hash."""
         raw = text.encode("utf-8", "surrogatepass")
         name = hashlib.sha256(raw).hexdigest()
         if self.get(name) is None:
@@ -30,7 +30,7 @@ class Blobs:
         return name
 
     def get(self, name: str) -> str | None:
-        """The text with a hash; None where it is missing or damaged."""
+        """Returns the text with this hash, or None if it is missing or damaged."""
         try:
             raw = read_file(self.folder / name, RECORD_BYTES)
         except OSError:

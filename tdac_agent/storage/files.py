@@ -1,4 +1,4 @@
-"""Files that are whole or not there, also when the program is interrupted."""
+"""Atomic file writes: an interrupted program leaves no partial file."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ def write_atomic(path: Path, data: str | bytes, *, lasting: bool = True) -> None
     """Writes a file under a temporary name and moves it into place.
 
     Args:
-        path: Where to; the folder must exist.
+        path: Target file; its folder must exist.
         data: Text (as UTF-8) or bytes.
-        lasting: Whether it is to outlive a machine that stops right afterwards.
+        lasting: Whether the file must survive a machine crash right afterwards (fsync).
 
     Raises:
-        OSError: It names the file, whatever went wrong.
+        OSError: The write failed; the error names the file.
     """
     raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     try:
@@ -47,14 +47,14 @@ def _write(path: Path, raw: bytes, lasting: bool) -> None:
 
 
 def keep(path: Path, text: str) -> None:
-    """Writes a file that does not hold this text already."""
+    """Writes a file unless it already contains this text."""
     raw = text.encode("utf-8", "surrogatepass")
     if not path.is_file() or path.read_bytes() != raw:
         write_atomic(path, raw)
 
 
 def sync_folder(folder: Path) -> None:
-    """Forces the names in a folder to the disk, where the system can."""
+    """Flushes the entries of a folder to disk, if the system supports it."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -64,6 +64,6 @@ def sync_folder(folder: Path) -> None:
 
 
 def clear_unfinished(folder: Path) -> None:
-    """Removes what was left by a program that was killed while it wrote."""
+    """Removes temporary files that a program left when it was killed."""
     for path in folder.rglob(f".*{UNFINISHED}"):
         path.unlink(missing_ok=True)

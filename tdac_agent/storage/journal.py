@@ -1,4 +1,4 @@
-"""An append-only record of JSON lines, whole also after a crash in mid-line."""
+"""An append-only file of JSON lines that survives a crash in mid-line."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ JOURNAL_BYTES = 256_000_000
 
 
 def append_record(path: Path, record: JournalRecord) -> None:
-    """Appends one line, and forces it to the disk.
+    """Appends one line and flushes it to disk.
 
-    A line that cannot be written as a whole is taken back.
+    A partially written line is removed again.
 
     Raises:
-        OSError: It names the file, whatever went wrong.
+        OSError: The write failed; the error names the file.
     """
     line = json.dumps(record, sort_keys=True).encode() + b"\n"
     try:
@@ -40,7 +40,7 @@ def append_record(path: Path, record: JournalRecord) -> None:
 def _write(handle: int, line: bytes) -> None:
     size = os.fstat(handle).st_size
     try:
-        # All at once; only a disk that is full takes a part, and then says why.
+        # Usually one write; a full disk accepts a part, and the next write raises.
         while line:
             line = line[os.write(handle, line) :]
         os.fsync(handle)
@@ -51,7 +51,7 @@ def _write(handle: int, line: bytes) -> None:
 
 
 def read_records(path: Path) -> list[JournalRecord]:
-    """All whole records; a torn or foreign line is none, a missing file has none."""
+    """Returns all valid records; skips torn or foreign lines and missing files."""
     try:
         raw = read_file(path, JOURNAL_BYTES)
     except FileNotFoundError:
@@ -60,20 +60,20 @@ def read_records(path: Path) -> list[JournalRecord]:
 
 
 def read_on(path: Path, offset: int) -> tuple[list[JournalRecord], int]:
-    """The records behind an offset, and the offset behind them; a torn end is mended.
+    """Returns the records after an offset and the end offset; repairs a torn end.
 
     Args:
-        path: A file that is there.
-        offset: Where a line begins, as the last call gave it, or 0.
+        path: An existing file.
+        offset: Start of a line, as returned by the last call, or 0.
     """
-    raw = _behind(path, offset)
+    raw = _read_after(path, offset)
     if raw and not raw.endswith(b"\n"):
         mend(path)
-        raw = _behind(path, offset)
+        raw = _read_after(path, offset)
     return _records(raw), offset + len(raw)
 
 
-def _behind(path: Path, offset: int) -> bytes:
+def _read_after(path: Path, offset: int) -> bytes:
     return read_file(path, JOURNAL_BYTES, offset)
 
 
@@ -83,9 +83,9 @@ def _records(raw: bytes) -> list[JournalRecord]:
 
 
 def mend(path: Path) -> None:
-    """Has the file end with a whole line: a torn one is cut off.
+    """Repairs the end of the file by cutting off a torn last line.
 
-    A last line that only lacks its end is kept, as `read_records` does.
+    A valid last line without a line end is completed, since `read_records` counts it.
     """
     try:
         raw = read_file(path, JOURNAL_BYTES)

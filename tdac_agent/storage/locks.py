@@ -1,4 +1,4 @@
-"""Locks between processes; the system lets go of those of a process that has died."""
+"""Locks between processes; the system releases those of a dead process."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from pathlib import Path
 LOCK_FILE = ".lock"
 TRIES = 5
 TRY_SECONDS = 0.1
-"""Somebody who looks whether a lock is held, holds it for a moment."""
+"""`is_held` takes the lock for a moment, so one failed attempt proves nothing."""
 
 
 def open_lock(file: Path) -> int:
-    """A descriptor of a file to be locked, which is made where it is missing.
+    """Returns a descriptor of a lock file, which is created if it is missing.
 
-    A link in its place is an OSError: it would make a file wherever it points to.
+    A symbolic link raises OSError: it could create a file wherever it points to.
     """
     return os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
 
 
 @contextmanager
 def hold(file: Path) -> Generator[bool]:
-    """Holds the lock of a file meanwhile; gives False where another process does."""
+    """Locks a file in a `with` block; yields False if another process holds it."""
     handle = open_lock(file)
     try:
         yield any(_take(handle, attempt) for attempt in range(TRIES))
@@ -45,7 +45,7 @@ def _take(handle: int, attempt: int) -> bool:
 
 @contextmanager
 def wait_for(file: Path) -> Generator[None]:
-    """Holds the lock of a file meanwhile, and waits for it as long as it takes."""
+    """Locks a file in a `with` block; waits for the lock without a time limit."""
     handle = open_lock(file)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)

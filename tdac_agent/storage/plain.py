@@ -1,4 +1,4 @@
-"""Texts of unknown origin, made fit to be stored, printed and quoted."""
+"""Make texts of unknown origin safe to store, print and quote."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ from typing import Any
 
 MAX_MESSAGE = 300
 MAX_VALUE = 80
-"""Characters of a value that is quoted."""
+"""Most characters of a quoted value."""
 MARK = "\N{REPLACEMENT CHARACTER}"
-# Python calls none of these printable; line ends, tabs, and spaces that people write.
+# Legitimate whitespace that `str.isprintable` rejects.
 _KEPT = frozenset("\n\t\u00a0\u2009\u202f\u3000")
 _FOLDERS = re.compile(r"(?<![\w.])(?:/[\w.+-]+)+/(?=[\w.+-])")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+|0x[0-9a-fA-F]{6,}")
 
 
 def printable(text: str) -> str:
-    """The text with a mark for each character that a reader does not see as itself.
+    """Replaces each character that is not displayed as itself with a mark.
 
-    These are control characters, and with them escape sequences, characters that turn
-    the direction of writing or have no width, and halves of surrogate pairs. The
-    length stays.
+    These are control characters (and so escape sequences), lone surrogates, and
+    characters that have no width or change the writing direction. The length stays.
     """
     if text.isprintable():
         return text
@@ -29,12 +28,12 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str) -> str:
-    """The printable text in one line: no part of it can look like a line of ours."""
+    """Returns the printable text as one line, so that it cannot imitate other lines."""
     return " ".join(printable(text).split())
 
 
 class _Short(reprlib.Repr):
-    """Looks at the first items of each collection only, and not far into it."""
+    """Describes only the first items of a collection, a few levels deep."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -42,23 +41,23 @@ class _Short(reprlib.Repr):
         self.maxstring = self.maxlong = self.maxother = MAX_VALUE
 
     def repr_bytes(self, value: bytes, _: int) -> str:
-        """The first of many."""
+        """Shows only the first bytes."""
         return repr(value[:MAX_VALUE])
 
     def repr_ndarray(self, value: Any, _: int) -> str:
-        """A small array whole, of another what it is."""
+        """Shows a small array completely, a larger one by shape and type."""
         if value.size <= 16:
             return repr(value)
         return f"array of shape {value.shape} and type {value.dtype}"
 
 
 def shown(value: object, most: int = MAX_VALUE) -> str:
-    """What a value looks like, in so many characters; none costs much to describe."""
+    """Describes a value of any size cheaply, in at most `most` characters."""
     text = printable(_Short().repr(value))
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def plain(message: str) -> str:
-    """One bounded line, folders cut short, without addresses and full stop."""
+    """Returns one bounded line: folders as `…/`, no addresses, no final full stop."""
     line = one_line(_ADDRESS.sub("", _FOLDERS.sub("…/", message))).rstrip(".")
     return line if len(line) <= MAX_MESSAGE else f"{line[:MAX_MESSAGE]} …"

@@ -1,4 +1,4 @@
-"""The base of what is stored about controllers, models and files of others."""
+"""Base class of records with texts from controllers, models or files."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from tdac_agent.storage.plain import printable
 
 
 class PrintableRecord(BaseModel):
-    """A record whose texts can all be written and printed, wherever they come from.
+    """A record whose texts can be written and printed, whatever their origin.
 
-    Half a surrogate pair, for one, would make the whole record unwritable.
+    A single lone surrogate would otherwise make the whole record unwritable.
     """
 
     @model_validator(mode="before")

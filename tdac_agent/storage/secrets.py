@@ -1,4 +1,4 @@
-"""Keys are read from the environment, and leave it only in a request's header."""
+"""API keys: read from the environment, sent only in request headers."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from urllib.parse import urlsplit, urlunsplit
 
 from tdac_agent.errors import ProviderError
 
-# The judge starts the controllers, so it holds no keys: on the weakest tier they may
-# read its environment.
+# The judge starts the controllers, so its environment must have no variable with such
+# a name: on the weakest tier a controller can read it.
 SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
 NO_KEY = "none"
 SHORTEST_SECRET = 8
@@ -19,10 +19,10 @@ LONGEST_LINE = 300
 
 
 def read_key(variable: str, vendor: str, *, needed: bool) -> str:
-    """The key in an environment variable; a word in its place where none is needed.
+    """Returns the key in an environment variable, or `NO_KEY` if it may be missing.
 
     Raises:
-        ProviderError: There is none.
+        ProviderError: A needed key is missing, or the value cannot be a key.
     """
     key = os.environ.get(variable, "").strip()
     if not key and needed:
@@ -30,12 +30,14 @@ def read_key(variable: str, vendor: str, *, needed: bool) -> str:
             f"no key for {vendor}: set the environment variable {variable}"
         )
     if not key.isascii() or not key.isprintable() or " " in key:
-        raise ProviderError(f"the value of {variable} is no key: it has odd characters")
+        raise ProviderError(
+            f"{variable} is not a valid key: expected printable ASCII without spaces"
+        )
     return key or NO_KEY
 
 
 def keeps_secrets(url: str | None) -> bool:
-    """Whether nobody on the way to a server can read along: https, or this machine."""
+    """Whether a key is safe on its way to a server: https, or this machine."""
     if url is None:
         return True
     parts = urlsplit(url)
@@ -49,7 +51,7 @@ def keeps_secrets(url: str | None) -> bool:
 
 
 def without_secrets(text: str) -> str:
-    """A text in which no value of a variable that looks like a key is left."""
+    """Replaces values of key-like environment variables by the variables' names."""
     for name, value in os.environ.items():
         secret = value.strip()
         if SECRET.search(name) and len(secret) >= SHORTEST_SECRET:
@@ -58,17 +60,17 @@ def without_secrets(text: str) -> str:
 
 
 def public_url(url: str) -> str:
-    """An address without user, password and query, for records."""
+    """Returns a URL without user, password and query, for records."""
     try:
         parts = urlsplit(url)
         host = parts.netloc.rpartition("@")[2]
         return one_line(urlunsplit((parts.scheme, host, parts.path, "", "")))
     except ValueError:
-        return "an address that is none"
+        return "an invalid URL"
 
 
 def one_line(text: str, longest: int = LONGEST_LINE) -> str:
-    """A text from elsewhere as one short line, for messages and records."""
+    """Returns external text as one short line without secrets, for messages."""
     line = without_secrets(" ".join(text.split()))
     line = "".join(c for c in line if unicodedata.category(c)[0] != "C")
     kept = re.sub(r"\s+", " ", line).strip()

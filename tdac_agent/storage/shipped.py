@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-# In a wheel the files are beside this package's modules, in a clone at its top.
+# A wheel has `configs` inside the package, a clone has it beside the package.
 _HERE = Path(__file__).parents[1]
 _FOLDERS = (_HERE / "configs", _HERE.parent / "configs")
 
 
 def shipped(name: str) -> Path:
-    """The file of this name below `configs`; it need not be there."""
+    """Returns the path of a file below `configs`; the file may not exist."""
     files = [folder / name for folder in _FOLDERS]
     return next((file for file in files if file.is_file()), files[0])
 
 
 def shipped_names(pattern: str) -> list[str]:
-    """The names below `configs` that match a pattern, in order."""
+    """Returns the names below `configs` that match a glob pattern, sorted."""
     found = {
         str(file.relative_to(folder))
         for folder in _FOLDERS

@@ -1,4 +1,4 @@
-"""A YAML file of a known form, read whole or refused in one line."""
+"""Read a YAML file into a pydantic model, or refuse it with a one-line message."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def read_yaml(file: Path, form: type[M], what: str, refusal: type[TdacError]) -> M:
-    """What a file says.
+    """Returns the validated contents of a YAML file.
 
     Args:
-        file: To read.
-        form: Of its contents.
-        what: It holds, for messages: `the prices in`.
-        refusal: Raised where it cannot be read, or has a wrong or unknown key.
+        file: File to read.
+        form: Model of its contents.
+        what: Its contents in messages, such as `the prices in`.
+        refusal: Error to raise if it cannot be read or has a wrong or unknown key.
     """
     try:
         return form.model_validate(parse_yaml(read_file(file, TEXT_BYTES)))
     except ValidationError as error:
-        # A key may have another name in a file than in Python.
+        # The name of a key in the file (its alias) may differ from that in Python.
         known = [field.alias or name for name, field in form.model_fields.items()]
         raise refusal(f"{file}: {first_problem(error, known)}") from error
     except (OSError, ValueError) as error:

@@ -278,7 +278,7 @@ def test_a_missing_key(options, vendor, monkeypatch):
     assert choose_model(f"{vendor}:x", elsewhere).missing == ()
     monkeypatch.setenv(name, "two words")
     (line,) = choose_model(f"{vendor}:x", options).missing
-    assert "is no key" in line
+    assert "is not a valid key" in line
 
 
 @pytest.mark.parametrize("vendor", ["anthropic", "openai"])
