@@ -1,4 +1,4 @@
-"""`anthropic:MODEL`, by the official package."""
+"""`anthropic:MODEL`: models of Anthropic, through the official package."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STOPS: dict[str, Stop] = {
 
 
 class AnthropicModel(VendorModel["anthropic.Anthropic"]):
-    """A model of Anthropic, or of a server that speaks its language."""
+    """A model of Anthropic, or of a server with a compatible API."""
 
     vendor = Vendor(
         package="anthropic",
@@ -52,12 +52,12 @@ class AnthropicModel(VendorModel["anthropic.Anthropic"]):
             ) as stream:
                 gathered.request_id = stream.response.headers.get("request-id")
                 for event in stream:
-                    _gather(gathered, event)
+                    _add_event(gathered, event)
             return gathered.reply()
 
 
 def _content(request: Request) -> list[TextBlockParam]:
-    """The prompt's parts; what is the same in all of a run is to be cached."""
+    """Returns the prompt's parts; the stable one is marked for caching."""
     blocks: list[TextBlockParam] = [
         {"type": "text", "text": part} for part in request.parts
     ]
@@ -66,7 +66,7 @@ def _content(request: Request) -> list[TextBlockParam]:
     return blocks
 
 
-def _gather(gathered: Gathered, event: RawMessageStreamEvent) -> None:
+def _add_event(gathered: Gathered, event: RawMessageStreamEvent) -> None:
     if event.type == "message_start":
         gathered.model = event.message.model
         _count(gathered, event.message.usage)
@@ -84,7 +84,7 @@ def _gather(gathered: Gathered, event: RawMessageStreamEvent) -> None:
 def _count(
     gathered: Gathered, usage: anthropic.types.Usage | anthropic.types.MessageDeltaUsage
 ) -> None:
-    """Takes over what is reported: the numbers are of the whole answer so far."""
+    """Stores the reported token counts, which cover the whole answer so far."""
     if usage.input_tokens is not None:
         gathered.tokens_cached = count(usage.cache_read_input_tokens)
         gathered.tokens_written = count(usage.cache_creation_input_tokens)

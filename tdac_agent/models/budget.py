@@ -1,7 +1,7 @@
-"""What may be spent: the worst case of a call is reserved before the call is made.
+"""Spending limits: the worst case of a call is reserved before the call is made.
 
-What is reserved and what is spent never exceeds the limits together, however many runs
-share them: threads share a `Budget`, processes a file that each has a `Budget` of.
+Reservations and spending together never exceed the limits, however many runs share
+them. Threads share one `Budget`; processes share a ledger file, each with its `Budget`.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Amount:
     """Tokens and money.
 
     Attributes:
-        tokens: In and out together.
-        usd: 0 for what is not counted in money.
+        tokens: Input and output tokens together.
+        usd: Cost in USD; 0 if it is not counted in money.
     """
 
     tokens: int = 0
@@ -39,11 +39,11 @@ class Amount:
             raise ValueError(f"expected an amount of 0 or more, got {self}")
 
     def plus(self, other: Amount) -> Amount:
-        """Both together."""
+        """Returns the sum."""
         return Amount(self.tokens + other.tokens, self.usd + other.usd)
 
     def times(self, count: int) -> Amount:
-        """So many of it."""
+        """Returns this amount multiplied by `count`."""
         return Amount(count * self.tokens, count * self.usd)
 
 
@@ -52,12 +52,12 @@ Limit = Literal["--max-cost", "--max-tokens"]
 
 
 class BudgetExhausted(Exception):
-    """The worst case of a call is more than what is left.
+    """The worst case of a call exceeds what is left.
 
     Args:
         message: One line.
-        limit: What it would go beyond.
-        taken: All that is reserved or spent without the call.
+        limit: Flag of the limit that it would exceed.
+        taken: Amount reserved or spent without the call.
     """
 
     def __init__(self, message: str, limit: Limit, taken: Amount) -> None:
@@ -66,11 +66,11 @@ class BudgetExhausted(Exception):
         self._taken = taken
 
     def flag(self, most: Amount, times: int = 1) -> str:
-        """The flag with which more could be taken, cents rounded up.
+        """Returns the flag with a sufficient limit, rounded up to whole cents.
 
         Args:
-            most: What more.
-            times: So many times all that has been taken then.
+            most: Amount needed in addition to what is taken.
+            times: Factor applied to the sum.
         """
         total = self._taken.plus(most).times(times)
         if self._limit == "--max-tokens":
@@ -80,39 +80,36 @@ class BudgetExhausted(Exception):
 
 @dataclass(slots=True)
 class _Taken:
-    """What calls have taken, by the last word on each of them, and the sum of it.
+    """The latest amount of each call, and the exact running sum of them."""
 
-    The sum is exact, and need not be made anew with each call.
-    """
-
-    of: dict[str, Amount] = field(default_factory=dict)
+    by_call: dict[str, Amount] = field(default_factory=dict)
     _tokens: int = 0
     _usd: Fraction = field(default_factory=Fraction)
 
     @property
-    def all(self) -> Amount:
+    def total(self) -> Amount:
         return Amount(self._tokens, float(self._usd))
 
-    def but(self, call: str) -> Amount:
-        """All without a call."""
-        one = self.of.get(call, NOTHING)
+    def without(self, call: str) -> Amount:
+        """Returns the sum without one call."""
+        one = self.by_call.get(call, NOTHING)
         usd = self._usd - Fraction(one.usd)
         return Amount(self._tokens - one.tokens, float(usd))
 
     def put(self, call: str, amount: Amount) -> None:
-        before = self.of.get(call, NOTHING)
+        before = self.by_call.get(call, NOTHING)
         self._tokens += amount.tokens - before.tokens
         self._usd += Fraction(amount.usd) - Fraction(before.usd)
-        self.of[call] = amount
+        self.by_call[call] = amount
 
 
 class Budget:
-    """Limits, and what has been taken of them. For any number of threads.
+    """Limits and the amounts taken from them; safe for any number of threads.
 
     Args:
         max_cost: USD, None for no limit.
-        max_tokens: In and out together, None for no limit.
-        ledger: File that processes share; made where it is not there.
+        max_tokens: Input and output tokens together, None for no limit.
+        ledger: File that processes share; created if it is missing.
     """
 
     def __init__(
@@ -130,41 +127,41 @@ class Budget:
 
     @property
     def taken(self) -> Amount:
-        """What is reserved or spent."""
-        with self._open():
-            return self._taken.all
+        """The amount that is reserved or spent."""
+        with self._synchronized():
+            return self._taken.total
 
     def reserve(self, call: str, worst: Amount) -> None:
-        """Takes the most that a call can cost.
+        """Reserves the worst-case amount of a call.
 
         Args:
-            call: Its name, the same for the same call in another process.
-            worst: The most.
+            call: Name of the call, the same in every process.
+            worst: Worst-case amount.
 
         Raises:
-            BudgetExhausted: There is less left; nothing was taken.
+            BudgetExhausted: Less than that is left; nothing was reserved.
         """
-        with self._open():
-            self._check(self._taken.but(call), worst)
+        with self._synchronized():
+            self._check(self._taken.without(call), worst)
             self._take(call, worst)
 
     def settle(self, call: str, spent: Amount) -> None:
-        """Replaces what was reserved for a call by what it took."""
-        with self._open():
+        """Replaces the reservation of a call by the amount that it took."""
+        with self._synchronized():
             self._take(call, spent)
 
     def restore(self, calls: Mapping[str, Amount]) -> None:
-        """Takes over calls of an earlier process, also beyond the limits."""
-        with self._open():
+        """Takes over the calls of an earlier process, even beyond the limits."""
+        with self._synchronized():
             for call, amount in calls.items():
-                if self._taken.of.get(call) != amount:
+                if self._taken.by_call.get(call) != amount:
                     self._take(call, amount)
 
     def _check(self, taken: Amount, worst: Amount) -> None:
-        """Refuses what is more than what is left.
+        """Checks that the limits allow another `worst`.
 
         Raises:
-            BudgetExhausted: It says how much there was.
+            BudgetExhausted: They do not.
         """
         both, cost, tokens = taken.plus(worst), self.max_cost, self.max_tokens
         if cost is not None and worst.usd and both.usd > cost + ROUNDING:
@@ -190,8 +187,8 @@ class Budget:
         self._taken.put(call, amount)
 
     @contextmanager
-    def _open(self) -> Generator[None]:
-        """What is taken, up to date, and not to be changed by others meanwhile."""
+    def _synchronized(self) -> Generator[None]:
+        """Locks the budget and brings it up to date with the ledger."""
         with self._lock:
             if self._ledger is None:
                 yield
@@ -201,7 +198,7 @@ class Budget:
                 yield
 
     def _catch_up(self, ledger: Path) -> None:
-        """Takes in what was written since; all of it, if that is another file now."""
+        """Reads what was added to the ledger; all of it if the file was replaced."""
         if ledger.stat().st_size < self._read_to:
             self._taken, self._read_to = _Taken(), 0
         calls, read_to = _read(ledger, self._read_to)
@@ -211,19 +208,19 @@ class Budget:
 
 
 def told_usd(amount: float) -> str:
-    """An amount of money for people: two digits that matter at least."""
+    """Formats USD, with four decimals below 0.10 USD."""
     return f"{amount:.2f} USD" if amount >= 0.1 or amount == 0 else f"{amount:.4f} USD"
 
 
 def _read(ledger: Path, offset: int) -> tuple[list[tuple[str, Amount]], int]:
-    """What a file says of calls behind an offset, and the offset behind that.
+    """Returns the calls recorded after an offset, and the end offset.
 
     Raises:
-        RunError: It is no such file.
+        RunError: The file is not a budget ledger.
     """
     try:
         records, end = read_on(ledger, offset)
         calls = [(one["call"], Amount(one["tokens"], one["usd"])) for one in records]
     except (KeyError, TypeError, ValueError) as error:
-        raise RunError(f"{ledger} is no record of a budget: {error}") from error
+        raise RunError(f"{ledger} is not a budget ledger: {error}") from error
     return calls, end

@@ -1,4 +1,4 @@
-"""From a string such as `anthropic:MODEL` to the provider that it names."""
+"""Resolve a string such as `anthropic:MODEL` to a provider."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
 
 GROUP = "tdac.providers"
-# Each is imported only when it is chosen: so are the packages that it needs.
+# A provider and the packages it needs are imported only when it is chosen.
 OWN = {
     "builtin": "tdac_agent.builtin.provider:make_builtin",
     "anthropic": "tdac_agent.models.anthropic_api:make",
@@ -31,16 +31,16 @@ FORMS = (
 )
 OFFLINE = frozenset({"builtin", "command", "manual", "replay", "scripted"})
 IN_FILES = frozenset({"replay", "scripted"})
-"""Those whose answers are all known beforehand."""
+"""Providers whose answers are all stored in files."""
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What a provider may need besides its own words.
+    """What a provider may need besides the text after the colon.
 
     Attributes:
-        setting: The task's, for providers that know the environments.
-        base_url: Where its models are served, if not where they usually are.
+        setting: Setting of the task, for providers that know the environments.
+        base_url: URL of the models' server; None for the default.
         key_over_http: Whether a key may go to another machine unencrypted.
     """
 
@@ -50,8 +50,8 @@ class Options:
 
 
 Make = Callable[[str, Options], Provider]
-"""What an entry point of the group `tdac.providers` is: the words after the colon and
-the options in, a provider out; it raises `ProviderError` where that is not possible."""
+"""Entry point of the group `tdac.providers`: takes the text after the colon and the
+options, and returns a provider or raises `ProviderError`."""
 
 
 def choose_models(
@@ -62,20 +62,20 @@ def choose_models(
     *,
     key_over_http: bool = False,
 ) -> tuple[Provider, Provider]:
-    """The Learner and the Optimizer; one and the same where they are named so.
+    """Returns the Learner and the Optimizer; one object if both have the same name.
 
     Args:
-        learner: A provider, or its name.
-        optimizer: The same; None for the learner.
-        setting: The task's.
-        base_url: Of the models that are served somewhere.
-        key_over_http: As for `Options`.
+        learner: A provider or its name.
+        optimizer: A provider or its name; None for the learner.
+        setting: Setting of the task.
+        base_url: URL of the models' server.
+        key_over_http: As in `Options`.
 
     Raises:
         ProviderError: A name is unknown, or cannot be used.
     """
     named = [name for name in (learner, optimizer) if isinstance(name, str)]
-    if base_url is not None and named:  # others have been made with theirs
+    if base_url is not None and named:  # provider objects have their own
         _check_url(base_url, named)
     options = Options(setting, base_url, key_over_http)
     first = choose_model(learner, options) if isinstance(learner, str) else learner
@@ -87,9 +87,9 @@ def choose_models(
 
 
 def choose_model(name: str, options: Options) -> Provider:
-    """The provider that a name such as `anthropic:MODEL` stands for.
+    """Returns the provider for a name such as `anthropic:MODEL`.
 
-    What it may lack before it can be asked is for `missing_for`.
+    Its key or package may still be missing; see `missing_for`.
 
     Raises:
         ProviderError: The name is unknown, or cannot be used.
@@ -104,21 +104,21 @@ def choose_model(name: str, options: Options) -> Provider:
 
 
 def missing_before(name: str, options: Options) -> tuple[str, ...]:
-    """What a run with a model would still need; no folder is made, nobody is asked.
+    """Returns what a run with a model still needs; creates no folder, asks no model.
 
     Raises:
-        ProviderError: The name is unknown, or no run could begin with it.
+        ProviderError: The name is unknown, or no run can start with it.
     """
     check_name(name)
     kind, _, words = name.partition(":")
-    # A provider of others may need its key, and `manual` makes its folder.
+    # Making a third-party provider may need its key; `manual` would create its folder.
     if kind not in OWN or (kind == "manual" and words):
         return ()
     return missing_for(choose_model(name, options))
 
 
 def answers_sha256(name: str, options: Options) -> str | None:
-    """Hash of all that a model may answer, where that is in files; else None.
+    """Returns the hash of a model's possible answers; None if they are not in files.
 
     Raises:
         ProviderError: The files cannot be used.
@@ -130,10 +130,10 @@ def answers_sha256(name: str, options: Options) -> str | None:
 
 
 def check_name(name: str) -> None:
-    """Refuses a name that no provider answers to; makes none, and needs no key.
+    """Checks that a provider with this name exists; makes none, and needs no key.
 
     Raises:
-        ProviderError: With the forms that there are.
+        ProviderError: None exists; the message lists the known forms.
     """
     kind = name.partition(":")[0]
     others = {point.name for point in entry_points(group=GROUP)}
@@ -156,10 +156,10 @@ def _load(point: EntryPoint) -> Make:
 
 
 def _check_url(url: str, named: list[str]) -> None:
-    """Refuses an address that cannot be meant, or may hold a secret.
+    """Checks that a URL is valid, applies to one vendor and contains no secret.
 
     Raises:
-        ProviderError: With what to do instead.
+        ProviderError: It does not; the message says what to do.
     """
     try:
         parts = urlsplit(url)
@@ -169,11 +169,12 @@ def _check_url(url: str, named: list[str]) -> None:
         usable = secret = False
     if secret:
         raise ProviderError(
-            "the base URL must hold no user, password or query: it is kept with the run"
+            "--base-url must have no user, password or query: it is stored with the run"
         )
     if not usable:
         raise ProviderError(
-            f"the base URL {url!r} is none; expected one like http://localhost:8000/v1"
+            f"--base-url {url!r} is not a valid URL; "
+            "expected one like http://localhost:8000/v1"
         )
     kinds = {name.partition(":")[0] for name in named} - OFFLINE
     if not kinds:
@@ -182,6 +183,6 @@ def _check_url(url: str, named: list[str]) -> None:
         )
     if len(kinds) > 1:
         raise ProviderError(
-            f"--base-url cannot be for {' and '.join(sorted(kinds))} at once; set "
+            f"--base-url cannot be used for {' and '.join(sorted(kinds))} at once; set "
             "ANTHROPIC_BASE_URL or OPENAI_BASE_URL for one of them"
         )

@@ -1,4 +1,4 @@
-"""`command:PROGRAM ARGS`: any program; prompt on its stdin, answer on its stdout."""
+"""`command:PROGRAM ARGS`: a program that reads a prompt and prints the answer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ AFTER_KILL_SECONDS = 5.0
 
 
 def make(words: str, options: Options) -> Command:
-    """A program that answers.
+    """Returns a provider that runs a program.
 
     Raises:
         ProviderError: There is no such program, or the words cannot be split.
@@ -30,14 +30,14 @@ def make(words: str, options: Options) -> Command:
     except ValueError as error:
         raise ProviderError(f"cannot read command:{words}: {error}") from error
     if not argv:
-        raise ProviderError("which program? As in command:'llm -m my-model'")
+        raise ProviderError("command: needs a program, as in command:'llm -m my-model'")
     if shutil.which(argv[0]) is None:
         raise ProviderError(f"there is no program {argv[0]!r} that can be run")
     return Command(argv)
 
 
 class Command:
-    """A provider; see `Provider`. It is started anew for each question.
+    """A provider that starts a program for each question; see `Provider`.
 
     Args:
         argv: Program and arguments.
@@ -54,18 +54,18 @@ class Command:
         answer = self._run(request.prompt.encode("utf-8", "replace"), request.seconds)
         text = answer.decode("utf-8", "replace")
         if len(text) > MAX_CHARS:
-            raise ProviderFault(f"an answer of {len(text)} characters")
+            raise ProviderFault(f"the answer has more than {MAX_CHARS} characters")
         return Reply(without_secrets(text))
 
     def _run(self, prompt: bytes, seconds: float) -> bytes:
-        """What the program writes; it and what it has started end with this call."""
+        """Returns the program's output; afterwards its process group is killed."""
         pipe = subprocess.PIPE
         try:
             process = subprocess.Popen(
                 self._argv, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
             )
         except OSError as error:
-            raise ProviderFault(f"it cannot be started: {error.strerror}") from None
+            raise ProviderFault(f"the program cannot start: {error.strerror}") from None
         try:
             out, err = process.communicate(prompt, timeout=seconds)
         except subprocess.TimeoutExpired:
@@ -73,9 +73,9 @@ class Command:
         finally:
             _end(process)
         if process.returncode != 0:
-            last = err.decode("utf-8", "replace").strip().rpartition("\n")[2]
-            told = f": {last}" if last else ""
-            raise ProviderFault(one_line(f"{_ending(process)}{told}"))
+            last_line = err.decode("utf-8", "replace").strip().rpartition("\n")[2]
+            detail = f": {last_line}" if last_line else ""
+            raise ProviderFault(one_line(f"{_ending(process)}{detail}"))
         return out
 
 
@@ -85,7 +85,7 @@ def _ending(process: subprocess.Popen[bytes]) -> str:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Ends a program with all of its group, and takes back its pipes."""
+    """Kills a program with its process group, and closes its pipes."""
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait(AFTER_KILL_SECONDS)

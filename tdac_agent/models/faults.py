@@ -1,4 +1,4 @@
-"""What went wrong between a vendor's package and its server, in four kinds."""
+"""Classify errors of vendors' packages as transient, rate limit or permanent."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tdac_agent.storage.secrets import one_line
 
 Headers = Mapping[str, str]
 
-# What a server may do again: a request time-out and a conflict pass, as do 5xx.
-PASSING = frozenset({408, 409, 425})
-# Words for the same in the body of an error, of both vendors. An error in the middle of
-# a stream has no other sign: its status is 200.
+# Transient besides 5xx: request time-out, conflict, too early.
+TRANSIENT_STATUS = frozenset({408, 409, 425})
+# Types and codes in the body of an error, of both vendors. They are all that identifies
+# an error in mid-stream, since its status is 200.
 LIMITED_WORDS = frozenset({"rate_limit_error", "rate_limit_exceeded"})
 PERMANENT_WORDS = frozenset(
     {
@@ -29,20 +29,19 @@ PERMANENT_WORDS = frozenset(
 
 
 def fault_of(error: Exception) -> ProviderFault:
-    """The fault that an error of a vendor's package stands for.
+    """Returns the fault for an error of a vendor's package.
 
     Args:
-        error: Of `anthropic` or `openai`, of the HTTP library below them, or what they
-            raise where an answer is not what they expect.
+        error: Error of `anthropic`, `openai`, or the HTTP library below them.
     """
     response = getattr(error, "response", None)
     headers: Headers = getattr(response, "headers", {})
     status = getattr(error, "status_code", None) or 200
-    words, told = _told(getattr(error, "body", None))
-    message = _message(error, status, words, told, headers)
+    words, text = _parse_body(getattr(error, "body", None))
+    message = _message(error, status, words, text, headers)
     kind = _kind(status, words)
     fault = kind(message, None if kind is PermanentFault else retry_after(headers))
-    # A server that was not reached, or that says no, has not begun an answer.
+    # A server that was not reached, or that sent an error status, began no answer.
     fault.billed = status == 200 and not _unsent(error)
     return fault
 
@@ -52,13 +51,13 @@ def _kind(status: int, words: set[str]) -> type[ProviderFault]:
         return PermanentFault
     if status == 429 or (status == 200 and words & LIMITED_WORDS):
         return RateLimited
-    if 300 <= status < 500 and status not in PASSING:
+    if 300 <= status < 500 and status not in TRANSIENT_STATUS:
         return PermanentFault
     return ProviderFault
 
 
 def _unsent(error: BaseException | None) -> bool:
-    """Whether there was no connection on which a question could be sent."""
+    """Whether the question was not sent because no connection was made."""
     import httpx2
 
     if error is None:
@@ -67,8 +66,8 @@ def _unsent(error: BaseException | None) -> bool:
     return unsent or _unsent(error.__cause__)
 
 
-def _told(body: object) -> tuple[set[str], str]:
-    """Type and code in the body of an error, and its message."""
+def _parse_body(body: object) -> tuple[set[str], str]:
+    """Returns type and code in the body of an error, and its message."""
     inner = body.get("error", body) if isinstance(body, dict) else body
     if not isinstance(inner, dict):
         return set(), inner if isinstance(inner, str) else ""
@@ -77,20 +76,20 @@ def _told(body: object) -> tuple[set[str], str]:
 
 
 def _message(
-    error: Exception, status: int, words: set[str], told: str, headers: Headers
+    error: Exception, status: int, words: set[str], text: str, headers: Headers
 ) -> str:
-    """One line: status, words, message, and by what name the vendor knows the call."""
+    """Returns one line: status, type and code, message, and the vendor's request ID."""
     number = "" if status == 200 else str(status)
     if not (words or number):
-        told = told or _plain(error)
-    parts = [number, " ".join(sorted(words)), told or type(error).__name__]
+        text = text or _root_cause(error)
+    parts = [number, " ".join(sorted(words)), text or type(error).__name__]
     line = ": ".join(part for part in parts if part)
     request_id = headers.get("request-id") or headers.get("x-request-id")
     return one_line(f"{line} (request {request_id})" if request_id else line)
 
 
-def _plain(error: Exception) -> str:
-    """An error that is not of the server's making: the innermost reason is the best."""
+def _root_cause(error: Exception) -> str:
+    """Describes an error that the server did not send, by its innermost cause."""
     reason = error
     while isinstance(reason.__cause__, Exception) and str(reason.__cause__):
         reason = reason.__cause__
@@ -99,11 +98,11 @@ def _plain(error: Exception) -> str:
 
 
 def retry_after(headers: Headers, now: datetime | None = None) -> float | None:
-    """Seconds that a server wants to be left alone; None where it does not say.
+    """Returns the seconds to wait that a server asks for; None if it does not.
 
     Args:
-        headers: Of its answer; `retry-after` may be seconds or a date.
-        now: For dates; the clock's by default.
+        headers: Response headers; `retry-after` may be seconds or a date.
+        now: Current time, for dates; by default that of the clock.
     """
     for name, unit in (("retry-after-ms", 1e-3), ("retry-after", 1.0)):
         text = headers.get(name, "").strip()
@@ -126,7 +125,7 @@ def _number(text: str) -> float | None:
 def _until(text: str, now: datetime) -> float | None:
     try:
         date = parsedate_to_datetime(text)
-        # A date without a zone is one in UTC.
+        # A date without a time zone is taken as UTC.
         return max(0.0, (date.replace(tzinfo=date.tzinfo or UTC) - now).total_seconds())
     except (ValueError, TypeError, OverflowError):
         return None
@@ -134,16 +133,16 @@ def _until(text: str, now: datetime) -> float | None:
 
 @contextmanager
 def as_faults(known: tuple[type[Exception], ...]) -> Generator[None]:
-    """Turns errors of a vendor's package into faults, without their trace.
+    """Turns errors of a vendor's package into faults without a traceback.
 
     Args:
-        known: Its own errors, and those of the HTTP library.
+        known: Errors of the package and of its HTTP library.
 
     Raises:
-        ProviderFault: Instead of them, and of what a malformed answer leads to.
+        ProviderFault: Replaces these errors, and those that a malformed answer causes.
     """
-    # The packages check little of what they read: an answer of the wrong form shows as
-    # whatever their code then raises.
+    # The packages validate little: a malformed answer shows as whatever error their
+    # code then raises.
     malformed = (ValueError, TypeError, AttributeError, LookupError, AssertionError)
     try:
         yield

@@ -1,4 +1,4 @@
-"""An answer that comes in pieces."""
+"""Assemble an answer that is streamed in pieces."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ Stop = Literal["end", "length", "refusal"]
 
 @dataclass(slots=True)
 class Gathered:
-    """What has come of an answer so far.
+    """The parts of an answer received so far; all numbers as the vendor reports them.
 
     Attributes:
-        stops: What each reason to stop of the vendor means.
-        pieces: Of the text.
-        reason: Why the model stopped, in the vendor's word, once it is said.
-        model: As reported.
-        request_id: As reported.
-        tokens_in: As reported, cached ones included.
-        tokens_out: As reported.
-        tokens_cached: Read from the cache, as reported.
-        tokens_written: Written to it.
-        refused: Whether the text is a refusal, for whatever reason it stops.
+        stops: Our name for each stop reason of the vendor.
+        pieces: Pieces of the text.
+        reason: The vendor's stop reason, None until it is received.
+        model: The model's name, as reported.
+        request_id: The vendor's ID of the request.
+        tokens_in: Input tokens, cached ones included.
+        tokens_out: Output tokens.
+        tokens_cached: Input tokens read from the cache.
+        tokens_written: Input tokens written to the cache.
+        refused: Whether the text is a refusal, whatever the stop reason.
     """
 
     stops: Mapping[str, Stop]
@@ -46,20 +46,20 @@ class Gathered:
         """Appends a piece of the text.
 
         Raises:
-            ProviderFault: It is none, or more than any answer may have.
+            ProviderFault: The piece is not a string, or the answer is too long.
         """
         if not isinstance(text, str):
-            raise ProviderFault("malformed answer: a piece of the text is no text")
+            raise ProviderFault("malformed answer: a piece of the text is not a string")
         self._chars += len(text)
         if self._chars > MAX_CHARS:
             raise ProviderFault(f"the answer has more than {MAX_CHARS} characters")
         self.pieces.append(text)
 
     def reply(self) -> Reply:
-        """The whole answer.
+        """Returns the whole answer.
 
         Raises:
-            ProviderFault: It ended without a reason that is known: it may be cut.
+            ProviderFault: No known stop reason was received: it may be truncated.
         """
         if self.reason is None:
             chars = f"{self._chars} characters"
@@ -79,5 +79,5 @@ class Gathered:
 
 
 def count(value: object) -> int:
-    """A number of tokens, 0 where none is reported."""
+    """Returns a reported number of tokens, or 0 if there is none."""
     return value if isinstance(value, int) and value > 0 else 0

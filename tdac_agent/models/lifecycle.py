@@ -1,4 +1,4 @@
-"""Which models are gone, or soon will be, by a dated file."""
+"""Retirement dates of models, from a dated file."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ SOON_DAYS = 90
 
 
 class Lifecycle(BaseModel):
-    """Contents of the file."""
+    """Contents of `lifecycle.yaml`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     dated: date
     source: str
-    ends: dict[str, date] = Field(description="By `anthropic:MODEL` and so on.")
+    ends: dict[str, date] = Field(description="Retirement date by model name.")
 
 
 @functools.cache
 def load_lifecycle() -> Lifecycle:
-    """What the shipped file says."""
+    """Returns the contents of the shipped file."""
     return Lifecycle.model_validate(yaml.safe_load(FILE.read_text("utf-8")))
 
 
 def retired(models: Iterable[str], today: date | None = None) -> list[str]:
-    """Those of some models that are gone, by their names for `--learner`."""
+    """Returns those models (`--learner` names) that are retired."""
     now = today or datetime.now(UTC).date()
     ends = load_lifecycle().ends
     return [model for model in models if model in ends and ends[model] <= now]
 
 
 def model_warnings(models: Iterable[str], today: date | None = None) -> list[str]:
-    """A line for each model that is gone, or will be within `SOON_DAYS`."""
+    """Returns a line for each model that is retired or will be within `SOON_DAYS`."""
     now = today or datetime.now(UTC).date()
     known = load_lifecycle()
     lines = []
@@ -47,5 +47,5 @@ def model_warnings(models: Iterable[str], today: date | None = None) -> list[str
         if end is None or (end - now).days > SOON_DAYS:
             continue
         when = f"was retired on {end}" if end <= now else f"will be retired on {end}"
-        lines.append(f"{model} {when} (as known on {known.dated})")
+        lines.append(f"{model} {when} (as of {known.dated})")
     return lines

@@ -1,4 +1,4 @@
-"""`manual:DIR`: a person, or anything else that reads and writes files."""
+"""`manual:DIR`: a person or a script answers through files in a folder."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ POLL_SECONDS = 0.5
 
 
 def make(words: str, options: Options) -> Manual:
-    """A folder in which somebody answers.
+    """Returns a provider that exchanges files in a folder.
 
     Raises:
-        ProviderError: It is not named, or cannot be made.
+        ProviderError: No folder is named, or it cannot be made.
     """
     del options
     if not words:
-        raise ProviderError("which folder? As in manual:questions")
+        raise ProviderError("manual: needs a folder, as in manual:questions")
     folder = Path(words)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -35,14 +35,14 @@ def make(words: str, options: Options) -> Manual:
 
 
 class Manual:
-    """A provider; see `Provider`. It waits for `NNN.reply.md` without end.
+    """A provider that waits for `NNN.reply.md` without a time limit; see `Provider`.
 
-    A question that is already in the folder keeps its number: a run that is started
-    again finds what was answered before. Of equal questions the run says which it is.
+    A question that is already in the folder keeps its number, so that a restarted run
+    finds the earlier answers. `Request.repeat` tells identical questions apart.
 
     Args:
-        folder: Where questions are put.
-        poll: Seconds between two looks for an answer.
+        folder: Folder of the questions and answers.
+        poll: Seconds between two checks for an answer.
     """
 
     paid = True
@@ -55,16 +55,16 @@ class Manual:
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
         try:
-            there = set(self._folder.glob("*.reply.md"))
+            existing = set(self._folder.glob("*.reply.md"))
             number = self._number(request.prompt, request.repeat)
             reply = self._folder / f"{number:03}.reply.md"
-            self._tell(number, reply, is_there=reply in there)
+            self._announce(number, reply, exists=reply in existing)
             return Reply(self._wait(reply))
         except OSError as error:
             raise PermanentFault(f"{error.filename}: {error.strerror}") from None
 
     def _number(self, prompt: str, repeat: int) -> int:
-        """The number of a question; it is written down where it is a new one."""
+        """Returns the number of a question; writes the question if it is new."""
         question = prompt.encode("utf-8", "surrogatepass")
         for number in itertools.count(1):
             path = self._folder / f"{number:03}.prompt.md"
@@ -77,17 +77,17 @@ class Manual:
                 repeat -= 1
         raise AssertionError("unreachable")
 
-    def _tell(self, number: int, reply: Path, *, is_there: bool) -> None:
-        """Says what is waited for, or which older answer is taken."""
+    def _announce(self, number: int, reply: Path, *, exists: bool) -> None:
+        """Prints which answer is awaited, or which existing one is used."""
         question = self._folder / f"{number:03}.prompt.md"
-        told = f"waiting: answer {question} in {reply}"
-        if is_there:
+        line = f"waiting: write the answer to {question} into {reply}"
+        if exists:
             written = datetime.fromtimestamp(reply.stat().st_mtime)
-            told = f"taking {reply}, which was there before, of {written:%F %H:%M}"
-        print(told, file=sys.stderr)
+            line = f"using {reply}, which already existed, written {written:%F %H:%M}"
+        print(line, file=sys.stderr)
 
     def _wait(self, path: Path) -> str:
-        """The text of an answer, once it is there and no longer grows."""
+        """Returns the text of an answer once it exists and no longer grows."""
         before = None
         while True:
             now = read_file(path, RECORD_BYTES) if path.exists() else b""

@@ -1,4 +1,4 @@
-"""`openai:MODEL`, by the official package: of OpenAI, or of a server that is alike."""
+"""`openai:MODEL`: models of OpenAI, through the official package."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 STOPS: dict[str, Stop] = {
     "stop": "end",
     "length": "length",
-    "eos": "end",  # of some servers that are alike
+    "eos": "end",  # sent by some compatible servers
     "content_filter": "refusal",
 }
 
 
 class OpenAIModel(VendorModel["openai.OpenAI"]):
-    """A model of OpenAI, or of a server that speaks its language."""
+    """A model of OpenAI, or of a server with a compatible API."""
 
     vendor = Vendor(
         package="openai",
@@ -41,25 +41,25 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
         import httpx2
         import openai
 
-        # Local servers know the older name of the limit only, OpenAI the newer one.
-        own = self._base_url is None
+        # Local servers know only the limit's older name, OpenAI wants the newer one.
+        is_openai = self._base_url is None
         gathered = Gathered(STOPS)
         with as_faults((openai.OpenAIError, httpx2.HTTPError)):
             with client.chat.completions.create(
                 model=self._model,
                 messages=[{"role": "user", "content": request.prompt}],
-                max_completion_tokens=request.max_tokens if own else openai.omit,
-                max_tokens=openai.omit if own else request.max_tokens,
+                max_completion_tokens=request.max_tokens if is_openai else openai.omit,
+                max_tokens=openai.omit if is_openai else request.max_tokens,
                 stream=True,
                 stream_options={"include_usage": True},
             ) as stream:
                 gathered.request_id = stream.response.headers.get("x-request-id")
                 for chunk in stream:
-                    _gather(gathered, chunk)
+                    _add_chunk(gathered, chunk)
             return gathered.reply()
 
 
-def _gather(gathered: Gathered, chunk: ChatCompletionChunk) -> None:
+def _add_chunk(gathered: Gathered, chunk: ChatCompletionChunk) -> None:
     gathered.model = chunk.model or gathered.model
     for choice in chunk.choices or ():
         if choice.delta and choice.delta.content:

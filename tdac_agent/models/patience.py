@@ -1,4 +1,4 @@
-"""Waiting for what may never come, and letting go of it at once."""
+"""Run blocking work with a time limit."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ T = TypeVar("T")
 
 CONNECT_SECONDS = 15.0
 STALL_SECONDS = 300.0
-"""Between two pieces of an answer; models on small machines read a prompt for long."""
+"""Longest gap between two pieces of an answer; small machines read prompts slowly."""
 
 
 def within(seconds: float, work: Callable[[], T], let_go: Callable[[], None]) -> T:
-    """What some work returns, or a fault when it takes too long.
+    """Returns the result of `work`, or raises a fault if it takes too long.
 
-    It is done in a thread of its own, so that neither a name server nor a server that
-    sends a byte now and then can hold up an interrupt or outlast the time. A thread
-    that is given up ends with the process.
+    It runs in a separate thread, so that neither a slow name server nor a server that
+    sends a byte now and then can delay an interrupt or exceed the time. An abandoned
+    thread ends with the process.
 
     Args:
-        seconds: That it may take.
-        work: What to do.
-        let_go: Called where its result is no longer waited for.
+        seconds: Time limit.
+        work: Function to run; its exceptions are passed on.
+        let_go: Called when its result is no longer awaited.
 
     Raises:
-        ProviderFault: It took longer; or what the work raises.
+        ProviderFault: It took longer.
     """
     future: Future[T] = Future()
 
@@ -44,7 +44,7 @@ def within(seconds: float, work: Callable[[], T], let_go: Callable[[], None]) ->
         return future.result(seconds)
     except TimeoutError:
         let_go()
-        raise ProviderFault(f"no whole answer within {seconds:.3g} s") from None
+        raise ProviderFault(f"no complete answer within {seconds:.3g} s") from None
     except BaseException:
         let_go()
         raise

@@ -1,4 +1,4 @@
-"""What models cost, by a dated file that a user can replace."""
+"""Prices of models, from a dated file that a user can replace."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tdac_envs.core.errors import TdacError
 
 SHIPPED = Path(__file__).parent / "prices.yaml"
 FREE = frozenset({"builtin", "replay", "scripted"})
-"""Providers that ask no model."""
+"""Providers that use no language model."""
 
 
 class PriceError(TdacError):
@@ -27,7 +27,7 @@ class _Strict(BaseModel):
 
 
 class Price(_Strict):
-    """Of one model, USD per million tokens."""
+    """Prices of one model, USD per million tokens."""
 
     input: float = Field(ge=0)
     output: float = Field(ge=0)
@@ -35,12 +35,12 @@ class Price(_Strict):
     cache_write: float | None = Field(None, ge=0)
 
     def most(self, tokens_in: int, tokens_out: int) -> float:
-        """USD for so many tokens, whether or not they are written to a cache."""
+        """Returns the highest possible cost in USD, cache writes included."""
         dearest = max(self.input, self.cache_write or 0.0)
         return (dearest * tokens_in + self.output * tokens_out) / 1e6
 
     def cost(self, reply: Reply) -> float:
-        """USD of an answer, by what is reported of it; a cache costs its own price."""
+        """Returns the cost of an answer in USD, from the tokens that it reports."""
         read = self.input if self.cache_read is None else self.cache_read
         written = self.input if self.cache_write is None else self.cache_write
         plain = reply.tokens_in - reply.tokens_cached - reply.tokens_written
@@ -57,13 +57,13 @@ class PriceList(_Strict):
 
     schema_version: Literal[1] = Field(1, alias="schema")
     dated: date
-    source: str = Field("", description="Where the prices are from.")
-    models: dict[str, Price] = Field(description="By `anthropic:MODEL` and so on.")
+    source: str = Field("", description="Source of the prices.")
+    models: dict[str, Price] = Field(description="Prices by model name.")
 
     def price_of(self, model: str, base_url: str | None = None) -> Price | None:
-        """Price of a model by its name for `--learner`; None where it is unknown.
+        """Returns the price of a model (a `--learner` name); None if it is unknown.
 
-        Somebody else's server has prices of its own, or none.
+        The listed prices do not apply to models on another server (`base_url`).
         """
         if model.partition(":")[0] in FREE:
             return Price(input=0.0, output=0.0)
@@ -71,21 +71,21 @@ class PriceList(_Strict):
 
 
 def price_file() -> Path:
-    """The file in use: `$TDAC_PRICES`, `~/.config/tdac/prices.yaml`, or the shipped."""
+    """Returns $TDAC_PRICES, else ~/.config/tdac/prices.yaml, else the shipped file."""
     named = os.environ.get("TDAC_PRICES")
     if named:
         return Path(named)
     settings = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
     own = Path(settings, "tdac", "prices.yaml")
-    # Without a home, as of a user id that the system does not know, it stays "~".
+    # For a user without a home `expanduser` keeps the "~".
     return own if own.is_absolute() and own.is_file() else SHIPPED
 
 
 def load_prices(path: Path | None = None) -> PriceList:
-    """The prices in a file.
+    """Returns the prices in a file.
 
     Args:
-        path: The file; the one in use by default.
+        path: Price file; by default the one in use.
 
     Raises:
         PriceError: It cannot be read, or has a wrong or unknown key.

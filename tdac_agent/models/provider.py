@@ -1,4 +1,4 @@
-"""The contract with whatever writes controllers: a language model or `builtin`."""
+"""The interface of everything that writes controllers: language models, `builtin`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Kind = Literal["generate", "edit", "summarise"]
 Role = Literal["learner", "optimizer"]
 
 MAX_OUTPUT_TOKENS = 16_000
-"""Of an answer, thinking included; after a truncated one there may be twice as many."""
+"""Limit of an answer, thinking included; doubled after a truncated answer."""
 ANSWER_SECONDS = 900.0
 
 
@@ -21,17 +21,17 @@ class Request:
 
     Attributes:
         kind: `generate` a controller, `edit` one, or `summarise` failures as rules.
-        prompt: The whole question in words; all that a language model sees.
+        prompt: The whole question; a language model sees nothing else.
         controller: Source that failed, for `edit` and `summarise`.
-        report: What failed, for `edit` and `summarise`.
-        rules: Text of each rule in force.
-        sample: (run, k, j), so that repeated questions stay different samples.
-        stable: So many characters at the beginning of the prompt are the same in all
-            questions of a run; a provider may have them cached.
-        max_tokens: That an answer may have.
-        seconds: That an answer may take.
-        turn: How many questions of this kind for this candidate came before.
-        repeat: How many questions with this very prompt came before in the run.
+        report: Report on the failure, for `edit` and `summarise`.
+        rules: Text of each repair rule in force.
+        sample: (run, k, j), which makes repeated questions different samples.
+        stable: Number of characters at the start of the prompt that are the same in
+            all questions of a run; a provider may cache them.
+        max_tokens: Token limit of the answer.
+        seconds: Time limit of the answer.
+        turn: Number of earlier questions of this kind for this candidate.
+        repeat: Number of earlier questions with the same prompt in this run.
     """
 
     kind: Kind
@@ -48,12 +48,12 @@ class Request:
 
     @property
     def role(self) -> Role:
-        """Who is asked: the Learner (LLM1) generates, the Optimizer (LLM2) repairs."""
+        """Role to ask: the Learner (LLM1) generates, the Optimizer (LLM2) repairs."""
         return "learner" if self.kind == "generate" else "optimizer"
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The prompt as its stable beginning and the rest; no part is empty."""
+        """The stable beginning of the prompt and the rest; empty parts are left out."""
         halves = (self.prompt[: self.stable], self.prompt[self.stable :])
         return tuple(part for part in halves if part)
 
@@ -63,15 +63,15 @@ class Reply:
     """An answer.
 
     Attributes:
-        text: As it came.
-        stop: `end` for a whole answer, `length` for a truncated one, `refusal`.
-        tokens_in: Tokens of the prompt, cached ones included; 0 where not reported.
-        tokens_out: Tokens of the answer, thinking included; 0 where not reported.
-        tokens_cached: Of `tokens_in`, those read from a cache.
-        tokens_written: Of `tokens_in`, those written to a cache.
-        model: As the provider reports it, if it does.
-        request_id: By which the vendor knows the call, if there is one.
-        notes: What the provider wants in the journal, e.g. which test changed what.
+        text: Text of the answer.
+        stop: `end` for a complete answer, `length` for a truncated one, or `refusal`.
+        tokens_in: Tokens of the prompt, cached ones included; 0 if not reported.
+        tokens_out: Tokens of the answer, thinking included; 0 if not reported.
+        tokens_cached: Part of `tokens_in` that was read from a cache.
+        tokens_written: Part of `tokens_in` that was written to a cache.
+        model: The model's name as reported, if it is.
+        request_id: The vendor's ID of the call, if it has one.
+        notes: Lines for the journal, e.g. which test changed what.
     """
 
     text: str
@@ -89,58 +89,58 @@ class Provider(Protocol):
     """Answers requests; both Learner and Optimizer are providers.
 
     Attributes:
-        name: For people and records; holds no key.
-        paid: Whether an answer costs money (or much else); before the first such
-            call of a run the suite has to prove itself.
+        name: Name in messages and records; must not contain a key.
+        paid: Whether an answer costs money or other effort; before the first paid
+            call of a run the test suite is checked.
 
-    One may also have `served_at`, the address of its server if that is not the
-    vendor's own, without anything secret; `missing`, what has to be had before it
-    can be asked, a line each; and `recorded_seed`, with which its answers were judged.
+    A provider may also have `served_at`, the URL of its server without secrets (None
+    for the vendor's own); `missing`, a line for each thing that it still needs; and
+    `recorded_seed`, the seed with which its recorded answers were judged.
     """
 
     name: str
     paid: bool
 
     def complete(self, request: Request) -> Reply:
-        """Answers one request, once: whether it is asked again is for the caller.
+        """Answers one request, without retries: the caller decides about those.
 
         A truncated or refused answer is a `Reply`, since it is paid for; its `stop`
-        says what it is. An answer without a reason why it stopped is a fault.
+        says so. An answer without a stop reason is a fault.
 
         Raises:
-            ProviderFault: The provider cannot be reached or is broken; neither pass
-                nor fail, and no iteration is used up.
+            ProviderFault: The provider cannot be reached or is broken. This is neither
+                a pass nor a fail, and uses up no iteration.
         """
         ...
 
 
 def served_at(model: Provider) -> str | None:
-    """Address of a model's server; None for the vendor's own, or without one."""
+    """Returns the URL of a model's server; None for the vendor's own or no server."""
     address: str | None = getattr(model, "served_at", None)
     return address
 
 
 def recorded_seed(model: Provider) -> int | None:
-    """Seed with which a recorded run was judged; None for models that are asked."""
+    """Returns the seed with which a replayed run was judged; None for other models."""
     seed: int | None = getattr(model, "recorded_seed", None)
     return seed
 
 
 def missing_for(model: Provider) -> tuple[str, ...]:
-    """What has to be had before a model can be asked; nothing for most."""
+    """Returns what a model still needs before it can be asked, a line each."""
     missing: tuple[str, ...] = getattr(model, "missing", ())
     return missing
 
 
 class ProviderFault(Exception):
-    """An infrastructure fault of a provider that may be gone the next time.
+    """An infrastructure fault of a provider; transient, unless a subclass differs.
 
     Args:
         message: One line.
-        retry_after: Seconds after which the provider wants to be asked again.
+        retry_after: Seconds that the provider asks to wait before a retry.
 
     Attributes:
-        billed: Whether there may have been an answer that has to be paid for.
+        billed: Whether the call may have been billed.
     """
 
     kind = "transient"
@@ -159,7 +159,7 @@ class RateLimited(ProviderFault):
 
 
 class PermanentFault(ProviderFault):
-    """Asking again does not help: no access, no credit, no such model, too long."""
+    """A retry does not help: no access, no credit, no such model, prompt too long."""
 
     kind = "permanent"
     billed = False

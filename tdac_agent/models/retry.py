@@ -1,4 +1,4 @@
-"""One retry loop for all providers; nothing below it asks twice."""
+"""The one retry loop of all providers; the vendors' own retries are off."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from tdac_agent.models.provider import (
 
 @dataclass(frozen=True, slots=True)
 class RetryPolicy:
-    """When a question is put again after a fault, and when it is given up.
+    """When a question is asked again after a fault, and when it is given up.
 
     Attributes:
-        retries: After faults that may pass. Rate limits are waited for instead.
-        seconds: In which the question must be answered, waiting included.
-        first_wait: Upper end of the first wait, s; it doubles with each fault, and
-            the wait is drawn between half of that and all of it.
-        longest_wait: No wait is longer, s, whatever the provider asks for.
+        retries: Retries after transient faults; rate limits are not counted.
+        seconds: Time limit of the question, waits included.
+        first_wait: Upper bound of the first wait, s; it doubles with each fault. A
+            wait is drawn between half the bound and the bound.
+        longest_wait: Longest wait, s, whatever the provider asks for.
     """
 
     retries: int = 3
@@ -37,13 +37,13 @@ class RetryPolicy:
     def __post_init__(self) -> None:
         numbers = (self.retries, self.seconds, self.first_wait, self.longest_wait)
         if min(numbers) < 0:
-            raise ValueError(f"a retry policy has no negative numbers: {self}")
+            raise ValueError(f"a retry policy must have no negative numbers: {self}")
 
 
 class Missed(NamedTuple):
-    """A call that failed: how often so far, why, and the wait before the next, s.
+    """A failed call: attempt number from 1, fault, and wait before the next call, s.
 
-    The wait is None where the question is given up.
+    The wait is None if the question is given up.
     """
 
     attempt: int
@@ -58,17 +58,17 @@ def answer(
     on_fault: Callable[[Missed], None],
     sleep: Callable[[float], None] = time.sleep,
 ) -> Reply:
-    """The answer of a model that may have to be asked again.
+    """Returns a model's answer, asking again after faults.
 
     Args:
-        complete: Asks it once.
-        request: What.
-        policy: How patiently.
-        on_fault: Called after each call that failed, before the wait.
-        sleep: Waits; an interrupt ends it at once.
+        complete: Asks the model once.
+        request: The question.
+        policy: Number of retries and length of the waits.
+        on_fault: Called after each failed call, before the wait.
+        sleep: Waits for some seconds; an interrupt ends it at once.
 
     Raises:
-        ProviderFault: The last one, when the question is given up.
+        ProviderFault: The last fault, when the question is given up.
     """
     end = time.monotonic() + policy.seconds
     attempt = 0
@@ -88,13 +88,13 @@ def answer(
 def _wait(
     fault: ProviderFault, attempt: int, policy: RetryPolicy, left: float
 ) -> float | None:
-    """Seconds before the next attempt, None where there is to be none."""
+    """Returns the seconds before the next attempt; None to give up."""
     if isinstance(fault, PermanentFault):
         return None
     limited = isinstance(fault, RateLimited)
     if not limited and attempt > policy.retries:
         return None
-    # Capped before the power: of a provider that is limited for hours it is large.
+    # The exponent is capped: a rate limit that lasts for hours makes it large.
     longest = min(policy.longest_wait, policy.first_wait * 2 ** min(attempt - 1, 20))
     wait = random.uniform(longest / 2, longest)
     if fault.retry_after is not None:

@@ -1,4 +1,4 @@
-"""What a model's answers cost, as far as that is known, and what bounds a run."""
+"""Cost of a model's answers, as far as it is known, and the limits of a run."""
 
 from __future__ import annotations
 
@@ -19,51 +19,51 @@ from tdac_agent.models.provider import (
 from tdac_agent.models.tokens import most_tokens
 
 MAX_COST = 2.0
-"""USD of a run, where the user says nothing."""
+"""Default limit of a run, USD."""
 UNPRICED_TOKENS = 1_000_000
-"""Of a run whose price nobody knows, where the user says nothing."""
+"""Default token limit of a run with a model of unknown price."""
 OWN_MATTER = frozenset({"command", "manual"})
-"""Providers whose cost is not for us to know."""
+"""Providers whose cost cannot be known."""
 BY_VENDOR = frozenset({"anthropic", "openai"})
 
 
 @dataclass(frozen=True, slots=True)
 class Tariff:
-    """Of one model.
+    """Tariff of one model.
 
     Attributes:
-        free: Whether no model is asked at all.
-        price: None where it is unknown.
+        free: Whether no language model is asked at all.
+        price: Price of the model; None if it is unknown.
     """
 
     free: bool = False
     price: Price | None = None
 
     def worst(self, request: Request) -> Amount:
-        """The most that an answer can cost."""
+        """Returns the worst-case amount of an answer."""
         if self.free:
             return NOTHING
         return self.most(most_tokens(request.prompt), request.max_tokens)
 
     def most(self, tokens_in: int, tokens_out: int) -> Amount:
-        """What so many tokens can cost, cached or not."""
+        """Returns the highest amount for these tokens, cached or not."""
         usd = self.price.most(tokens_in, tokens_out) if self.price else 0.0
         return Amount(tokens_in + tokens_out, usd)
 
     def spent(self, request: Request, reply: Reply) -> Amount:
-        """What an answer took; the worst case where that is not reported."""
+        """Returns what an answer took; the worst case if it reports no tokens."""
         tokens = reply.tokens_in + reply.tokens_out
         if self.free or tokens == 0:
             return self.worst(request)
         return Amount(tokens, 0.0 if self.price is None else self.price.cost(reply))
 
     def cost(self, spent: Amount) -> float | None:
-        """USD of what was spent; None where the price is unknown."""
+        """Returns the cost of an amount in USD; None if the price is unknown."""
         return spent.usd if self.free or self.price is not None else None
 
 
 class Bounds(NamedTuple):
-    """Limits of a run, and what a user should know of them."""
+    """Limits of a run, and notes on them for the user."""
 
     max_cost: float | None
     max_tokens: int | None
@@ -71,10 +71,10 @@ class Bounds(NamedTuple):
 
 
 def tariffs_of(models: Iterable[Provider]) -> dict[str, Tariff]:
-    """The tariff of each model, by its name.
+    """Returns the tariff of each model, by its name.
 
     Raises:
-        PriceError: The user's price file is broken.
+        PriceError: The user's price file cannot be used.
     """
     return {model.name: _tariff(model) for model in models}
 
@@ -91,18 +91,18 @@ def bounds_of(
     max_cost: float | None,
     max_tokens: int | None,
 ) -> Bounds:
-    """The limits of a run.
+    """Returns the limits of a run.
 
     Args:
-        models: That are asked.
-        tariffs: Theirs.
-        max_cost: As the user says, else `MAX_COST`.
-        max_tokens: As the user says. Where a price is unknown there has to be one: a
-            vendor's model is refused without, others get `UNPRICED_TOKENS`.
+        models: Models that are asked.
+        tariffs: Tariff of each model, by its name.
+        max_cost: Limit given by the user, USD; `MAX_COST` if None.
+        max_tokens: Limit given by the user. If it is None and a price is unknown, a
+            vendor's model is refused; for other models it is `UNPRICED_TOKENS`.
 
     Raises:
-        ProviderError: A model lacks its key or its package, or is a vendor's without a
-            price, so that nothing bounds it; all of that is said at once.
+        ProviderError: A model lacks its key or package, or nothing bounds the cost of
+            a vendor's model; the message lists all problems.
     """
     cost = MAX_COST if max_cost is None else max_cost
     notes: list[str] = []

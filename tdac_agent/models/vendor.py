@@ -1,4 +1,4 @@
-"""What the models of the vendors share, each of them behind its official package."""
+"""The common base of models that are asked through a vendor's official package."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ C = TypeVar("C")
 
 @dataclass(frozen=True, slots=True)
 class Vendor:
-    """Who serves a model.
+    """A vendor of models.
 
     Attributes:
-        package: Of Python; also the extra, and the first word of a model's name.
-        company: For people.
-        key: Environment variable that holds the key.
-        base_url: Environment variable that names another server.
-        example: Of a model's id.
+        package: Its Python package, also the extra and the prefix of model names.
+        company: Its name in messages.
+        key: Environment variable of the key.
+        base_url: Environment variable of another server's URL.
+        example: Example of a model ID.
     """
 
     package: str
@@ -45,11 +45,11 @@ class Vendor:
 
 
 class VendorModel(ABC, Generic[C]):
-    """A provider; see `Provider`. The key is read at each call, and not kept.
+    """A vendor's model; see `Provider`. The key is read at each call and not stored.
 
     Args:
-        model: Its id.
-        base_url: Of the server; None for the vendor's own.
+        model: Model ID.
+        base_url: URL of the server; None for the vendor's own.
         stall: Seconds of silence after which the connection is given up.
         key_over_http: Whether the key may go to another machine unencrypted.
     """
@@ -74,9 +74,9 @@ class VendorModel(ABC, Generic[C]):
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What has to be had before it can be asked: package and key, a line each."""
+        """What is missing before it can be asked: package and key, a line each."""
         vendor, found = self.vendor, []
-        # To import them takes a second or two: that is done beside the first question.
+        # The import takes a second or two, so it is left to the first question.
         if importlib.util.find_spec(vendor.package) is None:
             install = install_command(vendor.package)
             found.append(f"{self.name} needs a package: {install}")
@@ -88,17 +88,17 @@ class VendorModel(ABC, Generic[C]):
 
     @classmethod
     def make(cls, words: str, options: Options) -> VendorModel[C]:
-        """A model of the vendor, or of a server that speaks its language.
+        """Returns a model of the vendor or of a compatible server.
 
-        Package and key may be missing; a run is not begun without them.
+        Package and key may still be missing; see `missing`.
 
         Raises:
-            ProviderError: The model's name is missing.
+            ProviderError: No model is named.
         """
         vendor = cls.vendor
         if not words:
             example = f"{vendor.package}:{vendor.example}"
-            raise ProviderError(f"which model? As in {example}")
+            raise ProviderError(f"{vendor.package}: needs a model, as in {example}")
         base_url = options.base_url or os.environ.get(vendor.base_url) or None
         return cls(words, base_url, key_over_http=options.key_over_http)
 
@@ -110,7 +110,7 @@ class VendorModel(ABC, Generic[C]):
             base_url=self._base_url,
             max_retries=0,
             timeout=package.Timeout(self._stall, connect=CONNECT_SECONDS),
-            # A redirect might take prompt and key elsewhere.
+            # A redirect could send prompt and key elsewhere.
             http_client=package.DefaultHttpxClient(follow_redirects=False),
         )
         with client:
@@ -120,11 +120,11 @@ class VendorModel(ABC, Generic[C]):
 
     @abstractmethod
     def _client(self, **options: Any) -> Any:
-        """The package's client."""
+        """Returns a client of the package."""
 
     @abstractmethod
     def _ask(self, client: C, request: Request) -> Reply:
-        """Asks, and gathers the stream's answer."""
+        """Sends the request and assembles the streamed answer."""
 
     def _package(self) -> Any:
         try:

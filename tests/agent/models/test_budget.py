@@ -208,7 +208,7 @@ def test_a_foreign_file_is_no_ledger(tmp_path):
     """One line, and the file stays as it is."""
     file = tmp_path / "mine.jsonl"
     file.write_text('{"what": 1}\n')
-    with pytest.raises(RunError, match="is no record of a budget"):
+    with pytest.raises(RunError, match="is not a budget ledger"):
         Budget(1.0, ledger=file).reserve("a", NOTHING)
     assert file.read_text() == '{"what": 1}\n'
 

@@ -294,7 +294,7 @@ def test_an_answer_has_a_deadline(server, vendor):
     slow = Request("generate", "?", seconds=0.3)
     told, message = outcome(model_of(vendor, server), slow)
     assert told == "transient"
-    assert message == "no whole answer within 0.3 s"
+    assert message == "no complete answer within 0.3 s"
 
 
 def test_no_server(canary):

@@ -117,7 +117,7 @@ def test_a_person_answers(tmp_path, capsys):
     texts = [model.complete(question).text for question in questions]
     done()
     assert texts == ["one", "two", "three"]
-    assert capsys.readouterr().err.count("waiting: answer") == 3
+    assert capsys.readouterr().err.count("waiting: write the answer") == 3
     assert (folder / "003.prompt.md").read_text() == "other"
     # A second life finds all answers, in the same order.
     again = Manual(folder, poll=0.005)
@@ -125,8 +125,8 @@ def test_a_person_answers(tmp_path, capsys):
     # They may be those of another run, so it says which it takes, and of when.
     told = capsys.readouterr().err.splitlines()
     replies = sorted(folder.glob("*.reply.md"))
-    assert [line.split(",")[0] for line in told] == [f"taking {x}" for x in replies]
-    assert all("which was there before, of 20" in line for line in told)
+    assert [line.split(",")[0] for line in told] == [f"using {x}" for x in replies]
+    assert all("which already existed, written 20" in line for line in told)
     assert len(list(folder.iterdir())) == 6
     # Who remembers the first answer asks for the second alone, and gets that one.
     assert Manual(folder, poll=0.005).complete(questions[1]).text == "two"
@@ -227,12 +227,12 @@ def test_a_miss_is_an_error(policy_task, recorded, tmp_path, small_task, warm):
         ("antropic:x", r"unknown model 'antropic:x' \(did you mean 'anthropic'\?\)"),
         ("", "unknown model ''"),
         ("builtin:x", "'builtin' has no models"),
-        ("anthropic:", "which model"),
-        ("openai", "which model"),
-        ("command:", "which program"),
+        ("anthropic:", "anthropic: needs a model, as in anthropic:claude"),
+        ("openai", "openai: needs a model, as in openai:gpt"),
+        ("command:", "command: needs a program, as in"),
         ("command:'", "No closing quotation"),
         ("command:no-such-program-here -x", "no program 'no-such-program-here'"),
-        ("manual:", "which folder"),
+        ("manual:", "manual: needs a folder, as in"),
         ("manual:/proc/none/x", "cannot make /proc/none/x"),
         ("replay:", "which run"),
         ("replay:/nowhere", "cannot replay: /nowhere is not a run folder"),
@@ -248,9 +248,9 @@ def test_names_that_cannot_be_used(options, monkeypatch, name, reason):
 @pytest.mark.parametrize(
     ("url", "learner", "optimizer", "reason"),
     [
-        ("localhost:8000", "openai:x", None, "is none; expected one like http"),
-        ("http://", "openai:x", None, "is none"),
-        ("http://[::1", "openai:x", None, "is none"),
+        ("localhost:8000", "openai:x", None, "is not a valid URL; expected one like"),
+        ("http://", "openai:x", None, "is not a valid URL"),
+        ("http://[::1", "openai:x", None, "is not a valid URL"),
         ("http://me:secret@here/v1", "openai:x", None, "no user, password or query"),
         ("http://here/v1?key=secret", "openai:x", None, "no user, password or query"),
         ("http://here/v1", "builtin", None, "no such model is used"),
