@@ -1,7 +1,7 @@
-"""Run an untrusted `controller.py` in a child process and talk with it.
+"""Run an untrusted `controller.py` in a child process and communicate with it.
 
-`start` gives a `Child`; the controller's results come back as plain data, its failures
-as `ControllerFault`s, and failures of the sandbox as `SandboxError`.
+`start` returns a `Child`. The controller's results come back as plain data, its
+failures as `ControllerFault`s, and failures of the sandbox as `SandboxError`.
 """
 
 from tdac_agent.sandbox.ending import ChildUsage

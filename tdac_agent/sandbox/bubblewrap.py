@@ -12,14 +12,14 @@ from tdac_agent.sandbox.exposure import exposure
 def bubblewrap_command(
     parent: Path, scratch: list[str], lifeline: int, scratch_bytes: int
 ) -> list[str]:
-    """Return the words that come before the zygote's own command.
+    """Return the arguments that come before the zygote's own command.
 
     Args:
-        parent: Folder that holds the private ones.
-        scratch: The scratch folders in them.
+        parent: Folder that contains the private folders.
+        scratch: Scratch folders in the private folders.
         lifeline: Descriptor that bubblewrap's first process keeps open, out of the
             controllers' reach.
-        scratch_bytes: Size of a scratch folder.
+        scratch_bytes: Size limit of each scratch folder.
 
     Raises:
         SandboxError: bubblewrap is not installed.
@@ -29,8 +29,8 @@ def bubblewrap_command(
         raise SandboxError("bubblewrap (bwrap) is not installed")
     words = [program, "--unshare-user", "--unshare-net", "--unshare-pid"]
     words += ["--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try"]
-    # With a process of its own in between, the CPU time of a child that has ended
-    # would be lost.
+    # Otherwise bubblewrap adds an init process that reaps ended children, and their
+    # CPU time is lost.
     words += ["--as-pid-1"]
     words += ["--uid", "65534", "--gid", "65534", "--cap-drop", "ALL"]
     words += ["--sync-fd", str(lifeline)]
@@ -40,7 +40,7 @@ def bubblewrap_command(
     words += _each("--ro-bind", seen.system)
     for path in seen.hidden:
         words += ["--tmpfs", path]
-    # numpy may lie in a hidden folder, so that this can be closed only afterwards.
+    # numpy may be in a hidden folder, which therefore becomes read-only afterwards.
     words += _each("--ro-bind", (*seen.packages, str(parent)))
     for path in seen.hidden:
         words += ["--remount-ro", path]

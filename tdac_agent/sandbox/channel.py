@@ -1,4 +1,4 @@
-"""The judge's end of the channel: frames with deadlines, and the drained output."""
+"""The judge's end of the channel: frames with deadlines, and the printed output."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ CHUNK = 1 << 16
 # Most answers are short, and a large buffer costs more than the whole round trip.
 SHORT = 1 << 12
 KEPT_OUTPUT = 4000
-# Most answers come sooner; after this, waiting for a CPU is looked at.
+# Most answers come sooner; later ones have their run-queue wait time measured.
 SOON_SECONDS = 0.25
 MOST_WAITED_SECONDS = 300.0
-# Of the time that a child did not stand in line; so much on a CPU is all of it. Where
-# the host of a virtual machine takes more, a time-out is the machine's doing.
+# A child is busy if it was on a CPU for this share of its time outside the run queue.
+# Below it the machine may be to blame, such as the host of a virtual machine.
 BUSY_SHARE = 0.9
 
 
 class ChannelClosedError(Exception):
-    """The child closed its end, most likely by ending."""
+    """The child closed its end of the channel, most likely by exiting."""
 
 
 class DeadlineError(Exception):
-    """The deadline passed before a whole frame had come or gone.
+    """The deadline passed before a whole frame was sent or received.
 
     Args:
-        busy: Whether the child was on a CPU all the time that it had.
+        busy: Whether the child was on a CPU for all of its time.
     """
 
     def __init__(self, *, busy: bool) -> None:
@@ -40,23 +40,23 @@ class DeadlineError(Exception):
 
 
 class FrameError(Exception):
-    """The child sent bytes that are not the frame that was due."""
+    """The child sent bytes that are not the expected frame."""
 
 
 class OutputFloodError(Exception):
-    """The child printed more than it may."""
+    """The child printed more than the limit."""
 
 
 class Channel:
-    """Sends requests and receives answers; keeps head and tail of what is printed.
+    """Sends requests, receives answers, and keeps head and tail of the printed output.
 
     Args:
-        requests: Descriptor to write to; closed by `close`, as are the others.
-        answers: Descriptor to read from.
-        output: Descriptor of what the child prints.
+        requests: Descriptor to write requests to; `close` closes all three.
+        answers: Descriptor to read answers from.
+        output: Descriptor to read printed output from.
         frame_bytes: Largest payload of an answer.
-        output_bytes: Most that may be printed.
-        line: Where the child stands in line for a CPU, which puts a deadline off.
+        output_bytes: Limit of the printed output.
+        line: Run-queue statistics of the child; its wait time extends deadlines.
     """
 
     def __init__(
@@ -69,8 +69,8 @@ class Channel:
         line: Line,
     ) -> None:
         self._line = line
-        # When the child was looked at, its times then, and of which deadline.
-        self._looked, self._before, self._deadline = 0.0, (0.0, 0.0), 0.0
+        # Last look at the child's times: when, the times, and for which deadline.
+        self._seen_at, self._seen_times, self._seen_deadline = 0.0, (0.0, 0.0), 0.0
         self._requests, self._answers, self._output = requests, answers, output
         self._frame_bytes, self._output_bytes = frame_bytes, output_bytes
         self._buffer = b""
@@ -82,7 +82,7 @@ class Channel:
             self._poll.register(descriptor, select.POLLIN)
 
     def send(self, kind: int, sequence: int, payload: bytes, deadline: float) -> None:
-        """Write one frame, draining output meanwhile."""
+        """Write one frame, reading printed output meanwhile."""
         data = memoryview(HEADER.pack(len(payload), kind, sequence) + payload)
         while data:
             try:
@@ -104,7 +104,7 @@ class Channel:
             self._poll.unregister(self._requests)
 
     def receive(self, deadline: float) -> tuple[int, int, bytes]:
-        """Return kind, sequence number and payload of the one frame that is due."""
+        """Return kind, sequence number and payload of the one expected frame."""
         parts: list[bytes] = []
         have, need = 0, HEADER.size
         while have < need:
@@ -141,44 +141,44 @@ class Channel:
 
     def _events(self, deadline: float) -> list[tuple[int, int]]:
         left = deadline - time.monotonic()
-        if left > SOON_SECONDS and self._deadline != deadline:
+        if left > SOON_SECONDS and self._seen_deadline != deadline:
             events = self._poll.poll(math.ceil(SOON_SECONDS * 1000))
             if events:
                 return events
-            self._looked, self._before = time.monotonic(), self._line.times()
-            self._deadline = deadline
-        while (left := self._left(deadline)) > 0:
+            self._seen_at, self._seen_times = time.monotonic(), self._line.times()
+            self._seen_deadline = deadline
+        while (left := self._seconds_left(deadline)) > 0:
             events = self._poll.poll(math.ceil(left * 1000))
             if events:
                 return events
         raise DeadlineError(busy=self._was_busy(deadline))
 
     def _was_busy(self, deadline: float) -> bool:
-        if self._deadline != deadline:
+        if self._seen_deadline != deadline:
             return False
         ran, waited = (
             now - then
-            for now, then in zip(self._line.times(), self._before, strict=True)
+            for now, then in zip(self._line.times(), self._seen_times, strict=True)
         )
-        return ran >= BUSY_SHARE * (time.monotonic() - self._looked - waited) > 0
+        return ran >= BUSY_SHARE * (time.monotonic() - self._seen_at - waited) > 0
 
-    def _left(self, deadline: float) -> float:
-        """Seconds until a deadline, put off by what the machine kept from the child."""
+    def _seconds_left(self, deadline: float) -> float:
+        """Return the seconds until a deadline, extended by the run-queue wait time."""
         left = deadline - time.monotonic()
-        if left > 0 or left < -MOST_WAITED_SECONDS or self._deadline != deadline:
+        if left > 0 or left < -MOST_WAITED_SECONDS or self._seen_deadline != deadline:
             return left
         if self._line.stands():
             return SOON_SECONDS
-        return left + self._line.waited() - self._before[1]
+        return left + self._line.waited() - self._seen_times[1]
 
     def _drain(self) -> bool:
-        """Read what has been printed; return whether more can come."""
+        """Read printed output; return whether more can follow."""
         try:
             part = os.read(self._output, CHUNK)
         except BlockingIOError:
             return True
         if not part:
-            # The end is read again when the child is ended.
+            # `drain_until_end` reads the end of file again.
             with contextlib.suppress(KeyError):
                 self._poll.unregister(self._output)
             return False

@@ -1,4 +1,4 @@
-"""Requests and answers with one child, each with a deadline; failures are typed."""
+"""Exchange requests and answers with one child; turn failures into typed errors."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ EXIT_SECONDS = 1.0
 
 
 class Conversation:
-    """Speaks the protocol over a channel, and ends the child at the first breach.
+    """Runs the protocol over a channel, and ends the child at the first violation.
 
     Args:
-        channel: Carries the frames.
-        lifeline: Descriptor that tells when the child has ended.
-        limits: What the child may use.
-        root: The private folder, whose name is removed from messages.
-        end: Kills the child and returns what it used.
+        channel: Transports the frames.
+        lifeline: Descriptor that shows when the child has ended.
+        limits: Resource limits of the child.
+        root: Private folder, whose path is removed from messages.
+        end: Kills the child and returns its resource usage.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Conversation:
         self.send(kind, value, phase, deadline, seconds)
         answer, result = self.receive(phase, deadline, seconds)
         if answer != Kind.VALUE:
-            self.breach("an answer that was not due", phase)
+            self.breach("an unexpected answer", phase)
         return result
 
     def send(
@@ -83,7 +83,7 @@ class Conversation:
             self._fail(e, phase, seconds)
 
     def _payload(self, kind: Kind, value: Any) -> bytes:
-        """The value's bytes; observations, which are many, in a faster way."""
+        """Return the encoded value; observations, which are frequent, use a layout."""
         if kind != Kind.POLICY or type(value) is not dict:
             return encode(value)
         payload = None if self._layout is None else self._layout.encode(value)
@@ -105,17 +105,17 @@ class Conversation:
             self.breach("an answer to another request", phase)
         if kind == Kind.ERROR:
             if type(value) is not RemoteError:
-                self.breach("an error that is none", phase)
+                self.breach("a malformed error", phase)
             raise controller_error(value, phase, self._root)
         return kind, value
 
     def breach(self, what: str, phase: str) -> NoReturn:
-        """End the child because it sent something that its own server never sends."""
+        """End the child because it sent something that our server never sends."""
         message = f"wrote to the judge's channel at {phase}: {what}"
         self.give_up(ControllerProtocolError(message, phase))
 
     def stop(self) -> ChildUsage:
-        """End the child; further requests are refused, or raise its fault again."""
+        """End the child; further requests raise its fault again, or `SandboxError`."""
         self._fault = self._fault or SandboxError("the child has ended")
         return self._end()
 

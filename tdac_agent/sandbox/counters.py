@@ -1,4 +1,4 @@
-"""Counters in memory that a process shares with its later forks."""
+"""Counters in memory that a process shares with its forks."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import mmap
 
 
 def shared_counters(count: int) -> memoryview[int]:
-    """Returns `count` integers, 0 at first, that this process and its forks share.
+    """Returns `count` integers, initially 0, that this process and later forks share.
 
-    The kernel keeps the memory for as long as one of them refers to it. That of
-    `multiprocessing.RawValue` and `RawArray` is used for the next value as soon as the
-    process that made it has dropped it, even while its forks still write to it.
+    The kernel keeps this memory as long as a process refers to it. The memory of
+    `multiprocessing.RawValue` and `RawArray` is reused as soon as the process that
+    made it drops it, even while forks still write to it.
     """
     return memoryview(mmap.mmap(-1, max(1, 4 * count))).cast("i")

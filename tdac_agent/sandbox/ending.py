@@ -1,4 +1,4 @@
-"""End a child and everything it may have started; what it used, how it ended."""
+"""End a child and all its processes; report its resource usage and exit status."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ GRACE_SECONDS = 5.0
 
 @dataclass(frozen=True, slots=True)
 class ChildUsage:
-    """What a child used.
+    """Resource usage of a child, its output, and how it ended.
 
     Attributes:
-        cpu_seconds: User and system time.
-        max_rss_bytes: Largest resident memory.
-        output_bytes: How much it printed, also what was not kept.
-        output_head: The first printed text.
-        output_tail: The last printed text, where it does not fit in the head.
+        cpu_seconds: User and system time, s.
+        max_rss_bytes: Peak resident memory.
+        output_bytes: Size of all printed output, whether kept or not.
+        output_head: Beginning of the printed text.
+        output_tail: End of the printed text, if it does not fit into the head.
         status: Exit code, or minus the number of the signal that ended it.
     """
 
@@ -37,10 +37,10 @@ class ChildUsage:
 
 
 class Ending:
-    """Ends one child, once; every call returns what it used.
+    """Ends one child, once; every call returns its usage.
 
     Args:
-        forked: The child; its private folder is deleted, too.
+        forked: The child; its private folder is deleted too.
     """
 
     def __init__(self, forked: Forked) -> None:
@@ -50,7 +50,7 @@ class Ending:
     def __call__(self) -> ChildUsage:
         """Kill the process group, wait for it, and delete the folder."""
         if self._usage is None:
-            # Stands if the next line is interrupted: nothing is closed twice.
+            # Stays if `_end` is interrupted, so that nothing is closed twice.
             self._usage = ChildUsage(0.0, 0, 0, "", "", -signal.SIGKILL)
             self._usage = _end(self._forked)
         return self._usage
@@ -60,7 +60,7 @@ def _end(forked: Forked) -> ChildUsage:
     channel = forked.channel
     try:
         cpu, rss = _usage_of_tree(forked.pid)
-        # The leader is not reaped yet, so that the number is still its own.
+        # The leader is not reaped yet, so no other process can have its ID.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(forked.pid, signal.SIGKILL)
         status, own_cpu, own_rss = forked.reap()
@@ -68,7 +68,7 @@ def _end(forked: Forked) -> ChildUsage:
     finally:
         channel.close()
         os.close(forked.lifeline)
-        # A folder that cannot be removed is no reason to lose a verdict.
+        # A folder that cannot be removed must not cost a verdict.
         with contextlib.suppress(OSError):
             forked.folder.remove()
     return ChildUsage(
@@ -82,17 +82,17 @@ def _end(forked: Forked) -> ChildUsage:
 
 
 def has_ended(lifeline: int, seconds: float) -> bool:
-    """Wait for the end of a child without reaping it.
+    """Return whether a child ends within `seconds`, without reaping it.
 
-    A child cannot close its end of the lifeline, unless nothing filters its calls.
+    A child cannot close its end of the lifeline, unless seccomp is missing.
     """
     poll = select.poll()
-    poll.register(lifeline, 0)  # tells when nobody can read any more
+    poll.register(lifeline, 0)  # reports an error once no reader is left
     return bool(poll.poll(seconds * 1000))
 
 
 def _usage_of_tree(pid: int) -> tuple[float, int]:
-    """Return CPU seconds and largest resident bytes of a process and those below."""
+    """Return CPU seconds and peak resident bytes of a process and its descendants."""
     cpu, rss = 0.0, 0
     pids = [pid]
     while pids:

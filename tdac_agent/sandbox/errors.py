@@ -1,4 +1,4 @@
-"""What can go wrong with a child: the controller's doing, or ours."""
+"""Errors of a child: faults of the controller and failures of the sandbox."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from typing import Any
 
 
 class SandboxError(Exception):
-    """The sandbox itself failed; says nothing about the controller."""
+    """The sandbox itself failed; this says nothing about the controller."""
 
 
 class ControllerFault(Exception):
-    """The controller did something that a verdict counts as failed.
+    """A fault of the controller, which a verdict counts as failed.
 
     Args:
-        message: One sentence that a user can read.
+        message: One sentence for the user.
         phase: What the controller was doing: "import", "reset", "policy", ...
 
     Attributes:
-        may_pass: Whether it may have been the machine's doing, and is worth a retry.
+        may_pass: Whether the machine may have caused it, so that a retry may pass.
     """
 
     may_pass = False
@@ -33,7 +33,7 @@ class ControllerFault(Exception):
 def _revive(
     kind: type[ControllerFault], arguments: tuple[Any, ...], state: dict[str, Any]
 ) -> ControllerFault:
-    """Rebuild a fault that a worker process has sent."""
+    """Rebuild a fault that a worker process sent."""
     fault = kind.__new__(kind, *arguments)
     fault.__dict__.update(state)
     return fault
@@ -44,7 +44,7 @@ class ControllerError(ControllerFault):
 
     Args:
         type_name: Class of the exception.
-        text: Its message, bounded, without paths and addresses.
+        text: Its message, bounded, without paths and memory addresses.
         line: Line of `controller.py`, 0 where unknown.
         traceback: The controller's own lines, outermost first.
         phase: What the controller was doing.
@@ -67,9 +67,9 @@ class ControllerTimeout(ControllerFault):
 
     Args:
         phase: What the controller was doing.
-        seconds: How long it was given.
-        busy: Whether it was on a CPU all that time; else it may have been kept
-            waiting for something.
+        seconds: Time limit.
+        busy: Whether it was on a CPU all that time; if not, it may have been waiting
+            for something.
     """
 
     def __init__(self, phase: str, seconds: float, *, busy: bool = False) -> None:
@@ -93,12 +93,12 @@ class ControllerDied(ControllerFault):
 
 
 class ControllerProtocolError(ControllerFault):
-    """The controller wrote something of its own to the channel."""
+    """The controller wrote its own bytes to the channel."""
 
 
 class ControllerOutputFlood(ControllerFault):
-    """The controller printed more than it may."""
+    """The controller printed more than the limit."""
 
 
 class EnvRefusalError(Exception):
-    """An env refuses what a controller asked; the controller sees a RuntimeError."""
+    """An env refuses a controller's request; the controller gets a RuntimeError."""

@@ -1,4 +1,4 @@
-"""Say in a sentence what a child's failure was."""
+"""Describe a child's failure in one sentence."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ def controller_error(error: RemoteError, phase: str, root: Path) -> ControllerEr
 
 
 def clean(text: str, root: Path) -> str:
-    """Return `text` without paths of the private folder, addresses, odd characters."""
+    """Return `text` without private paths, addresses and unprintable characters."""
     text = text[: 4 * MAX_TEXT].replace(f"{root / 'work'}/", "").replace(f"{root}/", "")
     return printable(_ADDRESS.sub("", text))[:MAX_TEXT]
 
 
 def explain_end(status: int, phase: str, cpu_seconds: float, cpu_limit: float) -> str:
-    """Return how a child ended.
+    """Describe how a child ended.
 
     Args:
         status: Exit code, or minus the number of the signal.
         phase: What the controller was doing.
-        cpu_seconds: CPU time it used.
-        cpu_limit: CPU time it might use.
+        cpu_seconds: CPU time that it used.
+        cpu_limit: Limit of its CPU time, s.
     """
     if status >= 0:
         return f"ended its own process with exit code {status} at {phase}"
@@ -48,7 +48,7 @@ def explain_end(status: int, phase: str, cpu_seconds: float, cpu_limit: float) -
     if number == signal.SIGSYS:
         return f"killed at {phase} by SIGSYS: a forbidden system call"
     if number == signal.SIGKILL:
-        return f"killed at {phase} by SIGKILL, as the machine does when out of memory"
+        return f"killed at {phase} by SIGKILL, possibly because memory ran out"
     return f"crashed at {phase} with {_signal_name(number)}"
 
 

@@ -1,4 +1,4 @@
-"""Which files of this machine a child may see."""
+"""The files of this machine that a child may see."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Exposure:
     """Files that a child may read; everything else stays hidden.
 
     Attributes:
-        interpreter: The Python program, past virtual environments.
+        interpreter: The Python program itself, not the link of a virtual environment.
         system: The standard library, shared libraries and the loader.
-        hidden: Folders below `system` with other packages; not to be seen.
+        hidden: Folders below `system` with other packages, which stay hidden.
         packages: numpy, its libraries, and the child's own code.
         devices: Harmless devices.
         links: Symbolic links in the root folder, (path, target).
@@ -37,12 +37,12 @@ class Exposure:
 
 @functools.cache
 def exposure() -> Exposure:
-    """Return what the interpreter that runs this needs."""
-    # `_base_executable` is the only name of the program behind a virtual environment.
+    """Return the files that the running interpreter needs."""
+    # Only `_base_executable` names the program behind a virtual environment.
     program = os.path.realpath(getattr(sys, "_base_executable", sys.executable))
     stdlib = os.path.dirname(os.path.realpath(os.__file__))
     folders = _outermost({stdlib, *_extension_folders(), *_library_folders()})
-    # The parent is resolved, the file is not: programs ask for it by this name.
+    # Only the parent is resolved: programs ask for the loader by this file name.
     roots = [Path(folder).resolve() for folder in ("/lib", "/lib64")]
     loaders = [str(path) for root in roots for path in root.glob("ld-*.so*")]
     files = [program, *loaders, "/etc/ld.so.cache", "/etc/alternatives"]
@@ -61,7 +61,7 @@ def exposure() -> Exposure:
 
 
 def numpy_folders() -> tuple[str, ...]:
-    """Return the folders of numpy and of the libraries that came with it."""
+    """Return the folders of numpy and of its bundled libraries."""
     package = Path(np.__file__).resolve().parent
     return tuple(
         str(folder)
@@ -113,17 +113,18 @@ def entries_but_hidden(seen: Exposure) -> tuple[list[str], list[str]]:
     """Return `system` without `hidden`, for a sandbox that cannot mask a folder.
 
     Returns:
-        Paths to be read with all below them, and folders only to be listed.
+        Paths that may be read with everything below, and folders that may only be
+        listed.
     """
     readable, listable = [], []
-    waiting = list(seen.system)
-    while waiting:
-        path = waiting.pop()
+    pending = list(seen.system)
+    while pending:
+        path = pending.pop()
         if path in seen.hidden:
             continue
         if any(hidden.startswith(path + os.sep) for hidden in seen.hidden):
             listable.append(path)
-            waiting += [entry.path for entry in os.scandir(path)]
+            pending += [entry.path for entry in os.scandir(path)]
         else:
             readable.append(path)
     return readable, listable

@@ -15,15 +15,15 @@ MAX_FOLDER_BYTES = 256 << 20
 class PrivateFolder:
     """A new folder with `work` and `scratch`, made for one child.
 
-    Its name cannot be guessed by a child that has another one.
+    Other children cannot guess its name.
 
     Args:
-        parent: Where it is made.
+        parent: Folder in which it is made.
 
     Attributes:
         root: The folder.
-        work: What the controller sees as its working folder.
-        scratch: Where the controller may write.
+        work: Working folder of the controller.
+        scratch: Folder that the controller may write to.
     """
 
     def __init__(self, parent: Path) -> None:
@@ -34,7 +34,7 @@ class PrivateFolder:
             folder.mkdir(mode=0o700)
 
     def furnish(self, workdir: Path | None, source: bytes) -> None:
-        """Copy the files of `workdir` in and write the controller.
+        """Copy in the files of `workdir` and write the controller.
 
         Raises:
             SandboxError: The folder cannot be read or is too large.
@@ -53,14 +53,14 @@ class PrivateFolder:
                 continue
             room -= entry.stat().st_size
             if room < 0:
-                raise SandboxError(f"{workdir} holds more than {MAX_FOLDER_BYTES} B")
+                raise SandboxError(f"{workdir} is larger than {MAX_FOLDER_BYTES} B")
             shutil.copyfile(entry, self.work / entry.name)
 
     def remove(self) -> None:
         """Delete the folder, whatever the controller left in it.
 
-        Folders are lifted to the top before they are emptied: the controller may have
-        nested them deeper than a path can say, and taken away rights.
+        Folders are moved to the top before they are emptied: the controller may have
+        nested them deeper than a path can express, and removed their permissions.
         """
         folders = [self.root]
         for count, folder in enumerate(folders):

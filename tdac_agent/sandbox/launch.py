@@ -1,4 +1,4 @@
-"""Start a child: spawn it, confine it, and see that the confinement holds."""
+"""Start a child: fork it, confine it, and check that the confinement holds."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def start(
 
     Args:
         workdir: Folder whose files the controller may read. Without a source nothing
-            is copied yet, see `Child.furnish`.
+            is copied yet; see `Child.furnish`.
         controller_source: Text of `controller.py`.
-        tier: Name of a tier, or "auto" for the best one that works here.
-        limits: What the child may use.
+        tier: Name of a tier, or "auto" for the best one that works on this machine.
+        limits: Resource limits of the child.
 
     Raises:
         ControllerError: The source is larger than 200 kB.
-        SandboxError: The tier does not work here or the child did not start.
+        SandboxError: The tier does not work on this machine or the child did not start.
     """
     limits = limits or Limits()
     child = start_blank(find_tier(tier), limits)
@@ -54,7 +54,7 @@ def start_blank(tier: Tier, limits: Limits) -> Child:
     """Start a child without files, from a zygote of its own.
 
     Raises:
-        SandboxError: It did not start, or the tier's promise does not hold.
+        SandboxError: It did not start, or a promise of the tier does not hold.
     """
     zygote = start_zygote(tier, limits, 1)
     try:
@@ -67,9 +67,9 @@ def start_zygote(tier: Tier, limits: Limits, slots: int = SLOTS) -> Zygote:
     """Start a zygote, which loads numpy while the caller goes on.
 
     Args:
-        tier: Of its children.
-        limits: Of its children's scratch folders.
-        slots: Most children that it has.
+        tier: Tier of its children.
+        limits: Limits of its children's scratch folders.
+        slots: Maximum number of children.
 
     Raises:
         SandboxError: It cannot be started.
@@ -81,11 +81,11 @@ def start_zygote(tier: Tier, limits: Limits, slots: int = SLOTS) -> Zygote:
 
 
 def fork_child(zygote: Zygote, tier: Tier, limits: Limits) -> Child:
-    """Have a zygote fork a child, and confine it.
+    """Fork a child from a zygote, and confine it.
 
     Raises:
-        SandboxError: It did not start, or the tier's promise does not hold.
-        NoRoomError: The zygote has had all the children it can have.
+        SandboxError: It did not start, or a promise of the tier does not hold.
+        NoRoomError: The zygote can have no more children.
     """
     child = Child(tier.name, limits, zygote.fork(limits))
     try:
@@ -99,21 +99,21 @@ def fork_child(zygote: Zygote, tier: Tier, limits: Limits) -> Child:
     broken = [promise for promise in tier.promises if not facts[promise]]
     if broken:
         child.close()
-        raise SandboxError(f"{tier.name}: does not hold here: {', '.join(broken)}")
+        raise SandboxError(f"{tier.name}: promises not kept: {', '.join(broken)}")
     return child
 
 
 def available_tiers() -> list[TierStatus]:
-    """Return every tier, best first, each tried by starting a child in it."""
+    """Return the status of every tier, best first; starts a child in each."""
     return [_status(tier) for tier in TIERS]
 
 
 @functools.cache
 def best_tier() -> Tier:
-    """Return the best tier that works here and promises something.
+    """Return the best tier that works on this machine and promises something.
 
     Raises:
-        SandboxError: None does. What promises nothing must be asked for by its name.
+        SandboxError: There is none. A tier without promises must be named explicitly.
     """
     reasons = []
     for tier in CONFINING:
@@ -125,15 +125,15 @@ def best_tier() -> Tier:
 
 
 def nothing_confines(reasons: list[str]) -> SandboxError:
-    """The refusal to run a controller unconfined.
+    """Return the error that refuses to run a controller unconfined.
 
     Args:
-        reasons: Why the tiers do not work.
+        reasons: Why each tier does not work.
     """
     return SandboxError(
-        "no sandbox works here that keeps a controller from your files and from the "
-        "network; use Linux on x86-64 or aarch64 (apt install bubblewrap may help), or "
-        "run what you trust unconfined: tdac verify --tier rlimits "
+        "no sandbox on this machine shields your files and network from a controller; "
+        "use Linux on x86-64 or aarch64 (apt install bubblewrap may help), or run a "
+        "controller that you trust unconfined: tdac verify --tier rlimits "
         f"(why: {'; '.join(reasons)})"
     )
 
@@ -150,7 +150,7 @@ def find_tier(name: str) -> Tier:
     """Return the tier of that name, or the best one for "auto".
 
     Raises:
-        SandboxError: There is none, or none works here.
+        SandboxError: There is none, or none works on this machine.
     """
     if name == "auto":
         return best_tier()
@@ -165,7 +165,7 @@ def _setup(
     tier: Tier, limits: Limits, zygote: Zygote, folder: PrivateFolder
 ) -> dict[str, Any]:
     seen = exposure()
-    # Where mounts hide them, these folders need no care.
+    # Where mounts mask the hidden folders, no path needs to be left out.
     masked = "hides_names" in tier.promises
     readable, listable = (list(seen.system), []) if masked else entries_but_hidden(seen)
     return {

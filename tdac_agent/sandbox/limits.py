@@ -1,4 +1,4 @@
-"""What a controller may use."""
+"""Resource limits of a controller."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ MAX_SOURCE_BYTES = 200_000
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Bounds on one child.
+    """Resource limits of one child.
 
-    Wall times of the controller leave out what it stands in line for a CPU, so that a
-    busy machine makes no verdict (Linux; up to five minutes each).
+    Wall times of the controller exclude its run-queue wait time, so that a busy machine
+    does not decide a verdict (on Linux; up to five minutes each).
 
     Attributes:
-        start_seconds: Wall time until the child is ready; ours, not the controller's.
+        start_seconds: Wall time until the child is ready; no controller code runs yet.
         import_seconds: Wall time of importing the controller.
         reset_seconds: Wall time of one `reset`.
         call_seconds: Wall time of one call, `policy` included.
-        cpu_seconds: CPU time of the child in all.
-        memory_bytes: Address space.
-        output_bytes: Printed output.
-        frame_bytes: One value on the wire.
-        scratch_bytes: The scratch folder (one file of it where the tier has no tmpfs).
-        open_files: Descriptors.
+        cpu_seconds: CPU time of the child in total.
+        memory_bytes: Size of the address space.
+        output_bytes: Size of the printed output.
+        frame_bytes: Size of one encoded value.
+        scratch_bytes: Size of the scratch folder, or of each file in it without tmpfs.
+        open_files: Number of open descriptors.
     """
 
     start_seconds: float = 30.0

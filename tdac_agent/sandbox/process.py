@@ -1,4 +1,4 @@
-"""The judge's side of one child: ask, with a deadline, and get a value or a fault."""
+"""The judge's side of one child: each request returns a value or raises a fault."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tdac_agent.sandbox.zygote import Forked
 
 
 class EpisodeEnv(Protocol):
-    """What `run_episode` of a controller is given, on the judge's side."""
+    """The judge's side of the environment that `run_episode` steps."""
 
     def reset(self) -> tuple[Any, dict[str, Any]]:
         """Return the first observation and info."""
@@ -34,17 +34,17 @@ class EpisodeEnv(Protocol):
 
 
 class ProgramWorld(Protocol):
-    """What a program of its own is given, on the judge's side."""
+    """The judge's side of the world that a whole program steps."""
 
     @property
     def is_over(self) -> bool:
-        """Whether it has ended, so that the program should end, too."""
+        """Whether the world has ended, so that the program should end too."""
 
     def reset(self) -> Any:
-        """Return what the program is told at the beginning."""
+        """Return the data that the program gets at the beginning."""
 
     def step(self, action: Any) -> Any:
-        """Return the answer to a request; raises as that of `EpisodeEnv`."""
+        """Return the answer to a request; raises like `EpisodeEnv.step`."""
 
 
 Answering = EpisodeEnv | ProgramWorld
@@ -53,21 +53,21 @@ Answering = EpisodeEnv | ProgramWorld
 class Child:
     """One sandboxed process with numpy loaded, for one controller and one use.
 
-    A context manager; `close` kills it. Every method that runs the controller raises
-    a `ControllerFault`; after any but a `ControllerError` the child is gone, and each
+    A context manager; `close` kills the child. Methods that run the controller raise
+    `ControllerFault`; after any but a `ControllerError` the child is gone, and each
     further request raises the same fault again.
 
     Attributes:
-        tier: Name of the sandbox tier it runs in.
-        limits: What it may use.
+        tier: Name of its sandbox tier.
+        limits: Its resource limits.
         folder: Its private folder.
-        pid: The leader of its process group.
-        controller_pid: The process that runs the controller: the leader, or under the
-            tier `namespaces` the one that it waits for.
+        pid: Process ID of the leader of its process group.
+        controller_pid: ID of the process that runs the controller: the leader, or in
+            the tier `namespaces` the inner process that the leader waits for.
 
     Args:
-        tier: See above, as for the next one.
-        limits: What it may use.
+        tier: Name of its sandbox tier.
+        limits: Its resource limits.
         forked: Its process, folder and channel.
     """
 
@@ -95,22 +95,22 @@ class Child:
         self.close()
 
     def waited(self) -> float:
-        """Seconds for which it stood in line for a CPU; 0 where nobody knows."""
+        """Return its run-queue wait time, s; 0 if it is not known."""
         return self._line.waited()
 
     def close(self) -> ChildUsage:
-        """Kill the child and all it started, and return what it used."""
+        """Kill the child with all its processes; return its resource usage."""
         return self._talk.stop()
 
     def set_up(self, setup: dict[str, Any]) -> dict[str, bool]:
-        """Have the child confine itself; return what it found to hold."""
+        """Have the child confine itself; return which promises hold."""
         seconds = self.limits.start_seconds
         facts = dict(self._talk.request(Kind.SETUP, setup, "start", seconds))
         self.controller_pid = self._line.pid = facts.pop("pid", self.pid)
         return facts
 
     def furnish(self, workdir: Path | None, controller_source: str | bytes) -> None:
-        """Copy a working folder and a controller into a child started without.
+        """Copy a working folder and a controller into a child that has none yet.
 
         Args:
             workdir: Folder whose files the controller may read; not its subfolders.
@@ -128,7 +128,7 @@ class Child:
         self.folder.furnish(workdir, controller_source)
 
     def load(self, timeout: float | None = None) -> dict[str, str]:
-        """Import the controller; return its public names, each with its type's name."""
+        """Import the controller; return its public names with their types' names."""
         seconds = timeout or self.limits.import_seconds
         names = self._talk.request(Kind.LOAD, None, "import", seconds)
         if type(names) is not dict or not all(map(is_name, chain(*names.items()))):
@@ -151,7 +151,7 @@ class Child:
     ) -> Any:
         """Call a function by name, a callable handle, or (handle, method name).
 
-        Arguments may hold handles; a result that the wire cannot carry is a handle.
+        Arguments may contain handles; a result without an encoding becomes a handle.
         """
         owner, name = _split(target)
         phase = name if name is not None else "call"
@@ -165,19 +165,19 @@ class Child:
         calls: list[tuple[Any, ...]],
         timeout: float | None = None,
     ) -> Any:
-        """Return the results of many calls of one function or method, in one answer."""
+        """Call a function or method many times; return all results in one answer."""
         owner, name = _split(target)
         seconds = timeout or self.limits.call_seconds
         phase = name if name is not None else "call"
         return self._talk.request(Kind.CALL_EACH, (owner, name, calls), phase, seconds)
 
     def reset(self, observation: Any, timeout: float | None = None) -> Any:
-        """Call `reset(obs)`; None where the controller has none."""
+        """Call `reset(obs)`, if the controller has it."""
         seconds = timeout or self.limits.reset_seconds
         return self._talk.request(Kind.RESET, observation, "reset", seconds)
 
     def policy(self, observation: Any, timeout: float | None = None) -> Any:
-        """Return whatever `policy(obs)` returned; nothing about it is checked."""
+        """Return the result of `policy(obs)`, unchecked."""
         seconds = timeout or self.limits.call_seconds
         return self._talk.request(Kind.POLICY, observation, "policy", seconds)
 
@@ -188,15 +188,16 @@ class Child:
         timeout: float,
         deadline: float = math.inf,
     ) -> Any:
-        """Call `run_episode(env, max_steps)`, each step of which is the judge's.
+        """Call `run_episode(env, max_steps)`; `env` makes every step in this process.
 
         Args:
-            env: Answers the controller's requests, here, in this process.
-            max_steps: Passed on.
-            timeout: Seconds that the controller itself may take in all.
-            deadline: By `time.monotonic`, when it ends whoever took the time.
+            env: Answers the controller's requests.
+            max_steps: Passed to the controller.
+            timeout: Seconds that the controller itself may take in total.
+            deadline: Value of `time.monotonic` at which the call ends, whether the
+                controller or `env` took the time.
         """
-        return self._answer(
+        return self._converse(
             Kind.RUN_EPISODE,
             max_steps,
             "run_episode",
@@ -210,15 +211,15 @@ class Child:
     ) -> Any:
         """Run the controller's file as a program that asks `world` for each step.
 
-        A package `controller`, which connects the two, has to be in its folder.
+        Its folder must contain a package `controller`, which connects the two.
 
         Args:
-            world: Answers the program's requests, here, in this process.
-            arguments: Of its command line.
-            timeout: Seconds that the program itself may take in all.
+            world: Answers the program's requests in this process.
+            arguments: Command-line arguments.
+            timeout: Seconds that the program itself may take in total.
             grace: Seconds that it may take after the world has ended.
         """
-        return self._answer(
+        return self._converse(
             Kind.RUN_PROGRAM,
             arguments,
             "the run",
@@ -227,7 +228,7 @@ class Child:
             lambda: grace if world.is_over else math.inf,
         )
 
-    def _answer(
+    def _converse(
         self,
         kind: Kind,
         value: Any,
@@ -236,15 +237,15 @@ class Child:
         timeout: float,
         most: Callable[[], float],
     ) -> Any:
-        """Have the controller do something, and answer what it asks meanwhile.
+        """Send a request, and answer the controller's own requests until it is done.
 
         Args:
-            kind: What it is to do.
-            value: Sent with it.
-            phase: Name of it.
-            env: Answers.
-            timeout: Seconds that the controller itself may take in all.
-            most: Bound, from now on, on the seconds that are left.
+            kind: Kind of the request.
+            value: Payload of the request.
+            phase: Name of the request in messages.
+            env: Answers the controller's requests.
+            timeout: Seconds that the controller itself may take in total.
+            most: Returns the current upper bound on the seconds left.
         """
         left = min(timeout, most())
         self._talk.send(kind, value, phase, time.monotonic() + left, timeout)
@@ -255,7 +256,7 @@ class Child:
             if asked == Kind.VALUE:
                 return value
             if asked not in {Kind.ENV_RESET, Kind.ENV_STEP}:
-                self._talk.breach("an answer that was not due", phase)
+                self._talk.breach("an unexpected answer", phase)
             try:
                 answer = env.reset() if asked == Kind.ENV_RESET else env.step(value)
                 reply: tuple[Kind, Any] = (Kind.ENV_REPLY, answer)

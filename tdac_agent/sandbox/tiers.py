@@ -1,10 +1,10 @@
-"""The tiers of the sandbox, best first, and what each of them promises.
+"""The tiers of the sandbox, best first, and the promises of each.
 
 Every tier limits time, memory, descriptors, file size and output, scrubs the
 environment, and ends the child with its judge. Where the kernel filters system calls,
-`rlimits` denies network and processes too, yet promises nothing. Under `landlock` a
-controller can learn whether a path exists, and its scratch folder is bounded by the
-file and not in all; a tmpfs bounds it under the two tiers above.
+`rlimits` denies network and processes too, but promises nothing. Under `landlock` a
+controller can find out whether a path exists, and the size limit of the scratch folder
+applies to each file; in the two tiers above, a tmpfs limits the whole folder.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from dataclasses import dataclass
 class Tier:
     """One way to confine a child.
 
-    Each start checks, in the child, that what the tier promises holds.
+    At each start the child checks that the promises of its tier hold.
 
     Attributes:
-        name: As named in a verdict.
-        steps: What the child applies to itself after it has imported numpy.
-        promises: Of `hides_files` (only what it needs can be read), `hides_names`
-            (nor can it be asked whether others exist), `denies_network` and
+        name: Name in verdicts.
+        steps: Confinement steps that the child takes after it has imported numpy.
+        promises: Some of `hides_files` (only needed files can be read), `hides_names`
+            (nor can it find out whether others exist), `denies_network` and
             `denies_processes` (no fork, no program, no thread).
     """
 
@@ -32,16 +32,16 @@ class Tier:
 
 
 ALL_PROMISES = ("hides_files", "hides_names", "denies_network", "denies_processes")
-BUT_NAMES = ("hides_files", "denies_network", "denies_processes")
-# Landlock inside of bubblewrap keeps the children of one zygote from one another.
-INSIDE = ("end with parent", "rlimits", "landlock if offered", "seccomp")
+ALL_BUT_NAMES = ("hides_files", "denies_network", "denies_processes")
+# Inside bubblewrap, Landlock separates the children of one zygote.
+BUBBLEWRAP_STEPS = ("end with parent", "rlimits", "landlock if offered", "seccomp")
 TIERS = (
-    Tier("bubblewrap", INSIDE, ALL_PROMISES),
+    Tier("bubblewrap", BUBBLEWRAP_STEPS, ALL_PROMISES),
     Tier("namespaces", ("namespaces", "rlimits", "seccomp"), ALL_PROMISES),
-    Tier("landlock", ("rlimits", "landlock", "seccomp"), BUT_NAMES),
+    Tier("landlock", ("rlimits", "landlock", "seccomp"), ALL_BUT_NAMES),
     Tier("rlimits", ("rlimits", "seccomp if offered"), ()),
 )
-# One that promises nothing is used where it is named, never by itself.
+# A tier without promises is used only where it is named explicitly.
 CONFINING = tuple(tier for tier in TIERS if tier.promises)
 
 
@@ -51,8 +51,8 @@ class TierStatus:
 
     Attributes:
         tier: The tier.
-        works: Whether a child starts in it and finds its promises to hold.
-        reason: Why it does not work, or an empty text.
+        works: Whether a child starts in it and the promises hold.
+        reason: Why it does not work; empty if it does.
     """
 
     tier: Tier
@@ -61,5 +61,5 @@ class TierStatus:
 
     @property
     def withdrawn(self) -> tuple[str, ...]:
-        """What this tier does not promise."""
+        """Promises that this tier does not make."""
         return tuple(p for p in ALL_PROMISES if p not in self.tier.promises)

@@ -1,8 +1,7 @@
-"""How long a process was ready to run while the machine was busy with others.
+"""Run-queue statistics: how long a process was ready to run but had no CPU.
 
-Source: Linux, `Documentation/scheduler/sched-stats.rst`: time on a CPU, time in line
-for one, both of the first thread and in ns. Where the kernel does not tell, nobody
-stands in line.
+Source: Linux, `Documentation/scheduler/sched-stats.rst`: time on a CPU and run-queue
+wait time, both of the first thread and in ns. Without them both times are 0.
 """
 
 from __future__ import annotations
@@ -11,31 +10,31 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-# A kernel updates the time on a CPU with each of its ticks, at least each 10 ms.
+# The kernel updates the time on a CPU at each tick, at least every 10 ms.
 TICKS_SECONDS = 0.025
 
 
 @dataclass(slots=True)
 class Line:
-    """A process's place among those that want a CPU; sleepers are not in line.
+    """Run-queue statistics of a process; time asleep does not count.
 
     Attributes:
-        pid: Its id, or `thread-self` for the thread that asks.
+        pid: Process ID, or `thread-self` for the calling thread.
     """
 
     pid: int | str
 
     def waited(self) -> float:
-        """Seconds in line since it began, up to when it last got a CPU."""
+        """Returns the total run-queue wait time, s, up to when it last got a CPU."""
         return self.times()[1]
 
     def times(self) -> tuple[float, float]:
-        """Seconds on a CPU, and in line for one."""
+        """Returns the total time on a CPU and the total run-queue wait time, s."""
         ran, waited = self._statistics()
         return ran / 1e9, waited / 1e9
 
     def stands(self) -> bool:
-        """Whether it is ready to run, and gets no CPU; looks for some 25 ms."""
+        """Whether it is ready to run but gets no CPU; takes about 25 ms."""
         before = self._statistics()
         if before == (0, 0) or not self._is_ready():
             return False

@@ -1,7 +1,7 @@
 """Zygotes: processes with numpy loaded that fork children, each for one use.
 
-Starting an interpreter and loading numpy costs a tenth of a second, a fork a few
-thousandths. No controller's code runs in a zygote, so its children share nothing that
+Starting an interpreter and loading numpy takes a tenth of a second, a fork a few
+milliseconds. No controller code runs in a zygote, so its children share nothing that
 one of them could have written.
 """
 
@@ -40,12 +40,12 @@ BOOT = (
     "sys.path[:] = [code, *sys.path, site]; from inner.zygote import main; "
     "main(*map(int, fds), site)"
 )
-# No `-I`: it would ignore PYTHONHASHSEED. The environment below is all there is.
+# Not `-I`: it ignores PYTHONHASHSEED. `_environment` is the whole environment.
 OPTIONS = ("-s", "-S", "-P", "-B", "-u", "-X", "utf8")
 SLOTS = 16
 KEPT_OUTPUT = 4000
 REAP_SECONDS = 10.0
-# How many folders were given away, and how many children live.
+# Indices of the counters: folders that are in use or were, and living children.
 GIVEN, ALIVE = 0, 1
 
 Reaped = tuple[int, float, int]
@@ -53,15 +53,16 @@ Reaped = tuple[int, float, int]
 
 @dataclass(slots=True)
 class Forked:
-    """A child as it was forked.
+    """A newly forked child.
 
     Attributes:
-        pid: Its process id here, and that of a process group of its own.
+        pid: Its process ID as seen by the judge, also the ID of its process group.
         folder: Its private folder.
-        channel: The way to talk with it.
-        line: The line for a CPU in which its controller stands.
+        channel: Channel to it.
+        line: Run-queue statistics of its controller's process.
         lifeline: When this descriptor closes, the kernel kills the process group.
-        reap: Waits for its end; exit code or minus the signal, CPU s, resident bytes.
+        reap: Waits for its end; returns exit code or minus the signal, CPU time, s,
+            and peak resident bytes.
     """
 
     pid: int
@@ -73,20 +74,20 @@ class Forked:
 
 
 class NoRoomError(Exception):
-    """A zygote has had all the children it can have."""
+    """A zygote can have no more children."""
 
 
 class Zygote:
-    """Forks as many children as it has folders for; ends with the last of them.
+    """Forks one child for each of its folders; ends with the last child.
 
-    Where the kernel cannot keep the files of its children from one another, it has
-    one child only. Forks of the process that made it may use it as well, and share
-    its folders; only that process ends it.
+    Where the kernel cannot separate the files of its children, it has only one child.
+    Forks of the process that made it may use it too, and share its folders; only that
+    process ends it.
 
     Args:
         tier: Name of the tier.
-        limits: The scratch folders are bounded by these.
-        slots: Number of children.
+        limits: Limits of the scratch folders.
+        slots: Maximum number of children.
 
     Raises:
         SandboxError: The tier cannot be used.
@@ -103,7 +104,7 @@ class Zygote:
         self._counts = shared_counters(2)
         self.parent = Path(tempfile.mkdtemp(prefix="tdac-child-")).resolve()
         self.site = self.parent / "site"
-        # A file of the zygote's that no child may read.
+        # No child may be able to read this file.
         self.witness = self.parent / "witness"
         try:
             self._furnish()
@@ -117,15 +118,15 @@ class Zygote:
 
     @property
     def slots(self) -> int:
-        """How many further children it can have."""
+        """Number of further children that it can have."""
         return len(self._folders) - self._counts[GIVEN]
 
     def fork(self, limits: Limits) -> Forked:
-        """A new child that waits for its setup frame.
+        """Return a new child, which waits for its setup frame.
 
         Raises:
-            SandboxError: The zygote did not start, or has ended.
-            NoRoomError: Another process got the last folder.
+            SandboxError: The zygote did not start, has ended, or cannot fork.
+            NoRoomError: No folder is left.
         """
         with self._lock, contextlib.ExitStack() as theirs, contextlib.ExitStack() as us:
             if not self.slots:
@@ -157,18 +158,18 @@ class Zygote:
         return not self._end.alive
 
     def close(self) -> None:
-        """Have no further children; end now or with the last one."""
+        """Fork no further children; end now or with the last one."""
         with self._lock:
             self._counts[GIVEN] = len(self._folders)
             if not self._counts[ALIVE]:
                 self._end()
 
     def kill(self) -> None:
-        """End now, with all children; nobody else may use it any more."""
+        """End now, with all children; no process may use it afterwards."""
         self._end()
 
     def _reap(self, number: int) -> Reaped:
-        """Waits for a child that was killed; its id is nobody else's until then."""
+        """Wait for a killed child, whose process ID stays reserved until then."""
         lost = -signal.SIGKILL, 0.0, 0
         with self._lock:
             try:
@@ -184,7 +185,7 @@ class Zygote:
         return reaped
 
     def _answer(self) -> tuple[tuple[int, float, int], int]:
-        """A reply, and the process id of its sender in our namespace."""
+        """Return a reply, and the process ID of its sender in our namespace."""
         size = socket.CMSG_SPACE(struct.calcsize("3i"))
         data, ancillary, _, _ = self._link.recvmsg(REPLY.size, size)
         if len(data) < REPLY.size:
@@ -195,7 +196,7 @@ class Zygote:
         return reply, reply[0]
 
     def _last_words(self, error: OSError) -> str:
-        """What the zygote printed, else the error."""
+        """Kill the zygote; return what it printed, else the error."""
         self._process.kill()
         self._process.wait()
         with contextlib.suppress(BlockingIOError):
@@ -211,7 +212,7 @@ class Zygote:
         self.witness.write_text("not for children\n")
 
     def _start(self) -> tuple[subprocess.Popen[bytes], socket.socket, int, int]:
-        """The process, our end of its socket, its output, and its lifeline."""
+        """Return the process, our end of its socket, its output, and its lifeline."""
         with contextlib.ExitStack() as theirs, contextlib.ExitStack() as ours:
             link, control = socket.socketpair()
             ours.callback(link.close)
@@ -242,7 +243,7 @@ class Zygote:
             )
             _tie(lifeline, process.pid)
             if sys.platform == "linux":
-                # A child's id as the kernel says it, seen from our namespace.
+                # The kernel reports a child's ID as seen from our namespace.
                 link.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
             os.set_blocking(printed, False)
             ours.pop_all()
@@ -252,7 +253,7 @@ class Zygote:
 def _pipes(
     theirs: contextlib.ExitStack, ours: contextlib.ExitStack
 ) -> tuple[list[int], list[int]]:
-    """Ends for the child and for us: requests, answers, output, lifeline."""
+    """Return the child's and our pipe ends: requests, answers, output, lifeline."""
     inner: list[int] = []
     outer: list[int] = []
     for we_write in (True, False, False, True):
@@ -273,7 +274,7 @@ def _end(
     lifeline: int,
     parent: Path,
 ) -> None:
-    """Kills a zygote, and with it what is left of its children; its owner alone may."""
+    """Kill a zygote and its remaining children; only its owner process does this."""
     if os.getpid() != owner:
         return
     link.close()
@@ -286,7 +287,7 @@ def _end(
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return the whole environment of a zygote: nothing of ours but library paths."""
+    """Return a zygote's whole environment, which takes only library paths from ours."""
     environment = {
         "HOME": str(folder),
         "TMPDIR": str(folder),
@@ -303,7 +304,7 @@ def _environment(folder: Path) -> dict[str, str]:
 def _tie(lifeline: int, group: int) -> None:
     """Have the kernel kill `group` when our end of the lifeline closes.
 
-    Unlike the parent-death signal this holds for the process and not for the thread
+    Unlike the parent-death signal, this depends on our process and not on the thread
     that started the child.
     """
     if sys.platform == "linux":

@@ -92,7 +92,7 @@ def test_a_tier_that_does_not_confine_is_refused(monkeypatch, tmp_path):
     )
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
-    with pytest.raises(SandboxError, match="does not hold here: hides_names"):
+    with pytest.raises(SandboxError, match="promises not kept: hides_names"):
         start(tier="bubblewrap")
 
 
