@@ -113,8 +113,7 @@ def entries_but_hidden(seen: Exposure) -> tuple[list[str], list[str]]:
     """Return `system` without `hidden`, for a sandbox that cannot mask a folder.
 
     Returns:
-        Paths that may be read with everything below, and folders that may only be
-        listed.
+        Paths that may be read with everything below, folders that may only be listed.
     """
     readable, listable = [], []
     pending = list(seen.system)

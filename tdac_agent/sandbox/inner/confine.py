@@ -13,15 +13,15 @@ from . import kernel, landlock, namespaces, seccomp
 
 
 def confine(setup: dict[str, Any]) -> dict[str, int]:
-    """Apply `setup["steps"]` in order; return what was found to hold, and `pid`.
+    """Apply `setup["steps"]` in order; return which promises hold.
 
-    That is the id of this process outside, where a step has given it another one.
+    The result also has `pid`, this process's ID outside, if a step has changed it.
 
     Args:
         setup: The judge's setup frame.
 
     Raises:
-        OSError: A step is not possible here.
+        OSError: A step is not possible on this machine.
     """
     found: dict[str, int] = {}
     for step in setup["steps"]:
@@ -37,7 +37,7 @@ def confine(setup: dict[str, Any]) -> dict[str, int]:
 
 
 def _end_with_parent(setup: dict[str, Any]) -> None:
-    """Die with bubblewrap: the lifeline's signal does not reach a first process."""
+    """Have the kernel kill this process when its parent, the zygote, ends."""
     del setup
     kernel.prctl(kernel.PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -53,7 +53,7 @@ def _limit_resources(setup: dict[str, Any]) -> None:
     for name, value in limits.items():
         _lower(name, value, value)
     seconds = setup["cpu_seconds"]
-    # The first is a signal that says why; the second cannot be caught.
+    # The soft limit sends SIGXCPU, which shows the reason; the hard one sends SIGKILL.
     _lower(resource.RLIMIT_CPU, seconds, seconds + 1)
 
 
@@ -92,7 +92,7 @@ def _limit_system_calls_if_offered(setup: dict[str, Any]) -> None:
 
 
 def _files_hidden(witnesses: list[str]) -> bool:
-    """Return whether none of some files that exist outside can be opened."""
+    """Return whether none of these files, which exist outside, can be opened."""
     for path in witnesses:
         try:
             os.close(os.open(path, os.O_RDONLY))

@@ -1,4 +1,4 @@
-"""Decode one value of the wire format, from bytes that nobody has vouched for."""
+"""Decode one value of the wire format from untrusted bytes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .wire import (
     printable,
 )
 
-# Two floats in a tuple or a list, as most answers are.
+# Two floats in a tuple or a list: the most frequent answer.
 PAIR = struct.Struct("<cIcdcd")
 SIZES = [dtype.itemsize for dtype in DTYPES]
 BOOL = CODES[np.dtype(np.bool_)]
@@ -51,12 +51,12 @@ class _Reader:
 
 
 def decode(data: bytes, pos: int = 0, resolve: Resolver | None = None) -> Any:
-    """Decode one value that fills `data` from `pos` on.
+    """Decode the one value that `data` contains from `pos` to its end.
 
     Args:
         data: The bytes.
-        pos: Where the value starts.
-        resolve: Gives the object behind a handle; without it handles stay handles.
+        pos: Start of the value.
+        resolve: Returns the object behind a handle; without it handles stay handles.
 
     Raises:
         WireError: The bytes are not exactly one value.

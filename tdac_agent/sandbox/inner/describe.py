@@ -1,4 +1,4 @@
-"""Describe an exception of the controller by its own lines only."""
+"""Describe an exception of the controller, showing only lines of its own file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_LINE = 160
 
 
 def describe(error: BaseException, source: str) -> RemoteError:
-    """Return name, message, and where in the controller `error` was raised."""
+    """Return the type and message of `error`, and where the controller raised it."""
     try:
         first, left_out, last = _own_frames(error.__traceback__)
         if isinstance(error, SyntaxError) and error.filename == FILE_NAME:
@@ -34,7 +34,7 @@ def describe(error: BaseException, source: str) -> RemoteError:
 
 
 def type_name(value: object) -> str:
-    """Return the name of the class of `value`, past any metaclass."""
+    """Return the name of the class of `value`, bypassing any metaclass."""
     name = str(type.__dict__["__name__"].__get__(type(value)))
     return printable(name.replace("\n", " "), MAX_NAME)
 
@@ -50,7 +50,7 @@ def _message(error: BaseException) -> str:
 def _own_frames(
     traceback: TracebackType | None,
 ) -> tuple[list[tuple[int, str]], int, deque[tuple[int, str]]]:
-    """Return the first frames, how many are left out, and the last, of any number."""
+    """Return the controller's first frames, the number left out, and the last ones."""
     half = MAX_LINES // 2
     first: list[tuple[int, str]] = []
     last: deque[tuple[int, str]] = deque(maxlen=half)

@@ -28,7 +28,7 @@ from .wire import (
 
 ARRAYS = [struct.Struct(f"<cBB{count}I") for count in range(MAX_DIMENSIONS + 1)]
 BUILTINS = (dict, list, tuple, str, bytes, int, float)
-# On Linux these are int64 and uint64 under a second name.
+# The last two are aliases of int64 and uint64 on Linux.
 SCALARS = {*(dtype.type for dtype in DTYPES), np.longlong, np.ulonglong}
 
 Keeper = Callable[[object], Handle]
@@ -50,9 +50,9 @@ def encode(value: object, keep: Keeper | None = None) -> bytes:
     """Encode one value.
 
     Args:
-        value: What to send.
-        keep: Called with each object that has no encoding; gives its handle. Without
-            it such an object is an error.
+        value: Value to encode.
+        keep: Called with each object that has no encoding; returns its handle.
+            Without it, such an object is an error.
 
     Raises:
         WireError: The value is too deep, too large or has no encoding.
@@ -82,7 +82,7 @@ def _put_other(w: _Writer, value: Any) -> None:
 
 
 def _plain(builtin: Any, value: Any) -> Any:
-    """Return a value of a subclass as the built-in, past overridden methods."""
+    """Convert a subclass instance to the built-in type, bypassing its own methods."""
     if builtin is dict:
         return dict(dict.items(value))
     if builtin is list:
@@ -164,7 +164,7 @@ def _put_dict(w: _Writer, value: dict[Any, Any]) -> None:
 def _count_keys(w: _Writer, count: int) -> None:
     w.dict_room -= count
     if w.dict_room < 0:
-        most = f"{MAX_DICT_ITEMS} dict items (a key that is no text counts {ODD_KEY})"
+        most = f"{MAX_DICT_ITEMS} dict items (a non-string key counts {ODD_KEY})"
         raise WireError(f"a value has more than {most}")
 
 
@@ -182,7 +182,7 @@ def _put_array(w: _Writer, value: Any) -> None:
 
 
 def _put_other_array(w: _Writer, value: Any) -> None:
-    """Encode an array whose bytes are swapped; the rest have no encoding."""
+    """Encode an array in another byte order; all others have no encoding."""
     dtype = value.dtype.newbyteorder("<")
     if dtype in CODES and value.ndim <= MAX_DIMENSIONS:
         _put_array(w, value.astype(dtype))

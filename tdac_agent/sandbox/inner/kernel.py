@@ -1,4 +1,4 @@
-"""Calls to the kernel that the standard library has no function for."""
+"""Kernel calls that the standard library does not offer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 
 def syscall(name: str, *arguments: int | ctypes.Array[ctypes.c_char] | None) -> int:
-    """Make one system call of the setup table.
+    """Make one system call from the setup table.
 
     Raises:
         OSError: It failed, or this processor is not supported.
@@ -32,7 +32,7 @@ def prctl(option: int, value: int) -> None:
 
 
 def unshare(flags: int) -> None:
-    """Leave the namespaces named by `flags`."""
+    """Move this process into new namespaces of the kinds in `flags`."""
     _checked("unshare", _libc.unshare(flags))
 
 
@@ -44,12 +44,12 @@ def mount(source: str, target: str, kind: str, flags: int, data: str = "") -> No
 
 
 def detach(target: str) -> None:
-    """Unmount `target` and all below it."""
+    """Unmount `target` and everything below it."""
     _checked("umount", _libc.umount2(os.fsencode(target), 2))
 
 
 def can_open_socket() -> bool:
-    """Return whether the kernel gives this process an internet socket."""
+    """Return whether this process can open an internet socket."""
     descriptor = _libc.socket(2, 2, 0)
     if descriptor < 0:
         return False

@@ -1,4 +1,4 @@
-"""Landlock: what this process may open, restricted by the kernel for good."""
+"""Landlock: the kernel permanently restricts the files that a process may open."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FILE_RIGHTS = _WRITE_FILE | _READ_FILE | _TRUNCATE
 
 
 def is_offered() -> bool:
-    """Return whether this kernel has it."""
+    """Return whether this kernel has Landlock."""
     try:
         return sys.platform == "linux" and _version() > 0
     except OSError:
@@ -36,13 +36,13 @@ def _version() -> int:
 
 
 def apply(rights: list[tuple[str, int]]) -> None:
-    """Deny all files but those below the given paths.
+    """Deny access to all files except those below the given paths.
 
     Args:
         rights: (path, rights below it); a path that cannot be opened is left out.
 
     Raises:
-        OSError: The kernel does not offer it.
+        OSError: The kernel does not have Landlock.
     """
     abi = _version()
     ruleset = kernel.syscall("landlock_create_ruleset", *_ruleset(abi), 0)
@@ -57,13 +57,13 @@ def apply(rights: list[tuple[str, int]]) -> None:
 
 
 def _known(abi: int) -> int:
-    """Return all rights over files that a version of the interface has."""
+    """Return all file rights that a version of the interface has."""
     bits = {1: 13, 2: 14, 3: 15, 4: 15}.get(abi, 16)
     return (1 << bits) - 1
 
 
 def _ruleset(abi: int) -> tuple[ctypes.Array[ctypes.c_char], int]:
-    """Return the attributes: every right over files, TCP, and scopes, where known."""
+    """Return the ruleset with all file rights, TCP rights and scopes that exist."""
     words = [_known(abi), 0b11, 0b11][: 1 if abi < 4 else 2 if abi < 6 else 3]
     data = struct.pack(f"={len(words)}Q", *words)
     return ctypes.create_string_buffer(data, len(data)), len(data)

@@ -1,4 +1,4 @@
-"""The wire format of a dict of arrays that is sent over and over again."""
+"""Fast encoding of a dict of arrays that is sent again and again."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from .encode import encode
 
 
 class Layout:
-    """The bytes of a dict of arrays, all but the numbers in them.
+    """The encoded bytes of a dict of arrays, except for the numbers.
 
-    Observations differ only in their numbers, so that the rest is made and checked
-    once; what has another form is left to `encode` and `decode`.
+    Observations differ only in their numbers, so the rest is made and checked once.
+    Values with another layout are left to `encode` and `decode`.
 
     Args:
-        example: A dict of non-empty arrays in native byte order, with text for keys.
+        example: A dict of non-empty arrays in native byte order, with string keys.
     """
 
     def __init__(self, example: dict[str, Any]) -> None:
@@ -34,7 +34,7 @@ class Layout:
 
     @classmethod
     def of(cls, value: object) -> Layout | None:
-        """The layout of a value, or None where it is no dict of arrays."""
+        """Return the layout of a value, or None if it is no suitable dict of arrays."""
         if type(value) is not dict or not value:
             return None
         for key, item in value.items():
@@ -45,7 +45,7 @@ class Layout:
         return cls(value)
 
     def encode(self, value: dict[str, Any]) -> bytes | None:
-        """The bytes of a value of this layout; None of another one."""
+        """Return the bytes of a value, or None if it does not have this layout."""
         if len(value) != len(self._fields):
             return None
         parts = []
@@ -60,7 +60,7 @@ class Layout:
         return b"".join(parts)
 
     def decode(self, data: bytes) -> dict[str, Any] | None:
-        """The value that bytes of this layout stand for; None for other bytes."""
+        """Return the value of these bytes, or None if they do not have this layout."""
         if len(data) != self._size:
             return None
         value = {}

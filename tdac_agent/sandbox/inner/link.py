@@ -26,7 +26,7 @@ class Link:
     def receive(self) -> tuple[int, int, bytes]:
         """Return kind, sequence number and payload of the next request.
 
-        The process ends here when the judge has closed its end.
+        Ends the process when the judge has closed its end.
         """
         data = self._read(SHORT)
         while len(data) < HEADER.size:
@@ -52,7 +52,7 @@ class Link:
         """Write one frame.
 
         Raises:
-            WireError: The payload is larger than a frame may be.
+            WireError: The payload exceeds the size limit of a frame.
         """
         if len(payload) > self.frame_bytes:
             raise WireError(

@@ -1,4 +1,4 @@
-"""Entry of the child: read the setup, give up rights, serve."""
+"""Entry point of the child: read the setup, drop privileges, serve."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def main(requests: int, answers: int, lifeline: int, site: str) -> None:
     """Serve the judge on two descriptors until it closes them.
 
     Args:
-        requests: Descriptor that the judge writes to.
-        answers: Descriptor that the judge reads.
-        lifeline: Descriptor that has to stay open.
+        requests: Descriptor to read requests from.
+        answers: Descriptor to write answers to.
+        lifeline: Descriptor that must stay open.
         site: Folder from which numpy is imported.
     """
     link = Link(requests, answers)

@@ -1,6 +1,6 @@
-"""Own user, mount, process, network, IPC and host-name namespaces, without a helper.
+"""New user, mount, PID, network, IPC, host-name and cgroup namespaces.
 
-What bubblewrap does, for machines that do not have it.
+Replaces bubblewrap on machines that do not have it.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ _PID = struct.Struct("=i")
 
 
 def enter(setup: dict[str, Any]) -> dict[str, int]:
-    """Move this process into new namespaces; return in the first process of them.
+    """Move this process into new namespaces; return in their first process.
 
-    The process that called waits outside and ends as the inner one does.
+    The calling process stays outside, and ends as the inner one does.
 
     Returns:
-        The process id of the inner one as seen from outside, where /proc can tell the
-        judge how it fares.
+        The ID of the inner process as seen from outside, with which the judge reads
+        its CPU times in /proc.
 
     Raises:
         OSError: The kernel or the container does not allow it.
@@ -46,19 +46,19 @@ def enter(setup: dict[str, Any]) -> dict[str, int]:
     _write("/proc/self/gid_map", f"{_NOBODY} {gid} 1")
     kernel.mount("none", "/", "", _RECURSIVE | _PRIVATE)
     _build_root(setup)
-    outside, tell = os.pipe()
+    pid_read, pid_write = os.pipe()
     pid = os.fork()
     if pid:
-        os.write(tell, _PID.pack(pid))
-        _stand_by(pid, [*setup["descriptors"], outside, tell])
-    os.close(tell)
-    (seen_as,) = _PID.unpack(os.read(outside, _PID.size))
-    os.close(outside)
+        os.write(pid_write, _PID.pack(pid))
+        _wait_and_exit(pid, [*setup["descriptors"], pid_read, pid_write])
+    os.close(pid_write)
+    (outer_pid,) = _PID.unpack(os.read(pid_read, _PID.size))
+    os.close(pid_read)
     kernel.prctl(kernel.PR_SET_PDEATHSIG, signal.SIGKILL)
     kernel.prctl(kernel.PR_SET_NO_NEW_PRIVS, 1)
     header = struct.pack("=Ii", 0x20080522, 0)
     kernel.syscall("capset", _buffer(header), _buffer(bytes(24)))
-    return {"pid": seen_as}
+    return {"pid": outer_pid}
 
 
 def _write(path: str, text: str) -> None:
@@ -71,9 +71,9 @@ def _buffer(data: bytes) -> ctypes.Array[ctypes.c_char]:
 
 
 def _build_root(setup: dict[str, Any]) -> None:
-    """Make a root folder of the visible paths only, and move into it."""
+    """Make a root folder with only the visible paths, and move into it."""
     scratch = setup["scratch"]
-    # The scratch folder is the one place that is surely ours to mount over.
+    # The scratch folder is the only place that is certainly free to mount over.
     kernel.mount("tmpfs", scratch, "tmpfs", _NOSUID | _NODEV, "mode=755")
     for path, target in setup["links"]:
         os.symlink(target, scratch + path)
@@ -85,7 +85,7 @@ def _build_root(setup: dict[str, Any]) -> None:
         _show(path, scratch, _RECURSIVE)
     for path in (*setup["devices"], setup["root"], setup["site"]):
         _show(path, scratch, 0)
-    _hide_ways(setup, scratch)
+    _hide_parents(setup, scratch)
     _make_read_only(scratch)
     options = f"mode=700,size={setup['scratch_bytes']}"
     kernel.mount("tmpfs", scratch + scratch, "tmpfs", _NOSUID | _NODEV, options)
@@ -105,16 +105,16 @@ def _show(path: str, root: str, recursive: int) -> None:
     kernel.mount(path, target, "", _BIND | recursive)
 
 
-def _hide_ways(setup: dict[str, Any], root: str) -> None:
-    """Keep the folders that lead to visible ones from being listed.
+def _hide_parents(setup: dict[str, Any], root: str) -> None:
+    """Prevent the listing of the parent folders of visible paths.
 
-    Their names tell where this machine has its files, and differ from run to run.
+    Their names show where this machine has its files, and differ from run to run.
     """
     shown = (*setup["system"], *setup["packages"], setup["root"], setup["site"])
     device = os.stat(root).st_dev
-    for way in {parent for path in shown for parent in _parents(path)}:
-        if os.stat(root + way).st_dev == device:
-            os.chmod(root + way, 0o111)
+    for parent in {parent for path in shown for parent in _parents(path)}:
+        if os.stat(root + parent).st_dev == device:
+            os.chmod(root + parent, 0o111)
 
 
 def _parents(path: str) -> list[str]:
@@ -124,12 +124,12 @@ def _parents(path: str) -> list[str]:
 def _make_read_only(root: str) -> None:
     """Make every mount below `root` read-only, without set-uid programs."""
     attributes = struct.pack("=4Q", 1 | 2, 0, 0, 0)
-    here, recursively = -100, 0x8000
+    at_cwd, recursive = -100, 0x8000
     path = _buffer(os.fsencode(root) + b"\0")
-    kernel.syscall("mount_setattr", here, path, recursively, _buffer(attributes), 32)
+    kernel.syscall("mount_setattr", at_cwd, path, recursive, _buffer(attributes), 32)
 
 
-def _stand_by(pid: int, descriptors: list[int]) -> None:
+def _wait_and_exit(pid: int, descriptors: list[int]) -> None:
     """Wait for the inner process and end as it did."""
     for descriptor in descriptors:
         os.close(descriptor)

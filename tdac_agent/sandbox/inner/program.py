@@ -1,4 +1,4 @@
-"""Run a whole program, such as a Webots controller, whose steps are the judge's."""
+"""Run a whole program, such as a Webots controller, while the judge steps its world."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ PACKAGE = "controller"
 
 
 def run_program(source: bytes, arguments: list[str], world: Any) -> int | str | None:
-    """Run a file as `__main__`; return what it gave to `sys.exit`, if it did.
+    """Run a program as `__main__`; return its argument of `sys.exit`, or None.
 
-    It finds itself, with all files beside it, in a folder where it may write.
+    It runs in a writable copy of its folder.
 
     Args:
-        source: Of the program.
-        arguments: Those of `sys.argv` after the first.
-        world: Handed to the package `controller`, which is beside the program.
+        source: Source of the program.
+        arguments: Entries of `sys.argv` after the first.
+        world: Passed to the package `controller` in the program's folder.
     """
     folder = os.path.join(os.environ["TMPDIR"], "program")
     _copy(os.getcwd(), folder)
@@ -43,7 +43,7 @@ def run_program(source: bytes, arguments: list[str], world: Any) -> int | str | 
 
 
 def _copy(source: str, target: str) -> None:
-    """Copy a folder, contents only: a sandboxed process may not set rights."""
+    """Copy a folder without permissions, which a sandboxed process may not set."""
     os.mkdir(target)
     for entry in os.scandir(source):
         copy = os.path.join(target, entry.name)

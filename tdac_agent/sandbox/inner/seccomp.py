@@ -1,4 +1,4 @@
-"""Allow-list of system calls, enforced by the kernel; all others give EPERM."""
+"""Allow-list of system calls, enforced by the kernel; all others fail with EPERM."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ _ALLOW, _KILL, _DENY = 0x7FFF0000, 0x80000000, 0x00050000 | errno.EPERM
 _X32 = 0x40000000
 _IOCTLS = (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451)
 _FCNTLS = (0, 1, 2, 3, 1030)
-# Wait, wake, requeue, and those with a mask or by the wall clock, each of them private.
+# Wait, wake and requeue, with their bitset and wall-clock variants, all private.
 _FUTEXES = (128, 129, 131, 132, 137, 138, 384, 393)
 
 Instruction = tuple[int, int, int, int]
 
 
 def apply(lifeline: int) -> None:
-    """Restrict this process for good.
+    """Restrict this process permanently.
 
     Args:
-        lifeline: Descriptor that must stay open: the kernel kills the process through
-            it when the judge has gone.
+        lifeline: Descriptor that must stay open: through it the kernel kills the
+            process when the judge has ended.
 
     Raises:
-        OSError: The kernel or the processor does not offer it.
+        OSError: The kernel does not have seccomp, or the processor is not supported.
     """
     install(program(lifeline))
 
 
 def install(steps: list[Instruction]) -> None:
-    """Have the kernel filter this process's calls, and those of its children.
+    """Have the kernel filter the calls of this process and of its children.
 
     Raises:
-        OSError: The kernel does not offer it.
+        OSError: The kernel does not have seccomp.
     """
     code = b"".join(struct.pack("<HBBI", *step) for step in steps)
     buffer = ctypes.create_string_buffer(code, len(code))
@@ -80,9 +80,9 @@ def _guards(lifeline: int) -> dict[str, list[Instruction]]:
         "ioctl": [*_one_of(1, _IOCTLS), (_RETURN, 0, 0, _ALLOW)],
         "kill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
         "tgkill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
-        # On memory of its own: others map the same files.
+        # Private ones only: other children map the same files.
         "futex": [*_one_of(1, _FUTEXES), (_RETURN, 0, 0, _ALLOW)],
-        # May read its own limits and set none.
+        # It may read its own limits, but set none.
         "prlimit64": [
             *_one_of(0, (0, own)),
             *_one_of(2, (0,)),

@@ -1,4 +1,4 @@
-"""Serve the judge's requests on one controller."""
+"""Serve the judge's requests to one controller."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Server:
             self._send(Kind.ERROR, described)
 
     def _value(self, kind: int, payload: bytes) -> Any:
-        """What a request says; observations, which are many, in a faster way."""
+        """Decode a request; observations, which are frequent, use a layout."""
         if kind == Kind.POLICY and self._layout is not None:
             observation = self._layout.decode(payload)
             if observation is not None:
@@ -80,7 +80,7 @@ class Server:
         raise WireError(f"not a request: {kind}")
 
     def _use(self, kind: int, owner: object, name: str | None, *rest: Any) -> Any:
-        """Gets a value, calls a function once, or calls it for each of a list."""
+        """Get a value, call a function once, or call it for each argument tuple."""
         target = self._target(owner, name)
         if kind == Kind.GET:
             return target
@@ -123,7 +123,7 @@ class Server:
         return self._objects[handle.id]
 
     def ask(self, kind: Kind, value: object) -> Any:
-        """Send a request of the controller to the judge's environment.
+        """Send a controller's request to the judge's environment; return the reply.
 
         Raises:
             RuntimeError: The environment refused it.
@@ -137,7 +137,7 @@ class Server:
 
 
 class Env:
-    """The judge's environment as `run_episode` sees it; every step is the judge's.
+    """The judge's environment as `run_episode` sees it; the judge makes every step.
 
     Args:
         server: Carries the requests.
@@ -149,7 +149,7 @@ class Env:
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> Any:
-        """Return the first observation and info; seed and options are the judge's."""
+        """Return the first observation and info; the judge sets seed and options."""
         del seed, options
         return self._server.ask(Kind.ENV_RESET, None)
 
@@ -158,7 +158,7 @@ class Env:
         return self._server.ask(Kind.ENV_STEP, action)
 
     def render(self) -> None:
-        """Show nothing."""
+        """Do nothing."""
 
     def close(self) -> None:
-        """Leave the environment to the judge."""
+        """Do nothing: the judge closes the environment."""

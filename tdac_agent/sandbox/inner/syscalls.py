@@ -1,13 +1,13 @@
 """System calls that a controller may make, by number and processor.
 
-Left out on purpose: whatever makes processes, threads, sockets, links, devices, new
-rights or shared memory, locks files that other children see, looks into another
-process, or leaves the process group.
+Left out on purpose: calls that make processes, threads, sockets, links, devices, new
+rights or shared memory, lock files that other children see, inspect another process, or
+leave the process group.
 """
 
 from __future__ import annotations
 
-# Name, number on x86_64, number on aarch64 (`-` where it has none).
+# Name, number on x86_64, number on aarch64 (`-` if it has none).
 ALLOWED = """
 read 0 63, write 1 64, readv 19 65, writev 20 66, pread64 17 67, pwrite64 18 68,
 lseek 8 62, openat 257 56, open 2 -, creat 85 -, fstat 5 80, newfstatat 262 79,
@@ -33,17 +33,17 @@ uname 63 160, getcpu 309 168, sched_yield 24 124, sched_getaffinity 204 123,
 getrandom 318 278, wait4 61 260, waitid 247 95, exit 60 93,
 exit_group 231 94
 """
-# Allowed with the arguments that `seccomp` names.
+# Allowed only with the arguments listed in `seccomp`.
 _GUARDED = """
 close 3 57, dup2 33 -, dup3 292 24, fcntl 72 25, ioctl 16 29, kill 62 129,
 tgkill 234 131, prlimit64 302 261, futex 202 98
 """
-# For confining; not for the controller.
+# Used to confine the process; denied to the controller.
 _SETUP = """
 seccomp 317 277, landlock_create_ruleset 444 444, landlock_add_rule 445 445,
 landlock_restrict_self 446 446, pivot_root 155 41, mount_setattr 442 442, capset 126 91
 """
-# Machine to column of the tables and architecture number of the audit interface.
+# Machine: column in the tables, architecture number of the audit interface.
 MACHINES = {"x86_64": (1, 0xC000003E), "aarch64": (2, 0xC00000B7)}
 
 
@@ -54,15 +54,15 @@ def _column(table: str, machine: str) -> dict[str, int]:
 
 
 def allowed(machine: str) -> list[int]:
-    """Return the numbers that are allowed with any arguments."""
+    """Return the numbers of the calls that are allowed with any arguments."""
     return list(_column(ALLOWED, machine).values())
 
 
 def guarded(machine: str) -> dict[str, int]:
-    """Return name and number of those that are allowed with some arguments."""
+    """Return name and number of the calls that are allowed with some arguments."""
     return _column(_GUARDED, machine)
 
 
 def setup(machine: str) -> dict[str, int]:
-    """Return name and number of those that confining needs."""
+    """Return name and number of the calls that the confinement needs."""
     return _column(_SETUP, machine)

@@ -2,10 +2,10 @@
 
 A frame is a little-endian header (payload length u32, kind u8, sequence u32) and one
 encoded value. A value is a tag byte and its content. The decoder turns any bytes into
-a value or a `WireError`, in memory bounded by the length of the bytes; it runs no
-code of the sender. Exact types are kept: a numpy scalar comes back as that scalar.
+a value or a `WireError`, in memory bounded by the number of bytes; it runs no code of
+the sender. Exact types are kept: a numpy scalar comes back as the same numpy type.
 Subclasses of built-in types (a named tuple, an `IntEnum`) come back as the built-in.
-Names of types, and what an exception says, are bounded and printable.
+Type names and exception texts are bounded and printable.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ import numpy as np
 HEADER = struct.Struct("<IBI")
 MAX_DEPTH = 32
 MAX_ITEMS = 1_000_000
-# Keys chosen to collide make a dict quadratic; texts are hashed with a secret, other
-# keys count ten times, as do the items of a key: they still cost under a second.
+# Keys chosen to collide make a dict quadratic. String hashes have a secret seed; other
+# keys, and the items in them, count ten times, so that decoding takes under a second.
 MAX_DICT_ITEMS = 10_000
 ODD_KEY = 10
-# An array is printed more slowly than any other item.
+# An array counts as so many items, since it is the slowest item to print.
 ARRAY_ITEMS = 10
 # Below CPython's limit of 4300 decimal digits, so that every int can be printed.
 MAX_INT_BYTES = 1024
-# One of more dimensions is printed with many of its items, however few of each.
+# With more dimensions numpy prints many items, even of a summarized array.
 MAX_DIMENSIONS = 4
 # Characters of a name, and of any other text about an exception.
 MAX_NAME, MAX_TEXT = 200, 2000
@@ -42,7 +42,7 @@ F64 = struct.Struct("<d")
 
 
 class Kind(IntEnum):
-    """What a frame is: requests of the judge, then answers of the child."""
+    """Kinds of frames: those of the judge, then those of the child."""
 
     SETUP = 1
     LOAD = 2
@@ -66,7 +66,7 @@ class WireError(Exception):
 
 
 def printable(text: str, most: int) -> str:
-    """At most so many characters of a text, with a mark for each that is not one."""
+    """Return at most `most` characters, with a mark for each unprintable one."""
     text = text[:most]
     if text.isprintable():
         return text
@@ -74,13 +74,13 @@ def printable(text: str, most: int) -> str:
 
 
 def is_name(value: object) -> bool:
-    """Whether a value is a text that may be the name of a type or a variable."""
+    """Return whether a value is a string that can be the name of a type or variable."""
     return type(value) is str and len(value) <= MAX_NAME and value.isprintable()
 
 
 @dataclass(frozen=True, slots=True)
 class Handle:
-    """A name for an object that lives in the child.
+    """A reference to an object in the child.
 
     Attributes:
         id: Number of the object in that child.

@@ -18,14 +18,14 @@ from typing import NoReturn
 from . import kernel
 from .main import main as serve
 
-# What is wanted, and of which child.
+# Command, and for REAP the process ID of the child.
 REQUEST = struct.Struct("<cI")
 FORK, REAP = b"F", b"R"
-# To FORK, from the child itself: its process id in this namespace, or -1 and an error
-# number. To REAP: exit code or minus the signal, CPU seconds, largest resident kB.
+# To FORK, from the child itself: its process ID in this namespace; or -1 and an error
+# number. To REAP: exit code or minus the signal, CPU seconds, `ru_maxrss`.
 REPLY = struct.Struct("<qdq")
 DESCRIPTORS = 4
-# What controllers and `sensors.py` import; loaded once and not in each child.
+# Common imports of controllers and `sensors.py`, loaded once and not in each child.
 LIKELY = (
     "bisect",
     "dataclasses",
@@ -48,15 +48,15 @@ def main(control: int, lifeline: int, site: str) -> None:
 
     Args:
         control: Descriptor of the socket.
-        lifeline: Descriptor that is of no use to a child.
+        lifeline: Descriptor that children do not need.
         site: Folder from which numpy is imported.
     """
     if os.getpid() == 1:
-        # Die with bubblewrap: the lifeline's signal does not reach a first process.
+        # Die with bubblewrap, since the lifeline's signal does not reach PID 1.
         kernel.prctl(kernel.PR_SET_PDEATHSIG, signal.SIGKILL)
     for name in LIKELY:
         importlib.import_module(name)
-    # What is alive now stays shared with the children.
+    # The memory of all objects made so far stays shared with the children.
     gc.collect()
     gc.freeze()
     link = socket.socket(fileno=control)
@@ -64,8 +64,8 @@ def main(control: int, lifeline: int, site: str) -> None:
         data, descriptors, _, _ = socket.recv_fds(link, REQUEST.size, DESCRIPTORS)
         if not data:
             os._exit(0)
-        wanted, pid = REQUEST.unpack(data)
-        if wanted == REAP:
+        command, pid = REQUEST.unpack(data)
+        if command == REAP:
             link.send(_reap(pid))
             continue
         try:
@@ -81,14 +81,14 @@ def main(control: int, lifeline: int, site: str) -> None:
 
 
 def _reap(pid: int) -> bytes:
-    """Waits for a child that is ending."""
+    """Wait for a child to end; return its reply to REAP."""
     _, status, used = os.wait4(pid, 0)
     cpu = used.ru_utime + used.ru_stime
     return REPLY.pack(os.waitstatus_to_exitcode(status), cpu, used.ru_maxrss)
 
 
 def _be_child(link: socket.socket, descriptors: list[int], site: str) -> NoReturn:
-    """Leads a process group of its own, and serves on descriptors of its own."""
+    """Lead a new session and process group, and serve the judge."""
     try:
         requests, answers, output, lifeline = descriptors
         os.setsid()
