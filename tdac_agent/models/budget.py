@@ -146,7 +146,7 @@ class Budget:
             self._take(call, worst)
 
     def settle(self, call: str, spent: Amount) -> None:
-        """Replaces the reservation of a call by the amount that it took."""
+        """Replaces the reservation of a call with the amount that it took."""
         with self._synchronized():
             self._take(call, spent)
 

@@ -98,7 +98,7 @@ def _root_cause(error: Exception) -> str:
 
 
 def retry_after(headers: Headers, now: datetime | None = None) -> float | None:
-    """Returns the seconds to wait that a server asks for; None if it does not.
+    """Returns the wait that a server asks for, s; None if it asks for none.
 
     Args:
         headers: Response headers; `retry-after` may be seconds or a date.

@@ -31,7 +31,7 @@ def load_lifecycle() -> Lifecycle:
 
 
 def retired(models: Iterable[str], today: date | None = None) -> list[str]:
-    """Returns those models (`--learner` names) that are retired."""
+    """Returns the given models (`--learner` names) that are retired."""
     now = today or datetime.now(UTC).date()
     ends = load_lifecycle().ends
     return [model for model in models if model in ends and ends[model] <= now]

@@ -45,7 +45,7 @@ class ControllerError(ControllerFault):
     Args:
         type_name: Class of the exception.
         text: Its message, bounded, without paths and memory addresses.
-        line: Line of `controller.py`, 0 where unknown.
+        line: Line of `controller.py`, 0 if unknown.
         traceback: The controller's own lines, outermost first.
         phase: What the controller was doing.
     """

@@ -64,7 +64,7 @@ def start_blank(tier: Tier, limits: Limits) -> Child:
 
 
 def start_zygote(tier: Tier, limits: Limits, slots: int = SLOTS) -> Zygote:
-    """Start a zygote, which loads numpy while the caller goes on.
+    """Start a zygote, which loads numpy while the caller continues.
 
     Args:
         tier: Tier of its children.

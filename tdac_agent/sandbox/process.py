@@ -53,9 +53,9 @@ Answering = EpisodeEnv | ProgramWorld
 class Child:
     """One sandboxed process with numpy loaded, for one controller and one use.
 
-    A context manager; `close` kills the child. Methods that run the controller raise
-    `ControllerFault`; after any but a `ControllerError` the child is gone, and each
-    further request raises the same fault again.
+    A context manager; `close` kills the child. Methods that run the controller can
+    raise a `ControllerFault`; after any but a `ControllerError` the child is gone, and
+    each further request raises the same fault again.
 
     Attributes:
         tier: Name of its sandbox tier.

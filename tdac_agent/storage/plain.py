@@ -19,7 +19,7 @@ _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+|0x[0-9a-fA-F]{6,}")
 def printable(text: str) -> str:
     """Replaces each character that is not displayed as itself with a mark.
 
-    These are control characters (and so escape sequences), lone surrogates, and
+    This covers control characters (and so escape sequences), lone surrogates, and
     characters that have no width or change the writing direction. The length stays.
     """
     if text.isprintable():

@@ -51,7 +51,7 @@ def keeps_secrets(url: str | None) -> bool:
 
 
 def without_secrets(text: str) -> str:
-    """Replaces values of key-like environment variables by the variables' names."""
+    """Replaces values of key-like environment variables with the variables' names."""
     for name, value in os.environ.items():
         secret = value.strip()
         if SECRET.search(name) and len(secret) >= SHORTEST_SECRET:

@@ -102,7 +102,7 @@ class RemoteError:
         type_name: Class of the exception.
         message: Its text.
         traceback: The controller's own lines, outermost first.
-        line: Line of `controller.py` where it was raised, 0 where unknown.
+        line: Line of `controller.py` where it was raised, 0 if unknown.
     """
 
     type_name: str
