@@ -1,1 +1,1 @@
-"""Webots worlds: what they hold, their files, pictures of them."""
+"""Webots worlds: their model, their files and pictures of them."""

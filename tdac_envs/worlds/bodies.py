@@ -1,4 +1,4 @@
-"""What of a world stands in the way of its e-puck, and on which ground."""
+"""Everything that an e-puck can hit in a world, and the ground under it."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from tdac_envs.worlds.world import EPuck, Obstacle, Part, World
 
 BODY_RADIUS = 0.037
 BODY_BOTTOM, BODY_TOP = 0.0025, 0.0475
-"""Of an e-puck above the ground, m."""
+"""Lowest and highest point of an e-puck's body above the ground, m."""
 
 _STEP_DOWN = 0.01
-"""How far above the robot's origin the ground under it may be, m."""
+"""Maximum height of the ground above the robot's origin, m."""
 _NEAR = 0.005
-"""Gap up to which a thing stands on what is below it, m."""
+"""Largest gap at which an obstacle still rests on what is below it, m."""
 
 
 def bodies(world: World) -> tuple[Obstacle, ...]:
-    """Obstacles, walls of the arenas, and the e-pucks that are not driven.
+    """The obstacles, then the arena walls, then the e-pucks that are not driven.
 
-    First the obstacles, in their order; those with a mass that hang in the air have
-    fallen.
+    The obstacles keep their order. Those that have a mass and hang in the air are
+    lowered onto what is below them.
     """
     floor = floor_under(world)
     fallen = [_fallen(thing, world.obstacles, floor) for thing in world.obstacles]
@@ -33,7 +33,7 @@ def bodies(world: World) -> tuple[Obstacle, ...]:
 def floor_under(world: World) -> float:
     """Height of the ground under the driven robot, m.
 
-    It may stand on an obstacle (a table, a plank); otherwise on an arena, or at 0.
+    The robot stands on an obstacle (a table, a plank), on an arena, or at 0.
     """
     if not world.robots:
         return 0.0
@@ -45,7 +45,7 @@ def floor_under(world: World) -> float:
 
 
 def at_body_height(parts: Iterable[Part], floor: float) -> tuple[Part, ...]:
-    """The parts that an e-puck which stands on `floor` can hit."""
+    """The parts that an e-puck standing at height `floor` (m) can hit."""
     low, high = floor + BODY_BOTTOM, floor + BODY_TOP
     return tuple(part for part in parts if part.top > low and part.bottom < high)
 
@@ -58,7 +58,7 @@ def standing_robot(robot: EPuck) -> Obstacle:
 
 
 def _fallen(thing: Obstacle, others: Iterable[Obstacle], floor: float) -> Obstacle:
-    """An obstacle with a mass, let down onto the floor or what is below it."""
+    """The obstacle; one with a mass is lowered onto the floor or what is below it."""
     if thing.mass is None or not thing.solid:
         return thing
     bottom = min(part.bottom for part in thing.solid)
@@ -76,7 +76,7 @@ def _fallen(thing: Obstacle, others: Iterable[Obstacle], floor: float) -> Obstac
 
 
 def _above(thing: Obstacle, part: Part) -> bool:
-    """Whether some of a thing is over a part, as far as their bounds say."""
+    """Whether the bounds of a thing and of a part overlap in the ground plane."""
     left, low, right, high = part.shape.bounds
     return any(
         a <= right and left <= c and b <= high and low <= d

@@ -11,18 +11,18 @@ _DEFAULT = "arena"
 
 
 def bundled_worlds() -> tuple[str, ...]:
-    """Names of the bundled worlds: the default one first, the others sorted."""
+    """Names of the bundled worlds: the default first, then the others, sorted."""
     names = {path.stem for path in _FOLDER.glob("*.wbt")}
     return (_DEFAULT, *sorted(names - {_DEFAULT}))
 
 
 def world_file(source: str | Path) -> Path:
-    """The file of a bundled world, or of a path.
+    """The path of a bundled world, given by name, or `source` as a path.
 
-    Where there is no such file, `maze.wbt` is the bundled world `maze`.
+    If there is no file `maze.wbt`, this name selects the bundled world `maze`.
 
     Raises:
-        WorldError: There is neither; the message offers the closest name.
+        WorldError: There is no world of this name; the message suggests the closest.
     """
     path = Path(source)
     name = str(source).removesuffix(".wbt") if not path.exists() else str(source)
@@ -33,5 +33,5 @@ def world_file(source: str | Path) -> Path:
     names = bundled_worlds()
     raise WorldError(
         f"no bundled world is called {str(source)!r}{hint(str(source), names)}; "
-        f"there are {', '.join(names)}"
+        f"expected one of {', '.join(names)}"
     )

@@ -1,7 +1,7 @@
 """Footprints: discs and convex polygons in the ground plane, metres.
 
-Numbers are kept to 1e-9 m, and each shape has one canonical form, so that two shapes
-are equal exactly when they are the same place.
+Numbers are rounded to 1e-9 m, and each shape has one canonical form: two shapes of
+the same type are equal exactly when they cover the same area.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from tdac_envs.core.errors import WorldError
 
 DIGITS = 9
 THINNEST = 1e-4
-"""Thickness of what has none in the file, m."""
+"""Minimum thickness, used for shapes that are flat in the file, m."""
 Points = NDArray[np.float64]
 Point = tuple[float, float]
 
 
 def metres(name: str, value: float) -> float:
-    """The number to 1e-9.
+    """The value, rounded to 1e-9.
 
     Raises:
-        WorldError: It is not finite.
+        WorldError: The value is not finite.
     """
     number = float(value)
     if not math.isfinite(number):
@@ -35,7 +35,7 @@ def metres(name: str, value: float) -> float:
 
 
 def wrapped(angle: float) -> float:
-    """The same direction in (-pi, pi], to 1e-9."""
+    """The angle wrapped to (-pi, pi], rad, rounded to 1e-9."""
     turn = metres("an angle", math.remainder(angle, 2.0 * math.pi))
     return math.pi if abs(turn) > math.pi else turn
 
@@ -45,9 +45,9 @@ class Disc:
     """A disc.
 
     Attributes:
-        x: Of its centre.
-        y: Of its centre.
-        radius: Above 0.
+        x: x of the centre, m.
+        y: y of the centre, m.
+        radius: Radius, m, above 0.
     """
 
     x: float
@@ -59,17 +59,17 @@ class Disc:
         _above_zero(radius=self.radius)
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether the point lies in it, its rim included."""
+        """Whether the point lies in the disc, rim included."""
         return math.hypot(x - self.x, y - self.y) <= self.radius
 
     @property
     def area(self) -> float:
-        """m²."""
+        """Area, m²."""
         return math.pi * self.radius**2
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """(left, low, right, high)."""
+        """(left, low, right, high), m."""
         x, y, r = self.x, self.y, self.radius
         return x - r, y - r, x + r, y + r
 
@@ -79,11 +79,11 @@ class Rectangle:
     """A rectangle.
 
     Attributes:
-        x: Of its centre.
-        y: Of its centre.
-        yaw: Direction of its length, in [-pi/2, pi/2); of a square in [-pi/4, pi/4).
-        length: Along `yaw`; the longer side, whatever the order in which they came.
-        width: Across, above 0.
+        x: x of the centre, m.
+        y: y of the centre, m.
+        yaw: Direction of the length, rad: in [-pi/2, pi/2), of a square [-pi/4, pi/4).
+        length: Longer side, m, along `yaw`; the sides are swapped if necessary.
+        width: Shorter side, m, above 0.
     """
 
     x: float
@@ -106,40 +106,39 @@ class Rectangle:
 
     @property
     def turn(self) -> Points:
-        """Shape (2, 2): from its own axes to x and y."""
+        """Rotation matrix from the rectangle's axes to x and y, shape (2, 2)."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.array([[cos, -sin], [sin, cos]])
 
     @property
     def vertices(self) -> Points:
-        """Shape (4, 2), counter-clockwise."""
+        """Corners, shape (4, 2), counter-clockwise, m."""
         corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         half = np.array([self.length, self.width]) / 2
         return np.asarray(corners * half @ self.turn.T + (self.x, self.y))
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether the point lies in it, its edges included."""
+        """Whether the point lies in the shape, edges included."""
         own = (x - self.x, y - self.y) @ self.turn
         return bool(abs(own[0]) <= self.length / 2 and abs(own[1]) <= self.width / 2)
 
     @property
     def area(self) -> float:
-        """m²."""
+        """Area, m²."""
         return self.length * self.width
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """(left, low, right, high)."""
+        """(left, low, right, high), m."""
         return _bounds(self.vertices)
 
 
 @dataclass(frozen=True, slots=True)
 class Polygon:
-    """A convex polygon; `Polygon.around` makes one from any points.
+    """A convex polygon; `Polygon.around` builds one from any points.
 
     Attributes:
-        points: Vertices, counter-clockwise, beginning with the leftmost (the lowest
-            of these).
+        points: Vertices, counter-clockwise from the leftmost (of several, the lowest).
     """
 
     points: tuple[tuple[float, float], ...]
@@ -148,8 +147,8 @@ class Polygon:
         kept = _kept(self.points)
         if len(kept) < 3 or _hull(kept) != kept:
             raise WorldError(
-                "expected the vertices of a convex polygon, counter-clockwise, from "
-                f"the leftmost: got {len(kept)}, {kept[:4]} …"
+                "expected a convex polygon, counter-clockwise from the leftmost point: "
+                f"got {len(kept)} vertices, {kept[:4]} …"
             )
         object.__setattr__(self, "points", kept)
 
@@ -158,17 +157,17 @@ class Polygon:
         """The convex hull of points, shape (n, 2).
 
         Raises:
-            WorldError: They lie on one line.
+            WorldError: The points lie on one line.
         """
         return cls(_hull(_kept(points)))
 
     @property
     def vertices(self) -> Points:
-        """Shape (n, 2), counter-clockwise."""
+        """Vertices, shape (n, 2), counter-clockwise, m."""
         return np.array(self.points)
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether the point lies in it, its edges included."""
+        """Whether the point lies in the shape, edges included."""
         at = self.vertices
         edge = np.roll(at, -1, axis=0) - at
         side = edge[:, 0] * (y - at[:, 1]) - edge[:, 1] * (x - at[:, 0])
@@ -176,13 +175,13 @@ class Polygon:
 
     @property
     def area(self) -> float:
-        """m²."""
+        """Area, m²."""
         (x, y), (u, v) = self.vertices.T, np.roll(self.vertices, -1, axis=0).T
         return float((x * v - u * y).sum() / 2)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """(left, low, right, high)."""
+        """(left, low, right, high), m."""
         return _bounds(self.vertices)
 
 
@@ -192,16 +191,16 @@ Footprint = Disc | Rectangle | Polygon
 def ring(
     x: float, y: float, inner: float, outer: float, facets: int
 ) -> list[Polygon | Rectangle]:
-    """A ring in convex pieces, as Webots' pipes have it.
+    """A ring as convex pieces, like Webots' pipes.
 
-    The inner facets touch the inner circle, the outer corners lie on the outer one
-    (or, of a thin wall with few facets, where the wall keeps its thickness).
+    The inner facets touch the inner circle. The outer corners lie on the outer circle,
+    or farther out where a thin wall with few facets would lose its thickness.
 
     Args:
-        x: Of the centre.
-        y: Of the centre.
-        inner: Radius of the free disc inside.
-        outer: Outer radius.
+        x: x of the centre, m.
+        y: y of the centre, m.
+        inner: Radius of the free disc inside, m.
+        outer: Outer radius, m.
         facets: Number of pieces, at least 3.
     """
     half = math.pi / facets
@@ -217,7 +216,7 @@ def ring(
 
 
 def frame(floor: Rectangle, thickness: float) -> list[Polygon | Rectangle]:
-    """Four walls around a rectangle; those beside its width run past the corners."""
+    """Four walls around a rectangle; the two along its length cover the corners."""
     middle, turn = np.array([floor.x, floor.y]), floor.turn
     out = (floor.length / 2 + thickness / 2, 0.0)
     up = (0.0, floor.width / 2 + thickness / 2)
@@ -232,10 +231,10 @@ def frame(floor: Rectangle, thickness: float) -> list[Polygon | Rectangle]:
 
 
 def _kept(points: ArrayLike) -> tuple[Point, ...]:
-    """Points to 1e-9, as `metres` does for one number."""
+    """The points, rounded to 1e-9 and checked as in `metres`."""
     at = np.asarray(points, np.float64).reshape(-1, 2)
     if not np.isfinite(at).all():
-        raise WorldError("expected finite coordinates of a polygon")
+        raise WorldError("expected the coordinates of a polygon to be finite")
     return tuple((x, y) for x, y in (np.round(at, DIGITS) + 0.0).tolist())
 
 

@@ -1,4 +1,4 @@
-"""A picture of a world from above, x to the right and y up."""
+"""Draws a world from above, x to the right and y up."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tdac_envs.worlds.footprint import Disc, Footprint, Rectangle
 from tdac_envs.worlds.world import EPuck, Obstacle, World
 
 SIDE = 880
-"""Longest side of the world in the picture, px."""
+"""Longest side of the drawn world, px."""
 OUTSIDE: Colour = (222, 223, 219)
 STEEL: Colour = (98, 108, 126)
 _KINDS: dict[str, Colour] = {
@@ -43,21 +43,21 @@ _ROUND = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.
 _MARGIN, _STRIP, _LEFT = 0.05, 64, 12
 _PALE, _TOLERANCE = 0.3, 0.02
 _LEVEL = 0.0025
-"""Up to this height above the floor a thing is part of it, m."""
+"""Parts that end within this height of the floor are drawn as floor, m."""
 
 
 class View:
-    """A canvas, and where on it a point of the world is.
+    """A canvas with a mapping from world to canvas coordinates.
 
     Args:
-        bounds: (left, low, right, high) of what is to be seen, m.
-        strip: Height of the strip for text, px.
-        side: Longest side of the world in the picture, px.
-        margin: Around it, as a share of its longest side.
+        bounds: (left, low, right, high) of the visible area, m.
+        strip: Height of the text strip, px.
+        side: Longest side of the drawn world, px.
+        margin: Margin around the bounds, as a fraction of their longest side.
 
     Attributes:
-        canvas: To draw on, in canvas coordinates.
-        scale: px per m.
+        canvas: Canvas to draw on, in canvas coordinates.
+        scale: Pixels per metre.
     """
 
     def __init__(
@@ -99,13 +99,13 @@ class View:
             radius = shape.radius * self.scale
             self.canvas.disc(self.at((shape.x, shape.y)), radius, colour, alpha, 1)
         else:
-            # In two lines: one that ends where it begins would lose an edge.
+            # Two lines: the canvas simplifies a closed line and would lose an edge.
             corners = self.at(shape.vertices)
             self.canvas.line(corners, colour, 1, alpha)
             self.canvas.line(corners[[-1, 0]], colour, 1, alpha)
 
     def wash(self, shapes: Iterable[Footprint], colour: Colour, alpha: float) -> None:
-        """Paints footprints that may overlap as one."""
+        """Paints footprints as one transparent layer, even where they overlap."""
         before = self.canvas.image.copy()
         for shape in shapes:
             self.fill(shape, colour)
@@ -113,7 +113,7 @@ class View:
         image[...] = np.rint(alpha * image + (1.0 - alpha) * before)
 
     def grid(self) -> None:
-        """Faint lines at round lengths, those through the origin a little stronger."""
+        """Draws faint lines at round lengths, slightly stronger through the origin."""
         step = self.round_length(60.0)
         for x in np.arange(np.ceil(self._left / step), self._right / step) * step:
             self._grid_line([(x, self._low), (x, self._high)], x)
@@ -125,11 +125,11 @@ class View:
         self.canvas.line(self.at(ends), WALL, 1, 0.30 if at_origin else 0.09)
 
     def round_length(self, least: float) -> float:
-        """The smallest round length of at least so many px, m."""
+        """The smallest round length, m, that is at least `least` px long."""
         return next((r for r in _ROUND if r * self.scale >= least), _ROUND[-1])
 
     def scale_bar(self) -> None:
-        """A bar of a round length in the strip, with what it is."""
+        """Draws a scale bar of a round length, with its label, in the strip."""
         image, length = self.canvas.image, self.round_length(70.0)
         right, row = image.shape[1] - 16, self.canvas.strip_top + 30
         left = right - round(length * self.scale)
@@ -142,10 +142,10 @@ class View:
 
 
 def draw_world(world: World) -> Image:
-    """Arenas, obstacles, robots, goal, a scale and a legend, uint8 RGB.
+    """Draws arenas, obstacles, robots, goal, scale and legend, uint8 RGB.
 
-    What the robot cannot hit is pale: it is above or below it, or not solid. Nodes that
-    may be solid and are not modelled are crossed.
+    Parts that the robot cannot hit are pale: they are above or below it, or not solid.
+    Unmodelled nodes that may be solid are marked with a cross.
     """
     view = View(_bounds(world))
     draw_things(view, world, bodies(world))
@@ -161,7 +161,7 @@ def draw_world(world: World) -> Image:
 
 
 def draw_things(view: View, world: World, things: Iterable[Obstacle]) -> None:
-    """Floors, faint lines, and what stands on them; robots are left out."""
+    """Draws the floors, the grid, and all things except robots."""
     floor = floor_under(world)
     for arena in world.arenas:
         view.fill(arena.inside, FREE)
@@ -177,12 +177,12 @@ def draw_things(view: View, world: World, things: Iterable[Obstacle]) -> None:
 
 
 def colour_of(kind: str) -> Colour:
-    """The colour of an obstacle of some type."""
+    """The colour of obstacles of a type."""
     return _KINDS.get(kind, STEEL)
 
 
 def _bounds(world: World) -> tuple[float, float, float, float]:
-    """Around everything; a metre around the origin where there is nothing."""
+    """Bounds of everything; a square metre around the origin for an empty world."""
     edges = [arena.inside.bounds for arena in world.arenas]
     edges += [part.shape.bounds for thing in bodies(world) for part in thing.solid]
     points = [(robot.x, robot.y) for robot in world.robots]
@@ -267,7 +267,7 @@ def _write_strip(view: View, world: World) -> None:
 
 
 def _legend(world: World) -> list[tuple[str, Colour]]:
-    """What the colours mean; kinds of one colour together."""
+    """Labels and colours of the legend; types of one colour share an entry."""
     entries = [("goal", GREEN)] if world.goal is not None else []
     if any(node.may_be_solid for node in world.unmodelled):
         entries.append(("not modelled", RED))

@@ -1,13 +1,13 @@
-"""What a Webots world holds for an e-puck: robots, goal, arena, obstacles.
+"""Model of a Webots world for an e-puck: robots, goal, arenas and obstacles.
 
-Lengths are metres, angles radians. The frame is ENU whatever the file's was: x and y
-in the ground plane, z up, headings counter-clockwise from +x. Numbers are kept to
-1e-9, so that a world that is written to a file and read again is equal.
+Lengths are in metres, angles in radians. The frame is always ENU, whatever the file
+uses: x and y in the ground plane, z up, headings counter-clockwise from +x. Numbers
+are rounded to 1e-9, so that a world that is written and read back compares equal.
 
-Obstacles are prisms. A `Part` is a disc or a convex polygon, exactly as a 2D physics
-engine takes it, between two heights; it is the projection of one convex piece of the
-3D shape. What the robot's body can hit (boundingObjects) and what infra-red rays hit
-(graphical Shapes) are kept apart.
+Obstacles consist of vertical prisms. A `Part` is a disc or a convex polygon, as 2D
+physics engines use them, between two heights: the projection of one convex piece of
+the 3D shape. Parts that the robot can hit (boundingObjects) and parts that infra-red
+rays hit (graphical Shapes) are separate.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A prism, at least 0.1 mm high (a flat one grows downwards).
+    """A vertical prism; one lower than 0.1 mm is extended downwards to 0.1 mm.
 
     Attributes:
-        shape: Its footprint.
+        shape: Footprint.
         bottom: Lowest z, m.
         top: Highest z, m.
     """
@@ -58,19 +58,19 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """A thing in the world; it may be solid, visible to the sensors, or both.
+    """An object in the world: solid, visible to the sensors, or both.
 
     Attributes:
-        name: Its `name` field, or its DEF name, or empty.
-        kind: Node or PROTO type.
-        x: Of its origin.
-        y: Of its origin.
-        solid: What bodies hit; empty for a mere marker.
-        visible: What infra-red rays hit.
-        mass: kg, of what can be pushed; None is fixed.
-        reflectance: Factor by which Webots divides the distance that a sensor
-            measures, in [0.2, 1]; 1 where it is not known, or nothing is seen.
-        is_goal: It marks the goal.
+        name: The node's `name` field, or its DEF name, or empty.
+        kind: Node or PROTO type, or the `model` field of a Solid.
+        x: x of the origin, m.
+        y: y of the origin, m.
+        solid: Parts that bodies collide with; empty for a pure marker.
+        visible: Parts that infra-red rays hit.
+        mass: Mass of a pushable object, kg; None if it is fixed.
+        reflectance: Factor in [0.2, 1] by which Webots divides the distance that a
+            sensor measures; 1 if it is unknown or nothing is visible.
+        is_goal: Whether the object marks the goal.
     """
 
     name: str
@@ -86,13 +86,13 @@ class Obstacle:
     def __post_init__(self) -> None:
         object.__setattr__(self, "x", metres("x", self.x))
         object.__setattr__(self, "y", metres("y", self.y))
-        object.__setattr__(self, "reflectance", metres("f", self.reflectance))
+        object.__setattr__(self, "reflectance", metres("reflectance", self.reflectance))
         if self.mass is not None:
             object.__setattr__(self, "mass", metres("mass", self.mass))
             if self.mass <= 0.0:
                 raise WorldError(f"expected a mass above 0, got {self.mass}")
         if not 0.2 <= self.reflectance <= 1.0:
-            raise WorldError(f"expected 0.2 <= f <= 1, got {self.reflectance}")
+            raise WorldError(f"reflectance {self.reflectance} is not in [0.2, 1]")
         if not self.visible:
             object.__setattr__(self, "reflectance", 1.0)
 
@@ -102,13 +102,13 @@ class EPuck:
     """An e-puck.
 
     Attributes:
-        name: Its `name` field.
-        x: Of the middle of the axle.
-        y: Of the middle of the axle.
-        heading: Direction in which it drives, in (-pi, pi].
-        z: Of the point below, where the wheels touch the ground.
+        name: The node's `name` field.
+        x: x of the middle of the axle, m.
+        y: y of the middle of the axle, m.
+        heading: Driving direction, rad, in (-pi, pi].
+        z: Height at which the wheels touch the ground, m.
         version: "1" or "2".
-        controller: Name of the file's controller.
+        controller: Name of the controller in the file.
     """
 
     name: str
@@ -133,20 +133,20 @@ class EPuck:
 
     @property
     def max_wheel_speed(self) -> float:
-        """rad/s."""
+        """Maximum wheel speed, rad/s."""
         return MAX_WHEEL_SPEED[self.version]
 
 
 @dataclass(frozen=True, slots=True)
 class Arena:
-    """A floor, most often with a wall around it.
+    """A floor, usually with a wall around it.
 
     Attributes:
-        inside: The floor. A disc has a wall; a rectangle may have none.
-        wall_thickness: Of the wall, which stands outside the floor; 0 without one.
-        wall_height: Above the floor; 0 without a wall.
-        z: Of the floor.
-        facets: Flat pieces of a round wall; each touches the disc.
+        inside: Floor area. A disc always has a wall; a rectangle may have none.
+        wall_thickness: Thickness of the wall, outside the floor, m; 0 without a wall.
+        wall_height: Height of the wall above the floor, m; 0 without a wall.
+        z: Height of the floor, m.
+        facets: Number of flat segments of a round wall; each touches the disc.
     """
 
     inside: Disc | Rectangle
@@ -160,7 +160,7 @@ class Arena:
             object.__setattr__(self, key, metres(key, getattr(self, key)))
         wall = (self.wall_thickness, self.wall_height)
         if min(wall) < 0.0 or (min(wall) == 0.0) != (max(wall) == 0.0):
-            raise WorldError(f"expected a wall with thickness and height, got {wall}")
+            raise WorldError(f"a wall needs thickness and height above 0, got {wall}")
         if isinstance(self.inside, Disc) and (not self.has_wall or self.facets < 8):
             raise WorldError("expected a round arena with a wall of 8 facets or more")
         if isinstance(self.inside, Rectangle):
@@ -179,7 +179,7 @@ class Arena:
         return self.wall_height > 0.0
 
     def wall(self) -> Obstacle:
-        """The wall, in convex pieces; without pieces where there is none."""
+        """The wall as an obstacle of convex parts; it has no parts without a wall."""
         shape, thickness = self.inside, self.wall_thickness
         if not self.has_wall:
             return Obstacle("", self.kind, shape.x, shape.y)
@@ -194,16 +194,16 @@ class Arena:
 
 @dataclass(frozen=True, slots=True)
 class Unmodelled:
-    """A node of the file that is not in the model.
+    """A node of the file that the model leaves out.
 
     Attributes:
-        name: Its `name` field, or its DEF name, or empty.
+        name: The node's `name` field, or its DEF name, or empty.
         kind: Node or PROTO type.
-        x: Of its origin.
-        y: Of its origin.
-        why: Why it is left out.
-        may_be_solid: Whether a robot might hit it.
-        line: Where it stands in the file.
+        x: x of the origin, m.
+        y: y of the origin, m.
+        why: Reason for leaving it out.
+        may_be_solid: Whether a robot could hit it.
+        line: Line number in the file.
     """
 
     name: str
@@ -215,24 +215,24 @@ class Unmodelled:
     line: int = 0
 
     def is_called(self, name: str) -> bool:
-        """Whether `name` means this node: its name or its type."""
+        """Whether `name` is the name or the type of this node."""
         return name in (self.name, self.kind)
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A world.
+    """A Webots world.
 
     Attributes:
-        robots: The e-pucks; the first is the one that is driven, the others stand.
-        goal: Point (x, y), or None where the file names none.
+        robots: E-pucks; the first is driven, the others stand still.
+        goal: Point (x, y), m; None if the file names no goal.
         arenas: Floors, with or without walls.
-        obstacles: Everything else; without the walls of the arenas.
-        time_step: Of the physics, ms.
+        obstacles: Everything else, without the walls of the arenas.
+        time_step: Physics time step, ms.
         unmodelled: Nodes of the file that are not in the model.
-        source: Name of the file.
-        version: Of Webots, as the file says.
-        notes: What the reader supposed.
+        source: File name.
+        version: Webots version in the file's header.
+        notes: Assumptions that the reader made.
     """
 
     robots: tuple[EPuck, ...] = ()
@@ -253,14 +253,14 @@ class World:
             point = (metres("x", self.goal[0]), metres("y", self.goal[1]))
             object.__setattr__(self, "goal", point)
         elif any(obstacle.is_goal for obstacle in self.obstacles):
-            raise WorldError("a world with a mark of the goal needs a goal")
+            raise WorldError("an obstacle marks the goal, but the world has no goal")
 
     @property
     def robot(self) -> EPuck:
         """The e-puck that is driven.
 
         Raises:
-            WorldError: There is none.
+            WorldError: The world has no e-puck.
         """
         if not self.robots:
             raise WorldError(f"{self.source or 'the world'}: there is no e-puck in it")
@@ -268,7 +268,7 @@ class World:
 
     @property
     def arena(self) -> Arena | None:
-        """The walled floor that the robot is in, or the first walled one, or None."""
+        """The walled floor around the robot, else the first walled one, else None."""
         walled = [arena for arena in self.arenas if arena.has_wall]
         for arena in walled:
             if self.robots and arena.inside.contains(self.robot.x, self.robot.y):
@@ -277,14 +277,14 @@ class World:
 
 
 def check_modelled(world: World, ignore: Iterable[str] = ()) -> tuple[Unmodelled, ...]:
-    """The nodes that may be solid and are left out because `ignore` names them.
+    """Returns the unmodelled nodes that may be solid, if `ignore` names all of them.
 
     Args:
         world: The world.
-        ignore: Names or types of nodes that the user accepts to be missing.
+        ignore: Names or types of nodes that the user allows to be left out.
 
     Raises:
-        WorldError: There are others, or a name fits none.
+        WorldError: Such a node is not named, or a name matches no node.
     """
     names = tuple(ignore)
     open_ = [node for node in world.unmodelled if node.may_be_solid]

@@ -370,17 +370,17 @@ def test_values_are_checked():
         Part(Disc(0, 0, 1), 1.0, 0.0)
     with pytest.raises(WorldError, match="expected a mass above 0"):
         Obstacle("", "Solid", 0, 0, (part,), mass=0.0)
-    with pytest.raises(WorldError, match=r"expected 0\.2 <= f <= 1, got 0\.1"):
+    with pytest.raises(WorldError, match=r"reflectance 0\.1 is not in \[0\.2, 1\]"):
         Obstacle("", "Solid", 0, 0, (part,), reflectance=0.1)
     with pytest.raises(WorldError, match='expected version "1" or "2"'):
         EPuck("", 0, 0, 0, version="3")
-    with pytest.raises(WorldError, match="expected a wall with thickness and height"):
+    with pytest.raises(WorldError, match="a wall needs thickness and height"):
         Arena(Rectangle(0, 0, 0, 1, 1), 0.1, 0.0)
     with pytest.raises(WorldError, match="a round arena with a wall"):
         Arena(Disc(0, 0, 1))
     with pytest.raises(WorldError, match="expected a time step above 0"):
         World(time_step=0)
-    with pytest.raises(WorldError, match="a mark of the goal needs a goal"):
+    with pytest.raises(WorldError, match="an obstacle marks the goal, but"):
         World(obstacles=(Obstacle("", "Solid", 0, 0, is_goal=True),))
     with pytest.raises(WorldError, match="no e-puck in it"):
         World().robot  # noqa: B018
