@@ -1,4 +1,4 @@
-"""How well infra-red light is reflected, as Webots' distance sensors see it."""
+"""Infra-red reflectance of Shapes, as Webots' distance sensors use it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _MAPS = ("baseColorMap", "roughnessMap", "occlusionMap")
 
 
 def reflectance(shape: Node) -> float:
-    """The factor `f` of a Shape: a sensor sees it at its distance divided by `f`.
+    """The factor `f` of a Shape: a sensor measures its distance divided by `f`.
 
-    f = 0.2 + 0.8 red (1 - roughness / 2) (1 - occlusion / 2). What hangs on pictures
-    (textures, and appearances that are PROTOs) is not known, and taken as 1.
+    f = 0.2 + 0.8 red (1 - transparency) (1 - roughness / 2); only a PBRAppearance has
+    a roughness. Where f depends on textures or PROTOs, it is unknown and taken as 1.
 
     Args:
         shape: A Shape node.
@@ -36,7 +36,7 @@ def reflectance(shape: Node) -> float:
 
 
 def red_of(factor: float) -> float:
-    """The red of a Material that has this factor."""
+    """The red component of a Material with this factor."""
     return (factor - DARKEST) / (1.0 - DARKEST)
 
 

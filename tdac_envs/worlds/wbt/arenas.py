@@ -1,4 +1,4 @@
-"""Floors and arenas."""
+"""Reads floors and arenas."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tdac_envs.worlds.world import Arena
 
 ARENAS = {"CircleArena", "RectangleArena", "Floor"}
 _LEVEL = 0.02
-"""Tilt up to which a floor counts as level, rad."""
+"""Largest tilt at which a floor counts as level, rad."""
 
 
 def arena(node: Node, frame: Frame) -> Arena | str:
-    """A CircleArena, RectangleArena or Floor.
+    """Reads a CircleArena, RectangleArena or Floor.
 
     Returns:
-        The arena, or why it is none.
+        The arena, or the reason why it cannot be modelled.
 
     Raises:
         WorldError: A field is broken.
@@ -52,6 +52,6 @@ def arena(node: Node, frame: Frame) -> Arena | str:
 
 
 def _positive(node: Node, name: str, default: float) -> float:
-    """A length; the PROTOs put their default for one that is not above 0."""
+    """A length; the default if it is not above 0, as in the PROTOs."""
     length = number(node, name, default)
     return length if length > 0.0 else default

@@ -1,18 +1,18 @@
-"""What a node's fields say, as the type that is wanted."""
+"""Typed access to the fields of a node."""
 
 from __future__ import annotations
 
 from tdac_envs.worlds.wbt.tree import Node
 
 LARGEST = 1e6
-"""Bound of every length and coefficient; a world is some metres large."""
+"""Largest absolute value of a number; worlds measure only some metres."""
 
 
 def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-    """As many numbers as the default has.
+    """The numbers of a field, as many as in the default.
 
     Raises:
-        WorldError: The field holds something else, or a number beyond `LARGEST`.
+        WorldError: The field has other values, or a number beyond `LARGEST`.
     """
     if name not in node.fields:
         return default
@@ -27,21 +27,21 @@ def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, .
 
 
 def number(node: Node, name: str, default: float) -> float:
-    """One number; raises as `numbers` does."""
+    """The number of a field; raises as `numbers` does."""
     return numbers(node, name, (default,))[0]
 
 
 def number_list(node: Node, name: str) -> tuple[float, ...]:
-    """Any number of numbers; raises as `numbers` does."""
+    """All numbers of a field; raises as `numbers` does."""
     count = len(node.fields[name].items) if name in node.fields else 0
     return numbers(node, name, (0.0,) * count)
 
 
 def text(node: Node, name: str, default: str = "") -> str:
-    """A string.
+    """The string of a field.
 
     Raises:
-        WorldError: The field holds something else.
+        WorldError: The field is not a string.
     """
     if name not in node.fields:
         return default
@@ -52,10 +52,10 @@ def text(node: Node, name: str, default: str = "") -> str:
 
 
 def flag(node: Node, name: str, default: bool) -> bool:
-    """TRUE or FALSE.
+    """The TRUE or FALSE of a field.
 
     Raises:
-        WorldError: The field holds something else.
+        WorldError: The field is neither.
     """
     if name not in node.fields:
         return default
@@ -66,10 +66,10 @@ def flag(node: Node, name: str, default: bool) -> bool:
 
 
 def child(node: Node, name: str) -> Node | None:
-    """A node, or None for NULL or where the field is not there.
+    """The node of a field; None if it is NULL or the field is missing.
 
     Raises:
-        WorldError: The field holds something else.
+        WorldError: The field is not a single node.
     """
     found = children(node, name)
     if len(found) > 1:
@@ -78,10 +78,10 @@ def child(node: Node, name: str) -> Node | None:
 
 
 def children(node: Node, name: str = "children") -> tuple[Node, ...]:
-    """Nodes, without NULLs.
+    """The nodes of a field, without NULLs.
 
     Raises:
-        WorldError: The field holds something else.
+        WorldError: The field has values that are not nodes.
     """
     if name not in node.fields:
         return ()

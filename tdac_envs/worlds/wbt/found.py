@@ -1,4 +1,4 @@
-"""What has been found in a file so far."""
+"""Collects the content of a file while it is read."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from tdac_envs.worlds.wbt.tree import Node
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Unmodelled
 
 MOST_PARTS = 5_000
-"""Convex pieces in a world, at most."""
+"""Maximum number of convex pieces in a world."""
 _GOAL = "goal"
 
 
 @dataclass(slots=True)
 class Found:
-    """Lists that grow while a file is read."""
+    """The content of a file found so far."""
 
     robots: list[EPuck] = field(default_factory=list)
     goals: list[tuple[float, float]] = field(default_factory=list)
@@ -29,10 +29,10 @@ class Found:
     def obstacle(
         self, node: Node, obstacle: Obstacle, place: int | None = None
     ) -> None:
-        """Adds an obstacle, before the one at `place` where that is given.
+        """Inserts an obstacle at index `place`, by default at the end.
 
         Raises:
-            WorldError: The world is too large.
+            WorldError: The world has more than `MOST_PARTS` pieces.
         """
         self.parts += len(obstacle.solid) + len(obstacle.visible)
         if self.parts > MOST_PARTS:
@@ -41,27 +41,27 @@ class Found:
         self.obstacles.insert(at, obstacle)
 
     def left_out(self, node: Node, frame: Frame, why: str, solid: bool = True) -> None:
-        """Adds a node that is not modelled."""
+        """Adds a node that is not modelled, with the reason."""
         x, y, _ = frame.origin.tolist()
         self.unmodelled.append(
             Unmodelled(name_of(node), node.kind, x, y, why, solid, node.line)
         )
 
     def goal(self, frame: Frame) -> None:
-        """Adds a place that is named as the goal."""
+        """Adds the position of a node that is named as the goal."""
         x, y, _ = frame.origin.tolist()
         self.goals.append((x, y))
 
 
 def name_of(node: Node) -> str:
-    """Its name, or else its DEF name, or nothing.
+    """The node's `name` field, else its DEF name, else an empty string.
 
     Raises:
-        WorldError: Its name is not a string.
+        WorldError: The `name` field is not a string.
     """
     return text(node, "name", node.define)
 
 
 def is_goal(node: Node) -> bool:
-    """Whether it is named, or defined, as the goal."""
+    """Whether the node's name or DEF name is "goal", in any case."""
     return _GOAL in (node.define.lower(), name_of(node).lower())

@@ -1,8 +1,8 @@
-"""Frames: where a node is, and how it is turned and scaled.
+"""Frames: position, rotation and scale of nodes.
 
-Two things changed between versions of Webots, and a file may mix them: which axis of
-the *world* points up (ENU: z; NUE and EUN: y), and how *objects* see themselves (FLU
-since R2022a: x forward, z up; RUB before: -z forward, y up).
+Two conventions differ between versions of Webots, and a file may mix them: the *world*
+axis that points up (ENU: z; NUE and EUN: y), and the axes of *objects* (FLU since
+R2022a: x forward, z up; RUB before: -z forward, y up).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
-# (x, y, z) -> (-z, -x, y), as Webots' own converter turns worlds and objects.
+# (x, y, z) -> (-z, -x, y), as in Webots' own converter of worlds and objects.
 Y_UP_TO_Z_UP: Matrix = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
@@ -25,9 +25,9 @@ class Frame:
     """An affine map from a node's coordinates to the world's (ENU).
 
     Attributes:
-        matrix: Shape (3, 3).
-        origin: Shape (3,), m.
-        y_up: Objects see themselves as RUB.
+        matrix: Rotation and scale, shape (3, 3).
+        origin: Origin of the node in the world, shape (3,), m.
+        y_up: Whether the axes of objects are RUB (y up) instead of FLU.
     """
 
     matrix: Matrix
@@ -50,7 +50,7 @@ class Frame:
         return np.asarray(at @ self.matrix.T + self.origin)
 
     def flu(self) -> Frame:
-        """The same place with axes forward, left, up, whatever the version."""
+        """The same frame with the axes forward, left, up."""
         if not self.y_up:
             return self
         return Frame(self.matrix @ Y_UP_TO_Z_UP.T, self.origin, False)
@@ -68,19 +68,19 @@ class Frame:
 
 
 def world_frame(z_up: bool, y_up_objects: bool) -> Frame:
-    """The frame of the nodes at the top of a file."""
+    """The frame of the top-level nodes of a file."""
     matrix = np.eye(3) if z_up else Y_UP_TO_Z_UP
     return Frame(matrix, np.zeros(3), y_up_objects)
 
 
 def flu_size(size: tuple[float, ...], y_up: bool) -> tuple[float, float, float]:
-    """Lengths along forward, left and up, from those along x, y and z."""
+    """Lengths along forward, left and up, from lengths along x, y and z."""
     x, y, z = size
     return (z, x, y) if y_up else (x, y, z)
 
 
 def own_axes(vector: tuple[float, float, float], y_up: bool) -> tuple[float, ...]:
-    """A vector given as forward, left, up, in an object's own x, y and z."""
+    """A vector (forward, left, up) in an object's own x, y and z."""
     forward, left, up = vector
     return (-left, up, -forward) if y_up else vector
 

@@ -1,4 +1,4 @@
-"""Geometry nodes, and what bounds a Solid, as prisms."""
+"""Converts geometry nodes and boundingObjects to prisms."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from tdac_envs.worlds.world import Part
 
 GROUPS = {"Group", "Transform", "Pose"}
 _FLAT = 0.02
-"""Tilt up to which a Plane is the ground, rad."""
+"""Largest tilt at which a Plane counts as the ground, rad."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Some geometry.
+    """Geometry converted to prisms.
 
     Attributes:
-        parts: Its prisms.
-        volume: m³, as Webots takes it for a mass from a density: overlaps count
-            twice.
-        missing: What has no prisms, and why.
+        parts: Prisms.
+        volume: Volume, m³, from which Webots computes a mass by density: overlaps
+            count twice.
+        missing: Descriptions of the geometry that cannot be converted.
     """
 
     parts: tuple[Part, ...] = ()
@@ -45,14 +45,14 @@ class Pieces:
 
 
 def bounds(node: Node, frame: Frame) -> Pieces:
-    """A boundingObject: a geometry, or a Shape, Group, Transform or Pose with some.
+    """Converts a boundingObject: a geometry, or a Shape, Group, Transform or Pose.
 
     Args:
         node: The node.
-        frame: Of the Solid.
+        frame: Frame of the Solid.
 
     Raises:
-        WorldError: A field of it is broken.
+        WorldError: A field is broken.
     """
     if node.kind in GROUPS:
         inner = frame if node.kind == "Group" else placed(node, frame, scaled=True)
@@ -67,27 +67,27 @@ def bounds(node: Node, frame: Frame) -> Pieces:
 
 
 def _is_plane(node: Node) -> bool:
-    """Whether it is a Plane, or a grid of equal elevations."""
+    """Whether the geometry is a Plane, or an ElevationGrid of one height."""
     if node.kind == "ElevationGrid":
         return len(set(number_list(node, "height"))) <= 1
     return node.kind == "Plane"
 
 
 def geometry(node: Node, frame: Frame) -> Pieces:
-    """A geometry node.
+    """Converts a geometry node.
 
     Args:
         node: The node.
-        frame: Its frame, in the file's own axes.
+        frame: Frame of the node, in the file's object axes (FLU or RUB).
 
     Raises:
-        WorldError: A field of it is broken.
+        WorldError: A field is broken.
     """
     if node.kind == "IndexedFaceSet":
         found = mesh(node, frame)
         if isinstance(found, str):
             return Pieces(missing=(found,))
-        # A mesh that is pushed is rare; its prisms are as heavy as it gets.
+        # An upper bound, which is good enough: meshes are rarely pushed.
         volume = sum(p.shape.area * (p.top - p.bottom) for p in found)
         return Pieces(found, volume)
     if node.kind not in _PRIMITIVES:
@@ -145,6 +145,6 @@ _PRIMITIVES: dict[str, Callable[[Node, Frame, bool], _Made]] = {
 
 
 def _positive(node: Node, name: str, default: float) -> float:
-    """A length; Webots puts 1 for one that is not above 0."""
+    """A length; 1 if it is not above 0, as in Webots."""
     length = number(node, name, default)
     return length if length > 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""IndexedFaceSets as prisms."""
+"""Converts IndexedFaceSets to prisms."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from tdac_envs.worlds.wbt.tree import Node
 from tdac_envs.worlds.world import Part
 
 MOST_FACES = 1000
-"""Faces of a mesh that is not convex, at most."""
+"""Maximum number of faces of a non-convex mesh."""
 MOST_CORNERS = 100
-"""Corners of a face that is not convex, at most; of all such faces ten times that."""
+"""Maximum number of corners of a non-convex face; of all such faces, ten times that."""
 
 Points = NDArray[np.float64]
 Face = NDArray[np.int64]
@@ -24,18 +24,18 @@ Face = NDArray[np.int64]
 def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
     """The prisms of an IndexedFaceSet.
 
-    A convex mesh is one prism. Any other is a prism over each of its faces, as high
-    as the whole mesh: what is below an overhang counts as filled.
+    A convex mesh becomes one prism. Any other mesh becomes one prism per face, each as
+    high as the whole mesh: the space below an overhang counts as filled.
 
     Args:
         node: The IndexedFaceSet.
-        frame: Its frame, in the file's own axes.
+        frame: Frame of the node, in the file's object axes (FLU or RUB).
 
     Returns:
-        The parts, or why it has none.
+        The parts, or a description of the mesh if it cannot be converted.
 
     Raises:
-        WorldError: Its points or indices are broken.
+        WorldError: The points or indices are broken.
     """
     points = frame.at(_points(node))
     faces = _faces(node, len(points))
@@ -52,15 +52,15 @@ def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
 def _over_faces(
     points: Points, faces: list[Face], used: Points
 ) -> tuple[Part, ...] | str:
-    """A prism over each face, as high as the mesh."""
+    """One prism per face, each as high as the mesh."""
     bent = [len(face) for face in faces if not _is_flat_convex(points[face])]
     if max(bent, default=0) > MOST_CORNERS or sum(bent) > 10 * MOST_CORNERS:
-        return "a mesh with many faces that are not convex"
+        return "a mesh with too many non-convex faces"
     if len(faces) > MOST_FACES:
-        return f"a mesh with {len(faces)} faces that is not convex"
+        return f"a non-convex mesh with {len(faces)} faces"
     low, high = float(used[:, 2].min()), float(used[:, 2].max())
     pieces = [piece for face in faces for piece in _convex_pieces(points[face])]
-    shapes = [hull(piece)[0].shape for piece in pieces if _casts(piece)]
+    shapes = [hull(piece)[0].shape for piece in pieces if _has_area(piece)]
     parts = tuple(Part(shape, low, high) for shape in dict.fromkeys(shapes))
     return parts or hull(used)
 
@@ -74,7 +74,7 @@ def _points(node: Node) -> Points:
 
 
 def _faces(node: Node, count: int) -> list[Face]:
-    """Indices of the points of each face, without those of less than three."""
+    """Point indices of each face; faces of fewer than three points are dropped."""
     flat = np.array(number_list(node, "coordIndex"), np.float64)
     index = flat.astype(np.int64)
     if (index != flat).any() or (index < -1).any() or (index >= count).any():
@@ -92,7 +92,7 @@ def _is_flat(points: Points) -> bool:
 
 
 def _is_convex(points: Points, faces: list[Face], used: Points) -> bool:
-    """Whether no point stands out of the plane of a face, on either side of it."""
+    """Whether no face has points of the mesh on both sides of its plane."""
     for face in faces:
         normal = _normal(points[face])
         length = float(np.linalg.norm(normal))
@@ -110,7 +110,7 @@ def _normal(corners: Points) -> Points:
 
 
 def _is_flat_convex(corners: Points) -> bool:
-    """Whether all turns along a flat face go the same way."""
+    """Whether a flat face turns in the same direction at every corner."""
     normal = _normal(corners)
     edge = np.roll(corners, -1, axis=0) - corners
     turns = np.cross(edge, np.roll(edge, -1, axis=0)) @ normal
@@ -118,7 +118,7 @@ def _is_flat_convex(corners: Points) -> bool:
 
 
 def _convex_pieces(corners: Points) -> list[Points]:
-    """A flat face as it is where it is convex, or cut into triangles."""
+    """A flat face as one piece if it is convex, else as triangles."""
     if len(corners) == 3 or _is_flat_convex(corners):
         return [corners]
     flat = np.delete(corners, int(np.abs(_normal(corners)).argmax()), axis=1)
@@ -126,7 +126,7 @@ def _convex_pieces(corners: Points) -> list[Points]:
 
 
 def _ears(outline: Points) -> list[tuple[int, int, int]]:
-    """Triangles of a polygon, shape (n, 2), by cutting off ears."""
+    """Triangulates a polygon, shape (n, 2), by ear clipping."""
     (x, y), (u, v) = outline.T, np.roll(outline, -1, axis=0).T
     left = list(range(len(outline)))
     if (x * v - u * y).sum() < 0.0:
@@ -140,7 +140,7 @@ def _ears(outline: Points) -> list[tuple[int, int, int]]:
 
 
 def _is_ear(outline: Points, left: list[int], k: int) -> bool:
-    """Whether a corner can be cut off: it turns left, and no other corner is in it."""
+    """Whether corner `k` turns left and its triangle contains no other corner."""
     a, b, c = outline[[left[k - 1], left[k], left[(k + 1) % len(left)]]]
     others = outline[left]
     sides = [
@@ -152,6 +152,6 @@ def _is_ear(outline: Points, left: list[int], k: int) -> bool:
     return bool(turn >= 0.0 and not inside.any())
 
 
-def _casts(corners: Points) -> bool:
-    """Whether a face has an area as seen from above."""
+def _has_area(corners: Points) -> bool:
+    """Whether a face has an area when seen from above."""
     return bool(abs(_normal(corners)[2]) > 2.0 * THINNEST**2)

@@ -1,4 +1,4 @@
-"""Masses."""
+"""Masses of Solids."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ _DENSITY = 1000.0
 
 
 def mass_of(node: Node, volume: float) -> float | None:
-    """The mass of a Solid by its `physics` field, kg; None where it is fixed.
+    """The mass of a Solid, kg, from its `physics` field; None if it is fixed.
 
     Args:
         node: The Solid.
-        volume: Of its boundingObject, m³.
+        volume: Volume of its boundingObject, m³.
 
     Raises:
-        WorldError: A field of its Physics is broken.
+        WorldError: A field of the Physics node is broken.
     """
     physics = child(node, "physics")
     if physics is None:

@@ -1,4 +1,4 @@
-"""Where a node says it is."""
+"""Frames of nodes from their translation, rotation and scale."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _NO_SCALE = (1.0, 1.0, 1.0)
 def placed(
     node: Node, frame: Frame, default: Point = _ORIGIN, *, scaled: bool = False
 ) -> Frame:
-    """The frame of a node with translation and rotation.
+    """The frame of a node.
 
     Args:
         node: The node.
-        frame: That of its parent.
-        default: Its translation where it gives none; forward, left, up.
-        scaled: It may have a `scale`, too.
+        frame: Frame of its parent.
+        default: Translation (forward, left, up), m, if the node has none.
+        scaled: Whether to apply the node's `scale` field.
 
     Raises:
-        WorldError: A field is not what it should be, or the place is too far away.
+        WorldError: A field is broken, or its values are too large.
     """
     translation = numbers(node, "translation", own_axes(default, frame.y_up))
     rotation = numbers(node, "rotation", _NO_TURN)

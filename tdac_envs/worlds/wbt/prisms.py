@@ -1,8 +1,8 @@
-"""Primitive shapes anywhere in space, projected to prisms.
+"""Projects primitive shapes in any pose to prisms.
 
-A frame here is forward, left, up: cylinders, capsules and cones stand along its z. It
-may scale and shear. What is the same within `CLOSE` is taken as the same: a box that
-leans by a hair's breadth has the footprint of an upright one.
+All frames are FLU: cylinders, capsules and cones stand along z. A frame may scale and
+shear. Lengths below `CLOSE` count as 0: a box that leans by a few micrometres has the
+footprint of an upright one.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.world import Part
 
 CLOSE = 1e-5
-"""Lengths below this do not matter, m."""
+"""Lengths up to this are ignored, m."""
 _ROUND = 40
-"""Corners of the polygon around an ellipse."""
+"""Number of corners of the polygon that replaces an ellipse."""
 
 Vectors = NDArray[np.float64]
 
 _TURNS = 2.0 * np.pi * np.arange(_ROUND) / _ROUND
-# Corners on a circle that keeps the area of the unit disc.
+# Radius at which the polygon has the area of the unit disc.
 _OUT = math.sqrt(2.0 * math.pi / (_ROUND * math.sin(2.0 * math.pi / _ROUND)))
 _CIRCLE: Vectors = _OUT * np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
 
 
 def box(frame: Frame, size: ArrayLike) -> tuple[Part, ...]:
-    """A box around the frame's origin."""
+    """A box centred on the frame's origin."""
     halves = (frame.matrix * (np.asarray(size, np.float64) / 2)).T
     low, high = _heights(frame, float(np.abs(halves[:, 2]).sum()))
     return (Part(_zonotope(frame.origin[:2], halves[:, :2]), low, high),)
 
 
 def sphere(frame: Frame, radius: float) -> tuple[Part, ...]:
-    """A sphere around the frame's origin; a scaled one is an ellipsoid."""
+    """A sphere centred on the frame's origin; an ellipsoid if the frame scales."""
     rows = frame.matrix * radius
     low, high = _heights(frame, float(np.linalg.norm(rows[2])))
     _, spread, turn = np.linalg.svd(rows[:2])
@@ -49,7 +49,7 @@ def sphere(frame: Frame, radius: float) -> tuple[Part, ...]:
 
 
 def cylinder(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
-    """A cylinder around the frame's origin, along its z."""
+    """A cylinder centred on the frame's origin, along its z."""
     axis = frame.matrix[:, 2] * (height / 2)
     rim = frame.matrix[:, :2] * radius
     reach = abs(axis[2]) + math.hypot(*rim[2])
@@ -66,7 +66,7 @@ def cylinder(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
 
 
 def capsule(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
-    """A cylinder with half a sphere on both ends."""
+    """A cylinder with a hemisphere on each end; `height` excludes these."""
     axis = frame.matrix[:, 2] * (height / 2)
     if math.hypot(*axis[:2]) <= CLOSE:
         ball = sphere(frame, radius)[0]
@@ -83,7 +83,7 @@ def capsule(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
 
 
 def cone(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
-    """A cone around the frame's origin, its apex towards z."""
+    """A cone centred on the frame's origin, its apex towards +z."""
     axis = frame.matrix[:, 2] * (height / 2)
     rim = frame.matrix[:, :2] * radius
     spread = np.linalg.svd(rim[:2])[1]
@@ -94,12 +94,12 @@ def cone(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
 
 
 def plane(frame: Frame, length: float, width: float) -> tuple[Part, ...]:
-    """A flat rectangle across the frame's z."""
+    """A flat rectangle perpendicular to the frame's z."""
     return box(frame, (length, width, 0.0))
 
 
 def hull(points: Vectors) -> tuple[Part, ...]:
-    """The convex hull of points in the world, shape (n, 3)."""
+    """The prism around points in world coordinates, shape (n, 3)."""
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
     return (Part(_around(points[:, :2]), low, high),)
 
@@ -110,7 +110,7 @@ def _heights(frame: Frame, reach: float) -> tuple[float, float]:
 
 
 def _zonotope(middle: Vectors, halves: Vectors) -> Footprint:
-    """All points middle ± each of some half edges: a rectangle where it is one."""
+    """The hull of all sums `middle` ± each half edge; a Rectangle if it is one."""
     lengths = np.hypot(*halves.T)
     first = int(lengths.argmax())
     if lengths[first] <= CLOSE:
@@ -129,14 +129,14 @@ def _zonotope(middle: Vectors, halves: Vectors) -> Footprint:
 def _rectangle(
     middle: Vectors, along: Vectors, length: float, width: float
 ) -> Rectangle:
-    """From half lengths; never thinner than `THINNEST`."""
+    """A rectangle from half lengths; its sides are at least `THINNEST`."""
     x, y = middle.tolist()
     yaw = math.atan2(along[1], along[0])
     return Rectangle(x, y, yaw, max(2.0 * length, THINNEST), max(2.0 * width, THINNEST))
 
 
 def _between(one: Footprint, other: Footprint) -> Footprint:
-    """What lies between two discs (or ellipses) of the same size."""
+    """The area between two discs (or ellipses) of the same size."""
     if not (isinstance(one, Disc) and isinstance(other, Disc)):
         corners = [s.vertices for s in (one, other) if not isinstance(s, Disc)]
         return _around(np.vstack(corners))
@@ -147,7 +147,7 @@ def _between(one: Footprint, other: Footprint) -> Footprint:
 
 
 def _around(points: Vectors) -> Footprint:
-    """The hull of points, shape (n, 2); a thin rectangle where they lie on a line."""
+    """The hull of points, shape (n, 2); a thin rectangle if they lie on a line."""
     try:
         found = Polygon.around(points)
     except WorldError:

@@ -1,7 +1,7 @@
-"""The PROTOs of Webots that are obstacles: what they are made of.
+"""Converts Webots' obstacle PROTOs to prisms.
 
-Numbers are those of the PROTOs of R2023b and R2025a. Each function gets the node and
-the frame of its parent, and gives the prisms in the world.
+The constants are those of the PROTOs of R2023b and R2025a. Each reader takes the node
+and the frame of its parent, and returns the prisms in the world.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from tdac_envs.worlds.world import Part
 Size = tuple[float, float, float]
 
 _WOOD = 0.298
-"""Reflectance of a WoodenBox, as measured on its textures."""
+"""Reflectance of a WoodenBox, measured on its textures."""
 _ROUNDNESS = 0.01
-"""By how much of its thickness a pipe in pieces may depart from a round one."""
+"""Maximum deviation of a faceted pipe from a round one, relative to its thickness."""
 
 _NARROWEST = 1e-3
-"""Radius of a pipe, at least, m."""
+"""Minimum radius of a pipe, m."""
 
-# Outlines at scale 1, m, and how far up and down the rock reaches.
+# Outline, lowest z and highest z of each type of Rock at scale 1, m.
 _ROCKS: dict[str, tuple[list[tuple[float, float]], float, float]] = {
     "regular": (
         [
@@ -58,14 +58,14 @@ _ROCKS: dict[str, tuple[list[tuple[float, float]], float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A PROTO in the world.
+    """A PROTO converted to prisms.
 
     Attributes:
-        frame: Its own.
-        solid: What can be hit.
-        visible: What sensors see.
-        mass: kg, or None where it is fixed.
-        reflectance: Of all of it.
+        frame: Frame of the PROTO.
+        solid: Parts that can be hit.
+        visible: Parts that sensors see.
+        mass: Mass, kg; None if it is fixed.
+        reflectance: Reflectance of all parts.
     """
 
     frame: Frame
@@ -108,7 +108,7 @@ def _plastic_crate(node: Node, frame: Frame) -> Body:
 
 def _wooden_pallet(node: Node, frame: Frame) -> Body:
     own, parts = _standing(node, frame, (1.2, 0.8, 0.14))
-    # Older versions of the PROTO have no such field, and a boundingObject.
+    # Older versions lack this field and always have a boundingObject.
     return Body(own, parts if flag(node, "boundingObject", True) else (), parts)
 
 
@@ -176,7 +176,7 @@ def _solid_pipe(node: Node, frame: Frame) -> Body:
 
 
 def _facets(node: Node, radius: float, thickness: float) -> int:
-    """Webots' own number of facets, or more where these would show."""
+    """Webots' number of facets; more if they deviate too much from a round pipe."""
     own = number(node, "subdivision", 24.0)
     smooth = math.pi / math.sqrt(2.0 * _ROUNDNESS * thickness / radius)
     return math.ceil(min(max(own, smooth, 8.0), 200.0))
@@ -194,13 +194,13 @@ PROTOS: dict[str, Callable[[Node, Frame], Body]] = {
     "WoodenBox": _wooden_box,
     "WoodenPallet": _wooden_pallet,
 }
-"""By type; each reads a node in the frame of its parent."""
+"""The reader of each type."""
 
 
 def _standing(
     node: Node, frame: Frame, default: Size
 ) -> tuple[Frame, tuple[Part, ...]]:
-    """A box whose origin is in the middle of its bottom."""
+    """A box whose origin is the centre of its bottom face."""
     size, own = _size(node, frame, default), placed(node, frame)
     return own, box(own.flu().inside((0.0, 0.0, size[2] / 2)), size)
 
@@ -208,13 +208,13 @@ def _standing(
 def _column(
     frame: Frame, outline: Vectors, low: float, high: float
 ) -> tuple[Part, ...]:
-    """A convex outline, drawn out along z."""
+    """A convex outline, extruded along z."""
     ends = [np.column_stack([outline, np.full(len(outline), z)]) for z in (low, high)]
     return hull(frame.at(np.vstack(ends)))
 
 
 def _size(node: Node, frame: Frame, default: Size) -> Size:
-    """Forward, left, up; the default where one is not above 0, as Webots does."""
+    """Size (forward, left, up), m; the default if one is not above 0, as in Webots."""
     own: Point = default
     if frame.y_up:
         x, y, z = own_axes(default, True)
@@ -229,7 +229,7 @@ def _clamped(size: Size, least: float, most: float) -> Size:
 
 
 def _box_mass(node: Node, size: Size, heaviest: float) -> float | None:
-    """The mass of a box, kept within what its volume allows; None is fixed."""
+    """The mass of a box, kg, clamped to a range from its size; None if it is fixed."""
     mass, least = number(node, "mass", 0.0), math.prod(size) ** (2.0 / 3.0)
     return min(max(mass, least), heaviest * least) if mass > 0.0 else None
 

@@ -18,7 +18,7 @@ from tdac_envs.worlds.wbt.walk import walk
 from tdac_envs.worlds.world import EPuck, World
 
 LARGEST_FILE = 2_000_000
-"""Bytes."""
+"""Maximum size of a world file, bytes."""
 
 _FLU_SINCE = (2022, 1)
 _ENU_SINCE = (2020, 2)
@@ -41,11 +41,11 @@ def load_world(
     Args:
         path: The file.
         robot: Name of the e-puck to drive; by default the first.
-        goal: Point (x, y) in metres, ENU; by default that of the node named GOAL.
+        goal: Point (x, y), m, ENU; by default the position of the node named GOAL.
 
     Raises:
-        WorldError: The file cannot be read; what is wrong in it is said with line
-            and column.
+        WorldError: The file cannot be read or is broken; errors in the file are
+            reported with line and column.
     """
     file = Path(path)
     return read_world(read_text(file), printable(file.name), robot=robot, goal=goal)
@@ -67,7 +67,7 @@ def read_world(
             walk(node, frame, found)
         except WorldFileError:
             raise
-        except WorldError as error:  # a value that no shape can have
+        except WorldError as error:  # a value that is invalid for its shape
             raise node.error(str(error)) from None
     world = World(
         robots=_driven_first(found.robots, robot, name),
@@ -85,7 +85,7 @@ def read_world(
 
 
 def with_goal(world: World, goal: tuple[float, float]) -> World:
-    """The world with another goal; a mark that it had is then no longer one."""
+    """The world with another goal; its goal markers become ordinary obstacles."""
     marks = tuple(replace(thing, is_goal=False) for thing in world.obstacles)
     return replace(world, goal=goal, obstacles=marks)
 
@@ -94,7 +94,7 @@ def read_text(path: Path) -> str:
     """The text of a file.
 
     Raises:
-        WorldError: It cannot be read, or is too large.
+        WorldError: The file cannot be read, or is too large.
     """
     try:
         data = read_file(path, LARGEST_FILE)
@@ -107,14 +107,14 @@ def read_text(path: Path) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
-        return data.decode("latin-1")  # comments of old files
+        return data.decode("latin-1")  # old files may have Latin-1 comments
 
 
 def frame_of(document: Document) -> Frame:
-    """The frame of the nodes at the top of a file.
+    """The frame of the top-level nodes of a file.
 
     Raises:
-        WorldFileError: It names an unknown system of coordinates.
+        WorldFileError: The file names an unknown coordinate system.
     """
     info = _world_info(document)
     z_up = document.release >= _ENU_SINCE
@@ -127,7 +127,7 @@ def frame_of(document: Document) -> Frame:
             )
         z_up = _Z_UP[system]
     elif info is not None and not z_up and len(_items(info, "gravity")) == 3:
-        # Old files say which way is down by a vector.
+        # In old files gravity is a vector, which shows the vertical axis.
         x, y, z = numbers(info, "gravity", (0.0, -9.81, 0.0))
         z_up = -z > max(abs(x), abs(y))
     return world_frame(z_up, y_up_objects=document.release < _FLU_SINCE)
@@ -145,7 +145,7 @@ def _time_step(info: Node | None, found: Found) -> float:
     step = _STEP if info is None else number(info, "basicTimeStep", _STEP)
     if step >= 0.001:
         return step
-    found.notes.append(f"basicTimeStep {step:g} taken as {_STEP:g}, as Webots does")
+    found.notes.append(f"basicTimeStep {step:g} is replaced by {_STEP:g}, as in Webots")
     return _STEP
 
 
@@ -162,13 +162,13 @@ def _driven_first(
 
 
 def _notes(world: World, found: Found) -> list[str]:
-    """What a reader of the world should know."""
+    """Assumptions that depend on the whole world."""
     notes = []
     if len(world.robots) > 1:
         names = ", ".join(repr(robot.name) for robot in world.robots[1:])
         notes.append(f"{world.robot.name!r} is driven; {names} stand still")
     if len(set(found.goals)) > 1:
-        notes.append(f"{len(found.goals)} nodes are named GOAL; the first is taken")
+        notes.append(f"{len(found.goals)} nodes are named GOAL; the first is used")
     floor = floor_under(world)
     if abs(floor) > _RAISED:
         notes.append(
@@ -179,5 +179,5 @@ def _notes(world: World, found: Found) -> list[str]:
         if fallen != thing:
             drop = thing.solid[0].top - fallen.solid[0].top
             name = thing.name or thing.kind
-            notes.append(f"{name} hangs {drop:.3g} m up; it is taken as fallen")
+            notes.append(f"{name} hangs {drop:.3g} m up; it is modelled as fallen")
     return notes

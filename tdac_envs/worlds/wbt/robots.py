@@ -1,4 +1,4 @@
-"""Which nodes are e-pucks, and how they stand."""
+"""Recognises e-pucks and reads their poses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _EPUCK = re.compile(r"e[-_ ]?puck", re.IGNORECASE)
 
 
 def is_epuck(node: Node) -> bool:
-    """Whether a node is an e-puck: its PROTO, or a Robot that is written out."""
+    """Whether a node is an e-puck: the PROTO, or a Robot with its model or sensors."""
     if node.kind not in ROBOTS:
         return _EPUCK.fullmatch(node.kind) is not None
     if _EPUCK.search(text(node, "model")):
@@ -30,7 +30,7 @@ def is_epuck(node: Node) -> bool:
 
 
 def epuck(node: Node, frame: Frame) -> EPuck:
-    """The pose of an e-puck.
+    """Reads an e-puck.
 
     Raises:
         WorldError: A field is broken.
@@ -50,7 +50,7 @@ def epuck(node: Node, frame: Frame) -> EPuck:
 
 
 def inside(node: Node) -> Iterator[Node]:
-    """All nodes of a robot or a Solid, itself included; the body's, not the looks'."""
+    """The node and all nodes in its children, joints, devices and boundingObject."""
     stack, seen = [node], set()
     while stack:
         part = stack.pop()
@@ -62,10 +62,10 @@ def inside(node: Node) -> Iterator[Node]:
 
 
 def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
-    """Direction of the axis towards its two front sensors, ps0 and ps7.
+    """Direction of the robot's axis that points to its front sensors, ps0 and ps7.
 
-    A robot that is written out keeps the axes of the version that it was made with,
-    whatever the file's version.
+    A Robot node keeps the axes of the version that it was written for, whatever the
+    version of the file.
     """
     front = {
         text(part, "name"): numbers(part, "translation", (0.0, 0.0, 0.0))
@@ -74,14 +74,14 @@ def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
     }
     if len(front) != 2:
         return None
-    away = frame.matrix @ np.array(list(front.values())).sum(axis=0)
-    ways = np.vstack([frame.matrix[:2].T, -frame.matrix[:2].T])
-    x, y = ways[int((ways @ away[:2]).argmax())].tolist()
+    forward = frame.matrix @ np.array(list(front.values())).sum(axis=0)
+    axes = np.vstack([frame.matrix[:2].T, -frame.matrix[:2].T])
+    x, y = axes[int((axes @ forward[:2]).argmax())].tolist()
     return (x, y) if math.hypot(x, y) > 0.5 else None
 
 
 def has_body(node: Node) -> bool:
-    """Whether a robot may be hit: it, or a part of it, has a boundingObject."""
+    """Whether a robot can be hit: it or a part of it has a boundingObject."""
     return any(
         "boundingObject" in part.fields and child(part, "boundingObject") is not None
         for part in inside(node)

@@ -1,4 +1,4 @@
-"""The words of a `.wbt` file."""
+"""Tokenizer for `.wbt` files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tdac_envs.core.errors import WorldFileError
 
 Kind = Literal["number", "string", "word", "mark", "end"]
 
-# A comma is white space. A number's first character decides that it is one.
+# A comma is white space. The first character decides whether a token is a number.
 _TOKEN = re.compile(
     r"""[\s,]+ | \#[^\n]*
     | (?P<string>"(?:[^"\\\n]|\\[^\n])*")
@@ -26,12 +26,12 @@ _ESCAPE = re.compile(r"\\(.)")
 
 
 class Token(NamedTuple):
-    """A word.
+    """A token.
 
     Attributes:
-        kind: What it is.
-        text: As in the file; of a string, its content.
-        offset: Index of its first character.
+        kind: Type of the token.
+        text: Text in the file; for a string, its content.
+        offset: Index of the first character.
     """
 
     kind: Kind
@@ -41,32 +41,32 @@ class Token(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
-    """A text, and how to say where something in it is.
+    """The text of a file, which converts offsets to lines and columns.
 
     Attributes:
-        name: Of the file.
-        text: With LF as the only line end.
+        name: File name.
+        text: Text with LF as the only line end.
     """
 
     name: str
     text: str
 
     def line(self, offset: int) -> int:
-        """Number of the line, from 1."""
+        """Line number of an offset, from 1."""
         return self.text.count("\n", 0, offset) + 1
 
     def error(self, offset: int, message: str) -> WorldFileError:
-        """An error that says line and column, both from 1."""
+        """An error at an offset, with line and column, both from 1."""
         column = offset - self.text.rfind("\n", 0, offset)
         where = f"{self.name}, line {self.line(offset)}, column {column}"
         return WorldFileError(f"{where}: {message}")
 
 
 def tokens(source: Source, start: int = 0) -> Iterator[Token]:
-    """The words from `start` on, and an end.
+    """Yields the tokens from `start` on, then an `end` token.
 
     Raises:
-        WorldFileError: A string is not closed, or a number cannot be read.
+        WorldFileError: A string is not closed, or a number is invalid.
     """
     for match in _TOKEN.finditer(source.text, start):
         kind, text = match.lastgroup, match.group()

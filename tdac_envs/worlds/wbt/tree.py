@@ -1,4 +1,4 @@
-"""The nodes of a `.wbt` file, as written: every type and every field is kept."""
+"""Parses a `.wbt` file to nodes, with every type and every field as written."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from tdac_envs.core.errors import WorldFileError
 from tdac_envs.worlds.wbt.tokens import Kind, Source, Token, tokens
 
 DEEPEST = 100
-"""Nodes within nodes at most, so that no file exhausts the stack."""
+"""Maximum depth of nested nodes, so that no file exhausts the stack."""
 MOST_NODES = 5_000
-"""Nodes at most, each USE counted as what it stands for."""
+"""Maximum number of nodes; a USE counts as much as the node that it refers to."""
 
 _HEADER = re.compile(r"#VRML(?:_\w+)? +(\S+)(?: +utf8)?[^\S\n]*(?:\n|$)")
 _VERSION = re.compile(r"[RV]?(\d{1,6})(?:\.(\d{1,6})|([a-z]))?")
@@ -25,9 +25,8 @@ class Field:
     """The value of a field.
 
     Attributes:
-        items: What it holds; a single value is a list of one, a vector a list of
-            numbers.
-        offset: Where it begins in the text.
+        items: Values: one item for a single value, all numbers for a vector.
+        offset: Index of the first character in the text.
     """
 
     items: tuple[Item, ...]
@@ -41,9 +40,9 @@ class Node:
     Attributes:
         kind: Node or PROTO type.
         define: Its DEF name, or empty.
-        fields: By name.
-        source: The text.
-        offset: Where it begins in the text.
+        fields: Fields by name.
+        source: Text that contains the node.
+        offset: Index of the first character in the text.
         size: Number of nodes in it, itself included.
     """
 
@@ -55,24 +54,24 @@ class Node:
     size: int
 
     def error(self, message: str, field: str = "") -> WorldFileError:
-        """An error at one of its fields, or at the node."""
+        """An error at one of the fields, or at the node."""
         at = self.fields[field].offset if field in self.fields else self.offset
         return self.source.error(at, message)
 
     @property
     def line(self) -> int:
-        """Where it stands, from 1."""
+        """Line number, from 1."""
         return self.source.line(self.offset)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Document:
-    """A file.
+    """A parsed file.
 
     Attributes:
-        nodes: Those at the top.
-        version: As in the header, e.g. "R2025a".
-        release: Its numbers, which can be compared: (2025, 1), (8, 6).
+        nodes: Top-level nodes.
+        version: Version in the header, e.g. "R2025a".
+        release: The version as comparable numbers, e.g. (2025, 1) or (8, 6).
     """
 
     nodes: tuple[Node, ...]
@@ -81,14 +80,14 @@ class Document:
 
 
 def parse(text: str, name: str) -> Document:
-    """Reads a file's text.
+    """Parses the text of a file.
 
     Args:
-        text: Lines may end in LF, CR or both.
-        name: What errors call it.
+        text: Text; lines may end in LF, CR or both.
+        name: File name for errors.
 
     Raises:
-        WorldFileError: The text is not a Webots world; it says line and column.
+        WorldFileError: The text is not a Webots world; the message gives the position.
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     source = Source(name, text)
@@ -107,7 +106,7 @@ Item = float | str | bool | Node | None
 
 
 class _Parser:
-    """A recursive descent; keeps the next token and the DEF names so far."""
+    """Recursive-descent parser; keeps the next token and the DEF names so far."""
 
     def __init__(self, source: Source, stream: Iterator[Token]) -> None:
         self._source, self._stream = source, stream
@@ -137,10 +136,10 @@ class _Parser:
         self._take()
 
     def _node(self, depth: int) -> Node | None:
-        """A node, a USE of one, or NULL."""
+        """Parses a node, the USE of a node, or NULL."""
         begin = self._next
         if depth > DEEPEST:
-            raise self._unexpected(f"at most {DEEPEST} nodes within each other")
+            raise self._unexpected(f"at most {DEEPEST} nested nodes")
         if self._skip("word", "NULL"):
             return None
         if self._skip("word", "USE"):
@@ -159,7 +158,7 @@ class _Parser:
         )
         node = Node(kind, define, fields, self._source, begin.offset, size)
         self._bounded(size, node)
-        # A node within, of the same name, comes later than the beginning of this one.
+        # A nested node of the same DEF name takes precedence.
         if define and self._defined.get(define) is before:
             self._defined[define] = node
         return node
@@ -171,7 +170,7 @@ class _Parser:
     def _used(self, name: Token) -> Node:
         if name.text not in self._defined:
             raise self._source.error(
-                name.offset, f"USE {name.text}: there is no DEF {name.text} above"
+                name.offset, f"USE {name.text}: there is no DEF {name.text} before it"
             )
         return self._defined[name.text]
 
@@ -215,7 +214,7 @@ class _Parser:
         if token.kind == "word" and token.text in {"TRUE", "FALSE"}:
             return _CONSTANTS[self._take().text]
         if token.kind == "word" and token.text == "IS":
-            raise self._unexpected(f"{wanted}; IS belongs into .proto files")
+            raise self._unexpected(f"{wanted}; IS is allowed only in .proto files")
         if token.kind == "word":
             return self._node(depth + 1)
         raise self._unexpected(wanted)
@@ -226,7 +225,7 @@ class _Parser:
         return self._take()
 
     def _skip(self, kind: Kind, text: str) -> bool:
-        """Takes the next token if it is this one."""
+        """Consumes the next token if it matches."""
         if self._next.kind != kind or self._next.text != text:
             return False
         self._take()

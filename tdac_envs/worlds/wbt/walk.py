@@ -1,4 +1,4 @@
-"""From nodes to what they are: e-pucks, floors, obstacles, or not modelled."""
+"""Converts nodes to e-pucks, floors and obstacles, or lists them as unmodelled."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ _DEVICES = {
 
 
 def walk(node: Node, frame: Frame, found: Found) -> None:
-    """Adds a node, and what is in it, to what has been found.
+    """Adds a node and its content to `found`.
 
     Args:
         node: Any node of the scene.
-        frame: That of its parent.
-        found: Where to put it.
+        frame: Frame of its parent.
+        found: The content of the file so far.
 
     Raises:
-        WorldError: A field is broken; it says line and column.
+        WorldError: A field is broken; the message gives line and column.
     """
     if node.kind in _NEVER_SOLID:
         return
@@ -94,19 +94,19 @@ def _proto(node: Node, frame: Frame, found: Found) -> None:
 
 
 def _solid(node: Node, own: Frame, found: Found) -> None:
-    """A Solid: what bounds it is solid, its Shapes are visible, Solids in it follow."""
+    """Adds a Solid with its boundingObject and Shapes, then the Solids inside it."""
     if is_goal(node):
         found.goal(own)
     place, looks = len(found.obstacles), list[tuple[Pieces, float]]()
-    _look(children(node), own, found, looks)
+    _collect_shapes(children(node), own, found, looks)
     bounding = child(node, "boundingObject")
     body = Pieces() if bounding is None else bounds(bounding, own)
     for missing in dict.fromkeys(body.missing):
         found.left_out(node, own, f"its boundingObject is {missing}")
     visible = sum((pieces for pieces, _ in looks), Pieces())
     if visible.missing:
-        seen = "what bounds it" if body.parts else "nothing of it"
-        _unseen(node, visible, seen, found)
+        seen = "its boundingObject" if body.parts else "nothing of it"
+        _note_unseen(node, visible, seen, found)
         visible += Pieces(body.parts)
     if node.kind != "Solid" and not body.parts and not visible.parts:
         return
@@ -119,33 +119,33 @@ def _solid(node: Node, own: Frame, found: Found) -> None:
 
 
 def _kind(node: Node) -> str:
-    """The type, or what a Solid's `model` says that it is."""
+    """The `model` field of a Solid if it has one, else the node type."""
     model = node.fields.get("model")
     if model is None or len(model.items) != 1 or not isinstance(model.items[0], str):
         return node.kind
     return model.items[0] or node.kind
 
 
-def _unseen(node: Node, looks: Pieces, instead: str, found: Found) -> None:
+def _note_unseen(node: Node, looks: Pieces, instead: str, found: Found) -> None:
     what = ", ".join(dict.fromkeys(looks.missing))
-    name = name_of(node) or node.kind
-    found.notes.append(f"line {node.line}: {name} is {what}; sensors see {instead}")
+    where = f"line {node.line}: {name_of(node) or node.kind}"
+    found.notes.append(f"{where}: {what} is not modelled; sensors see {instead}")
 
 
-def _look(
+def _collect_shapes(
     nodes: tuple[Node, ...],
     frame: Frame,
     found: Found,
     looks: list[tuple[Pieces, float]],
 ) -> None:
-    """Gathers the Shapes of a Solid; everything else in it is walked."""
+    """Collects the Shapes of a Solid, and walks everything else in it."""
     for node in nodes:
         if node.kind == "Shape":
             shape = child(node, "geometry")
             if shape is not None:
                 looks.append((geometry(shape, frame), reflectance(node)))
         elif node.kind in GROUPS:
-            _look(children(node), _inside(node, frame), found, looks)
+            _collect_shapes(children(node), _inside(node, frame), found, looks)
         else:
             walk(node, frame, found)
 
@@ -166,13 +166,13 @@ def _group(node: Node, frame: Frame, found: Found) -> None:
 
 
 def _shape(node: Node, frame: Frame, found: Found, named: Node) -> None:
-    """A Shape outside of Solids: sensors see it, nothing hits it."""
+    """Adds a Shape outside of Solids: sensors see it, nothing hits it."""
     shape = child(node, "geometry")
     if shape is None:
         return
     looks = geometry(shape, frame)
     if looks.missing:
-        _unseen(node, looks, "nothing of it", found)
+        _note_unseen(node, looks, "nothing of it", found)
     x, y, _ = frame.origin.tolist()
     name = name_of(node) or name_of(named)
     mark = is_goal(node) or is_goal(named)
@@ -190,11 +190,11 @@ def _joint(node: Node, frame: Frame, found: Found) -> None:
         walk(end, frame, found)
         if node.kind != "Slot":
             name = name_of(end) or end.kind
-            found.notes.append(f"{name}: taken as fixed, though on a {node.kind}")
+            found.notes.append(f"{name}: modelled as fixed, although on a {node.kind}")
 
 
 def _unknown(node: Node, frame: Frame, found: Found) -> None:
-    # An unknown node may mean something else by these fields.
+    # These fields may have another meaning in an unknown node.
     with suppress(WorldError):
         frame = placed(node, frame)
     if is_goal(node):

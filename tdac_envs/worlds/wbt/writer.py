@@ -1,4 +1,4 @@
-"""Writes a world as a flat Webots file: ENU, R2025a, geometry spelled out."""
+"""Writes a world as a flat Webots file: ENU, R2025a, obstacles without PROTOs."""
 
 from __future__ import annotations
 
@@ -19,21 +19,20 @@ _FOLDERS = {
     "Floor": _FLOORS,
     "E-puck": "robots/gctronic/e-puck",
 }
-# Looks down, with x to the right.
+# Looking down, x to the right.
 _FROM_ABOVE = "-0.57735 0.57735 0.57735 2.0944"
 
 
 def write_world(world: World, *, supervisor: bool = False) -> str:
-    """The text of a `.wbt` file; `read_world` gives an equal world.
+    """The text of a `.wbt` file; `read_world` returns an equal world from it.
 
-    Every obstacle is a Solid at the top of the file. One with a single piece has that
-    as its boundingObject; of several pieces each stands in a Pose. What is not
-    modelled is named in comments only.
+    Every obstacle is a top-level Solid. A single part is its boundingObject; several
+    parts are each in a Pose. Unmodelled nodes appear only in comments.
 
     Args:
         world: The world.
-        supervisor: Whether the e-puck that is driven is one, and so may ask where it
-            is; the reader does not mind.
+        supervisor: Whether the driven e-puck is a supervisor, which can query its own
+            pose; `read_world` ignores this.
     """
     externs = ["TexturedBackground", "TexturedBackgroundLight"]
     externs += dict.fromkeys(arena.kind for arena in world.arenas)
@@ -58,7 +57,7 @@ def _extern(name: str) -> str:
 
 
 def _is_marked(world: World) -> bool:
-    """Whether the first thing named GOAL is at the goal."""
+    """Whether the first obstacle that marks the goal is at the goal."""
     marks = [(thing.x, thing.y) for thing in world.obstacles if thing.is_goal]
     return bool(marks) and marks[0] == world.goal
 
@@ -121,18 +120,18 @@ def _obstacle(thing: Obstacle) -> str:
 
 
 def _single(thing: Obstacle) -> Part | None:
-    """The only piece of an obstacle, if it can stand for it; or None."""
+    """The only part of an obstacle, if the Solid itself can hold it; else None."""
     pieces = set(thing.solid) | set(thing.visible)
     if len(pieces) != 1 or max(len(thing.solid), len(thing.visible)) > 1:
         return None
     part = pieces.pop()
     if isinstance(part.shape, Polygon):
-        return part  # written as seen from the origin
+        return part  # written relative to the origin
     return part if (part.shape.x, part.shape.y) == (thing.x, thing.y) else None
 
 
 def _placed(thing: Obstacle, part: Part, single: Part | None, visible: bool) -> str:
-    """A piece: its geometry alone, in a Shape, or either in a Pose."""
+    """A part: its geometry, in a Shape if visible, in a Pose if not the only one."""
     piece = _geometry(part, thing.x, thing.y)
     if visible:
         red = _n(red_of(thing.reflectance))
@@ -146,7 +145,7 @@ def _placed(thing: Obstacle, part: Part, single: Part | None, visible: bool) -> 
 
 
 def _pose(part: Part, x: float, y: float, from_x: float, from_y: float) -> list[str]:
-    """Where a piece is; a polygon at (x, y), others as seen from the other point."""
+    """Pose of a part: (x, y) for a polygon, else relative to (from_x, from_y)."""
     shape, z = part.shape, (part.bottom + part.top) / 2
     if isinstance(shape, Polygon):
         return [_translation(x, y, z)]
@@ -167,7 +166,7 @@ def _geometry(part: Part, x: float, y: float) -> str:
 
 
 def _prism(shape: Polygon, height: float, x: float, y: float) -> str:
-    """A polygon drawn out along z, seen from (x, y)."""
+    """A polygon extruded along z, relative to (x, y)."""
     count = len(shape.points)
     points = [
         f"{_n(px - x)} {_n(py - y)} {_n(z)}"
@@ -210,6 +209,6 @@ def _quoted(text: str) -> str:
 
 
 def _n(value: float) -> str:
-    """Half of the 1e-9 that a world is kept to; no exponents."""
+    """The number without exponent, with one digit more than a world keeps."""
     text = f"{value:.10f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

@@ -171,15 +171,15 @@ BROKEN = {
     "Foo { a 1e999 }": (2, 9, "expected a number, got '1e999'"),
     "Foo { a 1_0 }": (2, 9, "expected a number, got '1_0'"),
     'Foo { a "x\ny" }': (2, 9, "a string is not closed on its line"),
-    "Foo { a USE B }": (2, 13, "USE B: there is no DEF B above"),
-    "USE A\nDEF A Foo { }": (2, 5, "USE A: there is no DEF A above"),
-    "DEF A Foo { c USE A }": (2, 19, "USE A: there is no DEF A above"),
+    "Foo { a USE B }": (2, 13, "USE B: there is no DEF B before it"),
+    "USE A\nDEF A Foo { }": (2, 5, "USE A: there is no DEF A before it"),
+    "DEF A Foo { c USE A }": (2, 19, "USE A: there is no DEF A before it"),
     "DEF": (2, 4, "expected a name after DEF, got the end of the file"),
     "DEF TRUE Foo { }": (2, 5, "expected a name after DEF, got 'TRUE'"),
     "{ }": (2, 1, "expected a node, got '{'"),
     "}": (2, 1, "expected a node, got '}'"),
     "Foo { TRUE 1 }": (2, 7, "expected a field of Foo, got TRUE"),
-    "Foo { a IS b }": (2, 9, "IS belongs into .proto files"),
+    "Foo { a IS b }": (2, 9, "IS is allowed only in .proto files"),
     "Foo { hidden }": (2, 14, "expected a field after 'hidden', got '}'"),
     "EXTERNPROTO Foo { }": (2, 17, "expected the URL of a PROTO in quotes, got '{'"),
     "IMPORTABLE Foo { }": (2, 12, "expected EXTERNPROTO after IMPORTABLE"),
@@ -264,7 +264,7 @@ def test_nesting_and_size_are_bounded():
     deep = "Group { children [ " * (DEEPEST - 1)
     read_world(text(deep + "] }" * (DEEPEST - 1)), "w.wbt")
     with pytest.raises(
-        WorldError, match=r"column \d+: expected at most 100 nodes with"
+        WorldError, match=r"column \d+: expected at most 100 nested nodes"
     ):
         read_world(text("Group { children [ " * (DEEPEST + 2)), "w.wbt")
     laughs = ["DEF A Group { children [ " + "Foo { } " * 10 + "] }"]

@@ -240,7 +240,9 @@ def test_what_bounds_a_mesh_is_seen_in_its_place():
     )  # fmt: skip
     (pot,) = world.obstacles
     assert pot.visible == pot.solid
-    assert world.notes == ("line 3: pot is Mesh; sensors see what bounds it",)
+    assert world.notes == (
+        "line 3: pot: Mesh is not modelled; sensors see its boundingObject",
+    )
 
 
 def test_nesting():
@@ -265,7 +267,7 @@ def test_nesting():
     assert measures(inner.solid[0].shape) == rectangle(-1, 2, 1, 0.5, math.pi / 2)
     assert (inner.solid[0].bottom, inner.solid[0].top) == (0.75, 1.25)
     assert (door.x, door.y) == (1, 4)
-    assert "door: taken as fixed, though on a HingeJoint" in world.notes
+    assert "door: modelled as fixed, although on a HingeJoint" in world.notes
 
 
 def test_definitions_may_change_their_meaning():
@@ -435,7 +437,7 @@ def test_the_time_step():
     assert read_world(text(info="basicTimeStep 16")).time_step == 16
     world = read_world(text(info="basicTimeStep 0"))
     assert world.time_step == 32
-    assert world.notes == ("basicTimeStep 0 taken as 32, as Webots does",)
+    assert world.notes == ("basicTimeStep 0 is replaced by 32, as in Webots",)
 
 
 def test_nothing_is_silently_dropped():
@@ -548,7 +550,7 @@ def test_what_has_a_mass_falls():
     bottoms = [thing.solid[0].bottom for thing in bodies(world)]
     assert bottoms == pytest.approx([0, 0.1, 0, 0.45])
     assert world.obstacles[1].solid[0].bottom == pytest.approx(0.45)
-    assert sum("taken as fallen" in note for note in world.notes) == 2
+    assert sum("modelled as fallen" in note for note in world.notes) == 2
 
 
 def converted(points):
