@@ -1,5 +1,5 @@
-"""Webots controllers in our worlds: the `controller` module, and who answers it.
+"""Runs Webots controllers in simulated worlds: `controller` module and step server.
 
-`controller` is the package that a controller imports, in a process of its own;
+A controller imports the package `controller` in a process of its own;
 `server.StepServer` holds the environment and takes the steps.
 """

@@ -1,4 +1,4 @@
-"""From the environment's frame (ENU) to a file's own coordinates."""
+"""Conversion from the environment's frame (ENU) to the coordinates of a file."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from tdac_envs.worlds.wbt.tree import Node
 
 Found = tuple[Node, Frame]
 
-_HOLDING = (*GROUPS, "Solid")
+_CONTAINERS = (*GROUPS, "Solid")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileFrame:
-    """How a file says where the robot is.
+    """Converts the pose of the robot, or of a movable object, to file coordinates.
 
     Attributes:
-        world: Shape (3, 3): from the file's coordinates to ENU.
-        turn: Shape (3, 3): from the robot's axes to ENU, at the start.
-        heading: At the start, rad.
+        world: Rotation from the file's coordinates to ENU, shape (3, 3).
+        turn: Rotation from the robot's axes to ENU at the start, shape (3, 3).
+        heading: Heading at the start, rad.
         height: z of the robot's origin, m.
     """
 
@@ -40,24 +40,24 @@ class FileFrame:
 
     @classmethod
     def of(cls, top: Frame, robot: Frame, heading: float) -> FileFrame:
-        """From the frames of the file and of the robot, and the robot's heading."""
+        """From the frames of the file and of the robot, and its heading, rad."""
         return cls(top.matrix, robot.matrix, heading, float(robot.origin[2]))
 
     def vector(self, x: float, y: float, z: float = 0.0) -> list[float]:
-        """A vector of ENU in the file's coordinates."""
+        """An ENU vector in the file's coordinates."""
         return [float(value) for value in self.world.T @ (x, y, z)]
 
     def point(self, x: float, y: float) -> list[float]:
-        """Where the robot is, from its place in the plane."""
+        """The robot's position in the file's coordinates, from ENU x and y, m."""
         return self.vector(x, y, self.height)
 
     def rotation(self, heading: float) -> Matrix:
-        """Shape (3, 3): from the robot's axes to the file's coordinates."""
+        """Rotation from the robot's axes to the file's coordinates, shape (3, 3)."""
         spin = axis_angle(0.0, 0.0, 1.0, heading - self.heading)
         return np.asarray(self.world.T @ spin @ self.turn)
 
     def axis_angle(self, heading: float) -> list[float]:
-        """The robot's rotation as an axis and an angle in [0, pi]."""
+        """The same rotation as an axis (x, y, z) and an angle in [0, pi]."""
         vector = Rotation.from_matrix(self.rotation(heading)).as_rotvec()
         angle = float(np.linalg.norm(vector))
         if angle < 1e-12:
@@ -65,7 +65,7 @@ class FileFrame:
         return [*(float(part / angle) for part in vector), angle]
 
     def attitude(self, heading: float) -> list[float]:
-        """Roll, pitch, yaw, and the quaternion (x, y, z, w), of an inertial unit."""
+        """Roll, pitch, yaw (rad) and quaternion (x, y, z, w) as in an InertialUnit."""
         turn = self.rotation(heading)
         if abs(self.world[2, 2]) > 0.5:  # z is up
             roll = math.atan2(turn[2, 1], turn[2, 2])
@@ -79,24 +79,24 @@ class FileFrame:
         return [roll, pitch, yaw, *(float(part) for part in quaternion)]
 
     def north(self, heading: float) -> list[float]:
-        """The direction of north as the robot sees it: +y, or +x where y is up."""
+        """North in the robot's axes; north is +y in the file, or +x if y is up."""
         ahead = (0.0, 1.0, 0.0) if abs(self.world[2, 2]) > 0.5 else (1.0, 0.0, 0.0)
         return [float(value) for value in self.rotation(heading).T @ ahead]
 
 
 def walk_frames(nodes: Iterable[Node], frame: Frame) -> Iterator[Found]:
-    """Nodes that have a place, each with its own frame, outer ones first."""
+    """Yields nodes that have a position, with their frames, outer nodes first."""
     for node in nodes:
-        holds = node.kind in _HOLDING
+        is_container = node.kind in _CONTAINERS
         if node.kind == "Group":
             own = frame
-        elif "translation" in node.fields or is_epuck(node) or holds:
+        elif "translation" in node.fields or is_epuck(node) or is_container:
             try:
-                own = placed(node, frame, scaled=holds)
-            except WorldError:  # an unknown node may mean something else by these
+                own = placed(node, frame, scaled=is_container)
+            except WorldError:  # fields of an unknown node may mean something else
                 continue
         else:
             continue
         yield node, own
-        if holds:
+        if is_container:
             yield from walk_frames(children(node), own)

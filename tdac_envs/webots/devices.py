@@ -1,4 +1,4 @@
-"""Which devices a robot has, and which of them have no model here."""
+"""The devices of a robot, modelled or not."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Offset = tuple[float, float, float]
 WHEELS = (("left wheel motor", "left wheel sensor"),
           ("right wheel motor", "right wheel sensor"))  # fmt: skip
 ENCODER_STEP = 0.00628
-"""Resolution of the wheels' position sensors, rad."""
+"""Resolution of the wheel position sensors, rad."""
 DARK = 4095.0
-"""Reading of a light sensor in the dark: light is not modelled."""
+"""Reading of a light sensor in the dark; light is not modelled."""
 _LIGHT_TABLE = [1.0, DARK, 0.01, 2.0, 0.0, 0.01]
 _GROUND_TABLE = [0.0, 1000.0, 0.002, 0.016, 300.0, 0.004]
 _TURRET: Offset = (-0.0095, 0.0, 0.0486)
@@ -28,20 +28,20 @@ _PLACED = {
 }
 _MUTE = (("Camera", 38), ("Emitter", 43), ("Receiver", 56), ("Speaker", 59))
 GYRO_SCALE = 100000.0 / 13.3158
-"""Reading of the gyro at 1 rad/s."""
-_FASTEST, _HARDEST = 13.3158, 100.0
+"""Gyro reading per rad/s."""
+_MAX_RATE, _MAX_ACCEL = 13.3158, 100.0
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceFacts:
-    """A device.
+    """Facts about a device of the robot.
 
     Attributes:
-        name: Of the device.
+        name: Device name.
         kind: Class of the `controller` package.
-        node_type: Webots' number of the type.
-        more: What else the class wants to know.
-        offset: In the robot's own axes, m, of those for which it matters.
+        node_type: Webots' number of the node type.
+        more: Further facts that the class needs.
+        offset: Position in the robot's axes, m, where it matters.
     """
 
     name: str
@@ -51,7 +51,7 @@ class DeviceFacts:
     offset: Offset = (0.0, 0.0, 0.0)
 
     def plain(self) -> dict[str, Any]:
-        """As it is sent."""
+        """The facts as they are sent to the controller."""
         own = {"name": self.name, "kind": self.kind, "node_type": self.node_type}
         return {**own, **self.more}
 
@@ -62,18 +62,18 @@ def find_devices(
     """The devices of an e-puck, and the names of those that are not modelled.
 
     Args:
-        robot: Its node: the PROTO, or a Robot that is written out.
-        max_velocity: Of the motors, rad/s.
+        robot: Node of the e-puck: the PROTO or a plain Robot.
+        max_velocity: Maximum speed of the motors, rad/s.
     """
     devices = [*_standard(max_velocity), *_ground(robot)]
     absent = ["tof"] if text(robot, "version") == "2" else []
-    for node, offset in _added(robot):
-        name, number = _PLACED.get(node.kind, ("", 0))
-        called = text(node, "name", name)
+    for node, offset in _mounted(robot):
+        default, number = _PLACED.get(node.kind, ("", 0))
+        name = text(node, "name", default)
         if number:
-            devices.append(DeviceFacts(called, node.kind, number, {}, offset))
-        elif called:
-            absent.append(called)
+            devices.append(DeviceFacts(name, node.kind, number, {}, offset))
+        elif name:
+            absent.append(name)
     known = {device.name for device in devices}
     return tuple(devices), tuple(name for name in absent if name not in known)
 
@@ -89,9 +89,9 @@ def _standard(max_velocity: float) -> list[DeviceFacts]:
     light = {"table": _LIGHT_TABLE}
     devices += [DeviceFacts(f"ls{k}", "LightSensor", 49, light) for k in range(8)]
     devices += [DeviceFacts(f"led{k}", "LED", 47, {}) for k in range(10)]
-    force = [-_HARDEST, -_HARDEST, 0.003, _HARDEST, _HARDEST, 0.003]
+    force = [-_MAX_ACCEL, -_MAX_ACCEL, 0.003, _MAX_ACCEL, _MAX_ACCEL, 0.003]
     devices.append(DeviceFacts("accelerometer", "Accelerometer", 35, {"table": force}))
-    turn = [-_FASTEST, -100000.0, 0.003, _FASTEST, 100000.0, 0.003]
+    turn = [-_MAX_RATE, -100000.0, 0.003, _MAX_RATE, 100000.0, 0.003]
     devices.append(DeviceFacts("gyro", "Gyro", 45, {"table": turn}))
     return devices + [DeviceFacts(kind.lower(), kind, n, {}) for kind, n in _MUTE]
 
@@ -104,14 +104,14 @@ def _ground(robot: Node) -> list[DeviceFacts]:
     return [DeviceFacts(f"gs{k}", "DistanceSensor", 42, more) for k in range(3)]
 
 
-def _added(robot: Node) -> list[tuple[Node, Offset]]:
-    """Devices in the turret slot, or in a Robot that is written out."""
+def _mounted(robot: Node) -> list[tuple[Node, Offset]]:
+    """Devices in the turret slot or in a plain Robot, with their offsets."""
     slot = children(robot, "turretSlot")
     own = [node for node in inside(robot) if node.kind in _PLACED and node is not robot]
-    found = [(node, _moved(node, _TURRET)) for top in slot for node in inside(top)]
-    return found + [(node, _moved(node, (0.0, 0.0, 0.0))) for node in own]
+    found = [(node, _offset(node, _TURRET)) for top in slot for node in inside(top)]
+    return found + [(node, _offset(node, (0.0, 0.0, 0.0))) for node in own]
 
 
-def _moved(node: Node, origin: Offset) -> Offset:
+def _offset(node: Node, origin: Offset) -> Offset:
     x, y, z = numbers(node, "translation", (0.0, 0.0, 0.0))
     return origin[0] + x, origin[1] + y, origin[2] + z

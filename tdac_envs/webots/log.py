@@ -1,4 +1,4 @@
-"""What happened in a run of a Webots controller."""
+"""The record of a run of a Webots controller."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Pose = tuple[float, float, float]
 
 @dataclass(slots=True)
 class Log:
-    """What happened.
+    """Record of a run.
 
     Attributes:
-        poses: x, y, heading; the start included.
-        actions: Wheel speeds as fractions, shape (2,), float32.
-        path_distances: Shortest way left to the goal, m.
-        distances: Straight to the goal, m.
-        collisions: Steps with a contact.
-        first_contact: Step, x and y of the first.
-        outcome: How the simulation ended; None while it goes on.
-        teleport: What a supervisor did that it may not do.
+        poses: Poses x, y (m), heading (rad), start included.
+        actions: Wheel speeds as fractions of the maximum, shape (2,), float32.
+        path_distances: Lengths of the shortest path left to the goal, m.
+        distances: Straight-line distances to the goal, m.
+        collisions: Number of steps with a contact.
+        first_contact: Step, x and y (m) of the first contact.
+        outcome: How the simulation ended; None while it runs.
+        teleport: The forbidden supervisor call that ended the run, if any.
     """
 
     poses: list[Pose] = field(default_factory=list)
@@ -42,11 +42,11 @@ class Log:
 
     @property
     def steps(self) -> int:
-        """Steps of the world so far."""
+        """Number of world steps so far."""
         return len(self.actions)
 
     def note(self, env: EPuckEnv, info: dict[str, Any]) -> None:
-        """Writes a moment down."""
+        """Records the current pose, distances and contacts."""
         x, y, heading = env.pose().tolist()
         self.poses.append((x, y, heading))
         self.path_distances.append(info["path_distance"])
@@ -57,13 +57,13 @@ class Log:
 
 
 def way_of(log: Log) -> float:
-    """Length of what the robot drove, m."""
+    """Length of the driven path, m."""
     places = np.array(log.poses)[:, :2]
     return float(np.hypot(*np.diff(places, axis=0).T).sum())
 
 
 def velocity(poses: Sequence[Pose], dt: float) -> tuple[float, float]:
-    """Mean velocity in the last step, m/s; 0 before the first."""
+    """Mean velocity (x, y) in the last step, m/s; 0 before the first."""
     if len(poses) < 2:
         return 0.0, 0.0
     (x, y, _), (before_x, before_y, _) = poses[-1], poses[-2]
@@ -71,7 +71,7 @@ def velocity(poses: Sequence[Pose], dt: float) -> tuple[float, float]:
 
 
 def turn_rate(poses: Sequence[Pose], dt: float) -> float:
-    """Mean rate of turn in the last step, rad/s; 0 before the first."""
+    """Mean turn rate in the last step, rad/s; 0 before the first."""
     if len(poses) < 2:
         return 0.0
     return math.remainder(poses[-1][2] - poses[-2][2], 2.0 * math.pi) / dt

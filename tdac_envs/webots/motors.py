@@ -1,4 +1,4 @@
-"""What the motors of a robot do in one step, as Webots computes it."""
+"""Speed of a robot's motors in one step, computed as in Webots."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class MotorState:
-    """A rotational motor.
+    """State of a rotational motor.
 
     Attributes:
-        limit: Highest speed, rad/s.
-        position: Wanted, rad; infinite in velocity control.
-        velocity: Wanted; in position control the highest.
-        acceleration: rad/s²; -1 is unlimited.
-        pid: Gains of the control of the position.
-        speed: Now, rad/s.
+        limit: Maximum speed, rad/s.
+        position: Target position, rad; infinite in velocity control.
+        velocity: Target velocity, rad/s; in position control the maximum speed.
+        acceleration: Maximum acceleration, rad/s²; -1 is unlimited.
+        pid: Gains of the position controller.
+        speed: Current speed, rad/s.
     """
 
     limit: float
@@ -33,7 +33,7 @@ class MotorState:
             self.velocity = self.limit
 
     def set_velocity(self, velocity: float) -> str | None:
-        """Sets the wanted velocity; the warning where it is beyond the limit."""
+        """Sets the target velocity; returns a warning if it exceeds the limit."""
         self.velocity = min(max(velocity, -self.limit), self.limit)
         if abs(velocity) <= self.limit:
             return None
@@ -43,28 +43,28 @@ class MotorState:
         )
 
     def set_position(self, position: float) -> None:
-        """Sets the wanted position; infinite is velocity control."""
+        """Sets the target position; infinite selects velocity control."""
         self.position = position
         self._integral = self._previous = 0.0
 
     def next_speed(self, angle: float, dt: float) -> float:
-        """Speed in the next step, rad/s.
+        """Computes the speed in the next step, rad/s.
 
         Args:
-            angle: Of the wheel now, rad.
+            angle: Current wheel angle, rad.
             dt: Duration of the step, s.
         """
-        wanted = self._wanted(angle, dt)
+        target = self._target_speed(angle, dt)
         if self.acceleration < 0.0:
-            self.speed = wanted
+            self.speed = target
         else:
             most = self.acceleration * dt
-            self.speed += min(max(wanted - self.speed, -most), most)
+            self.speed += min(max(target - self.speed, -most), most)
         return self.speed
 
-    def _wanted(self, angle: float, dt: float) -> float:
+    def _target_speed(self, angle: float, dt: float) -> float:
         if math.isinf(self.position):
-            # -inf, too, is velocity control, as it is in Webots.
+            # As in Webots, -inf selects velocity control, too.
             return self.velocity
         error = self.position - angle
         self._integral += error * dt

@@ -1,4 +1,4 @@
-"""Things that a robot can push, and the nodes that stand for them."""
+"""Objects that a robot can push, and their nodes in the file."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from tdac_envs.worlds.wbt.tree import Node
 Point = tuple[float, float]
 Place = tuple[list[float], list[float]]
 
-# A world is kept to 1e-9 m.
+# m; numbers of a world are rounded to 1e-9.
 _SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Movable:
-    """A thing that can be pushed.
+    """An object that can be pushed.
 
     Attributes:
         node: Its node.
-        frame: How the file says where it is.
-        centre: Of the thing at the start, m.
-        origin: Of the node as seen from there, m.
+        frame: Conversion of its pose to the file's coordinates.
+        centre: Centre of the object at the start, m.
+        origin: Origin of the node relative to the centre at the start, m.
     """
 
     node: Node
@@ -36,12 +36,12 @@ class Movable:
     origin: Point
 
     def place(self, x: float, y: float, turn: float) -> Place | None:
-        """Translation and rotation, or None where it has not moved.
+        """Translation and rotation in the file; None if it has not moved.
 
         Args:
-            x: Of its centre, m.
-            y: Of its centre, m.
-            turn: Since the start, rad.
+            x: x of its centre, m.
+            y: y of its centre, m.
+            turn: Rotation since the start, rad.
         """
         if (x, y) == self.centre and turn == 0.0:
             return None
@@ -56,15 +56,15 @@ class Movable:
 def find_movables(
     ground: Ground, nodes: Iterable[Node], top: Frame
 ) -> tuple[Movable | None, ...]:
-    """The nodes of what can be pushed, in the environment's order.
+    """Finds the nodes of the objects that can be pushed.
 
     Args:
-        ground: Of the world.
-        nodes: Those at the top of the file.
-        top: Their frame.
+        ground: Ground of the world.
+        nodes: Top-level nodes of the file.
+        top: Frame of these nodes.
 
     Returns:
-        None stands for a thing whose node was not found.
+        One entry per object, in the environment's order; None if its node is not found.
     """
     pushable = [t for t in ground.things if t.mass is not None and t.solid]
     if not pushable:

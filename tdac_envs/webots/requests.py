@@ -1,4 +1,4 @@
-"""What the `controller` package may send; nothing else is believed."""
+"""Validates requests from the `controller` package, which are untrusted."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 LONGEST_STEP = 1_000_000_000
-"""Of one request, ms."""
+"""Maximum duration of one request, ms."""
 CHANGES = (
     "value", "setMF", "removeMF", "removeSF", "setVelocity", "resetPhysics", "remove",
     "loadState", "addForce", "addForceWithOffset", "addTorque", "setJointPosition",
     "simulationReset", "simulationResetPhysics", "worldReload", "worldLoad",
 )  # fmt: skip
-"""Calls of a supervisor that change the world."""
+"""Supervisor calls that change the world."""
 
 
 class RequestError(Exception):
@@ -20,39 +20,39 @@ class RequestError(Exception):
 
 
 def checked(request: Any) -> tuple[int, list[Any], Any]:
-    """A request whose form is right; its values are checked where they are used.
+    """Returns a well-formed request; its values are checked where they are used.
 
     Raises:
-        RequestError: It is not.
+        RequestError: The request is malformed.
     """
     match request:
-        case (int(duration), list(commands), event) if _may_last(duration):
+        case (int(duration), list(commands), event) if _is_duration(duration):
             pass
         case _:
-            raise RequestError("a request of another form")
+            raise RequestError("malformed request")
     match event:
         case None | (str(), int() | None, str()):
             pass
         case _:
-            raise RequestError("an event of another form")
+            raise RequestError("malformed event")
     for command in commands:
         match command:
             case (str(), str(), int() | float()) | (str(), "pid", [_, _, _]):
                 pass
             case _:
-                raise RequestError("a command of another form")
+                raise RequestError("malformed command")
     return duration, commands, event
 
 
-def _may_last(duration: int) -> bool:
+def _is_duration(duration: int) -> bool:
     return type(duration) is int and 0 <= duration <= LONGEST_STEP
 
 
 def real(value: Any, *, infinite: bool = False) -> float:
-    """A number.
+    """Returns a number as a float.
 
     Raises:
-        RequestError: It is none, or not finite where it has to be.
+        RequestError: The value is not a number, or infinite and `infinite` is false.
     """
     if type(value) not in (int, float) or math.isnan(value):
         raise RequestError("expected a number")

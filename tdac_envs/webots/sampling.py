@@ -1,4 +1,4 @@
-"""When sensors sample, and what they then read."""
+"""Samples the sensors of a robot and computes their readings."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Reader = Callable[[], Any]
 
 
 class Sampler:
-    """The sensors of a robot; each samples once its period is over.
+    """Samples each sensor of a robot at its own period.
 
     Args:
-        stage: World and robot.
+        stage: Stage with the world and the robot.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -38,19 +38,19 @@ class Sampler:
         return sensor in self._readers
 
     def enable(self, sensor: str, period: int, now: float) -> None:
-        """Samples every `period` from now on; 0 is never. Times in ms."""
+        """Samples a sensor every `period` ms from `now` (ms) on; 0 disables it."""
         if period:
             self._sampling[sensor] = (period, now)
         else:
             self._sampling.pop(sensor, None)
 
     def sample(self, now: float, observation: Observation, poses: list[Pose]) -> None:
-        """Reads what is due.
+        """Reads the sensors whose period is over.
 
         Args:
-            now: ms.
-            observation: Of the environment.
-            poses: At all steps so far, the start included.
+            now: Simulated time, ms.
+            observation: Current observation of the environment.
+            poses: Poses at all steps so far, start included.
         """
         self._observation, self._poses = observation, poses
         for name, (period, last) in self._sampling.items():
@@ -59,7 +59,7 @@ class Sampler:
                 self._fresh[name] = self._readers[name]()
 
     def take(self) -> dict[str, Any]:
-        """The samples since the last time, by sensor; of several the last."""
+        """Returns the latest new sample of each sensor, and forgets these samples."""
         fresh, self._fresh = self._fresh, {}
         return fresh
 
@@ -99,21 +99,21 @@ class Sampler:
         return self._frame.attitude(self._poses[-1][2])
 
     def _turning(self) -> list[float]:
-        """Rates of turn about the robot's axes, as its gyro says them."""
+        """Gyro reading: turn rates about the robot's axes, scaled by `GYRO_SCALE`."""
         rate = GYRO_SCALE * turn_rate(self._poses, self._dt)
         up = self._frame.vector(0.0, 0.0, rate)
-        return self._seen(up, 100000.0)
+        return self._in_robot_axes(up, 100000.0)
 
     def _acceleration(self) -> list[float]:
-        """Along the robot's axes, m/s²; what holds it against gravity included."""
+        """Proper acceleration in the robot's axes, m/s²; at rest `GRAVITY` upwards."""
         now = velocity(self._poses, self._dt)
         before = velocity(self._poses[-3:-1], self._dt)
         x, y = ((a - b) / self._dt for a, b in zip(now, before, strict=True))
-        return self._seen(self._frame.vector(x, y, GRAVITY), 100.0)
+        return self._in_robot_axes(self._frame.vector(x, y, GRAVITY), 100.0)
 
-    def _seen(self, vector: list[float], most: float) -> list[float]:
+    def _in_robot_axes(self, vector: list[float], limit: float) -> list[float]:
         turn = self._frame.rotation(self._poses[-1][2])
-        return [float(value) for value in np.clip(turn.T @ vector, -most, most)]
+        return [float(value) for value in np.clip(turn.T @ vector, -limit, limit)]
 
     def _position(self, offset: Offset) -> list[float]:
         x, y, heading = self._poses[-1]

@@ -1,4 +1,4 @@
-"""The nodes of a file as a supervisor sees them, and which of them it may change."""
+"""The nodes of a file as a supervisor sees them, and which it may change."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tdac_envs.worlds.wbt.tree import Field, Item, Node
 SF_BOOL, SF_INT32, SF_FLOAT, SF_VEC2F, SF_VEC3F = 1, 2, 3, 4, 5
 SF_ROTATION, SF_COLOR, SF_STRING, SF_NODE, MF = 6, 7, 8, 9, 16
 
-# A text does not say what type a field has; these cannot be told from their values.
+# A file does not state the types of fields; these do not follow from the values.
 _LISTS = {
     **dict.fromkeys(
         ("children", "device", "turretSlot", "groundSensorsSlot", "bodySlot"),
@@ -52,8 +52,8 @@ _BACKGROUNDS = {
     "TexturedBackground": "Background",
     "TexturedBackgroundLight": "DirectionalLight",
 }
-_HERE = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 1.0, 0.0]}
-_ROBOT: dict[str, Any] = {
+_POSE = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 1.0, 0.0]}
+_ROBOT_FIELDS: dict[str, Any] = {
     "controller": "<generic>",
     "controllerArgs": [],
     "customData": "",
@@ -77,10 +77,10 @@ class SceneNode:
 
     Attributes:
         kind: Node or PROTO type.
-        base: Node type; of a PROTO, what it is made of.
+        base: Node type; for a PROTO, its base type.
         define: DEF name, or empty.
-        parent: Number of the node that it is in; -1 of the root.
-        fields: Name, type and value of each; nodes by their numbers.
+        parent: Number of the parent node; -1 for the root.
+        fields: Name, type and value of each field; nodes as their numbers.
     """
 
     kind: str
@@ -90,7 +90,7 @@ class SceneNode:
     fields: list[list[Any]]
 
     def plain(self) -> tuple[Any, ...]:
-        """As it is sent."""
+        """The node as it is sent to the controller."""
         return self.kind, self.base, self.define, self.parent, self.fields
 
 
@@ -98,7 +98,7 @@ class Scene:
     """All nodes of a file; number 0 is the root.
 
     Args:
-        nodes: Those at the top of the file.
+        nodes: Top-level nodes of the file.
     """
 
     def __init__(self, nodes: Iterable[Node]) -> None:
@@ -112,18 +112,18 @@ class Scene:
         return self._numbers[id(node)]
 
     def has(self, number: int, field: str) -> bool:
-        """Whether there is such a node, with such a field if it is not empty."""
+        """Whether a node exists, and its field too, unless `field` is empty."""
         if not 0 <= number < len(self.nodes):
             return False
         names = [name for name, _, _ in self.nodes[number].fields]
         return not field or field in names
 
     def may_write(self, number: int, field: str) -> bool:
-        """Whether a field may change in a judged run: nothing moves by it."""
+        """Whether a field may change in a judged run, since it moves nothing."""
         return self.nodes[number].base in _FREE_NODES or field in _FREE_FIELDS
 
     def describe(self, number: int) -> str:
-        """A node in words."""
+        """A short description of a node for messages."""
         node = self.nodes[number]
         if node.define:
             return f"DEF {node.define} {node.kind}"
@@ -157,7 +157,7 @@ class Scene:
 
 
 def base_type(node: Node) -> str:
-    """Node type; of a PROTO, what it is made of."""
+    """Node type; for a PROTO, its base type."""
     if is_epuck(node) or node.kind in ROBOTS:
         return "Robot"
     if node.kind in _SOLID_PROTOS:
@@ -168,9 +168,9 @@ def base_type(node: Node) -> str:
 def _defaults(node: Node, base: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     if base in ("Solid", "Robot", "Pose", "Transform"):
-        values |= {key: list(value) for key, value in _HERE.items()}
+        values |= {key: list(value) for key, value in _POSE.items()}
     if base == "Robot":
-        values |= _ROBOT
+        values |= _ROBOT_FIELDS
     if node.kind in ("Solid", "Robot", "Group", "Pose", "Transform"):
         values["children"] = []
     if base in ("Solid", "Robot"):
@@ -184,7 +184,7 @@ def _type_of_value(name: str, value: Any) -> int:
 
 
 def _typed(name: str, items: tuple[Item, ...]) -> tuple[int, Any]:
-    """Type and value of a field without nodes in it."""
+    """Type and value of a field that contains no nodes."""
     values = list(items)
     if name in _LISTS:
         kind = _LISTS[name]

@@ -1,4 +1,4 @@
-"""The judge's side of a Webots controller: takes the steps and keeps the record."""
+"""The judge's side of a Webots run: takes the steps and keeps the record."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from tdac_envs.webots.sampling import Sampler
 from tdac_envs.webots.stage import Stage
 
 PATIENCE = 3
-"""Requests that are answered after the end; a controller should leave at the first."""
+"""Requests answered after the end; a controller should stop after the first."""
 
 
 class RunEnded(Exception):
-    """The controller goes on although the simulation has ended."""
+    """The controller keeps sending requests after the simulation has ended."""
 
 
 class StepServer:
-    """Answers the `controller` package; see `controller.connection`.
+    """Answers requests of the `controller` package; see `controller.connection`.
 
     Args:
-        env: The judge's environment, of this stage.
-        stage: World and robot.
-        folder: Where the controller finds itself and the world's file.
+        env: The judge's environment of the stage.
+        stage: Stage with the world and the robot.
+        folder: Project path that the controller gets.
     """
 
     def __init__(self, env: EPuckEnv, stage: Stage, folder: str = "") -> None:
@@ -43,7 +43,7 @@ class StepServer:
         self._sampler = Sampler(stage)
         self._warnings: list[str] = []
         self._warned: set[str] = set()
-        self._late = 0
+        self._late_requests = 0
 
     @property
     def is_over(self) -> bool:
@@ -51,40 +51,40 @@ class StepServer:
         return self.log.outcome is not None
 
     def reset(self) -> dict[str, Any]:
-        """Puts the robot on its start; the facts for the controller.
+        """Puts the robot at its start; returns the facts for the controller.
 
         Raises:
-            RequestError: It has been there.
+            RequestError: The simulation has already begun.
         """
         if self.log.poses:
-            raise RequestError("the simulation has begun")
+            raise RequestError("the simulation has already begun")
         self._observation, info = self._env.reset(seed=0)
         self.log.note(self._env, info)
         place = {"world_path": self._stage.name, "project_path": self._folder}
         return {**self._stage.facts(), **place, "places": self._places()}
 
     def step(self, action: Any) -> dict[str, Any]:
-        """Answers one request: duration (ms), commands to devices, an event.
+        """Answers one request: duration (ms), device commands and an event.
 
         Raises:
-            RequestError: It is none.
-            RunEnded: The controller does not leave.
+            RequestError: The request is invalid.
+            RunEnded: The controller does not stop after the end.
         """
         duration, commands, event = checked(action)
         if self.is_over:
-            self._late += 1
-            if self._late > PATIENCE:
+            self._late_requests += 1
+            if self._late_requests > PATIENCE:
                 raise RunEnded
             return self._answer()
         for device, what, value in commands:
             self._command(device, what, value)
         if event is not None:
-            self._note_event(*event)
+            self._handle_event(*event)
         self._advance(duration)
         return self._answer()
 
     def _advance(self, duration: int) -> None:
-        """Takes as many steps as `duration` needs: the last one may go beyond it."""
+        """Takes steps for `duration` ms, rounded up to whole steps."""
         count = math.ceil(duration / self._basic - 1e-9)
         if abs(count * self._basic - duration) > 1e-6:
             self._warn(
@@ -114,7 +114,7 @@ class StepServer:
         self._sampler.sample(self._now(), self._observation, self.log.poses)
 
     def _now(self) -> float:
-        """Simulated, ms."""
+        """Simulated time, ms."""
         return self.log.steps * self._basic
 
     def _answer(self) -> dict[str, Any]:
@@ -123,13 +123,13 @@ class StepServer:
             "over": self.is_over,
             "time": self._now() / 1e3,
             "values": self._sampler.take(),
-            "velocity": self._velocity() if self._tells_truth else [0.0] * 6,
+            "velocity": self._velocity() if self._reveals_velocity else [0.0] * 6,
             "places": self._places(),
             "warnings": warnings,
         }
 
     @property
-    def _tells_truth(self) -> bool:
+    def _reveals_velocity(self) -> bool:
         """Whether the controller may know the robot's velocity."""
         sees = any(device.kind == "GPS" for device in self._stage.devices)
         return self._stage.is_supervisor or sees
@@ -139,7 +139,7 @@ class StepServer:
             self._enable(device, value)
             return
         if device not in self._motors:
-            raise RequestError(f"no device {device:.40} for {what:.40}")
+            raise RequestError(f"no device {device:.40} that accepts {what:.40}")
         motor = self._motors[device]
         if what == "pid":
             motor.pid = (real(value[0]), real(value[1]), real(value[2]))
@@ -152,25 +152,24 @@ class StepServer:
             if warning is not None:
                 self._warn(f'WARNING: "{device}": {warning}')
         else:
-            raise RequestError(f"no command {what:.40}")
+            raise RequestError(f"unknown command {what:.40}")
 
     def _enable(self, device: str, period: Any) -> None:
         if type(period) is not int or period < 0:
-            raise RequestError("a sampling period that is none")
+            raise RequestError("invalid sampling period")
         if device.startswith("ls"):
             self._warn(
-                f"tdac: light is not modelled here; ls0 to ls7 read {DARK:g}, as in "
-                "the dark"
+                f"tdac: light is not modelled; ls0 to ls7 read {DARK:g}, as in the dark"
             )
         self._sampler.enable(device, period, self._now())
 
-    def _note_event(self, call: str, node: int | None, field_name: str) -> None:
-        """Judges what a supervisor does; most of it ends the run."""
+    def _handle_event(self, call: str, node: int | None, field_name: str) -> None:
+        """Judges a call of a supervisor; most calls end the run."""
         if call == "simulationQuit":
             self.log.outcome = "quit"
             return
         if call not in CHANGES:
-            raise RequestError("no such call")
+            raise RequestError("unknown supervisor call")
         what = f"{call}()"
         if node is not None:
             scene = self._stage.scene
@@ -192,13 +191,13 @@ class StepServer:
             self._warnings.append(text)
 
     def _velocity(self) -> list[float]:
-        """Of the robot, from its last step, in the file's coordinates."""
+        """Linear (m/s) and angular (rad/s) velocity, in the file's coordinates."""
         dt, frame, poses = self._env.task.dt, self._stage.frame, self.log.poses
         motion = frame.vector(*velocity(poses, dt))
         return [*motion, *frame.vector(0.0, 0.0, turn_rate(poses, dt))]
 
     def _places(self) -> dict[int, tuple[list[float], list[float]]]:
-        """Where a supervisor finds what moves; empty where the file says it."""
+        """Poses of moved nodes, for a supervisor; empty while the file's are valid."""
         stage, at_start = self._stage, self.log.steps == 0
         if not stage.is_supervisor or (at_start and not stage.is_moved):
             return {}

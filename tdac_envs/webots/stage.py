@@ -1,4 +1,4 @@
-"""A world file, ready for a controller: environment, scene, devices."""
+"""A world file prepared for a controller: environment, scene and devices."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ from tdac_envs.worlds.world import World, check_modelled
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """Where a controller is run.
+    """A world in which a controller runs.
 
     Attributes:
-        name: Of the file.
-        text: Of the file.
-        world: With a goal; see `has_goal`.
-        is_moved: Whether the robot starts elsewhere than where the file has it.
-        has_goal: Whether there is one; else that of `world` is the farthest place.
-        left_out: Nodes that may be solid and are ignored.
-        scene: The file's nodes.
-        robot: The robot's node.
-        frame: How the file says where it is.
-        movables: Things that can be pushed, as the environment numbers them.
-        devices: Of the robot.
-        absent: Names of its devices that are not modelled.
+        name: File name.
+        text: Content of the file.
+        world: World, always with a goal; see `has_goal`.
+        is_moved: Whether the robot starts elsewhere than in the file.
+        has_goal: Whether a goal is given; else that of `world` is the farthest place.
+        left_out: Names or types of unmodelled nodes that are ignored.
+        scene: Nodes of the file.
+        robot: Node of the robot.
+        frame: Conversion of the robot's pose to the file's coordinates.
+        movables: Objects that can be pushed, in the environment's order.
+        devices: Modelled devices of the robot.
+        absent: Names of the devices that are not modelled.
     """
 
     name: str
@@ -62,11 +62,11 @@ class Stage:
 
     @property
     def is_supervisor(self) -> bool:
-        """Whether the robot may look at the world."""
+        """Whether the robot is a supervisor, which may query the world."""
         return flag(self.robot, "supervisor", False)
 
     def facts(self) -> dict[str, Any]:
-        """What the `controller` package is told at the beginning."""
+        """The facts that the `controller` package gets at the start."""
         number = self.scene.number(self.robot)
         nodes = [node.plain() for node in self.scene.nodes]
         return {
@@ -93,12 +93,12 @@ class Stage:
     def make_env(
         self, *, steps: int | None = None, webots_sensors: bool = False, **options: Any
     ) -> EPuckEnv:
-        """The environment; contacts are counted, and the robot drives on.
+        """Makes the environment; contacts are counted and do not end the run.
 
         Args:
-            steps: Horizon.
-            webots_sensors: With Webots' noise and materials, the goal's mark seen.
-            options: Of `EPuckEnv`.
+            steps: Horizon, steps; by default that of the environment.
+            webots_sensors: Use Webots' noise and materials, and show the goal marker.
+            options: Further options of `EPuckEnv`.
         """
         sensors: dict[str, Any] = {}
         if webots_sensors:
@@ -124,17 +124,17 @@ def open_stage(
     ignore: Iterable[str] = (),
     start: Sequence[float] | None = None,
 ) -> Stage:
-    """Reads a world for a controller.
+    """Reads a world file for a controller.
 
     Args:
         path: The `.wbt` file.
-        goal: (x, y), m; by default the file's. There need not be one.
-        ignore: Names or types of nodes that may be missing.
-        start: (x, y), m, or (x, y, heading), rad; by default the file's.
+        goal: (x, y), m; by default the file's, if it has one.
+        ignore: Names or types of unmodelled nodes that may be left out.
+        start: (x, y) or (x, y, heading), m and rad; by default the file's.
 
     Raises:
         WorldError: The world cannot be used.
-        TaskError: Start or goal is no point.
+        TaskError: Start or goal is invalid.
     """
     content = read_text(path)
     world = read_world(content, path.name)
@@ -173,17 +173,17 @@ def open_stage(
 
 
 def _find_robot(nodes: Iterable[Node], top: Frame, name: str) -> Found:
-    """The first e-puck and its frame, as the reader finds it."""
+    """The first e-puck and its frame, in the order of the reader."""
     for node, own in walk_frames(nodes, top):
         if is_epuck(node):
             return node, own
     raise WorldError(
-        f"{name}: the e-puck is within a node that is no Group, Pose or Solid"
+        f"{name}: the e-puck must be at the top level or in a Group, Pose or Solid"
     )
 
 
 def _farthest(world: World) -> tuple[float, float]:
-    """The place that is farthest from the robot, for the body; its own if shut in."""
+    """The reachable place farthest from the robot; its own if it is shut in."""
     ground = Ground.of(world)
     free = open_field(ground.free(BODY_RADIUS))
     begin = entry(ground, free, world.robot.pose[:2])
