@@ -1,9 +1,9 @@
-"""What `from controller import Robot` means here: the Python API of Webots R2025a.
+"""The `controller` package of a run: the Python API of Webots R2025a.
 
-The package needs the standard library only, and nothing of the rest of tdac: it is
-copied to where a controller runs. All that it knows of the simulation comes from the
-process that called `connect`, a step at a time. What it does where a call is wrong is
-what Webots does, as far as that is known.
+The package is copied to the folder in which a controller runs, so it uses only the
+standard library and nothing else of tdac. It knows the simulation only through the
+`World` given to `connect`, one step at a time. It handles invalid calls as Webots
+does, as far as that is known.
 """
 
 from .absent import (

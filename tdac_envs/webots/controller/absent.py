@@ -1,7 +1,7 @@
-"""Devices that have no model here.
+"""Devices that are not modelled.
 
-Those that every e-puck has are there and give nothing, which is said once; of the
-others there is the name, so that it can be imported.
+Devices of every e-puck are present, but return no data, and print this once. The other
+classes exist only so that they can be imported.
 """
 
 from __future__ import annotations
@@ -14,35 +14,35 @@ from .messages import once, unsupported
 
 
 class _Mute(Device):
-    """A device that never gives anything."""
+    """A device that never returns data."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self._period = 0
 
     def enable(self, p: int) -> None:
-        """Says once that nothing will come."""
-        once(f"tdac: {self.name} is not modelled here; it gives nothing")
+        """Prints once that the device returns no data."""
+        once(f"tdac: {self.name} is not modelled; it returns no data")
         self._period = c_int(p)
 
     def disable(self) -> None:
-        """Switches it off."""
+        """Disables the device."""
         self._period = 0
 
     def getSamplingPeriod(self) -> int:
-        """As given to `enable`, ms."""
+        """Sampling period given to `enable`, ms."""
         return self._period
 
 
 class Camera(_Mute):
-    """A camera whose first image never comes."""
+    """A camera that never has an image."""
 
     def getWidth(self) -> int:
-        """Of an image that would come, pixels."""
+        """Image width, pixels."""
         return 52
 
     def getHeight(self) -> int:
-        """Of an image that would come, pixels."""
+        """Image height, pixels."""
         return 39
 
     def getFov(self) -> float:
@@ -54,7 +54,7 @@ class Camera(_Mute):
         return 0.0055
 
     def hasRecognition(self) -> bool:
-        """False."""
+        """Always False."""
         return False
 
     getImage: Any = unsupported("Camera.getImage")
@@ -69,13 +69,13 @@ class Camera(_Mute):
 
 
 class Emitter(_Mute):
-    """Nobody hears it."""
+    """An emitter without receivers."""
 
     CHANNEL_BROADCAST = -1
     _channel = 1
 
     def getChannel(self) -> int:
-        """As set."""
+        """Channel given to `setChannel`."""
         return self._channel
 
     def setChannel(self, channel: int) -> None:
@@ -89,17 +89,17 @@ class Emitter(_Mute):
 
 
 class Receiver(_Mute):
-    """Nobody speaks to it: its queue is empty."""
+    """A receiver whose queue is always empty."""
 
     CHANNEL_BROADCAST = -1
     _channel = 1
 
     def getQueueLength(self) -> int:
-        """0."""
+        """Always 0."""
         return 0
 
     def getChannel(self) -> int:
-        """As set."""
+        """Channel given to `setChannel`."""
         return self._channel
 
     def setChannel(self, channel: int) -> None:
@@ -114,7 +114,7 @@ class Receiver(_Mute):
 
 
 class Speaker(Device):
-    """Nobody hears it."""
+    """A speaker that makes no sound."""
 
     playSound: Any = unsupported("Speaker.playSound")
     stop: Any = unsupported("Speaker.stop")

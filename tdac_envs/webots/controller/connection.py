@@ -1,4 +1,4 @@
-"""The way to the simulation: what is sent with a step, and what comes back."""
+"""The connection to the simulation: requests and answers."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from .messages import complain
 
 
 class World(Protocol):
-    """What carries requests to the simulation."""
+    """Carries requests to the simulation."""
 
     def reset(self) -> Any:
-        """Facts on robot, devices and world."""
+        """Facts about robot, devices and world."""
 
     def step(self, action: Any) -> Any:
         """The answer to one request."""
 
 
 class Connection:
-    """One simulation, seen from the controller.
+    """The controller's connection to one simulation.
 
     Attributes:
-        facts: As the simulation gave them at the beginning.
-        devices: Facts on each device, by name.
-        time: Simulated, s.
-        values: Last samples, by device; those of sensors that have none are missing.
-        velocity: Of the robot: three of motion (m/s), three of rotation (rad/s).
-        motors: Those that were made, by name.
-        places: Translation and rotation in the world of nodes that move, by number.
+        facts: Facts that the simulation sent at the start.
+        devices: Facts about each device, by name.
+        time: Simulated time, s.
+        values: Last sample of each device, by name; devices without one are missing.
+        velocity: Velocity of the robot: linear (m/s), then angular (rad/s).
+        motors: Motors created so far, by name.
+        places: World translation and rotation of moved nodes, by number.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class Connection:
         self._commands: list[tuple[str, str, Any]] = []
 
     def open(self, world: World) -> None:
-        """Asks the simulation what there is."""
+        """Starts the simulation and keeps its facts."""
         self._world = world
         self.facts = world.reset()
         self.devices = {device["name"]: device for device in self.facts["devices"]}
@@ -53,7 +53,7 @@ class Connection:
         self.facts["scene"] = [dict(zip(keys, node, strict=True)) for node in nodes]
 
     def check(self) -> None:
-        """Refuses to go on without a simulation.
+        """Checks that there is a simulation.
 
         Raises:
             RuntimeError: There is none.
@@ -64,15 +64,15 @@ class Connection:
             )
 
     def command(self, device: str, what: str, value: Any) -> None:
-        """Notes what is to be sent with the next request."""
+        """Queues a device command for the next request."""
         self._commands.append((device, what, value))
 
     def step(self, duration: int) -> int:
-        """Lets the simulation go on; 0, or -1 when it has ended."""
+        """Advances the simulation by `duration` ms; -1 if it has ended, else 0."""
         return self._request(duration, None)
 
     def tell(self, call: str, node: int | None = None, field: str = "") -> bool:
-        """Says what a supervisor does; whether the simulation goes on."""
+        """Reports a supervisor call; returns whether the simulation goes on."""
         return self._request(0, (call, node, field)) == 0
 
     def _request(self, duration: int, event: Any) -> int:
@@ -90,19 +90,19 @@ class Connection:
 
 
 connection = Connection()
-"""There is one in a process, as in Webots."""
+"""The only connection of the process, as in Webots."""
 
 
 def connect(world: World) -> None:
-    """Says where the simulation is, before the controller starts."""
+    """Connects to the simulation; called before the controller starts."""
     connection.open(world)
 
 
 def c_int(value: Any) -> int:
-    """A number that Webots' functions in C take for an int.
+    """Returns a value that Webots' C functions accept as an int.
 
     Raises:
-        ctypes.ArgumentError: It is none; 32.0 is not one either.
+        ctypes.ArgumentError: They do not accept it; 32.0 is refused, too.
     """
     if not isinstance(value, int):
         raise ctypes.ArgumentError(
@@ -112,9 +112,9 @@ def c_int(value: Any) -> int:
 
 
 def c_double(value: Any) -> float:
-    """A number that Webots' functions in C take for a double.
+    """Returns a value that Webots' C functions accept as a double.
 
     Raises:
-        TypeError: It is none.
+        TypeError: They do not accept it.
     """
     return ctypes.c_double(value).value

@@ -1,4 +1,4 @@
-"""What all devices have in common."""
+"""Base class of all devices."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Device:
     """A device of the robot.
 
     Args:
-        name: As in the world.
+        name: Device name in the world.
     """
 
     def __init__(self, name: str) -> None:
@@ -24,7 +24,7 @@ class Device:
             complain(f'Device "{name}" was not found on robot "{robot}"')
 
     def getName(self) -> str:
-        """Name."""
+        """Name of the device."""
         return self.name
 
     def getModel(self) -> str:
@@ -32,7 +32,7 @@ class Device:
         return self.model
 
     def getNodeType(self) -> int:
-        """One of `Node`'s constants."""
+        """Node type, one of `Node`'s constants."""
         return self.node_type
 
     @property

@@ -1,4 +1,4 @@
-"""Fields of nodes, as strict as those of Webots."""
+"""Fields of nodes, with type checks as strict as those of Webots."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Field:
 
     Args:
         node: Number of the node.
-        entry: Name, type and value, as the scene has them.
+        entry: Name, type and value in the scene; changes are written to it.
     """
 
     SF_BOOL, SF_INT32, SF_FLOAT, SF_VEC2F, SF_VEC3F = 1, 2, 3, 4, 5
@@ -35,23 +35,23 @@ class Field:
         self.type = int(entry[1])
 
     def getName(self) -> str:
-        """Name."""
+        """Name of the field."""
         return self.name
 
     def getType(self) -> int:
-        """One of the constants."""
+        """Type of the field, one of the constants."""
         return self.type
 
     def getTypeName(self) -> str:
-        """For instance `SFVec3f`."""
+        """Type name, for instance `SFVec3f`."""
         return self.type_name
 
     def getCount(self) -> int:
-        """How many values a list has; -1 where it is none."""
+        """Number of values of a list; -1 for a single field."""
         return self.count
 
     def getActualField(self) -> Field:
-        """Itself."""
+        """The field itself."""
         return self
 
     @property
@@ -78,12 +78,12 @@ class Field:
 
     @property
     def value(self) -> Any:
-        """The value of a single field; None of a list."""
+        """The value of a single field; None for a list."""
         if self.type == self.SF_NODE:
             return self.getSFNode()
         if self.type & _MF:
             return None
-        value = self._now()
+        value = self._current_value()
         return list(value) if isinstance(value, list) else value
 
     @value.setter
@@ -160,20 +160,20 @@ class Field:
 
     def setMFBool(self, index: int, value: Any) -> None:
         """Sets a value of a list."""
-        if self._item(index) is not None and self._may("setMF"):
+        if self._item(index) is not None and self._is_allowed("setMF"):
             self._entry[2][index] = value
 
     setMFInt32 = setMFFloat = setMFString = setMFBool
     setMFVec2f = setMFVec3f = setMFRotation = setMFColor = setMFBool
 
     def removeMF(self, index: int) -> None:
-        """Takes a value from a list."""
-        if self._item(index) is not None and self._may("removeMF"):
+        """Removes a value from a list."""
+        if self._item(index) is not None and self._is_allowed("removeMF"):
             del self._entry[2][index]
 
     def removeSF(self) -> None:
-        """Takes the node."""
-        if self.type == self.SF_NODE and self._may("removeSF"):
+        """Removes the node."""
+        if self.type == self.SF_NODE and self._is_allowed("removeSF"):
             self._entry[2] = -1
 
     importMFNodeFromString: Any = unsupported("Field.importMFNodeFromString")
@@ -190,14 +190,14 @@ class Field:
             self.value = value
 
     def _write(self, call: str, value: Any) -> None:
-        if self._may(call):
+        if self._is_allowed(call):
             self._entry[2] = list(value) if isinstance(value, list) else value
 
-    def _may(self, call: str) -> bool:
+    def _is_allowed(self, call: str) -> bool:
         return connection.tell(call, self._node, self.name)
 
-    def _now(self) -> Any:
-        """The value; of a node that moves, where it is now."""
+    def _current_value(self) -> Any:
+        """The value; for the pose of a moved node, the current one."""
         place = connection.places.get(self._node)
         if place is not None and self.name in ("translation", "rotation"):
             return place[self.name == "rotation"]

@@ -1,4 +1,4 @@
-"""Keyboard, mouse and joystick, at which nobody sits."""
+"""Keyboard, mouse and joystick, none of which gives any input."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .messages import complain, once, unsupported
 
 
 class Keyboard:
-    """A keyboard on which no key is pressed."""
+    """A keyboard on which no key is ever pressed."""
 
     END, HOME, LEFT, UP, RIGHT, DOWN = 312, 313, 314, 315, 316, 317
     PAGEUP, PAGEDOWN = 366, 367
@@ -21,20 +21,20 @@ class Keyboard:
         self.sampling_period = c_int(sampling_period)
 
     def enable(self, sampling_period: int) -> None:
-        """Says once that there is no keyboard."""
-        once("tdac: there is no keyboard here; getKey() returns -1")
+        """Prints once that there is no keyboard."""
+        once("tdac: there is no keyboard; getKey() returns -1")
         self.sampling_period = c_int(sampling_period)
 
     def disable(self) -> None:
-        """Switches it off."""
+        """Disables the device."""
         self.sampling_period = 0
 
     def getSamplingPeriod(self) -> int:
-        """As given to `enable`, ms."""
+        """Sampling period given to `enable`, ms."""
         return self.sampling_period
 
     def getKey(self) -> int:
-        """-1: no key."""
+        """Always -1: no key."""
         if self.sampling_period <= 0:
             complain(
                 "Error: wb_keyboard_get_key() called for a disabled device! "
@@ -48,29 +48,29 @@ class Keyboard:
         return self.getKey()
 
 
-class _Nobody:
-    """A device that never says anything."""
+class _NoInput:
+    """An input device that does not exist."""
 
     def enable(self, sampling_period: int) -> None:
-        """Says once that there is none."""
+        """Prints once that there is no such device."""
         del sampling_period
         name = type(self).__name__.lower()
-        once(f"tdac: there is no {name} here")
+        once(f"tdac: there is no {name}")
 
     def disable(self) -> None:
-        """Switches it off."""
+        """Disables the device."""
 
     getSamplingPeriod: Any = unsupported("getSamplingPeriod", 0)
 
 
-class Mouse(_Nobody):
-    """No mouse."""
+class Mouse(_NoInput):
+    """A mouse that does not exist."""
 
     getState: Any = unsupported("Mouse.getState")
 
 
-class Joystick(_Nobody):
-    """No joystick."""
+class Joystick(_NoInput):
+    """A joystick that does not exist."""
 
     isConnected: Any = unsupported("Joystick.isConnected", False)
     getPressedButton: Any = unsupported("Joystick.getPressedButton", -1)

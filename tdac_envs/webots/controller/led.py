@@ -1,4 +1,4 @@
-"""Lights."""
+"""LEDs."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from .device import Device
 
 
 class LED(Device):
-    """A light; nobody sees it here."""
+    """An LED; its value has no effect."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self._value = 0
 
     def set(self, value: int) -> None:
-        """Switches it: 0 is off."""
+        """Sets the value; 0 is off."""
         self._value = c_int(value)
 
     def get(self) -> int:
-        """What was set last."""
+        """The value that was set last."""
         return self._value
 
     @property

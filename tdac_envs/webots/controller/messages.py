@@ -1,4 +1,4 @@
-"""What Webots would print in its console."""
+"""Messages that Webots would print in its console."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from typing import Any
 
 
 def complain(text: str) -> None:
-    """Prints to the standard error."""
+    """Prints to standard error."""
     print(text, file=sys.stderr)
 
 
-_said: set[str] = set()
+_printed: set[str] = set()
 
 
 def once(text: str) -> None:
-    """Prints to the standard error, if the same was not printed before."""
-    if text not in _said:
-        _said.add(text)
+    """Prints to standard error, each text only once."""
+    if text not in _printed:
+        _printed.add(text)
         complain(text)
 
 
 def unsupported(call: str, result: Any = None) -> Callable[..., Any]:
-    """A function for a call that means nothing here: says so once, gives `result`."""
+    """Makes a function for an unsupported call: prints that once, returns `result`."""
 
     def absent(*_: Any, **__: Any) -> Any:
-        once(f"tdac: {call}() is not supported here; it has no effect")
+        once(f"tdac: {call}() is not supported; it has no effect")
         return result
 
     absent.__name__ = call.rpartition(".")[2]

@@ -11,16 +11,16 @@ from .messages import complain, unsupported
 
 
 class Motor(Device):
-    """A wheel's motor: until `setPosition(inf)` it holds its position 0.
+    """A wheel motor; it holds position 0 until `setPosition` is called.
 
     Args:
-        name: As in the world.
+        name: Device name in the world.
     """
 
     ROTATIONAL, LINEAR = 0, 1
 
     def __new__(cls, name: str) -> Motor:
-        """The one motor of that name: both of two objects know what was set."""
+        """Returns the only motor of that name, so that all users share its settings."""
         motor = connection.motors.get(name)
         if not isinstance(motor, Motor):
             motor = connection.motors[name] = super().__new__(cls)
@@ -36,25 +36,25 @@ class Motor(Device):
         self._torque = self.max_torque
 
     def setPosition(self, position: float) -> None:
-        """Turns to an angle (rad) at the set velocity; inf: velocity control."""
+        """Sets the target angle, rad; inf selects velocity control."""
         self.target_position = position
 
     def setVelocity(self, velocity: float) -> None:
-        """rad/s; in position control the highest, and not below 0."""
+        """Sets the velocity, rad/s; in position control the maximum, at least 0."""
         self.target_velocity = velocity
 
     def setAcceleration(self, acceleration: float) -> None:
-        """rad/s²; -1 is unlimited."""
+        """Sets the maximum acceleration, rad/s²; -1 is unlimited."""
         self.target_acceleration = acceleration
 
     def setAvailableTorque(self, torque: float) -> None:
-        """N m; kept, and without effect: the motor always gets its speed."""
+        """Stores the torque, N m; no effect: the motor always reaches its speed."""
         self._set_torque(torque)
 
     setAvailableForce = setAvailableTorque
 
     def setControlPID(self, p: float, i: float, d: float) -> None:
-        """Of position control; 10, 0, 0 at first."""
+        """Sets the gains of position control; initially 10, 0, 0."""
         gains = [c_double(p), c_double(i), c_double(d)]
         for gain, name, words in zip(
             gains, "pid", ("negative or zero", "negative", "negative"), strict=True
@@ -68,57 +68,57 @@ class Motor(Device):
         connection.command(self.name, "pid", gains)
 
     def getTargetPosition(self) -> float:
-        """As set."""
+        """Target angle as set, rad."""
         return self.target_position
 
     def getMinPosition(self) -> float:
-        """0: no limit."""
+        """Always 0: no limit."""
         return 0.0
 
     def getMaxPosition(self) -> float:
-        """0: no limit."""
+        """Always 0: no limit."""
         return 0.0
 
     def getVelocity(self) -> float:
-        """As set, not as driven."""
+        """Velocity as set, not as driven, rad/s."""
         return self.target_velocity
 
     def getMaxVelocity(self) -> float:
-        """rad/s."""
+        """Maximum velocity, rad/s."""
         return self.max_velocity
 
     def getAcceleration(self) -> float:
-        """As set."""
+        """Acceleration as set, rad/s²."""
         return self.target_acceleration
 
     def getAvailableTorque(self) -> float:
-        """As set."""
+        """Torque as set, N m."""
         return self._torque
 
     def getMaxTorque(self) -> float:
-        """N m."""
+        """Maximum torque, N m."""
         return self.max_torque
 
     getAvailableForce = getAvailableTorque
     getMaxForce = getMaxTorque
 
     def getMultiplier(self) -> float:
-        """1."""
+        """Always 1."""
         return 1.0
 
     def getType(self) -> int:
-        """ROTATIONAL."""
+        """Always ROTATIONAL."""
         return self.ROTATIONAL
 
     def getPositionSensor(self) -> Any:
-        """The wheel's sensor."""
+        """The wheel's position sensor."""
         from .robot import Robot
 
         name = self._facts.get("sensor", "")
         return getattr(Robot.created, "devices", {}).get(name)
 
     def getBrake(self) -> None:
-        """None: there is none."""
+        """Always None: there is no brake."""
 
     setTorque: Any = unsupported("Motor.setTorque")
     setForce: Any = unsupported("Motor.setForce")

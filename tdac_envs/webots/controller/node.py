@@ -35,7 +35,7 @@ class Node:
     """A node.
 
     Args:
-        number: In the scene.
+        number: Number of the node in the scene.
     """
 
     NO_NODE, GROUP, ROBOT, COMPASS, DISTANCE_SENSOR, GPS = 0, 14, 34, 39, 42, 44
@@ -60,15 +60,15 @@ class Node:
         return self.DEF
 
     def getType(self) -> int:
-        """One of the constants, of the base type."""
+        """Base type, one of the constants."""
         return self.type
 
     def getTypeName(self) -> str:
-        """Node type, or name of the PROTO."""
+        """Node type or name of the PROTO."""
         return self.type_name
 
     def getBaseTypeName(self) -> str:
-        """Node type; of a PROTO, what it is made of."""
+        """Node type; for a PROTO, its base type."""
         return self.base_type_name
 
     @property
@@ -92,28 +92,28 @@ class Node:
         return str(self._data["base"])
 
     def isProto(self) -> bool:
-        """Whether it is one."""
+        """Whether the node is a PROTO."""
         return self.type_name != self.base_type_name
 
     def getParentNode(self) -> Node | None:
-        """The node that it is in; None of the root."""
+        """The parent node; None for the root."""
         number = self._data["parent"]
         return node_of(number) if number >= 0 else None
 
     def getField(self, name: str) -> Field | None:
-        """A field, or None."""
+        """The field called `name`, or None."""
         for entry in self._data["fields"]:
             if entry[0] == name:
                 return Field(self.id, entry)
         return None
 
     def getFieldByIndex(self, index: int) -> Field | None:
-        """A field by its number, or None."""
+        """The field at an index, or None."""
         fields = self._data["fields"]
         return Field(self.id, fields[index]) if 0 <= index < len(fields) else None
 
     def getNumberOfFields(self) -> int:
-        """How many there are."""
+        """Number of fields."""
         return self.number_of_fields
 
     @property
@@ -122,15 +122,15 @@ class Node:
         return len(self._data["fields"])
 
     def getPosition(self) -> list[float]:
-        """In the world, m."""
+        """Position in the world, m."""
         return self._place()[0]
 
     def getOrientation(self) -> list[float]:
-        """Rotation matrix in the world, nine numbers, row after row."""
+        """Rotation matrix in the world, nine numbers, row by row."""
         return [value for row in self._place()[1] for value in row]
 
     def getPose(self, fromNode: Node | None = None) -> list[float]:
-        """Sixteen numbers: rotation and position, row after row."""
+        """Pose matrix in the world or in `fromNode`, sixteen numbers, row by row."""
         position, turn = self._place()
         if fromNode is not None:
             origin, base = fromNode._place()
@@ -141,47 +141,47 @@ class Node:
         return [*rows[0], *rows[1], *rows[2], 0.0, 0.0, 0.0, 1.0]
 
     def getVelocity(self) -> list[float]:
-        """Three of motion (m/s), three of rotation (rad/s); 0 but for the robot."""
+        """Linear (m/s) and angular (rad/s) velocity of the robot; 0 for other nodes."""
         own = self.id == connection.facts["self"]
         return list(connection.velocity) if own else [0.0] * 6
 
     def setVelocity(self, velocity: list[float]) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         del velocity
         self._change("setVelocity")
 
     def resetPhysics(self) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         self._change("resetPhysics")
 
     def remove(self) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         self._change("remove")
 
     def loadState(self, stateName: str) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         del stateName
         self._change("loadState")
 
     def addForce(self, force: list[float], relative: bool) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         del force, relative
         self._change("addForce")
 
     def addForceWithOffset(
         self, force: list[float], offset: list[float], relative: bool
     ) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         del force, offset, relative
         self._change("addForceWithOffset")
 
     def addTorque(self, torque: list[float], relative: bool) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         del torque, relative
         self._change("addTorque")
 
     def setJointPosition(self, position: float, index: int = 1) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         del position, index
         self._change("setJointPosition")
 
@@ -213,12 +213,12 @@ for _number, _name in enumerate(_NAMES):
 
 
 def node_of(number: int) -> Node:
-    """The node of a number."""
+    """The node with this number."""
     return Node(number)
 
 
 def may_supervise(function: str) -> bool:
-    """Whether the robot is a supervisor; complains where it is not."""
+    """Whether the robot is a supervisor; prints an error if it is not."""
     if connection.facts["supervisor"]:
         return True
     complain(

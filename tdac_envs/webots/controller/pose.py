@@ -1,4 +1,4 @@
-"""Where nodes are: translations and rotations, from the root down."""
+"""Poses of nodes, composed of the translations and rotations of their parents."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 def rotation_matrix(axis_angle: list[float]) -> Matrix:
-    """Of an axis (of any length) and an angle, rad."""
+    """Rotation matrix of an axis (of any length) and an angle, rad."""
     x, y, z, angle = axis_angle
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-12:
@@ -27,31 +27,31 @@ def rotation_matrix(axis_angle: list[float]) -> Matrix:
 
 
 def product(a: Matrix, b: Matrix) -> Matrix:
-    """Of two matrices."""
+    """Product of two matrices."""
     return [
         [sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)
     ]
 
 
 def moved(a: Matrix, by: list[float], point: list[float]) -> list[float]:
-    """A point of a frame in the frame around it."""
+    """Converts a point of a frame to the parent frame: a point + by."""
     return [by[i] + sum(a[i][k] * point[k] for k in range(3)) for i in range(3)]
 
 
 def transposed(a: Matrix) -> Matrix:
-    """The inverse of a rotation."""
+    """The transpose, which is the inverse of a rotation."""
     return [list(column) for column in zip(*a, strict=True)]
 
 
 def absolute(
     scene: list[dict[str, Any]], live: dict[int, Any], number: int
 ) -> tuple[list[float], Matrix]:
-    """Where a node is in the world: position and rotation.
+    """Position and rotation of a node in the world.
 
     Args:
         scene: All nodes.
-        live: Translation and rotation in the world of those that move, by number.
-        number: Of the node.
+        live: World translation and rotation of moved nodes, by number.
+        number: Number of the node.
     """
     position, turn = [0.0, 0.0, 0.0], IDENTITY
     while number >= 0:

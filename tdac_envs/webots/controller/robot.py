@@ -39,15 +39,15 @@ def _deprecated(getter: str) -> Callable[[Any, str], Device | None]:
         return found
 
     get.__name__ = getter
-    get.__doc__ = "As `getDevice`, with a warning."
+    get.__doc__ = "Same as `getDevice`, with a warning."
     return get
 
 
 class Robot:
-    """The robot. A second one says so and has no devices.
+    """The robot. A second instance prints an error and has no devices.
 
     Attributes:
-        created: The first one.
+        created: The first instance.
     """
 
     MODE_SIMULATION, MODE_CROSS_COMPILATION, MODE_REMOTE_CONTROL = 0, 1, 2
@@ -71,10 +71,9 @@ class Robot:
         self.joystick = Joystick()
 
     def step(self, time_step: int | None = None) -> int:
-        """Lets the simulation go on by `time_step` ms; -1 when it has ended.
+        """Advances the simulation by `time_step` ms; returns -1 if it has ended.
 
-        It goes on in steps of the world's `basicTimeStep`, so that other durations are
-        rounded up to a multiple.
+        Durations are rounded up to a multiple of the world's `basicTimeStep`.
         """
         duration = int(self.basic_time_step) if time_step is None else c_int(time_step)
         if duration < 0:
@@ -83,28 +82,28 @@ class Robot:
         return connection.step(duration)
 
     def getDevice(self, name: str) -> Device | None:
-        """A device, or None."""
+        """The device called `name`, or None."""
         if name in self.devices:
             return self.devices[name]
         if name in connection.facts["not_modelled"]:
-            once(f'tdac: the device "{name}" is not modelled here; it is missing')
+            once(f'tdac: the device "{name}" is not modelled')
         complain(f'Device "{name}" was not found on robot "{self.name}"')
         return None
 
     def getDeviceByIndex(self, index: int) -> Device:
-        """A device by its number, from 0."""
+        """The device at an index, from 0."""
         return list(self.devices.values())[index]
 
     def getNumberOfDevices(self) -> int:
-        """How many there are."""
+        """Number of devices."""
         return self.number_of_devices
 
     def getBasicTimeStep(self) -> float:
-        """In ms."""
+        """Basic time step of the world, ms."""
         return self.basic_time_step
 
     def getTime(self) -> float:
-        """Simulated, s."""
+        """Simulated time, s."""
         return self.time
 
     def getName(self) -> str:
@@ -116,47 +115,47 @@ class Robot:
         return self.model
 
     def getCustomData(self) -> str:
-        """The robot's field."""
+        """The robot's `customData` field."""
         return self.custom_data
 
     def setCustomData(self, data: str) -> None:
-        """Sets the robot's field."""
+        """Sets the robot's `customData` field."""
         self.custom_data = data
 
     def getSupervisor(self) -> bool:
-        """Whether it may call a supervisor's functions."""
+        """Whether the robot is a supervisor."""
         return self.supervisor
 
     def getSynchronization(self) -> bool:
-        """Whether the simulation waits for it: it does."""
+        """The robot's `synchronization` field; the simulation always waits."""
         return self.synchronization
 
     def getMode(self) -> int:
-        """MODE_SIMULATION."""
+        """Always MODE_SIMULATION."""
         return self.MODE_SIMULATION
 
     def getType(self) -> int:
-        """`Node.ROBOT`."""
+        """Always `Node.ROBOT`."""
         return int(connection.facts["node_type"])
 
     def getWorldPath(self) -> str:
-        """Of the world's file."""
+        """Path of the world file."""
         return self.world_path
 
     def getProjectPath(self) -> str:
-        """Of the controller's folder."""
+        """Path of the controller's folder."""
         return self.project_path
 
     def getKeyboard(self) -> Keyboard:
-        """A keyboard without anybody at it."""
+        """The keyboard, on which no key is ever pressed."""
         return self.keyboard
 
     def getMouse(self) -> Mouse:
-        """A mouse without anybody at it."""
+        """The mouse, which gives no input."""
         return self.mouse
 
     def getJoystick(self) -> Joystick:
-        """A joystick without anybody at it."""
+        """The joystick, which gives no input."""
         return self.joystick
 
     getAccelerometer = _deprecated("getAccelerometer")

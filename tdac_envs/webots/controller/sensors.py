@@ -1,4 +1,4 @@
-"""Sensors: NaN until their first sample, then the last one."""
+"""Sensors: they read NaN before their first sample, then the last sample."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .messages import complain
 
 
 class Sensor(Device):
-    """A sensor that samples every so often once it is enabled.
+    """A sensor that samples periodically once it is enabled.
 
     Args:
-        name: As in the world.
-        sampling_period: ms; with it the sensor is enabled at once.
+        name: Device name in the world.
+        sampling_period: Period, ms; if given, the sensor is enabled at once.
     """
 
     _c_name = ""
@@ -27,7 +27,7 @@ class Sensor(Device):
             self.enable(sampling_period)
 
     def enable(self, p: int) -> None:
-        """Samples every `p` ms, the first time `p` ms from now; 0 is never."""
+        """Samples every `p` ms, first after `p` ms; 0 disables the sensor."""
         period = c_int(p)
         if period < 0:
             complain(
@@ -42,11 +42,11 @@ class Sensor(Device):
             connection.command(self.name, "enable", period)
 
     def disable(self) -> None:
-        """Samples no more."""
+        """Stops sampling."""
         self.enable(0)
 
     def getSamplingPeriod(self) -> int:
-        """As given to `enable`, ms."""
+        """Sampling period given to `enable`, ms."""
         return self._period
 
     @property
@@ -58,15 +58,15 @@ class Sensor(Device):
     def sampling_period(self, period: int | None) -> None:
         self.enable(0 if period is None else period)
 
-    def _sample(self, getter: str, nothing: Any) -> Any:
-        """The last sample, or `nothing` where there is none yet."""
+    def _sample(self, getter: str, default: Any) -> Any:
+        """The last sample, or `default` if there is none."""
         if self._period <= 0:
             complain(
                 f"Error: wb_{self._c_name}_{getter}() called for a disabled device! "
                 f"Please use: wb_{self._c_name}_enable()."
             )
-            return nothing
-        sample = connection.values.get(self.name, nothing)
+            return default
+        sample = connection.values.get(self.name, default)
         return list(sample) if isinstance(sample, list) else sample
 
 
@@ -82,10 +82,10 @@ class _Scalar(Sensor):
 
 
 class _Table(_Scalar):
-    """A sensor whose readings come from a table."""
+    """A sensor with a lookup table."""
 
     def getLookupTable(self) -> list[float]:
-        """Input, reading, relative noise; again and again."""
+        """Rows of input, reading and relative noise, as a flat list."""
         return self.lookup_table
 
     @property
@@ -109,11 +109,11 @@ class DistanceSensor(_Table):
         return self.min_value
 
     def getAperture(self) -> float:
-        """Of its cone, rad."""
+        """Aperture of the sensor's cone, rad."""
         return self.aperture
 
     def getType(self) -> int:
-        """INFRA_RED."""
+        """Always INFRA_RED."""
         return self.type
 
     @property
@@ -138,19 +138,19 @@ class DistanceSensor(_Table):
 
 
 class LightSensor(_Table):
-    """A light sensor, in the dark."""
+    """A light sensor; light is not modelled, so it reads darkness."""
 
     _c_name = "light_sensor"
 
 
 class PositionSensor(_Scalar):
-    """Says by how much a wheel has turned, rad."""
+    """Measures the angle by which a wheel has turned, rad."""
 
     ROTATIONAL, LINEAR = 0, 1
     _c_name = "position_sensor"
 
     def getType(self) -> int:
-        """ROTATIONAL."""
+        """Always ROTATIONAL."""
         return self.ROTATIONAL
 
     def getMotor(self) -> Any:
@@ -160,7 +160,7 @@ class PositionSensor(_Scalar):
         return Motor(self._facts["motor"]) if self._facts else None
 
     def getBrake(self) -> None:
-        """None: there is none."""
+        """Always None: there is no brake."""
 
     @property
     def motor(self) -> Any:
@@ -180,21 +180,21 @@ class _Vector(Sensor):
 
 
 class GPS(_Vector):
-    """Where it is, m."""
+    """Measures its position in the file's coordinates, m."""
 
     LOCAL, WGS84 = 0, 1
     _c_name = "gps"
 
     def getSpeed(self) -> float:
-        """Of the robot, m/s; NaN before the first sample."""
+        """Speed of the robot, m/s; NaN before the first sample."""
         return self.speed
 
     def getSpeedVector(self) -> list[float]:
-        """Its velocity, m/s."""
+        """Velocity of the robot, m/s; NaNs before the first sample."""
         return self.speed_vector
 
     def getCoordinateSystem(self) -> int:
-        """LOCAL."""
+        """Always LOCAL."""
         return self.LOCAL
 
     @property
@@ -210,7 +210,7 @@ class GPS(_Vector):
 
 
 class Accelerometer(_Vector):
-    """How it is accelerated, m/s²; at rest against gravity."""
+    """Measures the proper acceleration, m/s²; at rest 9.81 upwards."""
 
     _c_name = "accelerometer"
 
@@ -220,18 +220,18 @@ class Accelerometer(_Vector):
 
     @property
     def lookup_table(self) -> list[float]:
-        """Input, reading, relative noise; again and again."""
+        """Rows of input, reading and relative noise, as a flat list."""
         return list(self._facts.get("table", ()))
 
 
 class Gyro(Accelerometer):
-    """How fast it turns, by its table: 100000 is 13.3 rad/s."""
+    """Measures the turn rate in units of its table: 100000 is 13.3 rad/s."""
 
     _c_name = "gyro"
 
 
 class Compass(_Vector):
-    """Where north is, seen from the robot."""
+    """Measures the direction of north in the robot's axes."""
 
     _c_name = "compass"
 
@@ -241,20 +241,20 @@ class Compass(_Vector):
 
 
 class InertialUnit(Sensor):
-    """How the robot is turned."""
+    """Measures the orientation of the robot."""
 
     _c_name = "inertial_unit"
 
     def getRollPitchYaw(self) -> list[float]:
-        """Three angles, rad, or NaNs."""
+        """Roll, pitch and yaw, rad, or NaNs."""
         return self.roll_pitch_yaw
 
     def getQuaternion(self) -> list[float]:
-        """(x, y, z, w) of the rotation, or NaNs."""
+        """Quaternion (x, y, z, w), or NaNs."""
         return self.quaternion
 
     def getNoise(self) -> float:
-        """0."""
+        """Always 0."""
         return 0.0
 
     @property

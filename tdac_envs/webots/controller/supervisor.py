@@ -1,4 +1,4 @@
-"""A robot that may look at the whole world."""
+"""A robot that may query the whole world."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .robot import Robot
 
 
 class Supervisor(Robot):
-    """A robot with `supervisor TRUE`; without it each call here is refused.
+    """A robot with `supervisor TRUE`; without this field its calls are refused.
 
-    It may look at everything. Here it may not move anything, since the run is judged.
+    It may query everything, but not move anything, since the run is judged.
     """
 
     SIMULATION_MODE_PAUSE, SIMULATION_MODE_REAL_TIME, SIMULATION_MODE_FAST = 0, 1, 2
     _mode = SIMULATION_MODE_FAST
 
     def getRoot(self) -> Node | None:
-        """The node whose `children` are the file's nodes."""
+        """The root node; its `children` are the top-level nodes of the file."""
         return node_of(0) if may_supervise("wb_supervisor_node_get_root") else None
 
     def getSelf(self) -> Node | None:
@@ -31,7 +31,7 @@ class Supervisor(Robot):
         return node_of(connection.facts["self"])
 
     def getFromDef(self, name: str) -> Node | None:
-        """The node with a DEF name, or None; `A.B` is B within A."""
+        """The node with this DEF name, or None; `A.B` is B inside A."""
         if not may_supervise("wb_supervisor_node_get_from_def"):
             return None
         found, within = -1, -1
@@ -43,27 +43,27 @@ class Supervisor(Robot):
         return node_of(found)
 
     def getFromId(self, number: int) -> Node | None:
-        """The node of a number, or None."""
+        """The node with this number, or None."""
         if not may_supervise("wb_supervisor_node_get_from_id"):
             return None
         return node_of(number) if 0 <= number < len(_scene()) else None
 
     def getFromDevice(self, device: Device) -> Node | None:
-        """A device's node; None, since an e-puck's are within its PROTO."""
+        """Always None, since an e-puck's devices are inside its PROTO."""
         del device
         may_supervise("wb_supervisor_node_get_from_device")
         return None
 
     def getSelected(self) -> None:
-        """None: nobody selects anything."""
+        """Always None: nothing is selected."""
         may_supervise("wb_supervisor_node_get_selected")
 
     def simulationGetMode(self) -> int:
-        """As set; as fast as possible at first."""
+        """Mode as set; initially SIMULATION_MODE_FAST."""
         return self._mode
 
     def simulationSetMode(self, mode: int) -> None:
-        """Kept, and without effect."""
+        """Stores the mode, without effect."""
         if may_supervise("wb_supervisor_simulation_set_mode"):
             self._mode = c_int(mode)
 
@@ -83,22 +83,22 @@ class Supervisor(Robot):
             connection.tell("simulationQuit")
 
     def simulationReset(self) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         if may_supervise("wb_supervisor_simulation_reset"):
             connection.tell("simulationReset")
 
     def simulationResetPhysics(self) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         if may_supervise("wb_supervisor_simulation_reset_physics"):
             connection.tell("simulationResetPhysics")
 
     def worldReload(self) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         if may_supervise("wb_supervisor_world_reload"):
             connection.tell("worldReload")
 
     def worldLoad(self, filename: str) -> None:
-        """Ends the run, which fails: it is judged."""
+        """Forbidden in a judged run: ends it as a failure."""
         del filename
         if may_supervise("wb_supervisor_world_load"):
             connection.tell("worldLoad")
@@ -127,7 +127,7 @@ def _scene() -> list[dict[str, Any]]:
 
 
 def _defined(name: str, within: int) -> int:
-    """Number of the first node with a DEF name, or -1."""
+    """Number of the first node of a DEF name (inside `within`, unless -1), or -1."""
     for number, node in enumerate(_scene()):
         if node["def"] == name and (within < 0 or _is_in(number, within)):
             return number

@@ -49,7 +49,7 @@ class TestDevices:
             "left.getMaxVelocity())\n",
             world,
         )
-        assert out[0] == 'tdac: the device "tof" is not modelled here; it is missing'
+        assert out[0] == 'tdac: the device "tof" is not modelled'
         assert out[1:4] == ['Device "tof" was not found on robot "e-puck"'] * 3
         assert out[4:] == ["[None, None, None] 7.536"]
 
@@ -66,11 +66,11 @@ class TestDevices:
             "radio.getQueueLength(), camera.getSamplingPeriod())\n"
         )
         assert out == [
-            "tdac: camera is not modelled here; it gives nothing",
-            "tdac: receiver is not modelled here; it gives nothing",
-            "tdac: Camera.getImage() is not supported here; it has no effect",
-            "tdac: Emitter.send() is not supported here; it has no effect",
-            "tdac: Speaker.speak() is not supported here; it has no effect",
+            "tdac: camera is not modelled; it returns no data",
+            "tdac: receiver is not modelled; it returns no data",
+            "tdac: Camera.getImage() is not supported; it has no effect",
+            "tdac: Emitter.send() is not supported; it has no effect",
+            "tdac: Speaker.speak() is not supported; it has no effect",
             "None 52 39 0 64",
         ]
 
@@ -283,9 +283,7 @@ class TestMotors:
         )
         assert out[0] == "6.28 1.5 inf 10.0 0.0 0"
         assert out[1] == "left wheel sensor True"
-        assert out[2:] == [
-            "tdac: Motor.setTorque() is not supported here; it has no effect"
-        ]
+        assert out[2:] == ["tdac: Motor.setTorque() is not supported; it has no effect"]
 
 
 class TestSensors:
@@ -609,7 +607,7 @@ class TestSupervisor:
         assert report.steps == 2
         assert report.output.splitlines() == [
             "a b 2",
-            "tdac: Supervisor.setLabel() is not supported here; it has no effect",
+            "tdac: Supervisor.setLabel() is not supported; it has no effect",
         ]
 
     def test_only_for_supervisors(self, printed):
