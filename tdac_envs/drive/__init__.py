@@ -1,1 +1,1 @@
-"""What both robots share: poses, motion, steps, rewards, batches."""
+"""Code shared by both robots: poses, motion, steps, rewards, batches."""

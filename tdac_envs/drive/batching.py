@@ -1,4 +1,4 @@
-"""Seeds, masks, infos and spaces of many environments at once, as in Gymnasium."""
+"""Seeds, reset masks, infos and spaces of a batch, in Gymnasium's formats."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _INFOS: dict[str, tuple[int, type]] = {
 
 
 def ends_of(outcome: Array) -> tuple[Array, Flags, Flags]:
-    """Rewards of a step, and whose episodes it terminated and truncated.
+    """Rewards, terminations and truncations of a step.
 
     Args:
         outcome: Shape (num_envs, entries).
@@ -40,11 +40,11 @@ def ends_of(outcome: Array) -> tuple[Array, Flags, Flags]:
 
 
 def infos_of(outcome: Array, mask: Flags) -> dict[str, Any]:
-    """The infos of the robots in the mask, each key with its own.
+    """The infos of a batch; each `key` has its mask as `_key`, as in Gymnasium.
 
     Args:
-        outcome: Shape (num_envs, entries), 0 out of the mask.
-        mask: Shape (num_envs,).
+        outcome: Shape (num_envs, entries); 0 for robots outside the mask.
+        mask: Shape (num_envs,), bool: the robots that have infos.
     """
     infos: dict[str, Any] = {}
     for key, (entry, kind) in _INFOS.items():
@@ -53,7 +53,7 @@ def infos_of(outcome: Array, mask: Flags) -> dict[str, Any]:
 
 
 def autoreset_mode_of(given: str | AutoresetMode) -> AutoresetMode:
-    """The mode that is meant.
+    """The autoreset mode of this name or value.
 
     Raises:
         TaskError: There is no such mode.
@@ -73,22 +73,22 @@ def several(
     """The environments of a batch, one for each entry of `each`.
 
     Args:
-        make: Makes one.
-        each: Arguments that differ, as the caller of `make_vec` gave them.
-        options: Arguments that they share.
-        count: Of robots.
+        make: Class of the environments.
+        each: Arguments that differ, as passed to `make_vec`.
+        options: Arguments that all environments share.
+        count: Number of robots.
 
     Raises:
-        TaskError: `each` is no list of such arguments, has more than there are robots,
-            or an environment cannot be made: says which.
+        TaskError: `each` is not a list of dicts or is longer than `count`, or an
+            environment cannot be made; the message names the entry.
     """
     if not isinstance(each, Sequence) or not all(isinstance(e, Mapping) for e in each):
         raise TaskError(
-            f"expected each to be a list of dicts of arguments, as [{{'delay': 1}}], "
+            f"expected each to be a list of dicts of arguments, e.g. [{{'delay': 1}}], "
             f"got {each!r}"
         )
     if len(each) > count:
-        raise TaskError(f"each has {len(each)} entries for {count} robots")
+        raise TaskError(f"each has {len(each)} entries for {count} robots; remove some")
     envs = []
     for number, more in enumerate(each or [{}]):
         try:
@@ -101,33 +101,33 @@ def several(
 
 
 def no_pictures(render_mode: object) -> None:
-    """Refuses a mode of pictures.
+    """Checks that `render_mode` is None.
 
     Raises:
-        TaskError: There is one.
+        TaskError: It is not None.
     """
     if render_mode is not None:
         raise TaskError(
-            f"a batch draws nothing; expected render_mode None, or "
+            f"a batch cannot render; expected render_mode None, or "
             f"vectorization_mode='sync', got {render_mode!r}"
         )
 
 
 def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
-    """The observation space that holds those of all environments.
+    """The smallest observation space that contains those of all environments.
 
     Raises:
-        TaskError: Their robots' memory is of several shapes, or they observe other
-            things.
+        TaskError: The environments differ in the shapes of their robots' arrays or in
+            their sensors.
     """
     first = envs[0]
     shapes = [[array.shape for array in env.robot] for env in envs]
     if any(each != shapes[0] for each in shapes):
         rays = "n_rays and " if "ranges" in first.observation_space.spaces else ""
-        raise TaskError(f"expected the same {rays}delay of all robots of a batch")
+        raise TaskError(f"expected the same {rays}delay for all robots of a batch")
     keys = first.observation_space.keys()
     if any(env.observation_space.keys() != keys for env in envs):
-        raise TaskError("expected the same sensors of all robots of a batch")
+        raise TaskError("expected the same sensors for all robots of a batch")
     bounds: dict[str, gym.Space[Any]] = {}
     for key, box in first.observation_space.items():
         others = [env.observation_space[key] for env in envs]
@@ -138,10 +138,10 @@ def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
 
 
 def seeds_of(seed: Any, count: int) -> Sequence[int | None]:
-    """A seed for each robot, from one number, one for each, or None.
+    """The seeds of the robots: `seed + i` for an int, else one for each, or None.
 
     Raises:
-        ValueError: There are more or fewer than robots.
+        ValueError: `seed` is neither an int nor one seed for each robot.
     """
     if seed is None or isinstance(seed, int | np.integer):
         return [None if seed is None else int(seed) + i for i in range(count)]
@@ -152,22 +152,22 @@ def seeds_of(seed: Any, count: int) -> Sequence[int | None]:
             f"expected a whole number as seed, or {count} of them, got {seed!r}"
         ) from None
     if len(seeds) != count:
-        raise ValueError(f"expected {count} seeds, one a robot, got {len(seeds)}")
+        raise ValueError(f"expected {count} seeds, one per robot, got {len(seeds)}")
     return seeds
 
 
 def mask_of(given: Any, count: int) -> Flags:
-    """Which robots are reset; all where nothing is given.
+    """The mask of robots to reset, shape (count,), bool; all robots for None.
 
     Raises:
-        ValueError: It is not a bool for each robot, or all are False.
+        ValueError: The mask is not one bool for each robot, or all are False.
     """
     if given is None:
         return np.ones(count, np.bool_)
     mask = np.asarray(given)
     if mask.dtype != np.bool_ or mask.shape != (count,) or not mask.any():
         raise ValueError(
-            f"expected options['reset_mask'] to be {count} bools, one of them True at "
-            f"least, got {given!r}"
+            f"expected options['reset_mask'] to be {count} bools, at least one of them "
+            f"True, got {given!r}"
         )
     return mask

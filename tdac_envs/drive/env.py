@@ -1,4 +1,4 @@
-"""What the environments share: a robot on two wheels drives to a goal."""
+"""Base class of the environments: a two-wheeled robot drives to a goal."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ Observation = dict[str, NDArray[np.float32]]
 
 
 class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
-    """An environment whose actions are the speeds of two wheels.
+    """Base class of the environments whose actions are two wheel speeds.
 
-    A subclass has the robot's memory, makes the call that moves it (`_call_drive`),
-    observes (`_observation`) and draws (`_frame`).
+    A subclass provides the robot's arrays (`robot`), the compiled step (`_call_drive`),
+    the observation (`_observation`) and the picture (`_frame`).
 
     Args:
         on_collision: `"terminate"` or `"block"`.
-        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
-        delay: Steps by which an action takes effect late.
-        reward_weights: Those of the reward that are to differ, by their names.
+        delay: Number of steps until an action takes effect.
+        reward_weights: Reward weights that differ from the defaults, by name.
         dt: Duration of a step, s.
         render_mode: `"rgb_array"`, `"human"` or None.
 
     Attributes:
-        title: Of the window.
-        robot: Its memory; see `tdac_envs.drive.stepping`.
+        title: Title of the window.
+        robot: Arrays of the robot; see `tdac_envs.drive.stepping`.
     """
 
     title: str
@@ -80,7 +80,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Applies wheel speeds for one `dt`.
+        """Runs one time step with the wheel speeds of an action.
 
         Raises:
             ValueError: The action is not two finite numbers.
@@ -100,7 +100,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         return self._observation(), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The current frame, uint8 (height, width, 3), or None in a window."""
+        """The current frame, uint8 (height, width, 3); None for `"human"`."""
         if self.render_mode is None:
             gym.logger.warn("render() needs gym.make(..., render_mode='rgb_array')")
             return None
@@ -115,7 +115,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         return None
 
     def close(self) -> None:
-        """Closes the window, if there is one."""
+        """Closes the window, if one is open."""
         if self._window is not None:
             self._window.close()
             self._window = None
@@ -140,7 +140,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
 
 
 def wheel_speeds(action: Any) -> tuple[float, float]:
-    """The wheel speeds of an action, which may be out of [-1, 1].
+    """The wheel speeds of an action, unclipped.
 
     Raises:
         ValueError: The action is not two finite numbers.
@@ -148,7 +148,7 @@ def wheel_speeds(action: Any) -> tuple[float, float]:
     try:
         array = action if type(action) is np.ndarray else np.asarray(action)
         left, right = array.tolist()
-        # NaN and infinity times 0 are not 0.
+        # False for NaN and infinity.
         if 0.0 * left + 0.0 * right == 0.0:
             return float(left), float(right)
     except (TypeError, ValueError):

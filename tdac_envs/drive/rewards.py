@@ -1,4 +1,4 @@
-"""Reward of both environments, as pure functions of one step."""
+"""Reward of both environments, as a pure function of one step."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from tdac_envs.core.compiled import subkernel
 
 
 class RewardWeights(NamedTuple):
-    """Weights of the four terms.
+    """Weights of the four reward terms.
 
     Attributes:
-        progress: For each full-speed step's worth of progress along the shortest
-            path.
-        goal: Once, on reaching the goal.
-        collision: Subtracted at each contact.
-        time: Subtracted at each step.
+        progress: Reward for progress along the shortest path, per full-speed step.
+        goal: Reward for reaching the goal.
+        collision: Penalty of a step with a contact.
+        time: Penalty of each step.
     """
 
     progress: float = 0.1
@@ -27,7 +26,7 @@ class RewardWeights(NamedTuple):
 
 
 def weights_of(given: Mapping[str, float] | None) -> RewardWeights:
-    """The weights that are given by their names, and the default of the others.
+    """The reward weights, with the default for each name that is not given.
 
     Raises:
         TaskError: A name is unknown, or a weight is not a finite number of at least 0.
@@ -47,9 +46,9 @@ def step_reward(
 
     Args:
         weights: Weights of the terms.
-        progress: Path distance gained, in full-speed steps.
-        reached: Whether the goal was reached in this step.
-        collided: Whether the body touched an obstacle in this step.
+        progress: Decrease of the remaining path length, in full-speed steps.
+        reached: Whether the step reached the goal.
+        collided: Whether the body touched an obstacle.
     """
     reward = weights.progress * progress - weights.time
     if reached:

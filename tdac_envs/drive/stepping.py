@@ -1,7 +1,7 @@
-"""What the compiled steps of all environments share: memory, motion, reward, ends.
+"""Parts of a compiled step shared by all environments: motion, reward, episode end.
 
-A robot's memory is a few arrays, in which the environments have these entries in
-common; see `tdac_envs.epuck.robot.Robot` for what they mean.
+A robot's state is kept in a few arrays. The constants below are the indices of the
+entries that all environments have; `tdac_envs.epuck.robot.Robot` documents them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ N_OUTCOME = 10
 def clear(
     state: Array, queue: Array, wheel_speeds: NDArray[np.float32], outcome: Array
 ) -> None:
-    """Forgets the episode before; the pose and the way that is left are kept."""
+    """Clears the last episode, except for the pose and the remaining path length."""
     state[LEFT] = state[RIGHT] = 0.0
     state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
     state[STEPS] = 0.0
@@ -48,19 +48,19 @@ def clear(
 
 @subkernel
 def batch_at(batch: Words) -> tuple[Flags, Array, Array, Words]:
-    """What a loop over the robots of a batch reads, found by addresses.
+    """Input arrays of a loop over the robots of a batch, from their addresses.
 
-    Views of these arrays count no references: threads that count in the same place
-    wait for each other, and take half as long again.
+    Arrays made from addresses are not reference-counted. Threads that update the same
+    reference counts wait for each other, which makes a step 1.5 times as long.
 
     Args:
-        batch: Where they are, shape (4, 4) or more of them.
+        batch: Shape (4 or more, 4): addresses and shapes of the arrays.
 
     Returns:
-        over: Shape (n,): whether a robot's episode begins.
-        commands: Shape (n, 2): wanted speeds of the wheels.
-        starts: Shape (n, 4): pose in which an episode begins, and the way from there.
-        words: Shape (n, arrays, 4): where the arrays of each robot are.
+        over: Shape (n,): whether a robot's episode is over, so that the next begins.
+        commands: Shape (n, 2): commanded wheel speeds.
+        starts: Shape (n, 4): start pose, and length of the path from there.
+        words: Shape (n, arrays, 4): addresses and shapes of each robot's arrays.
     """
     return (
         line(batch[0], np.bool_),
@@ -77,9 +77,9 @@ def give_command(
     """Prepares a robot of a batch for its next call of `begin` or `drive`.
 
     Args:
-        begins: Whether its episode begins.
-        command: Shape (2,): wanted speeds of the wheels.
-        start: Shape (4,): pose in which an episode begins, and the way from there.
+        begins: Whether an episode begins.
+        command: Shape (2,): commanded wheel speeds.
+        start: Shape (4,): start pose, and length of the path from there.
         state: Overwritten.
         outcome: Overwritten.
     """
@@ -92,14 +92,14 @@ def give_command(
 
 @subkernel
 def copy_row(source: NDArray[Any], to: NDArray[Any], row: int) -> None:
-    """Copies an array of one dimension to a row of another."""
+    """Copies a 1D array into a row of a 2D array."""
     for k in range(source.shape[0]):
         to[row, k] = source[k]
 
 
 @subkernel
 def within(value: float) -> float:
-    """The value, limited to [-1, 1]."""
+    """The value clipped to [-1, 1]."""
     return min(max(value, -1.0), 1.0)
 
 
@@ -111,16 +111,16 @@ def apply_command(
     wheel_speeds: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Sets the wheels' speeds, as fractions, from those that are wanted."""
+    """Computes the wheel speeds, as fractions, from the commanded ones."""
     left, right = within(state[LEFT]), within(state[RIGHT])
     if left != state[LEFT] or right != state[RIGHT]:
         outcome[CLIPPED] += 1.0
     delay = int(constants[DELAY])
     if delay > 0:
-        late = int(state[STEPS]) % delay
-        wanted_left, wanted_right = left, right
-        left, right = queue[late, 0], queue[late, 1]
-        queue[late, 0], queue[late, 1] = wanted_left, wanted_right
+        slot = int(state[STEPS]) % delay
+        new_left, new_right = left, right
+        left, right = queue[slot, 0], queue[slot, 1]
+        queue[slot, 0], queue[slot, 1] = new_left, new_right
     lag = constants[LAG]
     wheel_speeds[0] = left + lag * (wheel_speeds[0] - left)
     wheel_speeds[1] = right + lag * (wheel_speeds[1] - right)
@@ -128,13 +128,13 @@ def apply_command(
 
 @subkernel
 def settle(constants: Array, state: Array, outcome: Array, before: float) -> None:
-    """Reward and end of a step, from what was touched and reached.
+    """Computes the reward of a step and whether it ends the episode.
 
     Args:
         constants: See the module.
-        state: See the module.
-        outcome: See the module.
-        before: Way that was left before the step.
+        state: The step count is incremented.
+        outcome: The reward, the ends and the number of collisions are written.
+        before: Length of the remaining path before the step.
     """
     reached, touched = outcome[REACHED] == 1.0, outcome[TOUCHED] == 1.0
     weights = RewardWeights(
@@ -151,8 +151,8 @@ def settle(constants: Array, state: Array, outcome: Array, before: float) -> Non
 
 def info_of(outcome: list[float]) -> dict[str, Any]:
     """The `info` of a step, from its `outcome` as a list."""
-    told = outcome[REACHED : ROOM + 1]
-    reached, touched, collisions, clipped, gap, remaining, room = told
+    entries = outcome[REACHED : ROOM + 1]
+    reached, touched, collisions, clipped, gap, remaining, room = entries
     return {
         "is_success": reached == 1.0,
         "collision": touched == 1.0,
@@ -166,7 +166,7 @@ def info_of(outcome: list[float]) -> dict[str, Any]:
 
 @kernel
 def wrap_angle(angle: float) -> float:
-    """The same direction in (-pi, pi]."""
+    """The angle wrapped to (-pi, pi]."""
     wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
     return math.pi if wrapped <= -math.pi else wrapped
 
@@ -175,29 +175,32 @@ def wrap_angle(angle: float) -> float:
 def move(
     x: float, y: float, heading: float, forward: float, turn: float
 ) -> tuple[float, float, float]:
-    """Pose after the exact arc of `forward` px and `turn` rad; heading unwrapped.
+    """The pose after an exact arc of length `forward` that turns by `turn` rad.
 
-    The chord of the arc points along the middle heading.
+    `forward` has the unit of x and y; the returned heading is not wrapped.
     """
     half = 0.5 * turn
-    # Below 1e-4 rad the series is exact to the last bit.
-    shrink = math.sin(half) / half if abs(half) > 1e-4 else 1.0 - half * half / 6.0
-    chord, middle = forward * shrink, heading + half
+    # The series is exact in float64 below 1e-4 rad.
+    ratio = math.sin(half) / half if abs(half) > 1e-4 else 1.0 - half * half / 6.0
+    # The chord of an arc points along the mean heading.
+    chord, mean = forward * ratio, heading + half
     return (
-        x + chord * math.cos(middle),
-        y + chord * math.sin(middle),
+        x + chord * math.cos(mean),
+        y + chord * math.sin(mean),
         heading + turn,
     )
 
 
 @subkernel
 def free_way(rest: float, approach: float, curvature: float) -> float:
-    """Way that is surely free: to the root of `rest + approach h - curvature h^2 / 2`.
+    """Arc length h that is certainly free of contact.
+
+    It is the positive root of `rest + approach * h - curvature * h**2 / 2`, if any.
 
     Args:
-        rest: Distance to the body.
-        approach: Rate at which it grows along the tangent, in [-1, 1].
-        curvature: Of the arc.
+        rest: Distance to the obstacle.
+        approach: Rate at which this distance grows along the tangent, in [-1, 1].
+        curvature: Curvature of the arc.
     """
     root = math.sqrt(approach * approach + 2.0 * curvature * rest)
     if approach < 0.0:

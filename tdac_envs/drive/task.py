@@ -1,4 +1,4 @@
-"""What the tasks of both robots share: poses, jittered starts, horizons."""
+"""Code shared by the tasks of both robots: poses, jittered starts, horizons."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_DRAWS = 1000
 
 
 class Pose(NamedTuple):
-    """Place and heading of the robot, in the frame and units of its environment."""
+    """Pose of a robot: x, y (px on a map, m in a world) and heading (rad)."""
 
     x: float
     y: float
@@ -24,7 +24,7 @@ class Pose(NamedTuple):
 
 
 def generous_horizon(shortest: float, full_step: float) -> int:
-    """Six times the full-speed steps of a shortest path, or 2500; any one unit."""
+    """Six times the steps of the shortest path at full speed, but at least 2500."""
     return max(MIN_HORIZON, math.ceil(min(6.0 * shortest / full_step, 2.0**62)))
 
 
@@ -34,10 +34,10 @@ def jittered_pose(
     random: np.random.Generator,
     may_start: Callable[[Pose], bool],
 ) -> Pose:
-    """A pose within `reach` of the nominal one that may be a start, heading +- 0.5 rad.
+    """A random start within `reach` of the nominal one, heading +- 0.5 rad.
 
-    The disc that is drawn from shrinks slowly; where the body fits nowhere but at the
-    nominal start, only the heading changes.
+    Positions are drawn from a disc that shrinks by 2 % after each draw that
+    `may_start` rejects. If all draws are rejected, only the heading changes.
     """
     for _ in range(MAX_DRAWS):
         distance = reach * math.sqrt(random.random())
@@ -55,6 +55,6 @@ def jittered_pose(
 
 
 def wrapped(heading: float) -> float:
-    """The same direction in (-pi, pi], for a heading of any size."""
+    """The heading wrapped to (-pi, pi]; exact for a heading of any size."""
     turn = math.remainder(heading, 2.0 * math.pi)
     return math.pi if turn <= -math.pi else turn

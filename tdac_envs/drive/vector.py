@@ -1,4 +1,4 @@
-"""What the batched environments share: many robots, stepped in one go on all cores."""
+"""Base class of the vector environments, which step a batch of robots on all cores."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ Result = tuple[Observations, Array, Flags, Flags, dict[str, Any]]
 
 
 class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
-    """Many robots, each with a task of its own, each as in an environment alone.
+    """Base class of the vector environments: many independent robots.
 
-    Robot i does what `envs[i % len(envs)]` would do with its seed and its actions, to
-    the last bit: both call the same compiled functions.
+    Robot i behaves bit for bit as `envs[i % len(envs)]` does with the same seed and
+    actions: both call the same compiled functions.
 
     Args:
-        envs: Environments of one kind, whose robots have memory of one shape. Each
-            has a `robot` and a `setup`, as `Map2DEnv` has.
+        envs: Environments of one class, whose robots' arrays have the same shapes.
+            Each has a `robot` and a `setup`, as `Map2DEnv` has.
         num_envs: Number of robots.
-        autoreset_mode: When an episode that has ended begins anew.
-        threads: How many work at a time; by default as many as there are cores.
+        autoreset_mode: When the next episode begins after one has ended.
+        threads: Number of threads; by default the number of cores.
 
     Attributes:
-        step_rows: The compiled loop of such robots; see
+        step_rows: The compiled loop over robots; see
             `tdac_envs.map2d.kernels.step_rows`.
-        copied: Keys of what it copies of what they observe.
-        last_poses: True poses in which the episodes ended that the last step began
-            anew, with `SAME_STEP`; shape (num_envs, 3), of the others as they are.
+        copied: Observation keys that this loop fills in.
+        last_poses: True poses of all robots before the last autoreset of the mode
+            `SAME_STEP`, shape (num_envs, 3).
     """
 
     step_rows: Callable[..., None]
@@ -89,7 +89,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
         self._vary = [setup.variation != "nominal" for setup in self.setups]
-        # Whether a robot's next task may be another one than its last.
+        # Whether a robot's task may change from episode to episode.
         self._drawn = any(self._vary)
         self._over = np.zeros(num_envs, np.bool_)
         self._never_begun = np.ones(num_envs, np.bool_)
@@ -108,13 +108,14 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         """Starts the episodes of all robots, or of those in `options["reset_mask"]`.
 
         Args:
-            seed: One number, from which robot i has `seed + i`; or one for each.
-            options: As of one environment, and `reset_mask`.
+            seed: One int, so that robot i gets `seed + i`, or one seed for each robot.
+            options: The reset options of a single environment, and `reset_mask`: shape
+                (num_envs,), bool.
 
         Raises:
-            ValueError: There are more or fewer seeds than robots, the mask is not one
-                of robots, or the options are no dict.
-            TaskError: The options are not feasible.
+            ValueError: The number of seeds is wrong, the mask is not one bool for each
+                robot, or `options` is not a dict.
+            TaskError: An option is unknown, or the start or goal is not feasible.
         """
         if not isinstance(options, Mapping | None):
             raise ValueError(f"expected options to be a dict, got {options!r}")
@@ -131,21 +132,21 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return observations, self._infos(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Result:
-        """Applies wheel speeds, shape (num_envs, 2), for one step.
+        """Runs one time step with wheel speeds of shape (num_envs, 2).
 
         Raises:
-            ValueError: The actions are not two finite numbers a robot.
-            ResetNeeded: Not all robots have been reset yet; or the mode is `DISABLED`
-                and an episode has ended.
+            ValueError: The actions are not two finite numbers for each robot.
+            ResetNeeded: Not all robots have been reset yet, or the autoreset mode is
+                `DISABLED` and an episode has ended.
         """
         if not self._begun:
-            raise gym.error.ResetNeeded("expected reset() of all robots before step()")
+            raise gym.error.ResetNeeded("call reset() of all robots before step()")
         self._command(actions)
         if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
-            resting = np.flatnonzero(self._over)
+            ended = np.flatnonzero(self._over)
             raise gym.error.ResetNeeded(
-                f"expected reset(options={{'reset_mask': ...}}) of the robots whose "
-                f"episodes have ended: {resting[:10].tolist()}"
+                f"call reset(options={{'reset_mask': ...}}) for the robots whose "
+                f"episodes have ended: {ended[:10].tolist()}"
             )
         if self._slippery:
             self._slip()
@@ -162,24 +163,24 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return observations, rewards, terminated, truncated, infos
 
     def close_extras(self, **_: Any) -> None:
-        """Ends the threads."""
-        # Gymnasium 1.2 also closes what was refused before it was made.
+        """Stops the threads."""
+        # Gymnasium 1.2 also calls this if `__init__` has failed.
         if hasattr(self, "_slices"):
             self._slices.close()
 
     def pose(self) -> Array:
-        """The true poses, shape (num_envs, 3)."""
+        """The true poses, shape (num_envs, 3): x, y (px or m), heading (rad)."""
         poses: Array = self.robots.state[:, : stepping.HEADING + 1].copy()
         return poses
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
-        """Of each robot."""
+        """Random number generator of each robot."""
         return tuple(self._random(i) for i in range(self.num_envs))
 
     @property
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
-        """Of each robot."""
+        """Seed of each robot."""
         return tuple(self._seeds)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -191,15 +192,15 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._bind()
 
     def _seen(self) -> Observations:
-        """What the kernels let the robots observe, in their own arrays."""
+        """The observations that the kernels write, as the robots' own arrays."""
         raise NotImplementedError
 
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
-        """Adds what no kernel does; noise is drawn anew for these robots."""
+        """Adds what no kernel computes; draws new noise for these robots."""
         raise NotImplementedError
 
     def _bind(self) -> None:
-        """Finds out where all arrays are that the kernels take."""
+        """Collects the addresses of all arrays that the kernels read and write."""
         self._addresses = Addresses(map(self._arrays, range(self.num_envs)))
         words = self._addresses.words
         self._unread = self._results()
@@ -207,7 +208,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._shared = Addresses([shared])
 
     def _results(self) -> tuple[Observations, Array]:
-        """Arrays for what a step returns; what no step changes is filled in."""
+        """New arrays for the result of a step, with all that no step changes."""
         seen = self._seen()
         results = {key: np.empty_like(array) for key, array in seen.items()}
         for key in seen.keys() - set(self.copied):
@@ -215,43 +216,43 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return results, np.empty_like(self.robots.outcome)
 
     def _act(self, rows: Rows, observations: Observations, outcome: Array) -> None:
-        """Makes the step of some robots, or begins their episodes.
+        """Steps some robots, or begins the next episodes of those that are over.
 
         Args:
-            rows: The robots; the threads share them.
-            observations: What these robots observe, without noise, is put here.
-            outcome: And here, what their steps led to.
+            rows: Indices of the robots, which are divided among the threads.
+            observations: Their rows are overwritten, without noise.
+            outcome: Their rows are overwritten with the outcomes of the steps.
         """
         out = words_of((outcome, *(observations[key] for key in self.copied)))
         batch = np.concatenate([self._shared.words[0], out])
         self._slices.run(partial(self.step_rows, batch), rows)
 
     def _arrays(self, i: int) -> tuple[NDArray[Any], ...]:
-        """What the kernels take of a robot and its world."""
+        """The arrays of a robot and its world that the kernels take."""
         return *self.setups[i].world(self.tasks[i]), *self.robots.row(i)
 
     def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
-        """Begins the episodes of the robots in a mask, and of no others."""
+        """Begins episodes of the robots in a mask."""
         chosen = np.flatnonzero(mask)
         if options or self._drawn:
             self._draw(chosen, options)
         self._over[chosen] = True
-        # Only the robots' own arrays are read after this.
+        # The caller reads the robots' own arrays, not these copies.
         self._act(chosen, *self._unread)
         self._over[chosen] = False
 
     def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
-        """Gives robots the tasks that their next episodes are about."""
+        """Draws the tasks of the next episodes of some robots."""
         drawn = [
             (i, self.setups[i].draw(options, self._random(i)))
             for i in robots.tolist()
             if options or self._vary[i] or self.tasks[i] is not self.setups[i].nominal
         ]
         for i, task in drawn:
-            self._give(i, task)
+            self._assign(i, task)
 
-    def _give(self, i: int, task: Any) -> None:
-        """Gives a robot another task."""
+    def _assign(self, i: int, task: Any) -> None:
+        """Assigns a task to a robot."""
         self._drawn = True
         before = self.tasks[i]
         self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
@@ -268,7 +269,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return random
 
     def _slip(self) -> None:
-        """Draws the wheels' slip of the robots that move."""
+        """Draws the wheel slip of the robots whose episodes go on."""
         for i in self._slippery:
             if not self._over[i]:
                 slip = self._random(i).normal(1.0, self.setups[i].wheel_slip, 2)
@@ -278,9 +279,9 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
     def _restart(
         self, observations: Observations, infos: dict[str, Any]
     ) -> dict[str, Any]:
-        """Begins anew what has ended; returns what it ended with.
+        """Resets the robots whose episodes have ended; returns the `final_*` infos.
 
-        Overwrites what the robots observe and what their infos say.
+        Overwrites the observations and infos of these robots.
         """
         ended = self._over.copy()
         over = np.flatnonzero(ended)
@@ -306,22 +307,22 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return infos_of(np.where(mask[:, None], self.robots.outcome, 0.0), mask)
 
     def _command(self, actions: Any) -> None:
-        """Keeps wheel speeds for the kernel, which limits them."""
+        """Stores the actions as commands for the kernel, which clips them."""
         try:
-            wanted = np.asarray(actions)
-            if wanted.shape == self._commands.shape:
-                self._commands[:] = wanted
+            commands = np.asarray(actions)
+            if commands.shape == self._commands.shape:
+                self._commands[:] = commands
                 if np.isfinite(self._commands).all():
                     return
         except (TypeError, ValueError):
             pass
         raise ValueError(
             f"expected actions of two finite numbers in [-1, 1] for each of "
-            f"{self.num_envs} robots, got {self._wrong(actions)}"
+            f"{self.num_envs} robots, got {self._fault_in(actions)}"
         )
 
-    def _wrong(self, actions: Any) -> str:
-        """What is wrong with actions, in few words."""
+    def _fault_in(self, actions: Any) -> str:
+        """A short description of invalid actions, for the error message."""
         shape = np.shape(actions) if isinstance(actions, np.ndarray) else None
         if shape is not None and shape != self._commands.shape:
             return f"an array of shape {shape}"
