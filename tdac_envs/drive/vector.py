@@ -90,7 +90,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._seeds: list[int | None] = [None] * num_envs
         self._vary = [setup.variation != "nominal" for setup in self.setups]
         # Whether a robot's task may change from episode to episode.
-        self._drawn = any(self._vary)
+        self._tasks_change = any(self._vary)
         self._over = np.zeros(num_envs, np.bool_)
         self._never_begun = np.ones(num_envs, np.bool_)
         self._begun = False
@@ -150,7 +150,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             )
         if self._slippery:
             self._slip()
-        if self._drawn:
+        if self._tasks_change:
             self._draw(np.flatnonzero(self._over), {})
         observations, outcome = self._results()
         self._act(self._all, observations, outcome)
@@ -203,7 +203,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         """Collects the addresses of all arrays that the kernels read and write."""
         self._addresses = Addresses(map(self._arrays, range(self.num_envs)))
         words = self._addresses.words
-        self._unread = self._results()
+        self._scratch = self._results()
         shared = self._over, self._commands, self._starts, words
         self._shared = Addresses([shared])
 
@@ -234,11 +234,11 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
     def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
         """Begins episodes of the robots in a mask."""
         chosen = np.flatnonzero(mask)
-        if options or self._drawn:
+        if options or self._tasks_change:
             self._draw(chosen, options)
         self._over[chosen] = True
         # The caller reads the robots' own arrays, not these copies.
-        self._act(chosen, *self._unread)
+        self._act(chosen, *self._scratch)
         self._over[chosen] = False
 
     def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
@@ -253,7 +253,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     def _assign(self, i: int, task: Any) -> None:
         """Assigns a task to a robot."""
-        self._drawn = True
+        self._tasks_change = True
         before = self.tasks[i]
         self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
         self.goals[i] = task.goal

@@ -1,4 +1,4 @@
-"""TDAC-Map2D-v0: contact → rays → terrain → task → kernels → env."""
+"""The environment TDAC-Map2D-v0: a robot on an occupancy grid."""
 
 from __future__ import annotations
 

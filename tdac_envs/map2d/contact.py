@@ -1,6 +1,6 @@
-"""Compiled motion of a disc on a differential drive, up to its first contact.
+"""Compiled test of a moving disc for its first contact with occupied squares.
 
-`clear` is the clearance of a map, from `grid.clearance`, with a border of zeros.
+`clear` is the clearance of a map, from `grid.clearance`, padded with zeros.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.stepping import free_way, move
 from tdac_envs.grid.grid import FloatGrid
 
-# A disc that starts in touch is stopped when it gets this much deeper, px: driving
-# along a wall in touch with it is free.
+# A disc that starts in contact is stopped once it sinks in by this much, px, so that
+# it can slide along a wall.
 SINK = 1e-8
-# No sequence of such steps gets deeper than this, px.
+# Repeated steps never sink deeper than this in total, px.
 DEEPEST = 1e-7
-# The search for a contact ends this near to it, px.
+# The search for a contact stops at this distance, px.
 _CLOSE = 1e-9
-# For the float32 rounding of the clearance field, px.
+# Margin for the float32 rounding of the clearance field, px.
 _ROUNDING = 1e-3
 
 
@@ -46,8 +46,8 @@ def first_contact(
         radius: Disc radius, px.
 
     Returns:
-        In [0, 1); 2.0 where the step is free. A disc that starts in touch and moves
-        away or along is free.
+        In [0, 1), or 2.0 if the step is free. A disc that starts in contact and moves
+        away from the wall or along it is free.
     """
     end_x, end_y, _ = move(x, y, heading, forward, turn)
     return contact_before(clear, x, y, heading, forward, turn, radius, end_x, end_y)
@@ -65,11 +65,11 @@ def contact_before(
     end_x: float,
     end_y: float,
 ) -> float:
-    """As `first_contact`, with the place where the step ends."""
+    """`first_contact`, given the point where the step ends."""
     length = abs(forward)
     if length == 0.0:
         return 2.0
-    # Both ends are the centre of a stretch of the arc that is surely free.
+    # The arc is free within the clearance of each end.
     open_at_start = max(_room(clear, x, y) - radius, 0.0)
     open_at_end = max(_room(clear, end_x, end_y) - radius, 0.0)
     if open_at_start + open_at_end > length:
@@ -92,15 +92,15 @@ def _scan(
     radius: float,
     floor: float,
 ) -> tuple[float, float]:
-    """Way to the first square that the disc gets into by more than `-floor` px.
+    """Arc length to the first square whose gap to the disc falls to `floor` px.
 
     Returns:
-        The way along the arc, px, and the distance at its start between the disc and
-        the nearest of the squares that were looked at, px.
+        The arc length, px (that of the whole arc if there is no contact), and the gap
+        at the start between the disc and the nearest of the checked squares, px.
     """
     end_x, end_y, _ = move(x, y, heading, forward, turn)
     best = abs(forward)
-    # How far the arc swings out beyond the box of its two ends, at most.
+    # Bound on how far the arc leaves the bounding box of its two ends.
     swing = 0.5 * best * min(1.0, 0.25 * abs(turn))
     reach = radius + swing + _ROUNDING
     left, right = min(x, end_x), max(x, end_x)
@@ -116,7 +116,7 @@ def _scan(
         while i <= last:
             room = clear[j + 1, i + 1]
             if room > 0.0:
-                # The nearest square is this far off, so it is in the row, too.
+                # No square in this row can be nearer than the clearance.
                 i += max(math.ceil(room + 0.5 - _ROUNDING), 1)
                 continue
             if _is_edge(clear, i + 1, j + 1):
@@ -139,7 +139,7 @@ def _square_distance2(x: float, y: float, i: int, j: int) -> float:
 
 @subkernel
 def has_room(clear: FloatGrid, x: float, y: float, radius: float) -> bool:
-    """Whether a point is at least `radius` px from all occupied squares."""
+    """Whether a point is at least `radius` px from every occupied square."""
     for j in range(math.ceil(y - radius - 0.5), math.floor(y + radius + 0.5) + 1):
         for i in range(math.ceil(x - radius - 0.5), math.floor(x + radius + 0.5) + 1):
             inside = -1 <= i < clear.shape[1] - 1 and -1 <= j < clear.shape[0] - 1
@@ -162,9 +162,9 @@ def _room(clear: FloatGrid, x: float, y: float) -> float:
 
 @subkernel
 def _is_edge(clear: FloatGrid, i: int, j: int) -> bool:
-    """Whether a free pixel is beside (i, j) of the padded map.
+    """Whether pixel (i, j) of the padded map has a free 4-neighbour.
 
-    The first contact with a union of squares is one with such a square.
+    The first contact with a union of squares is always with such a square.
     """
     height, width = clear.shape
     return bool(
@@ -188,7 +188,7 @@ def _travel(
     floor: float,
     limit: float,
 ) -> float:
-    """Way along the arc, px, until the disc's gap to square (i, j) falls to `floor`.
+    """Arc length, px, at which the gap of disc and square (i, j) falls to `floor`.
 
     The distance to a convex body is convex along a straight line, and an arc of
     curvature k is at most k h^2 / 2 away from its tangent after h px. So
@@ -196,11 +196,11 @@ def _travel(
     root of this bound never jumps over a contact and converges quadratically.
 
     Returns:
-        At most `limit`, where there is no contact before it.
+        The arc length, or `limit` if there is no contact before it.
     """
     length = abs(forward)
     curvature = abs(turn) / length
-    way, at_x, at_y, at_heading = 0.0, x, y, heading
+    travelled, at_x, at_y, at_heading = 0.0, x, y, heading
     while True:
         off_x = at_x - max(i - 0.5, min(at_x, i + 0.5))
         off_y = at_y - max(j - 0.5, min(at_y, j + 0.5))
@@ -210,14 +210,14 @@ def _travel(
         if distance > 0.0:
             along = off_x * math.cos(at_heading) + off_y * math.sin(at_heading)
             approach = math.copysign(1.0, forward) * along / distance
-        if way == 0.0 and approach >= 0.0 and rest < SINK:
-            # Even a disc that is too deep may leave.
+        if travelled == 0.0 and approach >= 0.0 and rest < SINK:
+            # A disc that is too deep may still move away.
             floor -= SINK - rest
             rest = SINK
         if rest <= _CLOSE:
-            return way
-        way += free_way(rest, approach, curvature)
-        if way >= limit:
+            return travelled
+        travelled += free_way(rest, approach, curvature)
+        if travelled >= limit:
             return limit
-        part = way / length
+        part = travelled / length
         at_x, at_y, at_heading = move(x, y, heading, part * forward, part * turn)

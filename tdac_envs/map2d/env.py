@@ -27,15 +27,16 @@ from tdac_envs.mapping.params import Said, Shade
 
 
 class Map2DEnv(DrivenEnv):
-    """A disc-shaped robot drives over a map image to a goal and touches nothing.
+    """A disc-shaped robot drives across a map to a goal without touching anything.
 
     ## Description
-    The world is an occupancy grid made from a map image. The pixel frame has x to
-    the right and y down; headings go from +x towards +y, so a positive turn is
-    clockwise on the screen. Pixel (i, j) is the square [i-1/2, i+1/2) x
-    [j-1/2, j+1/2), and everything outside the map is occupied. Motion follows the
-    exact arc of constant wheel speeds, and the disc swept along it is tested exactly
-    against the occupied squares: no step jumps through a thin wall.
+    The world is an occupancy grid made from a map image. Coordinates are pixels: x
+    points right, y points down, and headings are measured from +x towards +y, so a
+    positive turn is clockwise on the screen. Pixel (i, j) is the square
+    [i-1/2, i+1/2) x [j-1/2, j+1/2), and everything outside the map is occupied. The
+    robot moves along the exact arc of its wheel speeds, which are constant during a
+    step. The disc swept along this arc is tested exactly against the occupied squares,
+    so no step can jump through a thin wall.
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
@@ -57,19 +58,30 @@ class Map2DEnv(DrivenEnv):
     Rays start at the centre; no hit gives `range_max`.
 
     ## Rewards
-    Progress along the shortest path for the body (in full-speed steps) x 0.1, goal
-    +10, collision -10, each step -0.01; see `tdac_envs.drive.rewards.RewardWeights`.
+    The reward of a step is the sum of these terms; `reward_weights` changes them:
+    - `progress`: +0.1 for each full-speed step's length by which the shortest path to
+      the goal gets shorter (negative if it gets longer),
+    - `goal`: +10 if the goal is reached,
+    - `collision`: -10 if the body touches an obstacle,
+    - `time`: -0.01.
 
     ## Starting State
-    `variation="nominal"`: the given start. `"jitter"`: within one body radius of it,
-    heading +- 0.5 rad. `"mixed"`: so, or in every second episode on average any
-    feasible start. `"random"`: any feasible start and goal.
-    `reset(options={"start": (x, y, heading), "goal": (x, y)})` sets them.
+    The start depends on `variation`:
+    - `"nominal"`: the given start pose,
+    - `"jitter"`: within one body radius of the given start, heading +- 0.5 rad,
+    - `"mixed"`: as `"jitter"`, or with probability 0.5 any feasible start,
+    - `"random"`: any feasible start and goal.
+
+    `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides it.
 
     ## Episode End
-    Terminated when the centre is within `goal_tolerance` of the goal with no wall in
-    between (`info["is_success"]`), or on a collision (with `on_collision="block"` the
-    robot is stopped there and the contact counted). Truncated after `horizon` steps.
+    The episode ends if one of the following happens:
+    1. Termination: the robot's centre is within `goal_tolerance` of the goal, with no
+       wall in between (`info["is_success"]`).
+    2. Termination: the body touches an obstacle (`info["collision"]`). With
+       `on_collision="block"` the robot stops there, the contact is counted in
+       `info["collisions"]`, and the episode goes on.
+    3. Truncation: the episode has lasted `horizon` steps.
 
     ## Arguments
     Args:
@@ -78,31 +90,34 @@ class Map2DEnv(DrivenEnv):
             and `params.json`; or a bool array `[y, x]`, True = occupied.
         start: (x, y) or (x, y, heading), px and rad. Default: the map's own.
         goal: (x, y), px. Default: the map's own.
-        heading: Nominal start heading, rad.
+        heading: Nominal start heading, rad; overrides that of `start`.
         robot_radius: Radius of the body, px.
-        axle_length: Distance of the wheels, px. Default: twice the radius.
-        max_wheel_speed: px/s; 75.59 is the paper's 0.02 m/s at 3779.52 px/m.
+        axle_length: Distance between the wheels, px. Default: twice the radius.
+        max_wheel_speed: Wheel speed at action 1, px/s. The default of images, 75.59,
+            is the paper's 0.02 m/s at 3779.52 px/m.
         n_rays: Number of range rays.
-        field_of_view: Whole angle of the fan, degrees.
-        range_max: Range without a hit, px.
+        field_of_view: Angle between the first and the last ray, degrees.
+        range_max: Largest range, px; observed if a ray hits nothing.
         dt: Duration of a step, s.
-        horizon: Steps. Default: max(2500, 6 * d0 / (max_wheel_speed * dt)).
-        goal_tolerance: px. Default: min(20, d0 / 4).
-        on_collision: `"terminate"` or `"block"`.
-        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
-        range_noise: Standard deviation of each range, relative to it.
-        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        horizon: Steps before truncation. Default: max(2500, 6 * d0 / (max_wheel_speed *
+            dt)), where d0 is the length of the shortest path, px.
+        goal_tolerance: Distance at which the goal is reached, px. Default:
+            min(20, d0 / 4).
+        on_collision: `"terminate"` or `"block"`; see Episode End.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
+        range_noise: Relative standard deviation of each range.
+        wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
-        delay: Steps by which an action takes effect late.
-        reward_weights: Those of the reward that are to differ, by the names of
-            `RewardWeights`; who compares rewards leaves them.
-        snap: Move start and goal to the nearest place that holds the body.
+        delay: Number of steps until an action takes effect.
+        reward_weights: Reward weights by name, where they differ from the defaults.
+            Keep the defaults when comparing rewards.
+        snap: Whether to move start and goal to the nearest place where the body fits.
         polarity: Which pixels of a map image are obstacles: `"dark"`, `"light"`, or
-            None to find out.
+            None to decide from the image.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: first version.
+    * v0: Initial version.
     """
 
     title = "TDAC-Map2D-v0"
@@ -111,11 +126,11 @@ class Map2DEnv(DrivenEnv):
         "render_fps": 20,
     }
     readings = "ranges"
-    """Key of the distance sensors in an observation."""
+    """Observation key of the distance sensors."""
 
     def __init__(
         self,
-        map: MapSource = "maze",  # noqa: A002 - the field's word
+        map: MapSource = "maze",  # noqa: A002 - the usual term
         start: tuple[float, ...] | None = None,
         goal: tuple[float, float] | None = None,
         heading: float | None = None,
@@ -204,11 +219,10 @@ class Map2DEnv(DrivenEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for `options`.
+        """Starts an episode; the class documents `options`.
 
         Raises:
-            TaskError: The options name something else than a start and a goal, or
-                these are not feasible.
+            TaskError: An option is unknown, or the start or goal is not feasible.
         """
         super().reset(seed=seed)
         before, self.task = self.task, self.setup.draw(options or {}, self.np_random)
@@ -237,7 +251,7 @@ class Map2DEnv(DrivenEnv):
         self._bind()
 
     def _bind(self) -> None:
-        """Makes the kernels' calls on this environment's own arrays."""
+        """Binds the kernels to this environment's own arrays."""
         self.addresses = Addresses([(*self.setup.world(self.task), *self.robot)])
         (words,) = self.addresses.words
         self._call_begin: Callable[[], None] = partial(begin, words)
@@ -279,7 +293,7 @@ class Map2DEnv(DrivenEnv):
 def noisy(
     ranges: NDArray[np.float32], setup: Setup, random: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Ranges of one robot with relative noise, within the sensor's limits."""
+    """The ranges of one robot with relative noise, clipped to [0, range_max]."""
     noise = random.normal(1.0, setup.range_noise, ranges.size)
     return np.clip(ranges * noise, 0.0, setup.nominal.robot.range_max, out=noise)
 

@@ -1,7 +1,8 @@
-"""Compiled step of TDAC-Map2D-v0: motion up to a contact, rays, reward and ends.
+"""Compiled step of TDAC-Map2D-v0: motion up to a contact, rays, reward, episode end.
 
-`clear` and `leaps` are those of a `tdac_envs.map2d.terrain.Terrain`, which are padded;
-the arrays of one robot are described in `tdac_envs.map2d.robot.Robot`.
+`clear` and `leaps` are `padded_clear` and `leaps` of a
+`tdac_envs.map2d.terrain.Terrain`; `tdac_envs.map2d.robot.Robot` documents the arrays of
+a robot.
 """
 
 from __future__ import annotations
@@ -48,10 +49,10 @@ from tdac_envs.grid.grid import FloatGrid
 from tdac_envs.map2d.contact import contact_before
 from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
 
-# A body that was stopped by an obstacle goes back by this much of its way, px, so
-# that the next step starts outside it.
+# A stopped body is moved back along its arc by this distance, px, so that the next
+# step starts outside the obstacle.
 CONTACT_GAP = 1e-6
-# Places of some arrays among those of `begin`.
+# Indices of some of the arrays of `_arrays_at`.
 STATE, POSE, WHEEL_SPEEDS, RANGES, OUTCOME = 5, 7, 8, 9, 10
 
 
@@ -65,20 +66,20 @@ def advance(
     dt: float,
     radius: float,
 ) -> bool:
-    """Moves the robot by one step at constant wheel speeds, up to a contact.
+    """Moves the robot for one step at constant wheel speeds, up to a contact.
 
     Args:
         clear: Padded clearance, px.
         state: Begins with x, y (px) and heading (rad), which are overwritten.
         left: Speed of the left wheel, px/s.
         right: Speed of the right wheel, px/s.
-        axle: Distance of the wheels, px.
+        axle: Distance between the wheels, px.
         dt: Duration, s.
         radius: Body radius, px.
 
     Returns:
-        Whether the body touched an obstacle. It then stands `CONTACT_GAP` before
-        the touching pose, with the heading it had there.
+        Whether the body touched an obstacle. The robot is then placed `CONTACT_GAP`
+        before the contact, with the heading it had there.
     """
     forward = 0.5 * (left + right) * dt
     # y points down, so a positive turn is clockwise on the screen.
@@ -103,18 +104,18 @@ def _path_distance(
     y: float,
     previous: float,
 ) -> float:
-    """Length of the shortest path to the goal from any point, px.
+    """Length of the shortest path from a point to the goal, px.
 
-    The least sum of the way to a nearby pixel in sight and that pixel's distance.
-    Where no pixel within 2 px has a path (the body is squeezed into a corner),
-    `previous`.
+    It is the minimum, over the nearby visible pixels, of the distance to the pixel plus
+    the path length from there.
 
     Args:
         leaps: From `rays.leaps_of`.
         field: Shape (height, width), float32, from `plan.distance_field`.
         x: Column, px.
         y: Row, px.
-        previous: Value to fall back to.
+        previous: Result if no pixel within 2 px has a path to the goal, as when the
+            body is pressed into a corner.
     """
     height, width = field.shape
     column, row = math.floor(x), math.floor(y)
@@ -154,7 +155,7 @@ def _observe(
     ranges: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Fills in what follows from where the robot is."""
+    """Updates the observation and `outcome` for the current pose."""
     x, y, heading = state[X], state[Y], state[HEADING]
     pose[0], pose[1], pose[2] = x, y, heading
     cast_rays(leaps, directions, x, y, heading, constants[RANGE_MAX], ranges)
@@ -181,9 +182,9 @@ def _begin(
     ranges: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Begins an episode where `state` says; arguments as of `_drive`.
+    """Begins an episode at the pose in `state`; arguments as for `_drive`.
 
-    `outcome[REMAINING]` is given: the length of the shortest path from there.
+    `outcome[REMAINING]` must be the length of the shortest path from there.
     """
     forget(state, queue, wheel_speeds, outcome)
     remaining = outcome[REMAINING]
@@ -207,15 +208,15 @@ def _drive(
     ranges: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """One step of the environment, all of it but the random numbers.
+    """One step of the environment, except for the random numbers.
 
     Args:
         leaps: From `rays.leaps_of`.
         clear: Padded clearance, px.
-        field: Shape (height, width), float32: way to the goal, px.
+        field: Shape (height, width), float32: path length to the goal, px.
         directions: From `rays.fan`.
-        constants: See `Robot`, as the following ones.
-        state: Overwritten, but for the wanted speeds and the slip.
+        constants: See `Robot`, also for the following arrays.
+        state: Overwritten, except for the commands and the slip.
         queue: Overwritten.
         pose: Overwritten.
         wheel_speeds: Overwritten.
@@ -241,9 +242,7 @@ def _drive(
 
 @subkernel
 def _arrays_at(words: Words) -> Any:
-    """The arrays of a robot: of the world `leaps`, `clear`, `field`, `directions`, then
-    those of `Robot`, each as `_drive` says.
-    """
+    """The arrays of a robot and its world, in the order of `_drive`'s arguments."""
     return (
         block(words[0], np.uint8),
         plane(words[1], np.float32),
@@ -261,11 +260,11 @@ def _arrays_at(words: Words) -> Any:
 
 @kernel
 def begin(words: Words) -> None:
-    """Begins an episode where the robot's `state` says, from `outcome[REMAINING]`.
+    """Begins an episode; see `_begin`.
 
     Args:
-        words: Shape (11, 4), of a `tdac_envs.core.addresses.Addresses`; see
-            `Setup.world`.
+        words: Shape (11, 4), from `tdac_envs.core.addresses.Addresses`: the arrays of
+            `Setup.world`, then those of the robot.
     """
     _begin(*_arrays_at(words))
 
@@ -278,16 +277,17 @@ def drive(words: Words) -> None:
 
 @kernel
 def step_rows(batch: Words, rows: Words) -> None:
-    """One step of many robots, or the begin of an episode where one is over.
+    """Steps many robots, or begins the next episode of those whose episode is over.
 
-    What comes out of it is copied here: the robots' own memory then stays in the cache
-    of the core that steps them.
+    The results are copied here, while the robots' own arrays are in the cache of the
+    core that steps them.
 
     Args:
-        batch: Shape (8, 4): where the arrays of `tdac_envs.drive.stepping.batch_at`
-            are, with `words` of shape (n, 11, 4), and what is overwritten, with a row
-            for each robot: outcome, pose, wheel speeds and ranges.
-        rows: Numbers of the robots, shape (k,).
+        batch: Shape (8, 4): addresses and shapes of the arrays of
+            `tdac_envs.drive.stepping.batch_at`, with `words` of shape (n, 11, 4), and
+            of the arrays to overwrite, with one row per robot: outcome, pose, wheel
+            speeds and ranges.
+        rows: Indices of the robots, shape (k,).
     """
     over, commands, starts, words = batch_at(batch)
     outcomes = plane(batch[4], np.float64)

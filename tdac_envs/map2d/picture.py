@@ -1,4 +1,4 @@
-"""Pictures of TDAC-Map2D-v0: frames of an episode."""
+"""Frames of an episode of TDAC-Map2D-v0."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ SMALLEST_PICTURE = 6.0
 
 
 class Scene:
-    """What stays the same in an episode's frames, drawn once.
+    """The static part of an episode's frames, drawn once.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
-        start: Pose (x, y, heading).
+        start: Pose (x, y, heading), px and rad.
         goal: Point (x, y), px.
-        goal_tolerance: px.
-        robot: Its body radius and its sensor.
-        path: Reference path, shape (n, 2).
-        robot_image: Picture of the robot looking right; where it is missing, or the
-            robot too small for it, a disc with a nose is drawn.
+        goal_tolerance: Radius of the goal, px.
+        robot: Body and sensor of the robot.
+        path: Reference path, shape (n, 2), px.
+        robot_image: Picture of the robot facing right. A disc with a nose is drawn if
+            the file is missing or the robot is too small for it.
     """
 
     def __init__(
@@ -66,13 +66,13 @@ class Scene:
         trail: ArrayLike = (),
         status: Status | None = None,
     ) -> Image:
-        """The picture of one moment, uint8 RGB, both sides even.
+        """One frame, uint8 RGB with even width and height.
 
         Args:
-            pose: (x, y, heading).
+            pose: (x, y, heading), px and rad.
             ranges: Distances along the sensor's rays, px.
-            trail: Places so far, shape (n, 2).
-            status: Text for the strip; its outcome also marks the robot.
+            trail: Positions so far, shape (n, 2), px.
+            status: Text of the status strip; its outcome also marks the robot.
         """
         canvas, robot = self._canvas.copy(), self._robot
         x, y, heading = (float(value) for value in pose)

@@ -1,7 +1,7 @@
-"""Compiled geometry of the range sensor: exact rays that leap over open squares.
+"""Compiled ray casting of the range sensor: exact, in leaps over free squares.
 
-Everything works on a *padded* map: it has one occupied pixel added on every side, so
-that pixel (i, j) of the map is `[j + 1, i + 1]` and no ray needs a bounds test.
+All functions use a *padded* map with one occupied pixel added on every side: pixel
+(i, j) of the map is `[j + 1, i + 1]`, and no ray needs a bounds test.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from tdac_envs.grid.grid import BoolGrid
 
 LeapGrid = NDArray[np.uint8]
 
-# Of the quadrants: whether their x grows, and whether their y grows.
+# Whether x and y grow along the rays of each quadrant.
 _GROWS_X = np.array([True, False, True, False])
 _GROWS_Y = np.array([True, True, False, False])
 _LONGEST = 255
 
 
 def leaps_of(cells: BoolGrid) -> LeapGrid:
-    """How far a ray may go at once from each pixel, for rays of each quadrant.
+    """The free square that a ray may cross in one leap, per pixel and quadrant.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
 
     Returns:
         Shape (4, height + 2, width + 2), uint8: the side of the largest square of
-        free pixels that has the pixel in its corner and lies in the quadrant, at
-        most 255 px; 0 in obstacles. A ray that is in the pixel stays in the square
-        until it leaves it by one of the two far sides.
+        free pixels with the pixel in its corner that extends into the quadrant, at
+        most 255 px; 0 in obstacles. A ray in the pixel leaves this square through one
+        of its two far sides.
     """
     height, width = cells.shape
     leaps = np.zeros((4, height + 2, width + 2), np.uint8)
@@ -42,7 +42,7 @@ def leaps_of(cells: BoolGrid) -> LeapGrid:
 
 @kernel
 def _fill_leaps(cells: BoolGrid, leaps: LeapGrid) -> None:
-    """The square of a pixel is one more than the least of its three neighbours'."""
+    """Fills `leaps`: 1 + the smallest square of the three neighbours ahead."""
     height, width = cells.shape
     for quadrant in range(4):
         out = leaps[quadrant]
@@ -62,10 +62,10 @@ def _fill_leaps(cells: BoolGrid, leaps: LeapGrid) -> None:
 def _cast(
     leaps: LeapGrid, u: float, v: float, dx: float, dy: float, range_max: float
 ) -> float:
-    """Distance from (u, v) of the padded map along a unit vector to an obstacle."""
+    """Distance from (u, v) of the padded map to an obstacle along a unit vector."""
     i, j, t = math.floor(u), math.floor(v), 0.0
     quadrant, flip_x, flip_y = 0, 0, 0
-    # Mirrored, both coordinates grow along the ray, and pixel i is pixel ~i.
+    # After mirroring, both coordinates grow along the ray; pixel i becomes ~i.
     if dx < 0.0:
         quadrant, flip_x, u, dx, i = 1, -1, -u, -dx, ~i
     if dy < 0.0:
@@ -74,13 +74,13 @@ def _cast(
     inv_y = 1.0 / dy if dy > 0.0 else math.inf
     squares = leaps[quadrant]
     while True:
-        # Unsigned: an index below 0 would have to be told from one from the end.
+        # Unsigned indices avoid numba's wraparound test.
         side = int(squares[np.uint64(j ^ flip_y), np.uint64(i ^ flip_x)])
         if side == 0:
             return t
         out_i, out_j = i + side, j + side
         t_x, t_y = (out_i - u) * inv_x, (out_j - v) * inv_y
-        # Rounding must not lead out of the square but by the side that is crossed.
+        # Rounding must not move the ray out of the square through another side.
         if t_x < t_y:
             t, i, j = t_x, out_i, min(max(math.floor(v + dy * t_x), j), out_j - 1)
         else:
@@ -109,14 +109,14 @@ def cast_ray(
 def _cast_from(
     leaps: LeapGrid, x: float, y: float, dx: float, dy: float, range_max: float
 ) -> float:
-    """As `_cast`, from a point of the map or outside, where it is 0."""
+    """`_cast` from a point in map pixels; 0 outside the padded map."""
     u, v = x + 1.5, y + 1.5
     return _cast(leaps, u, v, dx, dy, range_max) if _is_on(leaps, u, v) else 0.0
 
 
 @subkernel
 def _is_on(leaps: LeapGrid, u: float, v: float) -> bool:
-    """Whether a point of the padded map is one."""
+    """Whether (u, v) lies on the padded map."""
     return bool(0.0 <= u < leaps.shape[2] and 0.0 <= v < leaps.shape[1])
 
 
@@ -127,13 +127,13 @@ def fan(field_of_view: float, n_rays: int) -> NDArray[np.float64]:
     a single ray points ahead.
 
     Args:
-        field_of_view: Whole angle of the fan, rad.
+        field_of_view: Angle between the first and the last ray, rad.
         n_rays: Number of rays.
     """
     step = field_of_view / (n_rays - 1) if n_rays > 1 else 0.0
     first = -0.5 * field_of_view if n_rays > 1 else 0.0
     offsets = (first + step * np.arange(n_rays)).tolist()
-    # As in `sensors`, to the last bit.
+    # Bit for bit as in `tdac_envs.controller_kit.sensors`.
     return np.array([[math.cos(v) for v in offsets], [math.sin(v) for v in offsets]])
 
 
@@ -147,7 +147,7 @@ def cast_rays(
     range_max: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Fills `out` with the fan of ranges; `out[0]` is the robot's leftmost ray.
+    """Fills `out` with the ranges of all rays; `out[0]` is the leftmost ray.
 
     Args:
         leaps: From `leaps_of`.

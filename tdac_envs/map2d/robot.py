@@ -1,4 +1,4 @@
-"""The memory of a robot of TDAC-Map2D-v0, as its compiled step reads and writes it."""
+"""The arrays of a robot of TDAC-Map2D-v0 that the compiled step reads and writes."""
 
 from __future__ import annotations
 
@@ -17,27 +17,26 @@ Observed = NDArray[np.float32]
 
 
 class Robot(NamedTuple):
-    """Arrays of one robot; or of many, with one more axis in front.
+    """Arrays of one robot, or of many robots with an additional first axis.
 
     Attributes:
-        constants: Shape (17,), float64: axle length (px), wheel limit (px/s), dt (s),
-            body radius, range limit (px), the share of its speed that a wheel keeps
-            from one step to the next, delay (steps), whether a contact ends the
-            episode, way of a step at full speed (px); weights of the reward:
-            progress, goal, collision, time; goal x and y, goal tolerance (px),
-            horizon (steps).
-        state: Shape (8,), float64: x, y (px), heading (rad); wanted speeds of the left
-            and of the right wheel, which may be out of [-1, 1]; for each the factor
-            between its speed and what it does on the ground; steps so far.
-        queue: Shape (delay, 2), float64: wanted speeds that are still to be applied.
-        pose: Shape (3,), float32: x, y, heading, as observed.
+        constants: Shape (17,), float64: axle length (px), full wheel speed (px/s), dt
+            (s), body radius, largest range (px), fraction of its speed that a wheel
+            keeps from one step to the next, delay (steps), whether a contact ends the
+            episode, distance of a step at full speed (px); reward weights: progress,
+            goal, collision, time; goal x and y, goal tolerance (px), horizon (steps).
+        state: Shape (8,), float64: x, y (px), heading (rad); unclipped commands of the
+            left and right wheel; slip of the left and right wheel, the ratio of speed
+            over ground to wheel speed; steps so far.
+        queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
+        pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
         ranges: Shape (n_rays,), float32, px.
-        outcome: Shape (10,), float64: reward of the last step, whether it terminated
-            or truncated the episode, whether the goal was reached and something
-            touched; contacts and clipped actions so far; straight distance to the
-            goal, length of the shortest path to it, clearance of the pixel under the
-            robot, px.
+        outcome: Shape (10,), float64: reward of the last step; whether it terminated
+            or truncated the episode, reached the goal, touched an obstacle; number of
+            contacts and of clipped actions so far; straight distance to the goal,
+            length of the shortest path to it, clearance of the pixel under the robot
+            (px).
     """
 
     constants: Array
@@ -62,11 +61,11 @@ class Robot(NamedTuple):
         )
 
     def row(self, index: int) -> Robot:
-        """One of many robots; its arrays are views."""
+        """Views of the arrays of one of many robots."""
         return Robot(*(array[index] for array in self))
 
     def place(self, task: Map2DTask) -> None:
-        """Puts the robot at the start of a task; `kernels.begin` does the rest."""
+        """Places the robot at the start of a task; call `kernels.begin` next."""
         goal = slice(stepping.GOAL_X, stepping.HORIZON + 1)
         self.constants[goal] = *task.goal, task.goal_tolerance, task.horizon
         self.state[: stepping.HEADING + 1] = task.start
@@ -84,10 +83,10 @@ def constants_of(
     """`Robot.constants` of a task.
 
     Args:
-        task: Robot, goal and horizon.
-        weights: Of the reward.
+        task: Task with robot, goal and horizon.
+        weights: Weights of the reward.
         motor_lag: Time constant of the wheel speeds, s.
-        delay: Steps by which an action takes effect late.
+        delay: Number of steps until an action takes effect.
         stops: Whether a contact ends the episode.
     """
     robot = task.robot

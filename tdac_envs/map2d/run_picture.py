@@ -1,4 +1,4 @@
-"""Pictures of whole runs on a map."""
+"""Pictures of complete runs on a map."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from tdac_envs.map2d.task import Map2DTask
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapChart:
-    """A canvas whose coordinates are those of the map."""
+    """A canvas in map coordinates; see `tdac_envs.drawing.backdrop.Chart`."""
 
     canvas: Canvas
 
     @property
     def scale(self) -> float:
-        """Frame px in a map px."""
+        """Frame px per map px."""
         return self.canvas.scale
 
     def at(self, points: Points) -> Points:
-        """The same places."""
+        """The points, unchanged."""
         return points
 
     def turned(self, heading: float) -> float:
-        """The same heading."""
+        """The heading, unchanged."""
         return heading
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Background:
-    """The backdrop of runs on a map."""
+    """The backdrop of runs on a map; see `tdac_envs.drawing.backdrop.Backdrop`."""
 
     task: Map2DTask
     canvas: Canvas
@@ -57,27 +57,27 @@ class Background:
         return background
 
     def draw_task(self, canvas: Canvas, path: Points) -> None:
-        """Draws start, goal and a part of the shortest path."""
+        """Draws start, goal and a given part of the shortest path."""
         task = self.task
         draw_task(canvas, task.start, task.goal, task.goal_tolerance, path)
 
     @property
     def radius(self) -> float:
-        """Of the body, px."""
+        """Body radius, px."""
         return self.task.robot.radius
 
     def whole(self) -> MapChart:
-        """The map."""
+        """A chart of the whole map."""
         return MapChart(self.canvas.copy())
 
     def window(self, middle: Points, extent: float) -> Window:
-        """Whole pixels."""
+        """A square around a point, aligned to whole pixels."""
         side = max(math.ceil(extent), 8)
         x, y = (np.floor(middle - side / 2.0 + 0.5) - 0.5).tolist()
         return Window(x, y, side)
 
     def close_up(self, window: Window) -> MapChart:
-        """A part of the map, enlarged."""
+        """An enlarged part of the map."""
         x, y, side = (math.ceil(value) for value in window)
         cells = _part(self.task.terrain.grid.cells, x, y, side)
         scale = CLOSE_UP / side
@@ -94,7 +94,7 @@ def _inside(path: Points, x: int, y: int, side: int) -> Points:
 
 
 def _part(cells: BoolGrid, x: int, y: int, side: int) -> BoolGrid:
-    """A square part of a map, occupied where it reaches beyond it."""
+    """A square part of a map; occupied outside the map."""
     height, width = cells.shape
     part = np.ones((side, side), np.bool_)
     x0, y0, x1, y1 = max(x, 0), max(y, 0), min(x + side, width), min(y + side, height)
@@ -119,15 +119,15 @@ def trajectory_picture(
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
-        trajectories: Each of shape (T + 1, 3): x, y, heading.
+        trajectories: Poses of each, shape (T + 1, 3): x, y (px), heading (rad).
         start: Nominal start, (x, y) or a pose.
         goal: Point (x, y), px.
-        goal_tolerance: px.
+        goal_tolerance: Radius of the goal, px.
         radius: Body radius, px.
-        path: Reference path, shape (n, 2).
+        path: Reference path, shape (n, 2), px.
         outcomes: "reached", "collision" or "out of time" for each trajectory; sets
             the mark at its end.
-        labels: A name for each trajectory.
+        labels: Name of each trajectory.
     """
     runs = [np.asarray(run, np.float64).reshape(-1, 3) for run in trajectories]
     ends = [*outcomes, *[""] * (len(runs) - len(outcomes))]

@@ -1,4 +1,4 @@
-"""What a TDAC-Map2D-v0 is made of, and how its episodes begin."""
+"""Configuration of a TDAC-Map2D-v0 environment, and the tasks of its episodes."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from tdac_envs.mapping.params import RobotParams
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """Everything about an environment that lasts longer than an episode.
+    """The part of an environment that does not change between episodes.
 
     Attributes:
-        nominal: The task as given.
+        nominal: The task without variation.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
-        fixed_horizon: Whether the horizon was given, or follows from the task.
+        fixed_horizon: Whether the user set the horizon; else it follows from the task.
         on_collision: `"terminate"` or `"block"`.
-        range_noise: Standard deviation of each range, relative to it.
-        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        range_noise: Relative standard deviation of each range.
+        wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
-        delay: Steps by which an action takes effect late.
-        weights: Of the reward.
-        directions: Of the rays, from `rays.fan`.
+        delay: Number of steps until an action takes effect.
+        weights: Weights of the reward.
+        directions: Directions of the rays, from `rays.fan`.
     """
 
     nominal: Map2DTask
@@ -69,7 +69,7 @@ class Setup:
         )
 
     def world(self, task: Map2DTask) -> tuple[NDArray[Any], ...]:
-        """What the kernels `begin` and `drive` take beside the robot's memory."""
+        """The arrays that `begin` and `drive` take in addition to the robot's."""
         terrain = task.terrain
         return terrain.leaps, terrain.padded_clear, task.field, self.directions
 
@@ -77,12 +77,12 @@ class Setup:
         """The task of an episode.
 
         Args:
-            options: Of `reset`: `start` and `goal`, which win over the variation.
-            random: Source of the variation.
+            options: Options of `reset`: `start` and `goal`, which override the
+                variation.
+            random: Random number generator of the variation.
 
         Raises:
-            TaskError: The options name something else than a start and a goal, or
-                these are not feasible.
+            TaskError: An option is unknown, or the start or goal is not feasible.
         """
         check_reset_options(options)
         task = self.nominal
@@ -112,10 +112,10 @@ class Setup:
 
 
 def override(robot: RobotParams, **given: float | None) -> RobotParams:
-    """The robot with the options that were given.
+    """The robot with the options that are not None.
 
     Raises:
-        TaskError: One of them is not usable.
+        TaskError: An option is not valid.
     """
     changes: dict[str, float] = {}
     for name, value in given.items():

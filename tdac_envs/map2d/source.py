@@ -1,4 +1,4 @@
-"""Where a Map2D task comes from: a bundled name, a file, a folder or an array."""
+"""Loads a Map2D task from a bundled name, a file, a folder or an array."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _YAML = {".yaml", ".yml"}
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A grid with the parameters that made it, start and goal filled in.
+    """A grid and its parameters, with start and goal filled in.
 
     Attributes:
-        grid: The world.
-        params: Its parameters.
-        image: The map image, where there is one.
+        grid: The occupancy grid.
+        params: Parameters of the map and the task.
+        image: Path of the map image, if any.
     """
 
     grid: OccupancyGrid
@@ -53,7 +53,7 @@ def prepare(
     snap: bool = False,
     said: Said = UNSAID,
 ) -> Prepared:
-    """Reads a map and settles start, goal, heading and body radius on it.
+    """Reads a map and determines start, goal, heading and body radius.
 
     Args:
         source: Bundled name; path of an image, ROS `map.yaml`, MovingAI `.map` or
@@ -61,22 +61,22 @@ def prepare(
             array `[y, x]`, True = occupied, also as nested lists of bools or 0 and 1.
         start: (x, y) or (x, y, heading), px and rad; from the params if None.
         goal: (x, y), px; from the params if None.
-        heading: rad; wins over `start[2]`.
-        robot_radius: px; default from the params, else 15.
-        snap: Move start and goal to the nearest place that holds the body.
-        said: Of an image, what is not to be found out.
+        heading: Start heading, rad; overrides `start[2]`.
+        robot_radius: Body radius, px; from the params if None, else 15.
+        snap: Whether to move start and goal to the nearest place where the body fits.
+        said: Polarity and threshold of an image, where the user gave them.
 
     Raises:
         MapError: The map cannot be read or used.
-        TaskError: No start or goal is known, or a number is not usable.
+        TaskError: Start or goal is missing, or a number is not valid.
     """
     if robot_radius is not None:
         robot_radius = positive("robot_radius", robot_radius)
     given = _Given.of(start, goal, heading, robot_radius, snap, said)
     if not isinstance(source, str | Path):
         _refuse(said, "a grid")
-        return _settled(_from_cells(_as_cells(source), "array"), given)
-    # A folder that happens to have a bundled map's name is `./maze`.
+        return _with_task(_from_cells(_as_cells(source), "array"), given)
+    # To load a folder with the name of a bundled map, write `./maze`.
     if isinstance(source, str) and source in bundled_maps():
         bundled = bundled_map(source)
         return _from_image(bundled.image, given.or_else(bundled))
@@ -84,17 +84,17 @@ def prepare(
     if path.is_dir():
         _check_is_map_folder(path)
         _refuse(said, str(path))
-        return _settled(_from_folder(path), given)
+        return _with_task(_from_folder(path), given)
     if path.suffix == ".npy":
         _refuse(said, str(path))
-        return _settled(_from_npy(path), given)
+        return _with_task(_from_npy(path), given)
     check_exists(path)
     return _from_image(path, given)
 
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """What the caller says about the task; None where the map is to say it."""
+    """The caller's options of the task; None stands for the map's own value."""
 
     start: Point | None
     goal: Point | None
@@ -126,7 +126,7 @@ class _Given:
         return cls(at, end, heading, robot_radius, snap, said)
 
     def or_else(self, bundled: BundledMap) -> _Given:
-        """The same with a bundled map's own task where nothing was given."""
+        """These options, with the values of a bundled map instead of None."""
         return _Given(
             self.start or bundled.start,
             self.goal or bundled.goal,
@@ -137,8 +137,12 @@ class _Given:
         )
 
 
-def _settled(prepared: Prepared, given: _Given) -> Prepared:
-    """Puts what was given in place of the params' own task."""
+def _with_task(prepared: Prepared, given: _Given) -> Prepared:
+    """Replaces the task in the params by the options that are not None.
+
+    Raises:
+        TaskError: Start or goal is missing.
+    """
     changes: dict[str, Any] = {
         name: value
         for name in ("start", "goal", "heading")
@@ -153,7 +157,7 @@ def _settled(prepared: Prepared, given: _Given) -> Prepared:
     if missing:
         raise TaskError(
             f"no {' and no '.join(missing)} for {params.source}: give start and goal "
-            "in pixels (`tdac map IMAGE` draws rulers to read them off)"
+            "in pixels (`tdac map IMAGE` draws rulers for reading them)"
         )
     if given.snap:
         params = _snapped(prepared.grid, params)
@@ -161,7 +165,7 @@ def _settled(prepared: Prepared, given: _Given) -> Prepared:
 
 
 def _snapped(grid: OccupancyGrid, params: MapParams) -> MapParams:
-    """Start and goal moved to the nearest pixels that hold the body."""
+    """Moves start and goal to the nearest pixels where the body fits."""
     free = body_free(clearance(grid.cells), params.robot.radius)
     changes: dict[str, Any] = {}
     notes = list(params.notes)
@@ -181,7 +185,7 @@ def metres_to_pixels(
     goal: Point | None,
     robot_radius: float | None,
 ) -> tuple[Point | None, Point | None, float | None]:
-    """Start, goal and body radius in pixels, from metres in the map's own frame.
+    """Converts start, goal and body radius from metres in the map frame to pixels.
 
     Raises:
         MapError: The map cannot be read, or has no resolution.
@@ -200,28 +204,30 @@ def metres_to_pixels(
 
 
 def _from_image(image: Path, given: _Given) -> Prepared:
-    # Of a ROS map, the picture is in another file than the one that is named.
+    # Not cached for a ROS map.yaml: the digest does not cover the image that it names.
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
     radius = given.robot_radius or RobotParams().radius
     ends = given.start, given.goal
     prepared = read(image, _digest(image), *ends, radius, given.snap, given.said)
-    # A point that was snapped stays where preprocessing put it.
+    # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
-    return _settled(prepared, _Given(start, goal, given.heading, radius, False, UNSAID))
+    return _with_task(
+        prepared, _Given(start, goal, given.heading, radius, False, UNSAID)
+    )
 
 
-# Preprocessing takes most of the time of `gym.make`; a grid has one byte a pixel.
+# Preprocessing takes most of the time of `gym.make`; a grid takes one byte per pixel.
 @lru_cache(maxsize=16)
 def _read_image(
     image: Path,
-    digest: str,  # noqa: ARG001 - tells apart what one path held at different times
+    digest: str,  # noqa: ARG001 - part of the cache key, as the file may change
     start: Point | None,
     goal: Point | None,
     radius: float,
     snap: bool,
     said: Said,
 ) -> Prepared:
-    # A grid that is ready needs none of it.
+    # Imported late: grids need no preprocessing.
     from tdac_envs.mapping.preprocessing import preprocess
 
     how: Any = {"snap": snap, "polarity": said.polarity, "threshold": said.threshold}
@@ -230,10 +236,10 @@ def _read_image(
 
 
 def _refuse(said: Said, what: str) -> None:
-    """Refuses words on how to read a picture where there is none."""
+    """Refuses image options for a map that is not an image."""
     if said != UNSAID:
         raise TaskError(
-            f"{what} says itself which cells are obstacles; leave out polarity and "
+            f"{what} already defines which cells are obstacles; leave out polarity and "
             "threshold"
         )
 
@@ -243,13 +249,13 @@ def _digest(path: Path) -> str:
 
 
 def _as_cells(source: NDArray[Any] | Sequence[Sequence[Any]]) -> NDArray[Any]:
-    """A map given as an array or, from JSON, as rows of bools or of 0 and 1."""
+    """The array of a map that is an array or, from JSON, nested lists."""
     if isinstance(source, np.ndarray):
         return source
     try:
         rows = np.array(source)
     except ValueError:
-        raise MapError("expected a map of rows of the same length") from None
+        raise MapError("expected all rows of the map to have the same length") from None
     whole = rows.dtype.kind in "iu" and np.isin(rows, (0, 1)).all()
     return rows.astype(np.bool_) if whole else rows
 
@@ -302,15 +308,15 @@ def _check_is_map_folder(folder: Path) -> None:
     if not (folder / "params.json").is_file():
         raise MapError(
             f"{folder} is a folder without a params.json: give a map file, or a folder "
-            "that `tdac map` wrote"
+            "written by `tdac map`"
         )
 
 
 def check_exists(path: Path) -> None:
-    """Refuses a map that is not there, with the bundled one that may be meant.
+    """Checks that a map exists.
 
     Raises:
-        MapError: There is no such file or folder.
+        MapError: It does not; the message suggests a bundled map with a similar name.
     """
     if path.exists():
         return

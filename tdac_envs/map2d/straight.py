@@ -1,4 +1,4 @@
-"""Straight ways of a disc on a grid."""
+"""Straight motion of a disc on a grid."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from tdac_envs.core.compiled import kernel
 from tdac_envs.grid.grid import FloatGrid
 from tdac_envs.map2d.contact import first_contact
 
-# Short pieces: the contact test looks at all squares of a piece's bounding box.
+# Lower bound of the length of a piece, px. Pieces are short because the contact test
+# checks all squares in the bounding box of a piece.
 _SHORTEST_PIECE = 4.0
 
 
@@ -20,11 +21,11 @@ def gets_straight(
 
     Args:
         clear: Padded clearance, px.
-        x: Column of the one point, px.
-        y: Its row, px.
-        to_x: Column of the other.
-        to_y: Its row.
-        radius: Of the disc, px.
+        x: Column of the first point, px.
+        y: Row of the first point, px.
+        to_x: Column of the second point, px.
+        to_y: Row of the second point, px.
+        radius: Radius of the disc, px.
     """
     length = math.hypot(to_x - x, to_y - y)
     heading = math.atan2(to_y - y, to_x - x)

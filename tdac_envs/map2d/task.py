@@ -1,4 +1,4 @@
-"""What is wanted on a map: start, goal, body, and the shortest way between them."""
+"""The navigation task on a map: start, goal, robot and shortest path."""
 
 from __future__ import annotations
 
@@ -50,19 +50,19 @@ MAX_TOLERANCE = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Map2DTask:
-    """A feasible task: drive the disc from start to goal and touch nothing.
+    """A feasible task: drive a disc from start to goal without touching anything.
 
     Attributes:
         terrain: The map.
-        start: Nominal start pose.
+        start: Nominal start pose, px and rad.
         goal: Point (x, y), px.
-        robot: Body, wheels and sensor.
-        goal_tolerance: px.
+        robot: Body, wheels and sensor of the robot.
+        goal_tolerance: Distance at which the goal is reached, px.
         dt: Duration of a step, s.
-        horizon: Steps before the episode is cut off.
+        horizon: Number of steps before truncation.
         field: Shape (height, width), float32: length of the shortest path for the
-            body from each pixel to the goal, px; inf where there is none.
-        shortest: d0, length of that path from the nominal start, px.
+            body from each pixel to the goal, px; inf if there is none.
+        shortest: d0, the length of the shortest path from the nominal start, px.
     """
 
     env_id: ClassVar = "TDAC-Map2D-v0"
@@ -83,7 +83,7 @@ class Map2DTask:
 
     @property
     def body_radius(self) -> float:
-        """Of the disc, px."""
+        """Body radius, px."""
         return self.robot.radius
 
     @property
@@ -93,7 +93,7 @@ class Map2DTask:
 
     @property
     def full_step(self) -> float:
-        """Way of one step at full speed, px."""
+        """Distance of one step at full speed, px."""
         return self.robot.max_wheel_speed * self.dt
 
     def jittered(self, random: np.random.Generator) -> Pose:
@@ -101,10 +101,7 @@ class Map2DTask:
         return jittered_start(self, random)
 
     def path_from(self, start: Pose) -> Path:
-        """Shortest path for the body, shape (n, 2); starts at the given point.
-
-        Empty where there is none.
-        """
+        """Shortest path from `start` to the goal, shape (n, 2), px; empty if none."""
         radius = self.robot.radius
         first = entry(self.terrain, self.field, start.x, start.y, radius)
         if first is None:
@@ -114,7 +111,7 @@ class Map2DTask:
         return np.vstack([[start.x, start.y], path, self.goal])
 
     def moved(self, start: Pose, goal: tuple[float, float] | None = None) -> Map2DTask:
-        """The same task with another start (and goal); horizon and tolerance kept.
+        """This task with another start (and goal), but the same horizon and tolerance.
 
         Raises:
             TaskError: No path joins the new start and goal.
@@ -139,21 +136,21 @@ def make_task(
     goal_tolerance: float | None = None,
     horizon: int | None = None,
 ) -> Map2DTask:
-    """Checks that a task is feasible and completes it.
+    """Makes a task and checks that it is feasible.
 
     Args:
         terrain: The map.
         start: Pose, px and rad.
         goal: Point (x, y), px.
-        robot: Body, wheels and sensor.
+        robot: Body, wheels and sensor of the robot.
         dt: Duration of a step, s.
-        goal_tolerance: px; by default min(20, d0 / 4).
-        horizon: Steps; by default max(2500, 6 * d0 / (v_max * dt)).
+        goal_tolerance: Distance at which the goal is reached, px; by default
+            min(20, d0 / 4).
+        horizon: Number of steps; by default max(2500, 6 * d0 / (v_max * dt)).
 
     Raises:
-        TaskError: A number is not usable, start or goal cannot hold the body, no path
-            joins them, or the start is already within the tolerance; the message says
-            which and what to do.
+        TaskError: A number is not valid, the body does not fit at start or goal, no
+            path joins them, or the start is already within the tolerance.
     """
     begin = Pose(*finite_numbers("start", start, 3))
     begin = begin._replace(heading=wrapped(begin.heading))
@@ -179,7 +176,7 @@ def make_task(
 
 
 def default_horizon(shortest: float, robot: RobotParams, dt: float) -> int:
-    """Steps in which to drive `shortest` px: six times what it takes, or 2500."""
+    """The horizon for a path of `shortest` px; see `generous_horizon`."""
     return generous_horizon(shortest, robot.max_wheel_speed * dt)
 
 
@@ -191,10 +188,10 @@ def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
 
 
 def mixed_start(task: Map2DTask, random: np.random.Generator) -> Pose:
-    """A jittered start or, in every second episode on average, any feasible one.
+    """A jittered start or, with probability 0.5, any feasible one.
 
-    These are drawn from the free pixels connected to the goal: who learns need not
-    first drive to what is to be learnt.
+    The latter is drawn from the free pixels connected to the goal, so that a learner
+    sees all parts of the map without having to drive there first.
     """
     if random.random() < 0.5:
         return jittered_start(task, random)
@@ -209,10 +206,10 @@ def mixed_start(task: Map2DTask, random: np.random.Generator) -> Pose:
 
 
 def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
-    """The same map and robot with any feasible start and goal; horizon kept.
+    """A task with any feasible start and goal; map, robot and horizon are the same.
 
-    Both are drawn from the free pixels connected to the nominal goal. Where hardly
-    any two of them are farther apart than the tolerance, it is the nominal task.
+    Both points are drawn from the free pixels connected to the nominal goal. If every
+    draw starts within the tolerance of its goal, the result is the nominal task.
     """
     width = task.field.shape[1]
     connected = np.flatnonzero(np.isfinite(task.field))
@@ -242,7 +239,7 @@ def _may_start(task: Map2DTask, pose: Pose) -> bool:
 def _restored(
     terrain: Terrain, start: Pose, goal: tuple[float, float], *rest: Any
 ) -> Map2DTask:
-    """A task from its pickle, which leaves out what can be computed."""
+    """Restores a pickled task and recomputes what the pickle leaves out."""
     robot, tolerance, dt, horizon = rest
     field = route(terrain, start[:2], goal, robot.radius)
     shortest = way(terrain, field, start.x, start.y)

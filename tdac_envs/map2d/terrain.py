@@ -1,4 +1,4 @@
-"""A map with what is computed from it once, and the body's ways over it."""
+"""A map with precomputed data, and the shortest paths of a body on it."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
-    """A grid and what is computed from it once; 9 bytes a pixel, read-only.
+    """A grid and data computed from it; read-only, 9 bytes per pixel.
 
     Attributes:
         grid: The map.
-        clear: Shape (height, width), float32, from `grid.clearance`.
+        clear: Shape (height, width), float32, from `grid.clearance`, px.
         padded_clear: `clear` with a border of zeros, for the kernels.
         leaps: Shape (4, height + 2, width + 2), uint8, from `rays.leaps_of`.
     """
@@ -50,11 +50,11 @@ class Terrain:
 
     @classmethod
     def of(cls, grid: OccupancyGrid) -> Terrain:
-        """The terrain of a grid; equal grids share the one used last."""
+        """The terrain of a grid, from a cache of the last few grids."""
         return _terrain(grid)
 
 
-# A map is often loaded by several envs, or again and again in one process.
+# A process often loads the same map several times.
 @lru_cache(maxsize=4)
 def _terrain(grid: OccupancyGrid) -> Terrain:
     padded_clear = constant(np.pad(clearance(grid.cells), 1))
@@ -65,14 +65,14 @@ def _terrain(grid: OccupancyGrid) -> Terrain:
 def at_goal(
     terrain: Terrain, goal: Point, tolerance: float, x: float, y: float
 ) -> bool:
-    """Whether (x, y) is within the tolerance and no wall stands in between."""
+    """Whether (x, y) is within the tolerance of the goal with no wall in between."""
     if math.hypot(goal[0] - x, goal[1] - y) > tolerance:
         return False
     return bool(sees(terrain.leaps, *map(float, (x, y, *goal))))
 
 
 def _near(x: float, y: float, shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
-    """The pixels (i, j) within 2 columns and rows of a point."""
+    """The pixels (i, j) at most 2 columns and 2 rows away from a point."""
     column, row = math.floor(x + 0.5), math.floor(y + 0.5)
     for j in range(max(row - 2, 0), min(row + 3, shape[0])):
         for i in range(max(column - 2, 0), min(column + 3, shape[1])):
@@ -82,11 +82,11 @@ def _near(x: float, y: float, shape: tuple[int, ...]) -> Iterator[tuple[int, int
 def entry(
     terrain: Terrain, field: NDArray[np.float32], x: float, y: float, radius: float
 ) -> tuple[int, int] | None:
-    """The pixel near (x, y) through which the shortest path goes, if any.
+    """The first pixel of the shortest path from (x, y), or None if there is no path.
 
-    The body gets there from (x, y) in a straight line.
+    The body can drive from (x, y) to this pixel in a straight line.
     """
-    # The pixels around the point come first, as in `path_distance`.
+    # The pixels around the point have priority, as in `path_distance`.
     found = [
         (
             max(abs(i - x), abs(j - y)) >= 1,
@@ -98,18 +98,18 @@ def entry(
         if field[j, i] < math.inf
     ]
     for _, _, i, j in sorted(found):
-        if _may_hop(terrain, (x, y), (i, j), radius):
+        if _is_free_line(terrain, (x, y), (i, j), radius):
             return i, j
     return None
 
 
-def _may_hop(
+def _is_free_line(
     terrain: Terrain,
     begin: Point,
     end: Point,
     radius: float,
 ) -> bool:
-    """Whether the body touches nothing on the straight line between two points."""
+    """Whether the body touches nothing on the line between two nearby points."""
     touch = first_contact(
         terrain.padded_clear,
         float(begin[0]),
@@ -125,10 +125,11 @@ def _may_hop(
 def check_stands(
     terrain: Terrain, name: str, x: float, y: float, radius: float
 ) -> None:
-    """Refuses a place, called `name`, where a disc of `radius` px cannot stand.
+    """Checks that a disc of `radius` px fits at (x, y), the point called `name`.
 
     Raises:
-        TaskError: It is outside, in an obstacle or too near to one; says what is near.
+        TaskError: The point is outside the map, in an obstacle or too near to one; the
+            message suggests the nearest free pixel.
     """
     grid = terrain.grid
     point = f"{name} ({x:g}, {y:g})"
@@ -139,7 +140,9 @@ def check_stands(
     if grid.is_occupied(x, y):
         problem = "lies in an obstacle"
     elif (room := clearance_at(grid.cells, x, y, radius)) < radius:
-        problem = f"is {room:.1f} px from a wall, too near for a body of {radius:g} px"
+        problem = (
+            f"is {room:.1f} px from a wall, too near for a body of {radius:g} px radius"
+        )
     else:
         return
     raise TaskError(f"{point} {problem}; {_nearest_place(terrain, x, y, radius)}")
@@ -149,7 +152,8 @@ def _nearest_place(terrain: Terrain, x: float, y: float, radius: float) -> str:
     rows, columns = np.nonzero(body_free(terrain.clear, radius))
     if rows.size == 0:
         return (
-            f"the body fits nowhere; the widest place is {terrain.clear.max():.1f} px"
+            "the body fits nowhere; the largest clearance is "
+            f"{terrain.clear.max():.1f} px"
         )
     nearest = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
     return f"the nearest free pixel is ({columns[nearest]}, {rows[nearest]})"
@@ -167,7 +171,9 @@ def may_start(
     goal_y: float,
     tolerance: float,
 ) -> bool:
-    """Whether an episode may start at (x, y): see the last three arguments.
+    """Whether an episode may start at (x, y).
+
+    The body must fit there, must not be at the goal yet, and must have a path to it.
 
     Args:
         clear: `Terrain.padded_clear`.
@@ -175,10 +181,10 @@ def may_start(
         field: From `field_to`.
         x: Column, px.
         y: Row, px.
-        radius: Of the body, px, which has room there and gets to the goal.
-        goal_x: Column of the goal, px, which is not reached yet.
+        radius: Radius of the body, px.
+        goal_x: Column of the goal, px.
         goal_y: Row of the goal, px.
-        tolerance: Of the goal, px.
+        tolerance: Distance at which the goal is reached, px.
     """
     body = math.sqrt(radius * radius + 0.5)
     if not has_room(clear, x, y, body):
@@ -203,13 +209,14 @@ def route(
     """Length of the shortest path to the goal from each pixel; see `field_to`.
 
     Raises:
-        TaskError: The body cannot get from start to goal; says how wide one could be.
+        TaskError: No path joins start and goal; the message gives the largest radius
+            for which there is one.
     """
     free = body_free(terrain.clear, radius)
-    # A goal that just holds the body may have no roomy pixel at its very centre.
+    # The pixel under a goal in a tight place may itself be too near to a wall.
     near = [(math.dist(goal, pixel), *pixel) for pixel in _near(*goal, free.shape)]
     for _, i, j in sorted(near):
-        if free[j, i] and _may_hop(terrain, goal, (i, j), radius):
+        if free[j, i] and _is_free_line(terrain, goal, (i, j), radius):
             field = _shared_field(terrain, (i, j), radius)
             if entry(terrain, field, *start, radius) is not None:
                 return field
@@ -219,7 +226,7 @@ def route(
     if widest <= 0.0:
         reason = "they are in separate rooms"
     raise TaskError(
-        f"no free path for a body of {radius:g} px from start ({start[0]:g}, "
+        f"no free path for a body of {radius:g} px radius from start ({start[0]:g}, "
         f"{start[1]:g}) to goal ({goal[0]:g}, {goal[1]:g}): {reason}"
     )
 
@@ -227,10 +234,10 @@ def route(
 def field_to(
     terrain: Terrain, goal: tuple[int, int], radius: float
 ) -> NDArray[np.float32]:
-    """Length of the shortest path for a disc of `radius` px to a pixel (x, y).
+    """Lengths of the shortest paths for a disc of `radius` px to a pixel (x, y).
 
     Returns:
-        Shape (height, width), float32, px, read-only; inf where there is no path.
+        Shape (height, width), float32, px, read-only; inf if there is no path.
     """
     free = body_free(terrain.clear, radius)
     return constant(distance_field(free, goal), np.float32)
@@ -240,14 +247,14 @@ _shared_field = lru_cache(maxsize=4)(field_to)
 
 
 def way(terrain: Terrain, field: NDArray[np.float32], x: float, y: float) -> float:
-    """Length of the shortest path from any point by a field of `field_to`, px."""
+    """Length of the shortest path from a point, px, given a field of `field_to`."""
     return float(path_distance(terrain.leaps, field, float(x), float(y), math.inf))
 
 
 def widest_connected_radius(clear: FloatGrid, start: Point, goal: Point) -> float:
-    """Largest disc, px, that gets from start to goal; 0 where nothing does.
+    """Radius of the largest disc that can move from start to goal, px; 0 if none can.
 
-    By bisection over the connected components of the clearance.
+    Found by bisection over the connected components of the clearance.
     """
     ends = [(math.floor(y + 0.5), math.floor(x + 0.5)) for x, y in (start, goal)]
     low, high = 0.0, float(min(clear[ends[0]], clear[ends[1]]))

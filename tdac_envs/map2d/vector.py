@@ -1,4 +1,4 @@
-"""TDAC-Map2D-v0 in one go for many robots."""
+"""The vector environment of TDAC-Map2D-v0."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from tdac_envs.map2d.kernels import step_rows
 
 
 class Map2DVectorEnv(DrivenVectorEnv):
-    """Many `Map2DEnv`, stepped in one compiled call on all cores.
+    """A vector of `Map2DEnv` that steps in one compiled call on all cores.
 
-    `gym.make_vec("TDAC-Map2D-v0", num_envs=1024)`. Robot i does, to the last bit, what
-    a `Map2DEnv` does with its seed and its actions. Observations, rewards, ends and
-    infos are those of Gymnasium's `SyncVectorEnv`.
+    Made by `gym.make_vec("TDAC-Map2D-v0", num_envs=1024)`. Robot i behaves bit for bit
+    as a `Map2DEnv` does with the same seed and actions. Observations, rewards,
+    terminations, truncations and infos are those of Gymnasium's `SyncVectorEnv`.
 
     Args:
         num_envs: Number of robots.
-        autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, or a member of
+        autoreset_mode: `"NextStep"`, `"SameStep"`, `"Disabled"`, or a member of
             `gymnasium.vector.AutoresetMode`.
-        threads: How many work at a time. Default: as many as there are cores. Results
-            do not depend on it.
-        each: Arguments that differ from robot to robot, as `[{"map": "maze"},
-            {"map": "office"}]`; robot i has the entry `i % len(each)`. All robots have
+        threads: Number of threads, which does not affect the results. Default: the
+            number of cores.
+        each: Arguments that differ between robots, such as `[{"map": "maze"},
+            {"map": "office"}]`; robot i takes entry `i % len(each)`. All robots need
             the same `n_rays` and `delay`.
-        render_mode: None; pictures are those of a `Map2DEnv`.
-        **options: Arguments of `Map2DEnv`, for all robots.
+        render_mode: None; a vector environment cannot render.
+        **options: Arguments of `Map2DEnv` for all robots.
     """
 
     step_rows = staticmethod(step_rows)
@@ -58,7 +58,7 @@ class Map2DVectorEnv(DrivenVectorEnv):
         )
         noises = [setup.range_noise for setup in self.setups]
         self._noisy = np.flatnonzero(noises)
-        # As observed last: a robot that is not reset keeps its noise, too.
+        # Last observation: robots that are not reset keep their noise.
         self._ranges = self.robots.ranges.copy()
 
     def _seen(self) -> Observations:

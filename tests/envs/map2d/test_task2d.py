@@ -127,8 +127,8 @@ class TestRefused:
             ),
             (
                 {"goal": (70, 47)},
-                r"goal \(70, 47\) is 2.5 px from a wall, too near for a body of 4 px; "
-                r"the nearest free pixel is \(70, 45\)",
+                r"goal \(70, 47\) is 2.5 px from a wall, too near for a body of 4 px "
+                r"radius; the nearest free pixel is \(70, 45\)",
             ),
             (
                 {"start": (70, 41, 0), "goal_tolerance": 2},
@@ -163,7 +163,7 @@ class TestRefused:
 
     def test_a_body_that_fits_nowhere(self):
         robot = RobotParams.disc(40.0)
-        with pytest.raises(TaskError, match=r"fits nowhere; the widest place is 24.5"):
+        with pytest.raises(TaskError, match=r"nowhere; the largest clearance is 24.5"):
             task_on(terrain(), (10.0, 10.0, 0.0), robot=robot)
 
     def test_the_goal_behind_a_wall_is_not_reached(self):
