@@ -130,11 +130,7 @@ def apply_command(
 def settle(constants: Array, state: Array, outcome: Array, before: float) -> None:
     """Computes the reward of a step and whether it ends the episode.
 
-    Args:
-        constants: See the module.
-        state: The step count is incremented.
-        outcome: The reward, the ends and the number of collisions are written.
-        before: Length of the remaining path before the step.
+    `before` is the length of the remaining path before the step.
     """
     reached, touched = outcome[REACHED] == 1.0, outcome[TOUCHED] == 1.0
     weights = RewardWeights(

@@ -1,1 +1,1 @@
-"""TDAC-EPuck-v0: prisms → contact → infra-red → ground → paths → task → env."""
+"""The environment TDAC-EPuck-v0: an e-puck in a Webots world."""

@@ -1,7 +1,6 @@
 """Compiled motion of a disc among prisms, up to its first contact.
 
-Headings are counter-clockwise; lengths and sets of parts are as in
-`tdac_envs.epuck.gaps`.
+Headings are counter-clockwise; `tdac_envs.epuck.gaps` documents lengths and parts.
 """
 
 from __future__ import annotations
@@ -16,12 +15,11 @@ from tdac_envs.drive.stepping import free_way, move, wrap_angle
 from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, Array, Index
 
-# As in `tdac_envs.map2d.contact`, but in metres: a disc in touch may get this much
-# deeper  in a step, and no deeper than that in all; a search ends this near.
+# As in `tdac_envs.map2d.contact`, but in metres.
 SINK = 1e-11
 DEEPEST = 1e-10
 _CLOSE = 1e-12
-# A body that was stopped goes back by this much of its way, m.
+# A stopped body is moved back along its arc by this distance, m.
 CONTACT_GAP = 1e-9
 
 X, Y, HEADING = range(3)
@@ -47,16 +45,16 @@ def first_touch(
         points: See the module.
         first: See the module.
         extent: See the module.
-        x: Of the disc's centre.
-        y: Of the disc's centre.
-        heading: rad.
+        x: x of the disc's centre.
+        y: y of the disc's centre.
+        heading: Heading, rad.
         forward: Arc length of the step, negative backwards.
         turn: Change of heading over the step, rad.
-        radius: Of the disc.
+        radius: Radius of the disc.
 
     Returns:
-        In [0, 1); 2.0 where the step is free. A disc that starts in touch and moves
-        away or along is free.
+        In [0, 1), or 2.0 if the step is free. A disc that starts in contact and moves
+        away from the part or along it is free.
     """
     return touch_of(
         points, first, extent, first[:0], 0, extent.shape[0],
@@ -79,7 +77,7 @@ def touch_of(
     turn: float,
     radius: float,
 ) -> float:
-    """As `first_touch`, of the listed parts."""
+    """`first_touch` for the listed parts."""
     length = abs(forward)
     if length == 0.0:
         return 2.0
@@ -112,11 +110,11 @@ def _scan(
     radius: float,
     floor: float,
 ) -> tuple[float, float]:
-    """Way to the first part that the disc gets into by more than `-floor`.
+    """Arc length to the first part whose gap to the disc falls to `floor`.
 
     Returns:
-        The way along the arc, and the gap at its start to the nearest of the parts
-        that were looked at.
+        The arc length (that of the whole arc if there is no contact), and the gap at
+        the start between the disc and the nearest of the checked parts.
     """
     best, nearest = abs(forward), math.inf
     for n in range(begin, end):
@@ -149,32 +147,31 @@ def _travel(
     floor: float,
     limit: float,
 ) -> float:
-    """Way along the arc until the disc's gap to a part falls to `floor`.
+    """Arc length at which the gap between the disc and a part falls to `floor`.
 
-    The distance to a convex body is convex along a straight line, and an arc leaves
-    its tangent by at most k h^2 / 2; see `tdac_envs.map2d.contact` for the search.
+    The search is that of `tdac_envs.map2d.contact._travel`.
 
     Returns:
-        At most `limit`, where there is no contact before it.
+        The arc length, or `limit` if there is no contact before it.
     """
     length = abs(forward)
     curvature = abs(turn) / length
-    way, at_x, at_y, at_heading = 0.0, x, y, heading
+    travelled, at_x, at_y, at_heading = 0.0, x, y, heading
     while True:
         gap, away_x, away_y = gap_of(points, first, extent, part, at_x, at_y)
         rest = gap - radius - floor
         along = away_x * math.cos(at_heading) + away_y * math.sin(at_heading)
         approach = math.copysign(1.0, forward) * along
-        if way == 0.0 and approach >= 0.0 and rest < SINK:
-            # Even a disc that is too deep may leave.
+        if travelled == 0.0 and approach >= 0.0 and rest < SINK:
+            # A disc that is too deep may still move away.
             floor -= SINK - rest
             rest = SINK
         if rest <= _CLOSE:
-            return way
-        way += free_way(rest, approach, curvature)
-        if way >= limit:
+            return travelled
+        travelled += free_way(rest, approach, curvature)
+        if travelled >= limit:
             return limit
-        share = way / length
+        share = travelled / length
         at_x, at_y, at_heading = move(x, y, heading, share * forward, share * turn)
 
 
@@ -194,20 +191,20 @@ def advance(
     """Moves a disc along an arc, up to a contact.
 
     Args:
-        points: See the module, as the next five.
-        first: Of the parts.
-        extent: Of the parts.
-        listed: Numbers of the parts that count.
-        begin: In `listed`.
-        end: In `listed`.
+        points: See the module.
+        first: See the module.
+        extent: See the module.
+        listed: Indices of the parts to check.
+        begin: First entry of `listed` to check.
+        end: End of these entries.
         state: Begins with x, y and heading, which are overwritten.
         forward: Arc length, m, negative backwards.
         turn: Change of heading, rad.
-        radius: Of the disc, m.
+        radius: Radius of the disc, m.
 
     Returns:
-        Whether it touched a part. It then stands `CONTACT_GAP` before the touching
-        pose, with the heading that it had there.
+        Whether it touched a part. It is then placed `CONTACT_GAP` before the contact,
+        with the heading that it had there.
     """
     x, y, heading = state[X], state[Y], state[HEADING]
     touch = touch_of(

@@ -1,4 +1,4 @@
-"""TDAC-EPuck-v0: an e-puck among the obstacles of a Webots world."""
+"""TDAC-EPuck-v0: an e-puck robot among the obstacles of a Webots world."""
 
 from __future__ import annotations
 
@@ -37,15 +37,16 @@ if TYPE_CHECKING:
 
 
 class EPuckEnv(DrivenEnv):
-    """An e-puck drives through a Webots world to a goal and touches nothing.
+    """An e-puck drives through a Webots world to a goal without touching anything.
 
     ## Description
-    The world is a `.wbt` file, in metres: x and y in the ground plane, headings
-    counter-clockwise from +x. The robot is a disc of 37 mm radius on two wheels of
-    20 mm radius, 52 mm apart. Motion follows the exact arc of constant wheel speeds,
-    and the disc swept along it is tested exactly against the shapes of all that it can
-    hit: no step jumps through a thin wall, and a contact stops the robot there. Around
-    the whole is a fence, which nobody sees (0.5 m away, where the world has no walls).
+    The world is a Webots `.wbt` file. Coordinates are metres: x and y lie in the ground
+    plane, and headings are measured counter-clockwise from +x. The robot is a disc of
+    37 mm radius with two wheels of 20 mm radius, 52 mm apart. It moves along the exact
+    arc of its wheel speeds, which are constant during a step. The disc swept along this
+    arc is tested exactly against the shapes of all solid objects, so no step can jump
+    through a thin wall; a contact stops the robot. A fence that the sensors do not see
+    surrounds the world (0.5 m away from its objects if the world has no walls).
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
@@ -61,34 +62,45 @@ class EPuckEnv(DrivenEnv):
     | `goal` | (2,) | m | x, y of the goal |
     | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
     | `ps` | (8,) | | readings of ps0 to ps7, 67 (nothing near) to 4095 (contact) |
-    | `wheel_positions` | (2,) | rad | by how much the wheels have turned |
-    | `ground` | (3,) | | gs0 to gs2, with `ground_sensors=True` |
+    | `wheel_positions` | (2,) | rad | angles turned by the wheels since the reset |
+    | `ground` | (3,) | | readings of gs0 to gs2, with `ground_sensors=True` |
     | `gps` | (3,) | m | x, y, z, with `gps=True` |
-    | `compass` | (3,) | | north (+y) as the robot sees it, with `compass=True` |
+    | `compass` | (3,) | | north (+y) in the robot's frame, with `compass=True` |
 
-    The infra-red sensors `ps` are numbered clockwise from the front: ps0, ps1, ps2
-    look ahead, 46 degrees and 90 degrees to the right, ps3 behind to the right, ps4
-    behind to the left, ps5, ps6, ps7 left and ahead again. Each sees 70 mm far along
-    one ray that rises from 33 to 44 mm above the ground, so low things are not seen.
+    The infra-red sensors `ps` are numbered clockwise from the front: ps0, ps1 and ps2
+    point ahead, 46 degrees and 90 degrees to the right, ps3 to the right rear, ps4 to
+    the left rear, and ps5, ps6 and ps7 mirror ps2, ps1 and ps0 on the left. Each sensor
+    sees along one ray of 70 mm that rises from 33 to 44 mm above the ground, so it does
+    not see low objects.
 
     ## Rewards
-    Progress along the shortest path for the body (in full-speed steps) x 0.1, goal
-    +10, collision -10, each step -0.01; see `tdac_envs.drive.rewards.RewardWeights`.
-    Paths lie on a grid of 5 mm (wider above 25 m²) in eight directions, so a length is
-    at most 8.3 % above the true one.
+    The reward of a step is the sum of these terms; `reward_weights` changes them:
+    - `progress`: +0.1 for each full-speed step's length by which the shortest path of
+      the body to the goal gets shorter (negative if it gets longer),
+    - `goal`: +10 if the goal is reached,
+    - `collision`: -10 if the body touches an obstacle,
+    - `time`: -0.01.
+
+    Paths follow a grid of 5 mm (wider above 25 m²) in eight directions, so they are at
+    most 8.3 % longer than the true shortest path.
 
     ## Starting State
-    `variation="nominal"`: the given start. `"jitter"`: within one body radius of it,
-    heading +- 0.5 rad. `"mixed"`: so, or in every second episode on average any
-    feasible start. `"random"`: any feasible start and goal.
-    `reset(options={"start": (x, y, heading), "goal": (x, y)})` sets them.
+    The start depends on `variation`:
+    - `"nominal"`: the given start pose,
+    - `"jitter"`: within one body radius of the given start, heading +- 0.5 rad,
+    - `"mixed"`: as `"jitter"`, or with probability 0.5 any feasible start,
+    - `"random"`: any feasible start and goal.
+
+    `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides it.
 
     ## Episode End
-    Terminated when the centre is within `goal_tolerance` of the goal with nothing
-    solid in between (`info["is_success"]`), or on a collision. With
-    `on_collision="block"` contacts are counted and the robot drives on: it is stopped
-    at what is fixed, and pushes what the file gives a mass. Truncated after `horizon`
-    steps.
+    The episode ends if one of the following happens:
+    1. Termination: the robot's centre is within `goal_tolerance` of the goal, with
+       nothing solid in between (`info["is_success"]`).
+    2. Termination: the body touches an obstacle (`info["collision"]`). With
+       `on_collision="block"` the episode goes on: fixed obstacles stop the robot, it
+       pushes those that have a mass, and `info["collisions"]` counts the contacts.
+    3. Truncation: the episode has lasted `horizon` steps.
 
     ## Arguments
     Args:
@@ -96,30 +108,33 @@ class EPuckEnv(DrivenEnv):
             a `tdac_envs.World`.
         start: (x, y) or (x, y, heading), m and rad. Default: the file's first e-puck.
         goal: (x, y), m. Default: the file's node named GOAL.
-        goal_tolerance: m.
+        goal_tolerance: Distance at which the goal is reached, m.
         dt: Duration of a step, s. Default: the file's `basicTimeStep`.
-        horizon: Steps. Default: max(2500, 6 * d0 / (full speed * dt)).
-        max_wheel_speed: rad/s. Default: 6.28, or 7.536 of an e-puck of version 2.
-        on_collision: `"terminate"` or `"block"`.
-        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
-        sensor_noise: Factor on the published noise of the infra-red sensors.
-        reflectance: `"ideal"`: everything is seen as in the sensor's table;
-            `"webots"`: with the reflectance of the file's materials, so that for
-            instance a WoodenBox is seen from 15 mm only.
+        horizon: Steps before truncation. Default: max(2500, 6 * d0 / (v * dt)), where
+            d0 is the length of the shortest path, m, and v the full speed, m/s.
+        max_wheel_speed: Wheel speed at action 1, rad/s. Default: 6.28, or 7.536 for an
+            e-puck of version 2.
+        on_collision: `"terminate"` or `"block"`; see Episode End.
+        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
+        sensor_noise: Noise of the infra-red sensors, as a factor of the published one.
+        reflectance: `"ideal"`: every object has the reflectance of the sensor's table;
+            `"webots"`: the reflectance of the file's materials, with which, for
+            instance, a WoodenBox is visible only within 15 mm.
         goal_visible: Whether the sensors see the file's goal marker.
-        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
-        delay: Steps by which an action takes effect late.
-        reward_weights: Those of the reward that are to differ, by the names of
-            `RewardWeights`; who compares rewards leaves them.
-        ignore: Names or types of nodes that may be solid and are not modelled.
+        delay: Number of steps until an action takes effect.
+        reward_weights: Reward weights by name, where they differ from the defaults.
+            Keep the defaults when comparing rewards.
+        ignore: Names or types of nodes that may be left out. Other nodes that may be
+            solid but are not modelled raise an error.
         ground_sensors: Whether to observe `ground`.
         gps: Whether to observe `gps`.
         compass: Whether to observe `compass`.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: first version.
+    * v0: Initial version.
     """
 
     title = "TDAC-EPuck-v0"
@@ -128,7 +143,7 @@ class EPuckEnv(DrivenEnv):
         "render_fps": 31,
     }
     readings = "ps"
-    """Key of the distance sensors in an observation."""
+    """Observation key of the distance sensors."""
 
     def __init__(
         self,
@@ -202,7 +217,7 @@ class EPuckEnv(DrivenEnv):
             self.weights,
         )
         self._pushes = setup.pushes
-        # Where things are now; the originals stay where they were at first.
+        # Current positions; `ground.solid` and `visible` keep the initial ones.
         visible = setup.around.visible
         self._solid = ground.solid.copy() if self._pushes else ground.solid
         self._seen = visible.copy() if self._pushes else visible
@@ -217,11 +232,10 @@ class EPuckEnv(DrivenEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see the class for `options`.
+        """Starts an episode; the class documents `options`.
 
         Raises:
-            TaskError: The options name something else than a start and a goal, or
-                these are not feasible.
+            TaskError: An option is unknown, or the start or goal is not feasible.
         """
         super().reset(seed=seed)
         before = self.task
@@ -246,7 +260,7 @@ class EPuckEnv(DrivenEnv):
         return self._observation(), info
 
     def things(self) -> NDArray[np.float64]:
-        """Centre (m) and turn since the start (rad) of what can be pushed, (k, 3)."""
+        """Centre (m) and rotation since the reset (rad) of movable objects, (k, 3)."""
         if self._pushes:
             return self._things[:, :3].copy()
         centres = self.task.ground.centres
@@ -254,7 +268,7 @@ class EPuckEnv(DrivenEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         calls = dict.fromkeys(
-            ("addresses", "_call_begin", "_call_drive", "_call_alone")
+            ("addresses", "_call_begin", "_call_drive", "_call_exact")
         )
         return {**self.__dict__, **calls, "_scene": None}
 
@@ -263,24 +277,24 @@ class EPuckEnv(DrivenEnv):
         self._bind()
 
     def _bind(self) -> None:
-        """Makes the kernels' calls on this environment's own arrays."""
+        """Binds the kernels to this environment's own arrays."""
         world = self.setup.world(self.task, self._solid, self._seen)
         self.addresses = Addresses([(*world, *self.robot)])
         (words,) = self.addresses.words
         self._call_begin: Callable[[], None] = partial(kernels.begin, words)
         self._call_drive = partial(kernels.drive, words)
         if self._pushes:
-            self._call_alone, self._call_drive = self._call_drive, self._push
+            self._call_exact, self._call_drive = self._call_drive, self._push
 
     def _push(self) -> None:
-        """Takes the step, with physics if something that can be pushed is near."""
+        """Runs one step, with the physics engine if a movable object is near."""
         from tdac_envs.epuck.pushing import Drive, is_near, push
 
         task, robot = self.task, self.robot
         ground, reach = task.ground, 1.5 * task.full_step
         if not is_near(self._solid, robot.state, self._things, reach):
             self._speed[:] = 0.0
-            self._call_alone()
+            self._call_exact()
             return
         (words,) = self.addresses.words
         state, outcome = robot.state, robot.outcome
@@ -294,7 +308,7 @@ class EPuckEnv(DrivenEnv):
         kernels.finish(words)
 
     def _carry(self) -> None:
-        """Puts what is solid and what is seen where the things are."""
+        """Moves the solid and visible parts to the current poses of their objects."""
         ground = self.task.ground
         self._solid.carry(ground.solid, ground.centres, self._things)
         visible = self.setup.around.visible

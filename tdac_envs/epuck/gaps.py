@@ -1,9 +1,9 @@
 """Compiled distances to prisms.
 
-Lengths are metres. A set of parts is given by the arrays `points`, `first` and `extent`
-of `tdac_envs.epuck.prisms.Prisms`; where only some count, by `listed`, `begin` and
-`end`, too: the numbers `listed[begin:end]`. An empty `listed` means that each part has
-its own place in the list.
+Lengths are metres. `points`, `first` and `extent` are the arrays of a
+`tdac_envs.epuck.prisms.Prisms`. Functions that also take `listed`, `begin` and `end`
+consider only the parts with the indices `listed[begin:end]`, or `range(begin, end)` if
+`listed` is empty.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, ROUND, Array, Index
 def gap_of(
     points: Array, first: Index, extent: Array, part: int, x: float, y: float
 ) -> tuple[float, float, float]:
-    """Signed distance from a point to a part, and the unit vector that leads away."""
+    """Signed distance of a point to a part, and the unit vector away from the part."""
     begin, end = first[part], first[part + 1]
     if end - begin == 1:
         off_x, off_y = x - points[begin, 0], y - points[begin, 1]
@@ -56,7 +56,7 @@ def part_gap(
 def _depth(
     points: Array, begin: int, end: int, x: float, y: float
 ) -> tuple[float, float, float]:
-    """As `gap_of`, of a point that is not outside a polygon."""
+    """`gap_of` for a point inside a polygon or on its edge."""
     outside, out_x, out_y = -math.inf, 1.0, 0.0
     for i in range(begin, end):
         j = i + 1 if i + 1 < end else begin
@@ -73,7 +73,7 @@ def _depth(
 def nearest_gap(
     points: Array, first: Index, extent: Array, x: float, y: float
 ) -> float:
-    """Distance from a point to the nearest part, negative within one; inf of none."""
+    """Distance from a point to the nearest part; negative inside, inf without parts."""
     return nearest_of(points, first, extent, first[:0], 0, extent.shape[0], x, y)
 
 
@@ -88,7 +88,7 @@ def nearest_of(
     x: float,
     y: float,
 ) -> float:
-    """As `nearest_gap`, of the listed parts."""
+    """`nearest_gap` for the listed parts."""
     best = math.inf
     for n in range(begin, end):
         k = listed[n] if listed.shape[0] else n
@@ -117,9 +117,9 @@ def clear_grid(
         extent: See the module.
         left: x of `clear[:, 0]`.
         low: y of `clear[0, :]`.
-        spacing: Between neighbours.
-        clear: Shape (height, width), filled with the largest distance of interest,
-            overwritten.
+        spacing: Distance between grid points.
+        clear: Shape (height, width), initially filled with the largest distance of
+            interest; overwritten.
     """
     height, width = clear.shape
     if height * width == 0:

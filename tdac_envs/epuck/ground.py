@@ -1,4 +1,4 @@
-"""A world as an e-puck has it under its wheels."""
+"""A world with the data that are precomputed for an e-puck on it."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
 
 SPACING = 0.005
-"""Of the grid on which paths are planned, m, in worlds of up to 25 m²."""
+"""Spacing of the path-planning grid, m, in worlds of up to 25 m²."""
 MOST_POINTS = 1_000_000
 _OPEN = 0.5
-"""How far around its things a world without walls goes on, m."""
+"""Margin around the objects of a world without walls, m."""
 _FENCE = 0.1
 _WIDEST = 0.1
-"""Clearances are known up to this, m."""
+"""Clearances are capped at this distance, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """A world and what is computed from it once.
+    """A world and data computed from it.
 
     Attributes:
         world: The world.
         floor: Height of the ground under the robot, m.
-        things: What may be in the way; see `bodies`.
-        solid: What the body can hit, and a fence around the whole.
+        things: Obstacles, walls and other robots; see `bodies`.
+        solid: Parts that the body can hit, with a fence around the world.
         bounds: (left, low, right, high) inside the fence, m.
-        spacing: Of the grid points, m.
+        spacing: Distance between grid points, m.
         clear: Shape (height, width): distance from grid point (u, v), which is at
-            (left + u spacing, low + v spacing), to what is solid, up to 0.1 m.
-        centres: Shape (k, 2): where the things are that can be pushed.
-        masses: Shape (k,), kg.
+            (left + u spacing, low + v spacing), to the nearest solid part, up to 0.1 m.
+        centres: Shape (k, 2): initial centres of the objects that can be pushed, m.
+        masses: Shape (k,): masses of these objects, kg.
     """
 
     world: World
@@ -61,15 +61,15 @@ class Ground:
 
     @classmethod
     def of(cls, world: World) -> Ground:
-        """The ground of a world; equal worlds share the one used last."""
+        """The ground of a world, from a cache of the last few worlds."""
         return _ground(world)
 
     def visible(self, webots: bool, goal_mark: bool) -> Prisms:
-        """What the sensors see.
+        """The parts that the sensors see.
 
         Args:
-            webots: With the reflectance that Webots gives each thing; else 1.
-            goal_mark: Also a mark of the goal that is not solid.
+            webots: Whether to use Webots' reflectance of each object instead of 1.
+            goal_mark: Whether to include a goal marker that is not solid.
         """
         seen = [t for t in self.things if goal_mark or t.solid or not t.is_goal]
         owners = _owners(self.things)
@@ -80,19 +80,18 @@ class Ground:
         )
 
     def gap(self, x: float, y: float) -> float:
-        """Distance from a point to what is solid, m; negative within it."""
+        """Distance from a point to the nearest solid part, m; negative inside."""
         return nearest_gap(*self.solid.arrays(), float(x), float(y))
 
     def at(self, column: int, row: int) -> Point:
-        """A grid point's place."""
+        """Position of a grid point, m."""
         left, low, _, _ = self.bounds
         return left + column * self.spacing, low + row * self.spacing
 
     def free(self, radius: float) -> NDArray[np.bool_]:
-        """Grid points from which a disc may step to a free neighbour.
+        """Grid points where a disc may stand, shape (height, width), bool.
 
-        Between two such points it stays `radius` away from everything; see
-        `grid.body_free`.
+        It may also move straight between two neighbouring ones; see `grid.body_free`.
         """
         return np.asarray(self.clear >= math.hypot(radius, self.spacing / 2**0.5))
 
@@ -119,13 +118,13 @@ def _ground(world: World) -> Ground:
 
 
 def _owners(things: tuple[Obstacle, ...]) -> dict[int, int]:
-    """Numbers of the things that can be pushed, by identity."""
+    """Indices of the objects that can be pushed, by `id`."""
     pushable = [t for t in things if t.mass is not None and t.solid]
     return {id(thing): number for number, thing in enumerate(pushable)}
 
 
 def _middle(thing: Obstacle) -> Point:
-    """Centre of area of a thing's parts."""
+    """Centre of area of an object's solid parts."""
     areas = [part.shape.area for part in thing.solid]
     centres = np.array([_centre(part) for part in thing.solid])
     x, y = np.average(centres, axis=0, weights=areas).tolist()
@@ -138,7 +137,7 @@ def _centre(part: Part) -> Point:
 
 
 def _bounds(world: World, things: tuple[Obstacle, ...]) -> Bounds:
-    """Around the robot's arena, or where there is none, around everything."""
+    """Bounds of the arena that contains robot and goal, else of the whole world."""
     points = [(robot.x, robot.y) for robot in world.robots[:1]]
     points += [world.goal] if world.goal else []
     arena = world.arena

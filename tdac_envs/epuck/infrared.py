@@ -1,7 +1,7 @@
-"""The e-puck's infra-red sensors: where they are, what they see, what they read.
+"""The e-puck's infra-red sensors: positions, rays and readings.
 
-Numbers are those of Webots' E-puck PROTO (R2020a to R2025a). The sensors are numbered
-clockwise as seen from above: ps0 to ps3 on the right side, ps4 to ps7 on the left.
+The numbers are those of Webots' E-puck PROTO (R2020a to R2025a). Seen from above, the
+sensors are numbered clockwise: ps0 to ps3 on the right side, ps4 to ps7 on the left.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ N_SENSORS = 8
 RANGE = 0.07
 """Length of a ray, m."""
 HEIGHT, ELEVATION = 0.033, 0.16
-"""Of a ray's origin above the ground, m; by how much it points up, rad."""
+"""Height of a ray's origin above the ground, m, and elevation of the ray, rad."""
 PLACES = np.array(
     [
         (0.030, -0.010, -0.3008),
@@ -41,7 +41,7 @@ PLACES = np.array(
         (0.030, 0.010, 0.2992),
     ]
 )
-"""Shape (8, 3): x forward and y left, m, and azimuth, rad, counter-clockwise."""
+"""Shape (8, 3): x (forward) and y (left), m, and azimuth (counter-clockwise), rad."""
 TABLE = np.array(
     [
         (0.0, 4095.0, 0.002),
@@ -56,15 +56,15 @@ TABLE = np.array(
         (0.07, 67.19, 0.04897),
     ]
 )
-"""Shape (10, 3): distance, m; value; its relative standard deviation."""
+"""Shape (10, 3): distance, m; reading; relative standard deviation of the reading."""
 LARGEST = 4200.0
-"""Above any value with its noise."""
+"""Upper limit of a noisy reading."""
 _COS, _SIN = math.cos(ELEVATION), math.sin(ELEVATION)
-_WAYS = np.column_stack([np.cos(PLACES[:, 2]), np.sin(PLACES[:, 2])])
+_DIRECTIONS = np.column_stack([np.cos(PLACES[:, 2]), np.sin(PLACES[:, 2])])
 FARTHEST = 0.11
-"""No ray gets farther from the robot's axle than this, m."""
+"""Bound on the distance of any point of a ray from the robot's centre, m."""
 
-# Ground sensors: see down from here, m.
+# Ground sensors, which look straight down: x, y; height and range; all in m.
 GROUND_PLACES = np.array([(0.03, 0.01), (0.03, 0.0), (0.03, -0.01)])
 GROUND_HEIGHT, GROUND_RANGE = 0.003, 0.016
 GROUND_TABLE = np.array([(0.0, 1000.0, 0.002), (0.016, 300.0, 0.004)])
@@ -72,7 +72,7 @@ GROUND_TABLE = np.array([(0.0, 1000.0, 0.002), (0.016, 300.0, 0.004)])
 
 @subkernel
 def _interpolated(table: Array, distance: float, column: int) -> float:
-    """Linear between the rows of a table, the end values beyond it."""
+    """Interpolates a table linearly in its first column; constant beyond its ends."""
     last = table.shape[0] - 1
     if distance <= table[0, 0]:
         return float(table[0, column])
@@ -86,10 +86,10 @@ def _interpolated(table: Array, distance: float, column: int) -> float:
 
 @subkernel
 def response(distance: float) -> float:
-    """What a sensor reads, without noise, of a thing of reflectance 1.
+    """Reading of a sensor, without noise.
 
     Args:
-        distance: Along the ray, m; divide it by a thing's reflectance.
+        distance: Distance along the ray divided by the object's reflectance, m.
     """
     return _interpolated(TABLE, distance, 1)
 
@@ -108,21 +108,22 @@ def crossing(
     part: int,
     x: float,
     y: float,
-    way_x: float,
-    way_y: float,
+    dir_x: float,
+    dir_y: float,
     near: float,
     far: float,
 ) -> float:
-    """Where between `near` and `far` a line first is within a part's footprint.
+    """The first crossing of a line with the footprint of a part.
 
     Returns:
-        The parameter of the line (x, y) + t (way_x, way_y); inf where it is nowhere.
+        The least t in [near, far] for which (x, y) + t (dir_x, dir_y) is in the
+        footprint; inf if there is none.
     """
     begin, end = first[part], first[part + 1]
     if end - begin == 1:
         off_x, off_y = x - points[begin, 0], y - points[begin, 1]
-        square = way_x * way_x + way_y * way_y
-        along = off_x * way_x + off_y * way_y
+        square = dir_x * dir_x + dir_y * dir_y
+        along = off_x * dir_x + off_y * dir_y
         rest = off_x * off_x + off_y * off_y - extent[part, ROUND] ** 2
         if square == 0.0:
             return near if rest <= 0.0 and near <= far else math.inf
@@ -137,7 +138,7 @@ def crossing(
         j = i + 1 if i + 1 < end else begin
         out_x, out_y = points[j, 1] - points[i, 1], points[i, 0] - points[j, 0]
         outside = out_x * (x - points[i, 0]) + out_y * (y - points[i, 1])
-        speed = out_x * way_x + out_y * way_y
+        speed = out_x * dir_x + out_y * dir_y
         if speed < 0.0:
             near = max(near, -outside / speed)
         elif speed > 0.0:
@@ -159,10 +160,10 @@ def in_sight(
     to_x: float,
     to_y: float,
 ) -> bool:
-    """Whether no footprint lies on the straight line between two points."""
-    way_x, way_y = to_x - x, to_y - y
+    """Whether no footprint intersects the straight line between two points."""
+    dir_x, dir_y = to_x - x, to_y - y
     for k in range(extent.shape[0]):
-        if crossing(points, first, extent, k, x, y, way_x, way_y, 0.0, 1.0) <= 1.0:
+        if crossing(points, first, extent, k, x, y, dir_x, dir_y, 0.0, 1.0) <= 1.0:
             return False
     return True
 
@@ -182,7 +183,7 @@ def sees(
 
 
 def at_ray_height(extent: Array, floor: float) -> NDArray[np.bool_]:
-    """Which parts are neither too low nor too high for all rays, shape (n,)."""
+    """Whether each part overlaps the height range of the rays, shape (n,), bool."""
     bottom = floor + HEIGHT
     return np.asarray(
         (extent[:, HIGH] >= bottom) & (extent[:, LOW] <= bottom + RANGE * _SIN + 1e-9)
@@ -202,24 +203,24 @@ def sense(
     readings: NDArray[np.float32],
     hits: Array,
 ) -> None:
-    """Fills `readings` with those of ps0 to ps7, without noise.
+    """Computes the readings of ps0 to ps7, without noise.
 
-    A ray rises from 33 mm to 44 mm above the floor: what is lower or higher is not
-    seen. Of what it hits, the nearest part counts, as its distance divided by its
+    A ray rises from 33 mm to 44 mm above the floor and sees nothing below or above. The
+    reading follows from the distance to the nearest part hit, divided by the part's
     reflectance.
 
     Args:
-        points: See `tdac_envs.epuck.gaps`, as the next five.
-        first: Of what is visible.
-        extent: Of what is visible.
-        listed: Numbers of the parts that may be in reach.
-        begin: In `listed`.
-        end: In `listed`.
+        points: Visible parts; see `tdac_envs.epuck.gaps`.
+        first: Visible parts.
+        extent: Visible parts.
+        listed: Indices of the parts to check.
+        begin: First entry of `listed` to check.
+        end: End of these entries.
         floor: Height of the ground, m.
         state: Begins with x, y and heading.
         readings: Shape (8,), overwritten.
-        hits: Shape (8, 3), overwritten: way along the ray to what it hits or 0.07 m,
-            that thing's reflectance, relative standard deviation of the reading.
+        hits: Shape (8, 3), overwritten: distance along the ray to the hit or 0.07 m,
+            reflectance of the part hit, relative standard deviation of the reading.
     """
     x, y, heading = state[0], state[1], state[2]
     cos, sin = math.cos(heading), math.sin(heading)
@@ -236,11 +237,11 @@ def sense(
         for i in range(N_SENSORS):
             ray_x = x + cos * PLACES[i, 0] - sin * PLACES[i, 1]
             ray_y = y + sin * PLACES[i, 0] + cos * PLACES[i, 1]
-            way_x = _COS * (cos * _WAYS[i, 0] - sin * _WAYS[i, 1])
-            way_y = _COS * (sin * _WAYS[i, 0] + cos * _WAYS[i, 1])
+            dir_x = _COS * (cos * _DIRECTIONS[i, 0] - sin * _DIRECTIONS[i, 1])
+            dir_y = _COS * (sin * _DIRECTIONS[i, 0] + cos * _DIRECTIONS[i, 1])
             near, far = max(enter, 0.0), min(leave, hits[i, 0])
             at = crossing(
-                points, first, extent, k, ray_x, ray_y, way_x, way_y, near, far
+                points, first, extent, k, ray_x, ray_y, dir_x, dir_y, near, far
             )
             if at < hits[i, 0]:
                 hits[i, 0], hits[i, 1] = at, extent[k, FACTOR]
@@ -264,10 +265,10 @@ def sense_ground(
     readings: NDArray[np.float32],
     spreads: Array,
 ) -> None:
-    """Fills `readings` with those of gs0 to gs2 (left to right), without noise.
+    """Computes the readings of gs0 to gs2 (left to right), without noise.
 
-    They see the floor, of reflectance 1, or a flat thing that lies on it; arguments
-    as for `sense`, with `readings` and `spreads` of shape (3,).
+    They see the floor, whose reflectance is 1, or a flat object on it. Arguments as for
+    `sense`; `readings` and `spreads` (standard deviations) have shape (3,).
     """
     x, y, heading = state[0], state[1], state[2]
     cos, sin = math.cos(heading), math.sin(heading)

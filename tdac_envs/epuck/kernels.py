@@ -1,6 +1,6 @@
-"""Compiled step of TDAC-EPuck-v0: motion up to a contact, sensors, reward and ends.
+"""Compiled step of TDAC-EPuck-v0: motion up to a contact, sensors, reward, episode end.
 
-The arrays of one robot are described in `tdac_envs.epuck.robot.Robot`.
+`tdac_envs.epuck.robot.Robot` documents the arrays of a robot.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ from tdac_envs.epuck.nearby import listed_at
 from tdac_envs.epuck.prisms import Array, Index
 
 WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
-"""Of an e-puck, m."""
+"""Wheel radius of an e-puck and distance between its wheels, m."""
 MOST_TURNED = 1e4
-"""Limit of the wheels' angles, as observed, rad."""
+"""Limit of the observed wheel angles, rad."""
 
 # Entries of `constants`, `state` and `outcome` beyond those of
 # `tdac_envs.drive.stepping`.
@@ -60,7 +60,7 @@ LEFT_TURNED, RIGHT_TURNED = range(8, 10)
 N_STATE = 10
 FORWARD, TURN = range(10, 12)
 N_OUTCOME = 12
-# Places of some arrays among those of `begin`.
+# Indices of some of the arrays of `_arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19
 
@@ -69,10 +69,11 @@ OUTCOME = 19
 def way_left(
     field: NDArray[np.float32], constants: Array, x: float, y: float, previous: float
 ) -> float:
-    """Length of the shortest path to the goal from any point, m.
+    """Length of the shortest path from a point to the goal, m.
 
-    The least sum of the way to a grid point nearer than the body's radius (nothing can
-    be in between) and that point's distance. Where there is none, `previous`.
+    It is the minimum, over grid points nearer than the body radius (nothing can be in
+    between), of the distance to the grid point plus the path length from there. The
+    result is `previous` if no such point has a path.
     """
     height, width = field.shape
     spacing = constants[SPACING]
@@ -112,7 +113,7 @@ def _observe(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Fills in what follows from where the robot is; arguments as for `_drive`."""
+    """Updates observation and `outcome` for the current pose; arguments as `_drive`."""
     x, y, goal_x, goal_y = state[X], state[Y], constants[GOAL_X], constants[GOAL_Y]
     left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
     pose[0], pose[1], pose[2] = x, y, state[HEADING]
@@ -157,9 +158,9 @@ def _begin(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Begins an episode where `state` says; arguments as for `_drive`.
+    """Begins an episode at the pose in `state`; arguments as for `_drive`.
 
-    `outcome[REMAINING]` is given: the length of the shortest path from there.
+    `outcome[REMAINING]` must be the length of the shortest path from there.
     """
     clear(state, queue, wheel_speeds, outcome)
     state[LEFT_TURNED] = state[RIGHT_TURNED] = 0.0
@@ -180,7 +181,7 @@ def _turn_wheels(
     wheel_speeds: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Sets the wheels' speeds and angles, and in `outcome` the arc that they wish.
+    """Updates wheel speeds and angles, and the commanded arc in `outcome`.
 
     Arguments as for `_drive`.
     """
@@ -210,7 +211,7 @@ def _finish(
     field: NDArray[np.float32],
     constants: Array,
     state: Array,
-    queue: Array,  # noqa: ARG001 - the same arrays as the others take
+    queue: Array,  # noqa: ARG001 - so that the arguments are those of `_drive`
     pose: NDArray[np.float32],
     wheel_speeds: NDArray[np.float32],  # noqa: ARG001
     turned: NDArray[np.float32],
@@ -218,9 +219,9 @@ def _finish(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Ends a step after `_turn_wheels`, when the robot is where it gets to.
+    """Completes a step after `_turn_wheels` and the motion of the robot.
 
-    Arguments as for `_drive`; `outcome[TOUCHED]` is given.
+    Arguments as for `_drive`; the caller has set `outcome[TOUCHED]`.
     """
     before = outcome[REMAINING]
     _observe(
@@ -254,34 +255,18 @@ def _drive(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """One step in which nothing is pushed, all of it but the random numbers.
+    """One step in which nothing is pushed, except for the random numbers.
 
-    Args:
-        points: Of what is solid; see `tdac_envs.epuck.gaps`, as the next two.
-        first: Of what is solid.
-        extent: Of what is solid.
-        cells: Of what is solid; see `tdac_envs.epuck.nearby.Nearby`, as the next.
-        listed: Of what is solid.
-        seen_points: The same five of what is visible.
-        seen_first: Of what is visible.
-        seen_extent: Of what is visible.
-        seen_cells: Of what is visible.
-        seen_listed: Of what is visible.
-        field: Shape (height, width): way to the goal from each grid point, m.
-        constants: See `Robot`, as the following ones.
-        state: Overwritten, but for the wanted speeds and the slip.
-        queue: Overwritten.
-        pose: Overwritten.
-        wheel_speeds: Overwritten.
-        turned: Overwritten.
-        readings: Overwritten.
-        hits: Overwritten.
-        outcome: Overwritten; what it says of the place where the step begins is used.
+    `points` to `listed` describe the solid parts and `seen_points` to `seen_listed` the
+    visible ones; see `tdac_envs.epuck.gaps` and `tdac_envs.epuck.nearby.Nearby`.
+    `field`, shape (height, width), is the path length to the goal from each grid point,
+    m. The others are the arrays of `Robot`; all but `constants`, and the commands and
+    the slip in `state`, are overwritten.
     """
     _turn_wheels(constants, state, queue, wheel_speeds, outcome)
     forward, turn, x, y = outcome[FORWARD], outcome[TURN], state[X], state[Y]
     if outcome[ROOM] - constants[RADIUS] > abs(forward):
-        # Nothing is within reach.
+        # No contact is possible.
         x, y, heading = move(x, y, state[HEADING], forward, turn)
         state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
         outcome[TOUCHED] = 0.0
@@ -301,7 +286,7 @@ def _drive(
 
 @subkernel
 def _arrays_at(words: Words) -> Any:
-    """The arrays of a robot, as `_drive` takes them."""
+    """The arrays of a robot and its world, in the order of `_drive`'s arguments."""
     return (
         plane(words[0], np.float64),
         line(words[1], np.int64),
@@ -328,11 +313,11 @@ def _arrays_at(words: Words) -> Any:
 
 @kernel
 def begin(words: Words) -> None:
-    """Begins an episode where the robot's `state` says, from `outcome[REMAINING]`.
+    """Begins an episode; see `_begin`.
 
     Args:
-        words: Shape (20, 4), of a `tdac_envs.core.addresses.Addresses`: of the world as
-            `Setup.world` has it, and of the robot.
+        words: Shape (20, 4), from `tdac_envs.core.addresses.Addresses`: the arrays of
+            `Setup.world`, then those of the robot.
     """
     _begin(*_arrays_at(words))
 
@@ -345,7 +330,7 @@ def drive(words: Words) -> None:
 
 @kernel
 def turn_wheels(words: Words) -> None:
-    """The begin of a step in which things may be pushed; `words` as for `begin`."""
+    """Begins a step that uses the physics engine; `words` as for `begin`."""
     _turn_wheels(
         line(words[CONSTANTS], np.float64),
         line(words[STATE], np.float64),
@@ -357,22 +342,23 @@ def turn_wheels(words: Words) -> None:
 
 @kernel
 def finish(words: Words) -> None:
-    """The end of such a step, when `outcome[TOUCHED]` is known."""
+    """Completes such a step, once `outcome[TOUCHED]` is known."""
     _finish(*_arrays_at(words))
 
 
 @kernel
 def step_rows(batch: Words, rows: Words) -> None:
-    """One step of many robots, or the begin of an episode where one is over.
+    """Steps many robots, or begins the next episode of those whose episode is over.
 
-    What comes out of it is copied here: the robots' own memory then stays in the cache
-    of the core that steps them.
+    The results are copied here, while the robots' own arrays are in the cache of the
+    core that steps them.
 
     Args:
-        batch: Shape (9, 4): where the arrays of `tdac_envs.drive.stepping.batch_at`
-            are, with `words` of shape (n, 20, 4), and what is overwritten, with a row
-            for each robot: outcome, pose, wheel speeds, wheel angles and readings.
-        rows: Numbers of the robots, shape (k,).
+        batch: Shape (9, 4): addresses and shapes of the arrays of
+            `tdac_envs.drive.stepping.batch_at`, with `words` of shape (n, 20, 4), and
+            of the arrays to overwrite, with one row per robot: outcome, pose, wheel
+            speeds, wheel angles and readings.
+        rows: Indices of the robots, shape (k,).
     """
     over, commands, starts, words = batch_at(batch)
     outcomes = plane(batch[4], np.float64)

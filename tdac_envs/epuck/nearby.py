@@ -1,4 +1,4 @@
-"""Which parts of a world count where: lists for the cells of a coarse grid."""
+"""Lists of nearby parts of a world, for each cell of a coarse grid."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from tdac_envs.epuck.infrared import FARTHEST, at_ray_height
 from tdac_envs.epuck.prisms import FIXED, Array, Index, Prisms
 
 _CELL = 0.04
-"""Width of a cell, m; more where there would be more distances than these."""
+"""Width of a cell, m; larger if there were more than `_MOST_DISTANCES` distances."""
 _MOST_DISTANCES = 1_000_000
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearby:
-    """The parts that count for a robot whose centre is in a cell.
+    """The parts that are relevant to a robot whose centre is in a cell.
 
     Attributes:
-        cells: Shape (rows, columns + 1): where in `listed` the parts of a cell begin;
-            they end where those of the next one begin.
-        listed: Numbers of parts in ascending order: first all of them, then those of
-            each cell.
+        cells: Shape (rows, columns + 1): index in `listed` at which the parts of a cell
+            begin; they end where those of the next cell begin.
+        listed: Indices of parts in ascending order: first all parts, then those of each
+            cell.
     """
 
     cells: Index
@@ -38,15 +38,16 @@ class Nearby:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """What a robot may touch and what it may see at each place of a ground.
+    """The parts that a robot may touch and see, depending on its position.
 
     Attributes:
-        width: Of a cell, m; the first one begins at the corner of the ground's bounds.
-        visible: What the infra-red sensors see.
-        solid: Of the ground's solid parts those that a step may touch, those that may
-            be the nearest, and all that can be pushed.
-        seen: Of the visible parts those that may be in reach of the sensors, and all
+        width: Width of a cell, m; the first cell begins at the lower left corner of the
+            ground's bounds.
+        visible: Parts that the infra-red sensors see.
+        solid: Solid parts that a step may touch or that may be the nearest, and all
             that can be pushed.
+        seen: Visible parts that may be in range of the sensors, and all that can be
+            pushed.
     """
 
     width: float
@@ -59,13 +60,14 @@ class Surroundings:
 def surroundings(
     ground: Ground, webots: bool, goal_mark: bool, reach: float
 ) -> Surroundings:
-    """The surroundings of a robot on a ground; equal ones are shared.
+    """The surroundings of a robot on a ground, from a cache.
 
     Args:
         ground: The world.
-        webots: See `Ground.visible`, as the next.
-        goal_mark: Whether a mark of the goal is seen.
-        reach: How far from its centre the body may get in a step, m.
+        webots: See `Ground.visible`.
+        goal_mark: See `Ground.visible`.
+        reach: Largest distance of the body from the robot's initial centre during a
+            step, m.
     """
     visible, solid = ground.visible(webots, goal_mark), ground.solid
     left, low, right, high = ground.bounds
@@ -92,7 +94,7 @@ def surroundings(
 def _gaps(
     prisms: Prisms, ground: Ground, width: float, shape: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Distance from the middle of each cell to each part, shape (rows, columns, n)."""
+    """Distance from the centre of each cell to each part, shape (rows, columns, n)."""
     gaps = np.empty((*shape, len(prisms.extent)))
     left, low, _, _ = ground.bounds
     cell_gaps(*prisms.arrays(), left, low, width, gaps)
@@ -100,7 +102,7 @@ def _gaps(
 
 
 def _listed(counts: NDArray[np.bool_]) -> Nearby:
-    """The lists of the parts that count, from shape (rows, columns, n)."""
+    """The lists for a mask of relevant parts, shape (rows, columns, n), bool."""
     rows, columns, n = counts.shape
     ends = n + np.cumsum(counts.sum(axis=2)).reshape(rows, columns)
     cells = np.empty((rows, columns + 1), np.int64)
@@ -119,7 +121,7 @@ def cell_gaps(
     width: float,
     gaps: NDArray[np.float64],
 ) -> None:
-    """Fills `gaps` with the distances from the cells' middles to the parts."""
+    """Fills `gaps` with the distances from the centres of the cells to the parts."""
     rows, columns, count = gaps.shape
     for row in range(rows):
         for column in range(columns):
@@ -132,9 +134,9 @@ def cell_gaps(
 def listed_at(
     cells: Index, count: int, left: float, low: float, width: float, x: float, y: float
 ) -> tuple[int, int]:
-    """Begin and end in `Nearby.listed` of the parts that count at a place.
+    """Begin and end in `Nearby.listed` of the parts that are relevant at a point.
 
-    Outside the cells they all do, of which there are `count`.
+    Outside the grid, these are all of the `count` parts.
     """
     column, row = math.floor((x - left) / width), math.floor((y - low) / width)
     if 0 <= row < cells.shape[0] and 0 <= column < cells.shape[1] - 1:

@@ -1,6 +1,6 @@
-"""What an e-puck observes: the space, and what is added to the compiled step's arrays.
+"""Observations of an e-puck: the space, and entries that no kernel computes.
 
-Functions take one robot, or many with one more axis in front.
+Functions take the arrays of one robot, or of many with an additional first axis.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def observation_space(
     task: EPuckTask, *, ground: bool = False, gps: bool = False, compass: bool = False
 ) -> spaces.Dict:
     """The observation space of a task; see `EPuckEnv`."""
-    # A body inside the fence; a little more for what physics lets in.
+    # The body is inside the fence, except for small overlaps in the physics engine.
     left, low, right, high = task.ground.bounds
     least = np.array([left, low], np.float32) - np.float32(BODY_RADIUS)
     most = np.array([right, high], np.float32) + np.float32(BODY_RADIUS)
@@ -53,12 +53,12 @@ def observation_space(
 
 
 def noisy(readings: Observed, spreads: Array, normal: Array) -> Observed:
-    """Readings with noise, within the sensors' limits.
+    """Readings with noise, clipped to the sensors' limits.
 
     Args:
-        readings: Without noise.
-        spreads: Relative standard deviation of each.
-        normal: Draws from the standard normal distribution, as many.
+        readings: Readings without noise.
+        spreads: Relative standard deviation of each reading.
+        normal: A draw from the standard normal distribution for each reading.
     """
     factor = 1.0 + spreads * normal
     return np.clip(readings * factor, 0.0, LARGEST).astype(np.float32)
@@ -68,9 +68,9 @@ def ground_readings(seen: Prisms, floor: float, robot: Robot) -> tuple[Observed,
     """Readings of gs0 to gs2 of one robot and their relative standard deviations.
 
     Args:
-        seen: What is visible.
+        seen: Visible parts.
         floor: Height of the ground, m.
-        robot: Its memory.
+        robot: Arrays of the robot.
     """
     readings, spreads = np.zeros(3, np.float32), np.zeros(3)
     sense_ground(*seen.arrays(), floor, robot.state, readings, spreads)
@@ -78,13 +78,13 @@ def ground_readings(seen: Prisms, floor: float, robot: Robot) -> tuple[Observed,
 
 
 def position(robot: Robot, floor: float | Array) -> Observed:
-    """Of the GPS: x, y and height, m; shape (3,)."""
+    """Reading of the GPS: x, y and height, m, shape (3,)."""
     height = np.broadcast_to(np.float32(floor), robot.pose.shape[:-1])
     return np.concatenate([robot.pose[..., :2], height[..., None]], axis=-1)
 
 
 def north(robot: Robot) -> Observed:
-    """Of the compass: the direction of +y as the robot sees it, shape (3,)."""
+    """Reading of the compass: the direction of +y in the robot's frame, shape (3,)."""
     heading = robot.state[..., HEADING]
     aim = np.stack([np.sin(heading), np.cos(heading), 0.0 * heading], axis=-1)
     return aim.astype(np.float32)

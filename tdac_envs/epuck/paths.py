@@ -1,4 +1,4 @@
-"""Where an e-puck may stand in a world, and its shortest ways over it."""
+"""Free positions of an e-puck in a world, and its shortest paths."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
 def at_goal(ground: Ground, goal: Point, tolerance: float, x: float, y: float) -> bool:
-    """Whether (x, y) is within the tolerance and nothing solid is in between."""
+    """Whether (x, y) is within the tolerance of the goal with nothing in between."""
     gap, solid = math.hypot(goal[0] - x, goal[1] - y), ground.solid
     if gap > tolerance:
         return False
@@ -27,10 +27,11 @@ def at_goal(ground: Ground, goal: Point, tolerance: float, x: float, y: float) -
 
 
 def check_stands(ground: Ground, name: str, x: float, y: float) -> None:
-    """Refuses a place, called `name`, where an e-puck cannot stand.
+    """Checks that an e-puck fits at (x, y), the point called `name`.
 
     Raises:
-        TaskError: It is outside, in an obstacle or too near to one; says what is near.
+        TaskError: The point is outside the world, in an obstacle or too near to one;
+            the message suggests the nearest free position.
     """
     point = f"{name} ({x:g}, {y:g})"
     left, low, right, high = ground.bounds
@@ -46,7 +47,7 @@ def check_stands(ground: Ground, name: str, x: float, y: float) -> None:
     if room > 0.0:
         problem = (
             f"is {1e3 * room:.1f} mm from an obstacle, too near for a body of "
-            f"{1e3 * BODY_RADIUS:g} mm"
+            f"{1e3 * BODY_RADIUS:g} mm radius"
         )
     raise TaskError(f"{point} {problem}; {_nearest_place(ground, x, y)}")
 
@@ -59,18 +60,18 @@ def _nearest_place(ground: Ground, x: float, y: float) -> str:
     u, v = (x - left) / ground.spacing, (y - low) / ground.spacing
     nearest = int(np.argmin((columns - u) ** 2 + (rows - v) ** 2))
     near_x, near_y = ground.at(int(columns[nearest]), int(rows[nearest]))
-    return f"the nearest free place is ({near_x:.3f}, {near_y:.3f})"
+    return f"the nearest free position is ({near_x:.3f}, {near_y:.3f})"
 
 
 def entry(
     ground: Ground, field: NDArray[np.float32], at: Point
 ) -> tuple[int, int] | None:
-    """The nearest grid point (column, row) to which the body gets straight on.
+    """The nearest grid point (column, row) that the body can reach straight on, if any.
 
     Args:
-        ground: The ground.
-        field: Shape (height, width): below inf where grid points come into question.
-        at: Where it is.
+        ground: The world.
+        field: Shape (height, width): finite at the grid points to choose from.
+        at: Position of the body, m.
     """
     solid, (left, low, _, _) = ground.solid, ground.bounds
     u, v = (at[0] - left) / ground.spacing, (at[1] - low) / ground.spacing
@@ -97,12 +98,12 @@ def _entry_cell(
     spacing: float,
     radius: float,
 ) -> int:
-    """Number of the grid point of `entry`, which is within 3 of (u, v); -1 if none."""
+    """Flat index of the grid point of `entry`, at most 3 from (u, v); -1 if none."""
     height, width = field.shape
     column, row = math.floor(u + 0.5), math.floor(v + 0.5)
     before, found = -1.0, -1
     while True:
-        # The next one by distance, column and row.
+        # The next grid point in the order of distance, column and row.
         best, cell = math.inf, -1
         for i in range(max(column - 3, 0), min(column + 4, width)):
             for j in range(max(row - 3, 0), min(row + 4, height)):
@@ -117,21 +118,21 @@ def _entry_cell(
         if field[j, i] < math.inf:
             off_x, off_y = left + i * spacing - x, low + j * spacing - y
             heading = math.atan2(off_y, off_x)
-            way = math.sqrt(off_x * off_x + off_y * off_y)
+            length = math.sqrt(off_x * off_x + off_y * off_y)
             touch = first_touch(
-                points, first, extent, x, y, heading, way, 0.0, radius
+                points, first, extent, x, y, heading, length, 0.0, radius
             )  # fmt: skip
             if touch > 1.0:
                 return int(j * width + i)
 
 
 def open_field(open_: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """What `entry` takes: 0 at the grid points that come into question, else inf."""
+    """A field for `entry`: 0 at the grid points to choose from, inf elsewhere."""
     return np.where(open_, np.float32(0.0), np.float32(math.inf))
 
 
 def _nearest(ground: Ground, at: Point) -> tuple[int, int]:
-    """The grid point (column, row) nearest to a place."""
+    """The grid point (column, row) nearest to a position."""
     left, low, _, _ = ground.bounds
     height, width = ground.clear.shape
     column, row = (
@@ -144,14 +145,14 @@ def _nearest(ground: Ground, at: Point) -> tuple[int, int]:
 def route(ground: Ground, start: Point, goal: Point) -> NDArray[np.float32]:
     """Length of the shortest path to the goal from each grid point, m.
 
-    Paths lead along the grid in eight directions: they are at most 8.3 % longer than
-    the shortest of all, and 5 % in the mean, but for some mm at corners.
+    Paths follow the grid in eight directions. Apart from some mm at corners, they are
+    at most 8.3 %, and on average 5 %, longer than the true shortest path.
 
     Returns:
-        Shape (height, width), float32, read-only; inf where there is no path.
+        Shape (height, width), float32, read-only; inf if there is no path.
 
     Raises:
-        TaskError: The body cannot get from start to goal; says how wide one could be.
+        TaskError: No path joins start and goal; the message gives the reason.
     """
     end = entry(ground, open_field(ground.free(BODY_RADIUS)), goal)
     if end is not None:
@@ -160,7 +161,7 @@ def route(ground: Ground, start: Point, goal: Point) -> NDArray[np.float32]:
             return field
     reason = _walled_off(ground, start, goal) or _too_narrow(ground, start, goal)
     raise TaskError(
-        f"no free path for a body of {1e3 * BODY_RADIUS:g} mm from start "
+        f"no free path for a body of {1e3 * BODY_RADIUS:g} mm radius from start "
         f"({start[0]:g}, {start[1]:g}) to goal ({goal[0]:g}, {goal[1]:g}): {reason}"
     )
 
@@ -173,7 +174,7 @@ def _too_narrow(ground: Ground, start: Point, goal: Point) -> str:
 
 
 def _walled_off(ground: Ground, start: Point, goal: Point) -> str:
-    """Which of the two is outside an arena whose wall is around the other."""
+    """Message if an arena's wall separates start and goal; empty otherwise."""
     for arena in ground.world.arenas:
         inside = [arena.inside.contains(*place) for place in (start, goal)]
         if arena.has_wall and inside[0] != inside[1]:
@@ -187,7 +188,7 @@ def _walled_off(ground: Ground, start: Point, goal: Point) -> str:
 
 @lru_cache(maxsize=4)
 def field_to(ground: Ground, goal: tuple[int, int]) -> NDArray[np.float32]:
-    """Length of the shortest path to a grid point (column, row); as of `route`."""
+    """The field of `route` for a goal at a grid point (column, row)."""
     steps = distance_field(ground.free(BODY_RADIUS), goal)
     field = (steps * ground.spacing).astype(np.float32)
     field.flags.writeable = False
@@ -195,9 +196,9 @@ def field_to(ground: Ground, goal: tuple[int, int]) -> NDArray[np.float32]:
 
 
 def path_down(ground: Ground, field: NDArray[np.float32], start: Point) -> Path:
-    """The path from a place down a field of `route`, shape (n, 2), m.
+    """The shortest path from a position by a field of `route`, shape (n, 2), m.
 
-    It ends at the field's grid point; empty where there is none.
+    It ends at the grid point of the goal. It is empty if there is no path.
     """
     begin = entry(ground, field, start)
     if begin is None:
@@ -212,9 +213,9 @@ def _exact(steps: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def widest_body(ground: Ground, start: Point, goal: Point) -> float:
-    """Radius of the largest disc, m, that gets from start to goal; 0 if none does.
+    """Radius of the largest disc that can move from start to goal, m; 0 if none can.
 
-    To the spacing of the grid.
+    It is as accurate as the grid spacing.
     """
     ends = [_nearest(ground, point)[::-1] for point in (start, goal)]
     low, high = 0.0, float(min(ground.clear[end] for end in ends))

@@ -1,4 +1,4 @@
-"""Pictures of TDAC-EPuck-v0 from above, x to the right and y up."""
+"""Frames of an episode of TDAC-EPuck-v0: seen from above, x right, y up."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tdac_envs.worlds.world import EPuck
 
 SMALLEST_BODY = 6.0
 NOTHING, CONTACT = 67.19, 2080.0
-"""Readings of nothing near, and of an ideal thing that touches the hull."""
+"""Readings with nothing near, and with an ideal object that touches the hull."""
 _QUIET: Colour = (150, 163, 182)
 _OTHER: Colour = (128, 132, 150)
 _WHEEL: Colour = (40, 34, 84)
@@ -41,11 +41,11 @@ _BAR, _BARS_HIGH = 15, 30
 
 
 class EPuckScene:
-    """What stays the same in an episode's frames, drawn once.
+    """The static part of an episode's frames, drawn once.
 
     Args:
         task: The task, with the start of the episode.
-        movable: Whether things with a mass may move; they are drawn in each frame.
+        movable: Whether objects with a mass may move and are drawn in each frame.
     """
 
     def __init__(self, task: EPuckTask, movable: bool) -> None:
@@ -75,15 +75,15 @@ class EPuckScene:
         solid: Prisms,
         status: Status,
     ) -> Image:
-        """The picture of one moment, uint8 RGB, both sides even.
+        """One frame, uint8 RGB with even width and height.
 
         Args:
             pose: (x, y, heading), m and rad.
-            readings: Of ps0 to ps7.
-            reaches: How far their rays got, m.
-            trail: Places so far, shape (n, 2), m.
-            solid: What is solid, where it is now.
-            status: Text for the strip; its outcome also marks the robot.
+            readings: Readings of ps0 to ps7.
+            reaches: Lengths of their rays up to the hit, m.
+            trail: Positions so far, shape (n, 2), m.
+            solid: Solid parts at their current positions.
+            status: Text of the status strip; its outcome also marks the robot.
         """
         view = copy.copy(self._view)
         view.canvas = canvas = self._view.canvas.copy()
@@ -134,13 +134,13 @@ def draw_wish(view: View, task: EPuckTask) -> None:
 
 
 def level(reading: float) -> float:
-    """How near a reading says that a thing is: 0 nothing seen, 1 contact."""
+    """Proximity for a reading: 0 if nothing is seen, 1 at contact, logarithmic."""
     nearness = math.log(max(reading, NOTHING) / NOTHING)
     return min(nearness / math.log(CONTACT / NOTHING), 1.0)
 
 
 def ray_colour(reading: float) -> Colour:
-    """Grey where nothing is near, over amber to red at contact."""
+    """Colour of a ray: grey if nothing is near, then amber, and red at contact."""
     share = 2.0 * level(reading)
     low, high = (_QUIET, AMBER) if share < 1.0 else (AMBER, RED)
     share -= math.floor(share) if share < 2.0 else 1.0
@@ -154,7 +154,7 @@ def _draw_rays(
     readings: NDArray[np.float64],
     reaches: NDArray[np.float64],
 ) -> None:
-    """A wedge along each sensor's ray, to what it hits."""
+    """Draws a wedge along each sensor's ray up to the hit."""
     for sensor in range(N_SENSORS):
         x, y, azimuth = PLACES[sensor].tolist()
         reach = float(reaches[sensor]) * math.cos(ELEVATION)
@@ -171,7 +171,7 @@ def _draw_rays(
 def _draw_epuck(
     view: View, pose: tuple[float, float, float], radius: float, colour: Colour
 ) -> None:
-    """A disc with two wheels, and a nose where it drives; `radius` in frame px."""
+    """Draws a disc with two wheels and a nose ahead; `radius` is in frame px."""
     canvas, middle = view.canvas, view.at(pose[:2])[0]
     canvas.disc(middle, radius + 1.5, FREE)
     canvas.disc(middle, radius, colour)
@@ -200,7 +200,7 @@ def _write_status(view: View, status: Status) -> None:
 
 
 def _draw_bars(view: View, readings: NDArray[np.float64]) -> None:
-    """The eight readings as bars, from behind on the left to behind on the right."""
+    """Draws the eight readings as bars, from the left rear to the right rear."""
     canvas, image = view.canvas, view.canvas.image
     whole = N_SENSORS * _BAR + 130
     left = image.shape[1] - 150 - whole

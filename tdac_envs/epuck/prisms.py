@@ -1,4 +1,4 @@
-"""Parts of a world as arrays, for compiled code; and what of them can be pushed."""
+"""Parts of a world as arrays for compiled code, with the objects that own them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ FIXED = -1
 
 
 class Owned(NamedTuple):
-    """A part, and whose it is.
+    """A part and the object that it belongs to.
 
     Attributes:
         part: A prism.
-        owner: Number of the thing that can be pushed; `FIXED` of what cannot.
-        factor: Its reflectance.
+        owner: Index of an object that can be pushed, or `FIXED`.
+        factor: Reflectance of the object.
     """
 
     part: Part
@@ -40,12 +40,12 @@ class Prisms:
     """Discs and convex polygons between two heights, m.
 
     Attributes:
-        points: Shape (m, 2): vertices of all parts, counter-clockwise; of a disc its
-            centre.
-        first: Shape (n + 1,): where in `points` each of n parts begins.
-        extent: Shape (n, 7): centre and radius of a circle around the part, its own
-            radius (0 of a polygon), bottom, top, reflectance.
-        owner: Shape (n,), of the thing that can be pushed, or `FIXED`.
+        points: Shape (m, 2): vertices of all parts, counter-clockwise; the centre of a
+            disc.
+        first: Shape (n + 1,): index in `points` at which each of the n parts begins.
+        extent: Shape (n, 7): x, y and radius of a circle around the part, radius of a
+            disc (0 for a polygon), bottom, top, reflectance.
+        owner: Shape (n,): index of an object that can be pushed, or `FIXED`.
     """
 
     points: Array
@@ -55,7 +55,7 @@ class Prisms:
 
     @classmethod
     def of(cls, owned: Iterable[Owned]) -> Prisms:
-        """The arrays of some parts, in their order."""
+        """The arrays of some parts, in the given order."""
         outlines: list[Array] = []
         extent: list[tuple[float, ...]] = []
         owners: list[int] = []
@@ -80,11 +80,11 @@ class Prisms:
         )
 
     def arrays(self) -> tuple[Array, Index, Array]:
-        """Points, first and extent as kernels take them."""
+        """`points`, `first` and `extent` as read-only arguments of kernels."""
         return constant(self.points), constant(self.first), constant(self.extent)
 
     def copy(self) -> Prisms:
-        """The same with places of its own, which may be changed."""
+        """A copy with its own `points` and `extent`, which may be changed."""
         return Prisms(self.points.copy(), self.first, self.extent.copy(), self.owner)
 
     def outline(self, part: int) -> Array:
@@ -92,12 +92,12 @@ class Prisms:
         return self.points[self.first[part] : self.first[part + 1]]
 
     def carry(self, origin: Prisms, centres: Array, poses: Array) -> None:
-        """Puts the parts that can be pushed where their things are.
+        """Moves the parts that can be pushed to the poses of their objects.
 
         Args:
-            origin: The parts where they were at first.
-            centres: Shape (k, 2): then the place of each thing.
-            poses: Shape (k, 3) or more: its x, y and angle now.
+            origin: The parts at their initial positions.
+            centres: Shape (k, 2): initial centres of the objects.
+            poses: Shape (k, 3 or more): current x, y and rotation of the objects.
         """
         for part in np.flatnonzero(self.owner != FIXED).tolist():
             thing = int(self.owner[part])

@@ -1,9 +1,9 @@
-"""What happens when an e-puck pushes things: physics by pymunk, seen from above.
+"""Physics of an e-puck that pushes objects, in the plane, by pymunk.
 
-Only steps near a thing that can be pushed, or in which one still moves, come here; all
-others are exact and need no physics engine. Each step makes a space of its own from
-poses and velocities alone, so that an episode can be copied at any step and goes on
-alike.
+It is only used for steps in which an object that can be pushed is near or moves; all
+other steps are exact and need no physics engine. Each step creates a new pymunk space
+from poses and velocities alone, so an episode that is copied at any step continues
+identically.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from tdac_envs.epuck.prisms import FIXED, MID_X, MID_Y, REACH, Array, Prisms
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 ROBOT_MASS = 0.16
-"""An e-puck with its two wheels, kg."""
+"""Mass of an e-puck with its two wheels, kg."""
 GRIP, SLIDE = 1.0, 0.5
-"""Coulomb friction of the robot's tyres and of a thing's foot on the ground; the
-first is Webots' default."""
+"""Coulomb friction coefficients on the ground: of the robot's tyres (Webots' default)
+and of objects."""
 _SKIN = 0.4
 _SUBSTEP = 0.002
 _GRAVITY = 9.81
 _AXLE = 0.052
 _STILL = 1e-5
 _LEAST = 0.05
-# Nothing moves farther than this in a step, m.
+# Bound on how far anything moves in a step, m.
 _NEAR = 0.05
 _ROBOT = 1
 
 
 class Drive(NamedTuple):
-    """What the wheels wish to do in a step.
+    """The motion commanded for a step.
 
     Attributes:
         forward: Length of the arc, m.
-        turn: rad.
+        turn: Change of heading, rad.
         dt: Duration, s.
     """
 
@@ -48,32 +48,33 @@ class Drive(NamedTuple):
     dt: float
 
 
-class Foot(NamedTuple):
-    """A thing that can be pushed, and its friction on the ground.
+class Movable(NamedTuple):
+    """An object that can be pushed, with its friction on the ground.
 
     Attributes:
-        body: Its body.
-        slide: Friction against sliding.
-        spin: Friction against turning.
-        weight: The first's limit while it only slides, N.
-        spread: Mean distance of its foot from the centre, m.
+        body: pymunk body.
+        slide: Friction joint against sliding.
+        spin: Friction joint against turning.
+        max_force: Friction force while the object slides without turning, N.
+        spread: Mean distance of its contact area from the centre, m.
     """
 
     body: Any
     slide: Any
     spin: Any
-    weight: float
+    max_force: float
     spread: float
 
 
 def is_near(solid: Prisms, state: Array, things: Array, reach: float) -> bool:
-    """Whether a thing moves, or is within `reach` (m) of the robot's hull.
+    """Whether an object moves, or is within `reach` of the robot's hull.
 
     Args:
-        solid: What is solid, where it is now.
+        solid: Solid parts at their current positions.
         state: Begins with the robot's x and y.
-        things: Shape (k, 6): x, y, angle and their velocities, of what can be pushed.
-        reach: m.
+        things: Shape (k, 6): x, y, angle and their velocities, for each object that can
+            be pushed.
+        reach: Distance, m.
     """
     if np.abs(things[:, 3:]).max(initial=0.0) > 0.0:
         return True
@@ -92,51 +93,51 @@ def push(
     things: Array,
     drive: Drive,
 ) -> bool:
-    """One step with physics.
+    """Simulates one step with physics.
 
     Args:
-        solid: What is solid, where it is now.
-        origin: The same where it was at first.
-        centres: Shape (k, 2): where the things were at first.
-        masses: Shape (k,), kg.
+        solid: Solid parts at their current positions.
+        origin: Solid parts at their initial positions.
+        centres: Shape (k, 2): initial centres of the objects, m.
+        masses: Shape (k,): masses of the objects, kg.
         state: Begins with the robot's x, y and heading; overwritten.
-        speed: Shape (3,): the robot's velocity (m/s) and rate of turn (rad/s);
+        speed: Shape (3,): the robot's velocity (m/s) and turn rate (rad/s);
             overwritten.
         things: Shape (k, 6), as for `is_near`; overwritten.
-        drive: What the wheels wish.
+        drive: Commanded motion of the robot.
 
     Returns:
         Whether the robot's body touched anything.
     """
     space = pymunk.Space()
     space.iterations = 30
-    # The defaults are made for pixels: these are metres.
+    # pymunk's defaults assume pixels, not metres.
     space.collision_slop, space.collision_bias = 1e-6, 0.0
-    feet = [
-        _thing(space, origin, k, centres[k], float(masses[k]), things[k])
+    movables = [
+        _add_movable(space, origin, k, centres[k], float(masses[k]), things[k])
         for k in range(len(things))
     ]
     _add_fixed(space, solid, state)
-    robot, wheels = _robot(space, state, speed)
+    robot, wheels = _add_robot(space, state, speed)
     touched: list[bool] = []
     space.on_collision(_ROBOT, None, post_solve=lambda *_: touched.append(True))
     count = max(math.ceil(drive.dt / _SUBSTEP), 1)
     for _ in range(count):
-        _wish(wheels, robot, drive, count)
-        for foot in feet:
-            _share_friction(foot)
+        _set_wheel_velocity(wheels, robot, drive, count)
+        for movable in movables:
+            _limit_friction(movable)
         space.step(drive.dt / count)
     state[:3] = *robot.position, math.remainder(robot.angle, 2.0 * math.pi)
     speed[:] = *robot.velocity, robot.angular_velocity
-    for (body, *_), row in zip(feet, things, strict=True):
+    for (body, *_), row in zip(movables, things, strict=True):
         row[:] = *body.position, body.angle, *body.velocity, body.angular_velocity
         if np.abs(row[3:]).max() < _STILL:
             row[3:] = 0.0
     return bool(touched)
 
 
-def _wish(wheels: Any, robot: Any, drive: Drive, count: int) -> None:
-    """Sets the speed that the tyres pull the robot to: the chord of the next arc."""
+def _set_wheel_velocity(wheels: Any, robot: Any, drive: Drive, count: int) -> None:
+    """Sets the velocity towards which the tyres pull the robot, for one substep."""
     dt, turn = drive.dt / count, drive.turn / count
     half = 0.5 * turn
     chord = drive.forward / count * (math.sin(half) / half if half else 1.0)
@@ -149,8 +150,8 @@ def _wish(wheels: Any, robot: Any, drive: Drive, count: int) -> None:
     wheels.angular_velocity = turn / dt
 
 
-def _robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
-    """The robot, and the body that stands for its wheels and pulls it by friction."""
+def _add_robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
+    """Adds the robot, and a kinematic body that models its wheels by friction."""
     moment = pymunk.moment_for_circle(ROBOT_MASS, 0.0, BODY_RADIUS)
     robot = pymunk.Body(ROBOT_MASS, moment)
     robot.position, robot.angle = (float(state[0]), float(state[1])), float(state[2])
@@ -163,14 +164,14 @@ def _robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
     wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
     wheels.position, wheels.angle = robot.position, robot.angle
     pull = GRIP * ROBOT_MASS * _GRAVITY
-    space.add(robot, hull, wheels, *_held(wheels, robot, pull, pull * _AXLE / 2))
+    space.add(robot, hull, wheels, *_friction(wheels, robot, pull, pull * _AXLE / 2))
     return robot, wheels
 
 
-def _thing(
+def _add_movable(
     space: Any, origin: Prisms, number: int, centre: Array, mass: float, row: Array
-) -> Foot:
-    """A thing that can be pushed, with friction on the ground."""
+) -> Movable:
+    """Adds an object that can be pushed, with friction on the ground."""
     outlines: list[tuple[Array, float]] = []
     for part in np.flatnonzero(origin.owner == number).tolist():
         radius = float(origin.extent[part, 3])
@@ -187,24 +188,25 @@ def _thing(
     space.add(body)
     for at, radius in outlines:
         _add_shape(space, body, at, radius)
-    weight = SLIDE * mass * _GRAVITY
-    slide, spin = _held(space.static_body, body, weight, weight * spread)
+    force = SLIDE * mass * _GRAVITY
+    slide, spin = _friction(space.static_body, body, force, force * spread)
     space.add(slide, spin)
-    return Foot(body, slide, spin, weight, spread)
+    return Movable(body, slide, spin, force, spread)
 
 
-def _share_friction(foot: Foot) -> None:
-    """What slides turns easily, and the other way round: an elliptic limit surface."""
-    slid = foot.body.velocity.length
-    spun = abs(foot.body.angular_velocity) * foot.spread
+def _limit_friction(movable: Movable) -> None:
+    """Divides friction between sliding and turning: an elliptic limit surface."""
+    slid = movable.body.velocity.length
+    spun = abs(movable.body.angular_velocity) * movable.spread
     speed = math.hypot(slid, spun)
     shares = (slid / speed, spun / speed) if speed > _STILL else (1.0, 1.0)
-    foot.slide.max_force = foot.weight * max(shares[0], _LEAST)
-    foot.spin.max_force = foot.weight * foot.spread * max(shares[1], _LEAST)
+    force = movable.max_force
+    movable.slide.max_force = force * max(shares[0], _LEAST)
+    movable.spin.max_force = force * movable.spread * max(shares[1], _LEAST)
 
 
-def _held(one: Any, other: Any, force: float, torque: float) -> list[Any]:
-    """Friction between two bodies: it ends their relative motion, within limits."""
+def _friction(one: Any, other: Any, force: float, torque: float) -> list[Any]:
+    """Joints that stop the relative motion of two bodies with limited force."""
     at = other.position
     slide = pymunk.PivotJoint(one, other, one.world_to_local(at), (0.0, 0.0))
     spin = pymunk.GearJoint(one, other, 0.0, 1.0)
@@ -214,7 +216,7 @@ def _held(one: Any, other: Any, force: float, torque: float) -> list[Any]:
 
 
 def _add_fixed(space: Any, solid: Prisms, state: Array) -> None:
-    """The fixed parts that the robot, or a thing, might touch in a step."""
+    """Adds the fixed parts that the robot or an object might touch in a step."""
     movers = np.vstack(
         [[(state[0], state[1], BODY_RADIUS)], solid.extent[solid.owner != FIXED, :3]]
     )

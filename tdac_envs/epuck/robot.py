@@ -1,4 +1,4 @@
-"""The memory of an e-puck, as its compiled step reads and writes it."""
+"""The arrays of an e-puck that the compiled step reads and writes."""
 
 from __future__ import annotations
 
@@ -17,31 +17,30 @@ Observed = NDArray[np.float32]
 
 
 class Robot(NamedTuple):
-    """Arrays of one robot; or of many, with one more axis in front.
+    """Arrays of one robot, or of many robots with an additional first axis.
 
     Attributes:
-        constants: Shape (22,), float64: axle length (m), wheel limit (rad/s), dt (s),
-            body radius, range of the sensors (m), share of its speed that a wheel
-            keeps from one step to the next, delay (steps), whether a contact ends the
-            episode, way of a step at full speed (m); weights of the reward: progress,
+        constants: Shape (22,), float64: axle length (m), full wheel speed (rad/s), dt
+            (s), body radius, sensor range (m), fraction of its speed that a wheel keeps
+            from one step to the next, delay (steps), whether a contact ends the
+            episode, distance of a step at full speed (m); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (m), horizon (steps);
-            height of the floor, x and y of the first point of the task's field and of
-            the first cell, spacing of that field, width of those cells (m).
-        state: Shape (10,), float64: x, y (m), heading (rad); wanted speeds of the left
-            and of the right wheel, which may be out of [-1, 1]; for each the factor
-            between its speed and what it does on the ground; steps so far; angles of
-            the wheels (rad).
-        queue: Shape (delay, 2), float64: wanted speeds that are still to be applied.
-        pose: Shape (3,), float32: x, y, heading, as observed.
+            height of the floor, x and y of the lower left corner of the path field and
+            of the cells, spacing of the field, width of the cells (m).
+        state: Shape (10,), float64: x, y (m), heading (rad); unclipped commands of the
+            left and right wheel; slip of the left and right wheel, the ratio of speed
+            over ground to wheel speed; steps so far; wheel angles (rad).
+        queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
+        pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
-        turned: Shape (2,), float32: angles of the wheels, as observed.
-        readings: Shape (8,), float32: of ps0 to ps7, without noise.
+        turned: Shape (2,), float32: observed wheel angles, rad.
+        readings: Shape (8,), float32: readings of ps0 to ps7, without noise.
         hits: Shape (8, 3), float64; see `infrared.sense`.
-        outcome: Shape (12,), float64: reward of the last step, whether it terminated
-            or truncated the episode, whether the goal was reached and something
-            touched; contacts and clipped actions so far; straight distance to the
-            goal, length of the shortest path to it, from the centre to the nearest
-            solid thing (m); length (m) and turn (rad) of the arc that was wished.
+        outcome: Shape (12,), float64: reward of the last step; whether it terminated
+            or truncated the episode, reached the goal, touched an obstacle; number of
+            contacts and of clipped actions so far; straight distance to the goal,
+            length of the shortest path to it, distance from the centre to the nearest
+            solid part (m); length (m) and turn (rad) of the commanded arc.
     """
 
     constants: Array
@@ -70,11 +69,11 @@ class Robot(NamedTuple):
         )
 
     def row(self, index: int) -> Robot:
-        """One of many robots; its arrays are views."""
+        """Views of the arrays of one of many robots."""
         return Robot(*(array[index] for array in self))
 
     def place(self, task: EPuckTask) -> None:
-        """Puts the robot at the start of a task; `kernels.begin` does the rest."""
+        """Places the robot at the start of a task; call `kernels.begin` next."""
         goal = slice(stepping.GOAL_X, stepping.HORIZON + 1)
         self.constants[goal] = *task.goal, task.goal_tolerance, task.horizon
         self.state[: stepping.HEADING + 1] = task.start

@@ -1,4 +1,4 @@
-"""Pictures of whole runs of an e-puck, x to the right and y up."""
+"""Pictures of complete runs of an e-puck, x right, y up."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.picture import SIDE, View, draw_things
 
 Points = NDArray[np.float64]
-# Columns on the right of the strip that the scale takes.
+# Width of the scale bar's place at the right of the strip, frame px.
 _SCALE = 170
 
 
@@ -33,10 +33,10 @@ def trajectory_picture(
     """The world with one or more trajectories and a legend, uint8 RGB.
 
     Args:
-        task: Whose world, start and goal.
-        trajectories: Each of shape (T + 1, 3): x, y, heading.
-        outcomes: How each ended; sets the mark at its end.
-        labels: A name for each.
+        task: Task with world, start and goal.
+        trajectories: Poses of each, shape (T + 1, 3): x, y (m), heading (rad).
+        outcomes: Outcome of each trajectory; sets the mark at its end.
+        labels: Name of each trajectory.
     """
     ends = [*outcomes, *[""] * (len(trajectories) - len(outcomes))]
     width = _columns(task.ground.bounds) - _SCALE
@@ -63,7 +63,7 @@ def task_view(
     side: int = SIDE,
     margin: float = 0.05,
 ) -> View:
-    """A world with start, goal and shortest path; arguments as for `View`."""
+    """A view of a task's world with start, goal and shortest path; see `View`."""
     ground = task.ground
     view = View(bounds, strip=strip, side=side, margin=margin)
     things = [thing for thing in ground.things if not thing.is_goal or thing.solid]
@@ -80,24 +80,24 @@ class WorldChart:
 
     @property
     def canvas(self) -> Canvas:
-        """To draw on."""
+        """The canvas of the view."""
         return self.view.canvas
 
     @property
     def scale(self) -> float:
-        """Frame px in a metre."""
+        """Frame px per metre."""
         return self.view.scale
 
     def at(self, points: Points) -> Points:
-        """Places on the canvas."""
+        """Points in canvas coordinates, shape (n, 2)."""
         return self.view.at(points)
 
     def turned(self, heading: float) -> float:
-        """The canvas' y points down."""
+        """The heading on the canvas, where y points down."""
         return -heading
 
     def poses(self, poses: Points) -> Points:
-        """Poses on the canvas, shape (n, 3)."""
+        """Poses in canvas coordinates, shape (n, 3)."""
         return np.column_stack([self.at(poses[:, :2]), -poses[:, 2]])
 
 
@@ -115,22 +115,22 @@ class WorldBackground:
 
     @property
     def radius(self) -> float:
-        """Of the body, m."""
+        """Body radius, m."""
         return BODY_RADIUS
 
     def whole(self) -> WorldChart:
-        """All of the world."""
+        """A chart of the whole world."""
         view = copy.copy(self.view)
         view.canvas = self.view.canvas.copy()
         return WorldChart(view)
 
     def window(self, middle: Points, extent: float) -> Window:
-        """A square around a place."""
+        """A square around a point."""
         x, y = (middle - extent / 2.0).tolist()
         return Window(x, y, extent)
 
     def close_up(self, window: Window) -> WorldChart:
-        """A part of the world, enlarged."""
+        """An enlarged part of the world."""
         x, y, side = window
         bounds = (x, y, x + side, y + side)
         view = task_view(self.task, bounds, strip=0, side=CLOSE_UP, margin=0.0)

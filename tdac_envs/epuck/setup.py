@@ -1,4 +1,4 @@
-"""What a TDAC-EPuck-v0 is made of, and how its episodes begin."""
+"""Configuration of a TDAC-EPuck-v0 environment, and the tasks of its episodes."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """Everything about an environment that lasts longer than an episode.
+    """The part of an environment that does not change between episodes.
 
     Attributes:
-        nominal: The task as given.
-        around: What may be touched and seen at each place.
+        nominal: The task without variation.
+        around: The parts that the robot may touch and see, depending on its position.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
-        fixed_horizon: Whether the horizon was given, or follows from the task.
+        fixed_horizon: Whether the user set the horizon; else it follows from the task.
         on_collision: `"terminate"` or `"block"`.
-        wheel_slip: Standard deviation of each wheel's speed, relative to it.
+        wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
-        delay: Steps by which an action takes effect late.
-        weights: Of the reward.
+        delay: Number of steps until an action takes effect.
+        weights: Weights of the reward.
     """
 
     nominal: EPuckTask
@@ -54,7 +54,7 @@ class Setup:
 
     @property
     def pushes(self) -> bool:
-        """Whether there is something to push, and the robot does."""
+        """Whether the robot can push objects."""
         return self.on_collision == "block" and len(self.nominal.ground.masses) > 0
 
     def constants(self) -> NDArray[np.float64]:
@@ -90,12 +90,12 @@ class Setup:
         solid: Prisms | None = None,
         seen: Prisms | None = None,
     ) -> tuple[NDArray[Any], ...]:
-        """What `begin`, `drive` and `finish` take beside the robot's memory.
+        """The arrays that the kernels take in addition to the robot's.
 
         Args:
-            task: Of the episode.
-            solid: What is solid, where that can be pushed; else the ground's own.
-            seen: What is visible, likewise.
+            task: Task of the episode.
+            solid: Solid parts, if objects can be pushed; by default the ground's own.
+            seen: Visible parts, if objects can be pushed; by default the ground's own.
         """
         solid = task.ground.solid if solid is None else solid
         seen = self.around.visible if seen is None else seen
@@ -110,12 +110,12 @@ class Setup:
         """The task of an episode.
 
         Args:
-            options: Of `reset`: `start` and `goal`, which win over the variation.
-            random: Source of the variation.
+            options: Options of `reset`: `start` and `goal`, which override the
+                variation.
+            random: Random number generator of the variation.
 
         Raises:
-            TaskError: The options name something else than a start and a goal, or
-                these are not feasible.
+            TaskError: An option is unknown, or the start or goal is not feasible.
         """
         check_reset_options(options)
         task = self.nominal

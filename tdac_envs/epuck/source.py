@@ -1,4 +1,4 @@
-"""From what `world=`, `start=` and `goal=` name to a world, a start and a goal."""
+"""Loads the world, start and goal of an e-puck task."""
 
 from __future__ import annotations
 
@@ -22,20 +22,19 @@ def open_world(
     goal: Sequence[float] | None = None,
     ignore: Iterable[str] = (),
 ) -> World:
-    """The world, with its first e-puck at the start, and with the goal.
+    """Loads a world and sets the pose of its first e-puck and its goal.
 
-    A mark of the file's own goal stays one if the goal is another: it is never an
-    obstacle.
+    The file's goal marker never becomes an obstacle, even if `goal` is elsewhere.
 
     Args:
         source: Name of a bundled world, path of a `.wbt` file, or a world.
-        start: (x, y) or (x, y, heading); by default the file's e-puck.
-        goal: (x, y); by default the file's.
-        ignore: Names or types of nodes that may be missing.
+        start: (x, y) or (x, y, heading), m and rad; by default the file's e-puck.
+        goal: (x, y), m; by default the file's goal.
+        ignore: Names or types of nodes that may be left out; see `check_modelled`.
 
     Raises:
         WorldError: The world cannot be used.
-        TaskError: There is no start or no goal, or it is not made of numbers.
+        TaskError: Start or goal is missing or not made of numbers.
     """
     if isinstance(ignore, str):
         raise TaskError(f"expected ignore to be a list of names, got {ignore!r}")
@@ -56,7 +55,7 @@ def started(world: World, start: Sequence[float]) -> World:
     """The world with its first e-puck at (x, y) or (x, y, heading).
 
     Raises:
-        TaskError: These are no numbers.
+        TaskError: `start` is not made of finite numbers.
     """
     there = world.robots[0] if world.robots else EPuck("e-puck", 0.0, 0.0, 0.0)
     given = tuple(start) if isinstance(start, Iterable) else (start,)

@@ -1,4 +1,4 @@
-"""What is wanted of an e-puck: start, goal, and the shortest way between them."""
+"""The navigation task of an e-puck: start, goal and shortest path."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ from tdac_envs.grid.plan import Path
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 TOLERANCE = 0.02
-"""m, as the paper has it."""
+"""Default goal tolerance, m, as in the paper."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EPuckTask:
-    """A feasible task: drive the e-puck from start to goal and touch nothing.
+    """A feasible task: drive an e-puck from start to goal without touching anything.
 
     Attributes:
         ground: The world.
         start: Nominal start pose, m and rad.
         goal: Point (x, y), m.
-        max_wheel_speed: rad/s.
-        goal_tolerance: m.
+        max_wheel_speed: Wheel speed at action 1, rad/s.
+        goal_tolerance: Distance at which the goal is reached, m.
         dt: Duration of a step, s.
-        horizon: Steps before the episode is cut off.
+        horizon: Number of steps before truncation.
         field: Length of the shortest path for the body from each grid point to the
             goal, m; see `paths.route`.
-        shortest: d0, length of that path from the nominal start, m.
+        shortest: d0, the length of the shortest path from the nominal start, m.
     """
 
     env_id: ClassVar = "TDAC-EPuck-v0"
@@ -71,7 +71,7 @@ class EPuckTask:
 
     @property
     def body_radius(self) -> float:
-        """Of the disc, m."""
+        """Body radius, m."""
         return BODY_RADIUS
 
     @property
@@ -81,7 +81,7 @@ class EPuckTask:
 
     @property
     def full_step(self) -> float:
-        """Way of one step at full speed, m."""
+        """Distance of one step at full speed, m."""
         return self.max_wheel_speed * WHEEL_RADIUS * self.dt
 
     def jittered(self, random: np.random.Generator) -> Pose:
@@ -89,12 +89,12 @@ class EPuckTask:
         return jittered_start(self, random)
 
     def path_from(self, start: Pose) -> Path:
-        """Shortest path for the body, shape (n, 2), m; empty where there is none."""
+        """Shortest path from `start` to the goal, shape (n, 2), m; empty if none."""
         path = path_down(self.ground, self.field, start[:2])
         return np.vstack([path, self.goal]) if len(path) else path
 
     def moved(self, start: Pose, goal: Point | None = None) -> EPuckTask:
-        """The same task with another start (and goal); horizon and tolerance kept.
+        """This task with another start (and goal), but the same horizon and tolerance.
 
         Raises:
             TaskError: No path joins the new start and goal.
@@ -118,21 +118,20 @@ def make_task(
     goal_tolerance: float = TOLERANCE,
     horizon: int | None = None,
 ) -> EPuckTask:
-    """Checks that a task is feasible and completes it.
+    """Makes a task and checks that it is feasible.
 
     Args:
         ground: The world.
         start: Pose, m and rad.
         goal: Point (x, y), m.
-        max_wheel_speed: rad/s.
+        max_wheel_speed: Wheel speed at action 1, rad/s.
         dt: Duration of a step, s.
-        goal_tolerance: m.
-        horizon: Steps; by default max(2500, 6 * d0 / (v_max * dt)).
+        goal_tolerance: Distance at which the goal is reached, m.
+        horizon: Number of steps; by default max(2500, 6 * d0 / (v_max * dt)).
 
     Raises:
-        TaskError: A number is not usable, start or goal cannot hold the body, no path
-            joins them, or the start is already within the tolerance; the message says
-            which and what to do.
+        TaskError: A number is not valid, the body does not fit at start or goal, no
+            path joins them, or the start is already within the tolerance.
     """
     begin = Pose(*finite_numbers("start", start, 3))
     begin = begin._replace(heading=wrapped(begin.heading))
@@ -154,12 +153,12 @@ def make_task(
 
 
 def default_horizon(task: EPuckTask) -> int:
-    """Steps for a task: six times what its shortest path takes, or 2500."""
+    """The horizon for the shortest path of a task; see `generous_horizon`."""
     return generous_horizon(task.shortest, task.full_step)
 
 
 def way(ground: Ground, field: NDArray[np.float32], at: Point) -> float:
-    """Length of the shortest path from a place by a field of `route`, m."""
+    """Length of the shortest path from a point, m, given a field of `route`."""
     begin = entry(ground, field, at)
     if begin is None:
         return math.inf
@@ -175,9 +174,9 @@ def jittered_start(task: EPuckTask, random: np.random.Generator) -> Pose:
 
 
 def mixed_start(task: EPuckTask, random: np.random.Generator) -> Pose:
-    """A jittered start or, in every second episode on average, any feasible one.
+    """A jittered start or, with probability 0.5, any feasible one.
 
-    These are drawn from the grid points connected to the goal.
+    The latter is drawn from the grid points connected to the goal.
     """
     if random.random() < 0.5:
         return jittered_start(task, random)
@@ -192,9 +191,9 @@ def mixed_start(task: EPuckTask, random: np.random.Generator) -> Pose:
 
 
 def random_task(task: EPuckTask, random: np.random.Generator) -> EPuckTask:
-    """The same world with any feasible start and goal; horizon kept.
+    """A task with any feasible start and goal; world and horizon are the same.
 
-    Both are drawn from the grid points connected to the nominal goal.
+    Both points are drawn from the grid points connected to the nominal goal.
     """
     ground = task.ground
     connected = np.flatnonzero(np.isfinite(task.field))
@@ -230,7 +229,7 @@ def _may_start(task: EPuckTask, pose: Pose) -> bool:
 
 
 def _restored(ground: Ground, start: Pose, goal: Point, *rest: Any) -> EPuckTask:
-    """A task from its pickle, which leaves out what can be computed."""
+    """Restores a pickled task and recomputes what the pickle leaves out."""
     limit, tolerance, dt, horizon = rest
     field = route(ground, start[:2], goal)
     shortest = way(ground, field, start[:2])

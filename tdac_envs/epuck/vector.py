@@ -1,4 +1,4 @@
-"""TDAC-EPuck-v0 in one go for many robots."""
+"""The vector environment of TDAC-EPuck-v0."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from tdac_envs.epuck.observed import Observed, ground_readings, noisy, north, po
 
 
 class EPuckVectorEnv(DrivenVectorEnv):
-    """Many `EPuckEnv`, stepped in one compiled call on all cores.
+    """A vector of `EPuckEnv` that steps in one compiled call on all cores.
 
-    `gym.make_vec("TDAC-EPuck-v0", num_envs=1024)`. Robot i does, to the last bit, what
-    an `EPuckEnv` does with its seed and its actions. Observations, rewards, ends and
-    infos are those of Gymnasium's `SyncVectorEnv`. Robots do not meet: each is alone in
-    its world. Nothing is pushed, so `on_collision="block"` is for worlds without things
-    that have a mass.
+    Made by `gym.make_vec("TDAC-EPuck-v0", num_envs=1024)`. Robot i behaves bit for bit
+    as an `EPuckEnv` does with the same seed and actions. Observations, rewards,
+    terminations, truncations and infos are those of Gymnasium's `SyncVectorEnv`. Each
+    robot is alone in its world. Robots cannot push objects, so `on_collision="block"`
+    requires a world in which no object has a mass.
 
     Args:
         num_envs: Number of robots.
-        autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, or a member of
+        autoreset_mode: `"NextStep"`, `"SameStep"`, `"Disabled"`, or a member of
             `gymnasium.vector.AutoresetMode`.
-        threads: How many work at a time. Default: as many as there are cores. Results
-            do not depend on it.
-        each: Arguments that differ from robot to robot, as `[{"world": "maze"},
-            {"world": "yard"}]`; robot i has the entry `i % len(each)`. All robots have
+        threads: Number of threads, which does not affect the results. Default: the
+            number of cores.
+        each: Arguments that differ between robots, such as `[{"world": "maze"},
+            {"world": "yard"}]`; robot i takes entry `i % len(each)`. All robots need
             the same `delay` and the same sensors.
-        render_mode: None; pictures are those of an `EPuckEnv`.
-        **options: Arguments of `EPuckEnv`, for all robots.
+        render_mode: None; a vector environment cannot render.
+        **options: Arguments of `EPuckEnv` for all robots.
 
     Raises:
-        TaskError: A robot would push things.
+        TaskError: A robot would be able to push objects.
     """
 
     step_rows = staticmethod(step_rows)
@@ -60,8 +60,8 @@ class EPuckVectorEnv(DrivenVectorEnv):
         envs = several(EPuckEnv, each, options, num_envs)
         if any(env.setup.pushes for env in envs):
             raise TaskError(
-                "a batch cannot push things; expected on_collision='terminate', a "
-                "world without things that have a mass, or vectorization_mode='sync'"
+                "a batch cannot push objects; expected on_collision='terminate', a "
+                "world without objects that have a mass, or vectorization_mode='sync'"
             )
         super().__init__(
             envs,
@@ -103,7 +103,7 @@ class EPuckVectorEnv(DrivenVectorEnv):
             observations["compass"] = north(self.robots)
 
     def _add_noise(self, robots: Sequence[int]) -> None:
-        """Draws the readings of these robots anew; the others keep theirs."""
+        """Draws new noise for these robots; the others keep their last readings."""
         spreads = self.robots.hits[robots, :, 2] * self._factors[robots, None]
         normal = np.empty(spreads.shape)
         for i, row in zip(robots, normal, strict=True):

@@ -59,8 +59,8 @@ class Map2DEnv(DrivenEnv):
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
-    - `progress`: +0.1 for each full-speed step's length by which the shortest path to
-      the goal gets shorter (negative if it gets longer),
+    - `progress`: +0.1 for each full-speed step's length by which the shortest path of
+      the body to the goal gets shorter (negative if it gets longer),
     - `goal`: +10 if the goal is reached,
     - `collision`: -10 if the body touches an obstacle,
     - `time`: -0.01.

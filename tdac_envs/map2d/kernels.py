@@ -107,15 +107,8 @@ def _path_distance(
     """Length of the shortest path from a point to the goal, px.
 
     It is the minimum, over the nearby visible pixels, of the distance to the pixel plus
-    the path length from there.
-
-    Args:
-        leaps: From `rays.leaps_of`.
-        field: Shape (height, width), float32, from `plan.distance_field`.
-        x: Column, px.
-        y: Row, px.
-        previous: Result if no pixel within 2 px has a path to the goal, as when the
-            body is pressed into a corner.
+    the path length from there, which is in `field`. The result is `previous` if no
+    pixel within 2 px has a path, as when the body is pressed into a corner.
     """
     height, width = field.shape
     column, row = math.floor(x), math.floor(y)
@@ -210,18 +203,10 @@ def _drive(
 ) -> None:
     """One step of the environment, except for the random numbers.
 
-    Args:
-        leaps: From `rays.leaps_of`.
-        clear: Padded clearance, px.
-        field: Shape (height, width), float32: path length to the goal, px.
-        directions: From `rays.fan`.
-        constants: See `Robot`, also for the following arrays.
-        state: Overwritten, except for the commands and the slip.
-        queue: Overwritten.
-        pose: Overwritten.
-        wheel_speeds: Overwritten.
-        ranges: Overwritten.
-        outcome: Overwritten.
+    `field`, shape (height, width), is the path length to the goal from each pixel, px;
+    `directions` are from `rays.fan`. `constants` and the arrays after it are those of
+    `Robot`; all but `constants`, and the commands and the slip in `state`, are
+    overwritten.
     """
     apply_command(constants, state, queue, wheel_speeds, outcome)
     limit, before = constants[MAX_SPEED], outcome[REMAINING]

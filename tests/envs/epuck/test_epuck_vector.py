@@ -197,7 +197,7 @@ def test_a_pickle_goes_on_where_the_batch_was():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"world": "crates", "on_collision": "block"}, "a batch cannot push things"),
+        ({"world": "crates", "on_collision": "block"}, "a batch cannot push objects"),
         ({"num_envs": 0}, "num_envs to be a whole number from 1"),
         ({"render_mode": "rgb_array"}, "expected render_mode None"),
         ({"each": [{"gps": True}, {}]}, "the same sensors"),
