@@ -56,7 +56,7 @@ def autoreset_mode_of(given: str | AutoresetMode) -> AutoresetMode:
     """The autoreset mode of this name or value.
 
     Raises:
-        TaskError: There is no such mode.
+        TaskError: The mode is unknown.
     """
     try:
         return AutoresetMode(given)

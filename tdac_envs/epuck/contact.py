@@ -147,12 +147,9 @@ def _travel(
     floor: float,
     limit: float,
 ) -> float:
-    """Arc length at which the gap between the disc and a part falls to `floor`.
+    """Arc length at which the gap of disc and part falls to `floor`, at most `limit`.
 
     The search is that of `tdac_envs.map2d.contact._travel`.
-
-    Returns:
-        The arc length, or `limit` if there is no contact before it.
     """
     length = abs(forward)
     curvature = abs(turn) / length

@@ -18,7 +18,7 @@ from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, ROUND, Array, Index
 def gap_of(
     points: Array, first: Index, extent: Array, part: int, x: float, y: float
 ) -> tuple[float, float, float]:
-    """Signed distance of a point to a part, and the unit vector away from the part."""
+    """Signed distance from a point to a part, and the unit vector away from it."""
     begin, end = first[part], first[part + 1]
     if end - begin == 1:
         off_x, off_y = x - points[begin, 0], y - points[begin, 1]

@@ -1,4 +1,4 @@
-"""A world with the data that are precomputed for an e-puck on it."""
+"""A world with data precomputed for an e-puck."""
 
 from __future__ import annotations
 

@@ -188,15 +188,12 @@ def _travel(
     floor: float,
     limit: float,
 ) -> float:
-    """Arc length, px, at which the gap of disc and square (i, j) falls to `floor`.
+    """Arc length at which the gap of disc and square falls to `floor`, at most `limit`.
 
     The distance to a convex body is convex along a straight line, and an arc of
     curvature k is at most k h^2 / 2 away from its tangent after h px. So
     `d + d' h - k h^2 / 2` bounds the distance from below, and going from root to
     root of this bound never jumps over a contact and converges quadratically.
-
-    Returns:
-        The arc length, or `limit` if there is no contact before it.
     """
     length = abs(forward)
     curvature = abs(turn) / length
