@@ -6,6 +6,7 @@ import atexit
 import os
 import random
 import signal
+import subprocess
 import sys
 import tempfile
 import zlib
@@ -22,10 +23,12 @@ REAL_DATA = ROOT.parent / "shared" / "data"
 sys.path.append(str(ROOT))
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """Interrupts reach what tests start, also where they are run in the background."""
     _set_up_hypothesis()
     _set_up_secret()
+    if not hasattr(config, "workerinput") and not config.option.collectonly:
+        _compile_kernels()
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
@@ -38,6 +41,15 @@ def _set_up_secret() -> None:
     secret.write_bytes(bytes(range(32)))
     os.environ["XDG_STATE_HOME"] = folder.name
     atexit.register(folder.cleanup)
+
+
+def _compile_kernels() -> None:
+    """Compiles before the first test, whose output would report it otherwise."""
+    from tdac_envs.core.code_cache import cache_folder
+
+    folder = cache_folder()
+    if folder is not None and not any(folder.rglob("*.nbi")):
+        subprocess.run([sys.executable, "-m", "tdac_agent", "warm"], check=True)
 
 
 def _set_up_hypothesis() -> None:
