@@ -1,6 +1,6 @@
-"""Gymnasium environments on map images and in Webots worlds.
+"""Gymnasium environments for map images and Webots worlds.
 
-`gym.make("TDAC-Map2D-v0")`, `gym.make("TDAC-EPuck-v0")`.
+Create them with `gym.make("TDAC-Map2D-v0")` and `gym.make("TDAC-EPuck-v0")`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = [
     "write_world",
 ]
 
-_HOME = {
+_MODULE_OF = {
     "MapParams": "tdac_envs.mapping.params",
     "OccupancyGrid": "tdac_envs.grid.grid",
     "RobotParams": "tdac_envs.mapping.params",
@@ -57,17 +57,17 @@ _HOME = {
 
 def __getattr__(name: str) -> Any:
     """Imports the heavier parts on first use."""
-    if name not in _HOME:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'tdac_envs' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    return getattr(import_module(_MODULE_OF[name]), name)
 
 
 def __dir__() -> list[str]:
-    """What there is, imported yet or not."""
+    """All names, including those that are imported on first use."""
     return sorted({*globals(), *__all__})
 
 
-# The horizon depends on the task, so the envs truncate themselves: no TimeLimit here.
+# No TimeLimit: the horizon depends on the task, and the envs truncate themselves.
 gym.register(
     "TDAC-Map2D-v0",
     entry_point="tdac_envs.map2d.env:Map2DEnv",

@@ -1,6 +1,6 @@
-"""A batched environment as Stable-Baselines3 takes it; needs the extra `sb3`.
+"""Adapter from batched environments to Stable-Baselines3; needs the extra `sb3`.
 
-The public face of `tdac_envs.learning.sb3`.
+Re-exports the public names of `tdac_envs.learning.sb3`.
 """
 
 from tdac_envs.learning.sb3 import Indices, SB3VecEnv

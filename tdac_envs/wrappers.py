@@ -1,6 +1,6 @@
-"""Observation wrappers for learning: the same form on every map, and guidance.
+"""Observation wrappers for learning: map-independent observations, and guidance.
 
-The public face of `tdac_envs.learning.wrappers`.
+Re-exports the public names of `tdac_envs.learning.wrappers`.
 """
 
 from tdac_envs.learning.wrappers import (

@@ -1,1 +1,1 @@
-"""What every room needs: errors, argument checks, extras, compiled code."""
+"""Shared basics: errors, argument and file checks, extras, compiled code."""

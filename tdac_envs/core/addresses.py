@@ -1,8 +1,8 @@
-"""Arrays by their addresses: how a compiled step reads those of one robot, or of many.
+"""Tables of array addresses, through which compiled code reads each robot's arrays.
 
-A step takes up to twenty arrays. Passing each of them costs longer than the step of an
-e-puck, and a batch has others for each robot, so that compiled code is given a table of
-addresses and shapes instead.
+A step needs up to twenty arrays. Passing them one by one takes longer than the step of
+an e-puck itself, and in a batch each robot has its own arrays. So compiled code takes a
+single table of addresses and shapes.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from tdac_envs.core.compiled import subkernel
 
 Words = NDArray[np.int64]
 _WORDS = 4
-"""For each array: its address, and its shape in up to three dimensions."""
+"""Words per array: its address, and its shape in up to three dimensions."""
 
 
 class Addresses:
-    """Where the arrays of some rows are; it holds them, so that they stay there.
+    """A table of the addresses of arrays; it keeps the arrays alive.
 
     Args:
-        rows: Arrays of each row, C-contiguous, of as many dimensions in each row.
+        rows: The C-contiguous arrays of each row. All rows have the same number of
+            arrays, with the same numbers of dimensions.
 
     Attributes:
-        words: Shape (rows, arrays, 4): address, and shape filled up with zeros.
+        words: Shape (rows, arrays, 4): address, and shape padded with zeros.
     """
 
     def __init__(self, rows: Iterable[tuple[NDArray[Any], ...]]) -> None:
@@ -40,17 +41,17 @@ class Addresses:
     def put(self, row: int, arrays: tuple[NDArray[Any], ...]) -> None:
         """Replaces the arrays of one row."""
         words = words_of(arrays)
-        # At no time, should this be interrupted, is there an address of what is gone.
+        # Keep both until the address is replaced, in case of an interrupt in between.
         self._held[row] = self._held[row], arrays
         self.words[row] = words
         self._held[row] = arrays
 
     def __getstate__(self) -> dict[str, Any]:
-        raise TypeError("addresses of memory cannot be copied or pickled")
+        raise TypeError("memory addresses cannot be copied or pickled")
 
 
 def words_of(arrays: Iterable[NDArray[Any]]) -> Words:
-    """Where some arrays are, shape (arrays, 4), as long as somebody else holds them."""
+    """The words of some arrays, shape (arrays, 4); the caller keeps these alive."""
     words = []
     for array in arrays:
         if not array.flags.c_contiguous:
@@ -63,7 +64,7 @@ def words_of(arrays: Iterable[NDArray[Any]]) -> Words:
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _compiled_pointer(_: Any, address: Any) -> Any:
-    """A whole number as `carray` takes it, in compiled code."""
+    """Converts an integer to a pointer for `carray`, in compiled code."""
 
     def generate(context: Any, builder: Any, _: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(types.voidptr))
@@ -76,21 +77,21 @@ _pointer = ctypes.c_void_p if config.DISABLE_JIT else _compiled_pointer
 
 @subkernel
 def line(words: Words, dtype: type[Any]) -> NDArray[Any]:
-    """The array of one dimension with these four words."""
+    """The one-dimensional array with these words."""
     array: NDArray[Any] = carray(_pointer(int(words[0])), (words[1],), dtype)
     return array
 
 
 @subkernel
 def plane(words: Words, dtype: type[Any]) -> NDArray[Any]:
-    """The array of two dimensions with these words."""
+    """The two-dimensional array with these words."""
     array: NDArray[Any] = carray(_pointer(int(words[0])), (words[1], words[2]), dtype)
     return array
 
 
 @subkernel
 def block(words: Words, dtype: type[Any]) -> NDArray[Any]:
-    """The array of three dimensions with these words."""
+    """The three-dimensional array with these words."""
     shape = words[1], words[2], words[3]
     array: NDArray[Any] = carray(_pointer(int(words[0])), shape, dtype)
     return array

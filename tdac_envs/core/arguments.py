@@ -1,4 +1,4 @@
-"""Numbers that a user gives: taken as they are meant, or refused in one line."""
+"""Checks of numeric arguments, with one-line errors."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import Any
 from tdac_envs.core.errors import TaskError
 
 LARGEST = 1e9
-"""Bound of every number that a user gives, so that what is computed stays finite."""
+"""Largest magnitude of an argument; it keeps all computed values finite."""
 SMALLEST = 1e-9
-"""Bound of one that must be above 0."""
+"""Smallest value of an argument that must be above 0."""
 MOST_STEPS = 10_000_000
-"""Of an episode: the longest path on the largest map, at a crawl."""
+"""Longest horizon, steps: the longest path on the largest map, driven very slowly."""
 
 
 def finite_numbers(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
     """The values as floats.
 
     Raises:
-        TaskError: There are not `count` of them, or one is not a finite number, or
-            beyond `LARGEST`.
+        TaskError: Their number is not `count`, or one is not a finite number within
+            +-`LARGEST`.
     """
     try:
         numbers = tuple(float(value) for value in values)
@@ -36,7 +36,7 @@ def finite_numbers(name: str, values: Sequence[float], count: int) -> tuple[floa
 
 
 def finite_point(name: str, values: Sequence[float]) -> tuple[float, float]:
-    """The values as a point (x, y); raises as `finite_numbers` does."""
+    """The values as a point (x, y); raises like `finite_numbers`."""
     x, y = finite_numbers(name, values, 2)
     return x, y
 
@@ -45,7 +45,7 @@ def finite(name: str, value: float) -> float:
     """The value as a float.
 
     Raises:
-        TaskError: It is not a finite number, or beyond `LARGEST`.
+        TaskError: It is not a finite number within +-`LARGEST`.
     """
     try:
         number = float(value)
@@ -66,7 +66,7 @@ def positive(name: str, value: float) -> float:
     """The value as a float.
 
     Raises:
-        TaskError: It is not a finite number above 0.
+        TaskError: It is not a number from `SMALLEST` to `LARGEST`.
     """
     number = finite(name, value)
     if number <= 0.0:
@@ -80,7 +80,7 @@ def not_negative(name: str, value: float) -> float:
     """The value as a float.
 
     Raises:
-        TaskError: It is not a finite number of at least 0.
+        TaskError: It is not a number from 0 to `LARGEST`.
     """
     number = finite(name, value)
     if number < 0.0:
@@ -89,10 +89,10 @@ def not_negative(name: str, value: float) -> float:
 
 
 def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
-    """Accepts one of the allowed values.
+    """Checks that the value is one of the allowed values.
 
     Raises:
-        TaskError: It is another one.
+        TaskError: It is not.
     """
     if value not in allowed:
         choices = ", ".join(map(repr, allowed))
@@ -126,16 +126,16 @@ def steps_of(horizon: float) -> int:
     if steps > MOST_STEPS:
         raise TaskError(
             f"expected a horizon of at most {MOST_STEPS} steps, got {steps}: "
-            "give faster wheels or longer steps"
+            "use faster wheels or a longer time step"
         )
     return steps
 
 
 def check_reset_options(options: dict[str, Any]) -> None:
-    """Refuses options of `reset` that are neither a start nor a goal.
+    """Checks that `reset` has no options other than `start` and `goal`.
 
     Raises:
-        TaskError: There is another one.
+        TaskError: It has.
     """
     unknown = sorted(map(str, options.keys() - {"start", "goal"}))
     if unknown:

@@ -1,7 +1,7 @@
-"""The one door to compiled code: numba's `njit`, with a cache that can be trusted.
+"""Decorators for compiled code: numba's `njit` with a cache that can be trusted.
 
-numba compiles a kernel when it is first called, and keeps the machine code on disk for
-later processes, in the folder of `tdac_envs.core.code_cache`.
+numba compiles a kernel at its first call and keeps the machine code for later processes
+in the folder of `tdac_envs.core.code_cache`.
 """
 
 from __future__ import annotations
@@ -20,42 +20,42 @@ from tdac_envs.core.code_cache import cache_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-TELL_SECONDS = 5.0
+REPORT_SECONDS = 5.0
 KERNELS: list[Any] = []
-"""All of the modules that have been imported."""
+"""All kernels of the modules imported so far."""
 
 
 def kernel(function: F) -> F:
-    """Compiles a function at its first call, or loads what is on disk; a decorator.
+    """Decorator: compiles a function at its first call, or loads it from disk.
 
-    All calls from Python have the same types: numbers are float or int as annotated,
-    arrays that are only read are `constant`. Each further combination would be compiled
-    on its own, and numba does not keep several on disk if processes write at once.
+    All calls from Python must use the same types: numbers are float or int as
+    annotated, arrays that are only read are `constant`. Each other combination is
+    compiled separately, and numba may lose some if processes write at the same time.
 
-    With `NUMBA_DISABLE_JIT=1` the function stays as it is.
+    With `NUMBA_DISABLE_JIT=1` the function is not compiled.
     """
     folder = cache_folder()
-    # The functions of others keep the place that they have.
-    others, config.CACHE_DIR = config.CACHE_DIR, str(folder or "")
+    # Functions of other packages keep their own cache folder.
+    previous, config.CACHE_DIR = config.CACHE_DIR, str(folder or "")
     try:
-        made: F = njit(nogil=True, cache=folder is not None)(function)
+        compiled: F = njit(nogil=True, cache=folder is not None)(function)
     finally:
-        config.CACHE_DIR = others
-    KERNELS.append(made)
-    return made
+        config.CACHE_DIR = previous
+    KERNELS.append(compiled)
+    return compiled
 
 
 def subkernel(function: F) -> F:
-    """Compiles a function into the kernels that call it; a decorator."""
-    made: F = njit(nogil=True)(function)
-    return made
+    """Decorator: compiles a function as part of the kernels that call it."""
+    compiled: F = njit(nogil=True)(function)
+    return compiled
 
 
 def constant(array: NDArray[Any], dtype: DTypeLike | None = None) -> NDArray[Any]:
-    """The array as kernels take what they only read: C-contiguous and read-only.
+    """A C-contiguous, read-only view of an array that kernels only read.
 
-    To numba that is another type than an array that can be written to. It is copied
-    where it is of another dtype.
+    For numba it has a different type than a writeable array. The data is copied only
+    if it is not contiguous or has another dtype.
     """
     view = np.ascontiguousarray(array, dtype).view()
     view.flags.writeable = False
@@ -63,21 +63,21 @@ def constant(array: NDArray[Any], dtype: DTypeLike | None = None) -> NDArray[Any
 
 
 class _Progress(event.Listener):  # type: ignore[misc]
-    """Says on standard error what takes so long: compiling takes many seconds."""
+    """Reports on stderr that kernels are compiled, which takes many seconds."""
 
     def __init__(self) -> None:
-        self._told = -TELL_SECONDS
+        self._reported = -REPORT_SECONDS
 
     def on_start(self, event: Any) -> None:
         if event.data["dispatcher"] not in KERNELS:
             return
         now = time.monotonic()
-        if now - self._told >= TELL_SECONDS:
-            self._told = now
+        if now - self._reported >= REPORT_SECONDS:
+            self._reported = now
             done = sum(bool(each.signatures) for each in KERNELS)
             count = f"kernel {done + 1} of at most {len(KERNELS)}"
-            told = f"compiling for this machine, kept for the next time: {count}"
-            print(f"tdac: {told}", file=sys.stderr, flush=True)
+            message = f"compiling for this machine, cached for later runs: {count}"
+            print(f"tdac: {message}", file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
         pass
@@ -86,7 +86,5 @@ class _Progress(event.Listener):  # type: ignore[misc]
 event.register("numba:compile", _Progress())
 
 if config.DISABLE_JIT:
-    told = (
-        "NUMBA_DISABLE_JIT: nothing is compiled, steps take hundreds of times as long"
-    )
-    print(f"tdac: {told}", file=sys.stderr, flush=True)
+    warning = "NUMBA_DISABLE_JIT is set: nothing is compiled, steps are much slower"
+    print(f"tdac: {warning}", file=sys.stderr, flush=True)

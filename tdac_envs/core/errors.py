@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 LONGEST = 200
-"""Characters that are quoted from a file, at most."""
+"""Most characters that an error quotes from a file."""
 
 
 class TdacError(Exception):
-    """Something the user gave cannot be used; the message says what and what to do."""
+    """An input cannot be used; the message says why and what to do."""
 
 
 class MapError(TdacError):
@@ -26,12 +26,12 @@ class TaskError(TdacError):
 
 
 class PolarityError(TaskError):
-    """Dark or light obstacles: both are likely, and only the user can tell.
+    """Dark and light obstacles are both likely: the user must choose.
 
     Attributes:
-        name: Of the map.
-        pictures: By polarity, what shows it: colours, grid and parameters.
-        folder: Where the command line writes both previews, if it is asked for.
+        name: Name of the map.
+        pictures: Image, grid and parameters of the preview of each polarity.
+        folder: Folder for both previews, set by the command line; None for the default.
     """
 
     def __init__(
@@ -52,49 +52,49 @@ class WorldFileError(WorldError):
 
 
 def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
-    """The first thing that a model refuses: `place.in.it: what is wrong`.
+    """The first problem of a validation error, as `path.to.key: problem`.
 
-    A key that it does not know comes first: another one may be missing for that.
+    Unknown keys come first: a misspelt key also makes the right one missing.
 
     Args:
-        error: The refusal.
-        known: The model's keys, one of which may be meant.
+        error: Error of a pydantic model.
+        known: The model's keys, to suggest one for an unknown key.
     """
     problems = error.errors(include_url=False)
     unknown = (p for p in problems if p["type"] == "extra_forbidden")
     first = next(unknown, problems[0])
     place = ".".join(map(str, first["loc"]))[:LONGEST]
-    reason = _PLAINLY.get(first["type"], first["msg"].removeprefix("Value error, "))
+    reason = _REASONS.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "extra_forbidden":
         reason += hint(place, known)
     return f"{place}: {reason}" if place else reason
 
 
 def why(error: Exception) -> str:
-    """Why a file cannot be used, in a line: it cannot be read, or says nonsense."""
+    """Why a file cannot be used, in one line: its OS error or its first problem."""
     from pydantic import ValidationError
 
     if isinstance(error, ValidationError):
         return first_problem(error)
-    told = error.strerror if isinstance(error, OSError) else error
-    return " ".join(str(told).split())[:LONGEST]
+    reason = error.strerror if isinstance(error, OSError) else error
+    return " ".join(str(reason).split())[:LONGEST]
 
 
 def hint(typed: str, known: Iterable[str]) -> str:
-    """In brackets, the name that may be meant; empty where none is like it."""
+    """The suffix " (did you mean 'NAME'?)"; empty if no known name is similar."""
     meant = nearest(typed, known)
     return f" (did you mean {meant!r}?)" if meant else ""
 
 
 def nearest(typed: str, known: Iterable[str]) -> str | None:
-    """The one of some names that is most like what was typed, where one is."""
-    import difflib  # not when the environments are imported
+    """The known name most similar to what was typed, or None."""
+    import difflib  # late, to keep the import of the environments fast
 
     return next(iter(difflib.get_close_matches(typed, list(known), n=1)), None)
 
 
-_PLAINLY = {
-    "extra_forbidden": "there is no such key",
+_REASONS = {
+    "extra_forbidden": "unknown key",
     "missing": "is missing",
-    "model_type": "expected keys with their values",
+    "model_type": "expected a mapping",
 }

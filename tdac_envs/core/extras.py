@@ -1,4 +1,4 @@
-"""How an extra is added to this installation."""
+"""The pip command that adds an extra to this installation."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ PACKAGE = "tdac"
 
 
 def install_command(extra: str) -> str:
-    """The command that adds an extra, from where the package itself came from.
+    """The command that installs an extra from the source of the package itself.
 
-    That is on record beside an installed package unless it came from an index
+    An installed package has a record of its source unless it came from an index
     (PEP 610).
 
     Args:
-        extra: Of `pyproject.toml`, e.g. `sb3`.
+        extra: Name of an extra in `pyproject.toml`, e.g. `sb3`.
     """
-    return f"{_pip()} install {' '.join(_source(f'[{extra}]'))}"
+    return f"{_pip()} install {' '.join(_requirement(f'[{extra}]'))}"
 
 
 def _pip() -> str:
-    """As it is to be typed for this interpreter."""
+    """The pip command of this interpreter."""
     found = shutil.which("pip")
     if found is not None and Path(found).parent == Path(sys.executable).parent:
         return "pip"
     return f"{shlex.quote(sys.executable)} -m pip"
 
 
-def _source(extra: str) -> list[str]:
-    """What pip is told to install, an extra of it included."""
+def _requirement(extra: str) -> list[str]:
+    """Arguments of `pip install` for this package with an extra, e.g. `[sb3]`."""
     try:
         text = metadata.distribution(PACKAGE).read_text("direct_url.json")
     except metadata.PackageNotFoundError:

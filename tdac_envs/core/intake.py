@@ -1,8 +1,8 @@
-"""Files from anybody: only regular ones of a limited size, only values of sane ones.
+"""Reads untrusted files: regular ones of limited size, with sane values.
 
-Every file that may come from somebody else is read by `read_file`; every YAML or JSON
-in it by `parse_yaml` or `parse_json`. What they cannot take is an OSError or a
-ValueError with one line, whatever is in the file.
+Every file that another person may have written is read by `read_file`, and its YAML or
+JSON by `parse_yaml` or `parse_json`. Whatever the file contains, the only errors are
+OSError and ValueError, with a one-line message.
 """
 
 from __future__ import annotations
@@ -25,33 +25,33 @@ from numpy.typing import NDArray
 from tdac_envs.core.errors import LONGEST
 
 TEXT_BYTES = 1_000_000
-"""Largest file that a person writes."""
+"""Size limit of a file that people write."""
 RECORD_BYTES = 32_000_000
-"""Largest file that this program writes of a run, but for pictures and arrays."""
+"""Size limit of a file of a run, except pictures and arrays."""
 IMAGE_BYTES = 512_000_000
-"""Largest picture or grid: 64 megapixels, 8 bytes each."""
+"""Size limit of a picture or grid: 64 megapixels of 8 bytes."""
 
 _MOST_NODES = 20_000
 _DEEPEST = 64
 _INTEGERS = range(-(2**63), 2**63)
 _MOST_DIGITS = 100
 _MOST_FILES = 10_000
-# Others are unpacked as a whole, however little of it is asked for.
+# With other methods, zipfile does not limit the size of what it unpacks at once.
 _BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
     """The bytes of a regular file.
 
-    Nothing is waited for: a pipe or a device is refused as soon as it is open.
+    Never blocks: a pipe or a device is refused as soon as it is open.
 
     Args:
         path: The file; links are followed.
-        most: Bytes that it may have.
-        offset: Of the first byte that is wanted.
+        most: Maximum number of bytes from `offset` on.
+        offset: Index of the first byte to read.
 
     Raises:
-        OSError: There is none, or it is something else, or larger; `strerror` says so.
+        OSError: The file is missing, not regular or too large; `strerror` says which.
     """
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
@@ -60,7 +60,7 @@ def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
             raise _refused(errno.EINVAL, "not a regular file", path) from None
         raise
     except ValueError:  # a null character, or a lone surrogate
-        raise _refused(errno.EINVAL, "not the name of a file", path) from None
+        raise _refused(errno.EINVAL, "not a valid file name", path) from None
     try:
         status = os.fstat(handle)
         mode = status.st_mode
@@ -70,7 +70,7 @@ def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
             raise _refused(errno.EINVAL, "not a regular file", path)
         if status.st_size - offset > most:
             raise _too_large(most, path)
-        # Some files of /proc are regular, have no size, and do not end.
+        # Some files in /proc are regular, report size 0 and never end.
         with open(handle, "rb", closefd=False) as file:
             file.seek(offset)
             data = file.read(most + 1)
@@ -80,7 +80,7 @@ def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
         raise
     finally:
         os.close(handle)
-    if data is None:  # nothing yet: it is regular by its name only
+    if data is None:  # no data yet: it only claims to be regular
         raise _refused(errno.EINVAL, "not a regular file", path)
     if len(data) > most:
         raise _too_large(most, path)
@@ -96,10 +96,10 @@ def _refused(number: int, why: str, path: str | Path) -> OSError:
 
 
 def read_array(data: bytes) -> NDArray[Any]:
-    """The array in the bytes of a `.npy` file; its size is told by its header first.
+    """The array in the bytes of a `.npy` file; the size in its header is checked first.
 
     Raises:
-        ValueError: They are of something else, or of less than the header says.
+        ValueError: It is not a `.npy` file of numbers, or its size is not as declared.
     """
     content = io.BytesIO(data)
     try:
@@ -107,13 +107,15 @@ def read_array(data: bytes) -> NDArray[Any]:
             header = np.lib.format.read_array_header_1_0(content)
         else:
             header = np.lib.format.read_array_header_2_0(content)
-    # The header is a literal of Python, which has errors of its own.
+    # The header is a Python literal; parsing it may raise any error.
     except Exception as error:
         raise ValueError(f"not a .npy file: {one_line(error)}") from None
     shape, fortran, dtype = header
     rest = memoryview(data)[content.tell() :]
     if dtype.kind not in "biuf" or math.prod(shape) * dtype.itemsize != len(rest):
-        raise ValueError(f"expected {shape} numbers, got {len(rest)} bytes of {dtype}")
+        raise ValueError(
+            f"expected numbers of shape {shape}, got {len(rest)} bytes of {dtype}"
+        )
     flat = np.frombuffer(rest, dtype)
     return flat.reshape(shape, order="F" if fortran else "C")
 
@@ -121,37 +123,37 @@ def read_array(data: bytes) -> NDArray[Any]:
 def read_zip(
     data: bytes, most: int, wanted: Collection[str] | None = None
 ) -> dict[str, bytes]:
-    """The files in a zip file by their names.
+    """The contents of the files in a zip file, by file name.
 
-    What its directory says of their sizes is added up before anything is unpacked, and
-    nothing is unpacked beyond what it says.
+    The sizes in its directory are checked before anything is unpacked, and no file is
+    unpacked beyond its declared size.
 
     Args:
-        data: Of the zip file.
-        most: Bytes that those that are wanted may have together.
-        wanted: Names of those that are; all of them by default.
+        data: Bytes of the zip file.
+        most: Maximum total size of the wanted files, bytes.
+        wanted: Names of the files to read; all by default.
 
     Raises:
-        ValueError: It is no zip file, damaged, or holds more.
+        ValueError: It is not a zip file, is damaged, or a limit is exceeded.
     """
-    # The directory is read as a whole; each file in it has this mark there.
+    # zipfile reads the whole directory, in which each file has this signature.
     if data.count(b"PK\x01\x02") > _MOST_FILES:
-        raise ValueError(f"a zip file with more than {_MOST_FILES} files in it")
+        raise ValueError(f"more than {_MOST_FILES} files in the zip file")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            there = [
+            items = [
                 item
                 for item in archive.infolist()
                 if wanted is None or item.filename in wanted
             ]
-            if any(item.compress_type not in _BOUNDED for item in there):
-                raise ValueError("packed by a method that is not used here")
-            if sum(item.file_size for item in there) > most:
+            if any(item.compress_type not in _BOUNDED for item in items):
+                raise ValueError("unsupported compression method in the zip file")
+            if sum(item.file_size for item in items) > most:
                 raise ValueError(f"more than {most / 1e6:g} MB when unpacked")
-            return {item.filename: archive.read(item) for item in there}
+            return {item.filename: archive.read(item) for item in items}
     except ValueError:
         raise
-    # zipfile and zlib have dozens of errors for a damaged file.
+    # zipfile and zlib raise dozens of error types for a damaged file.
     except Exception as error:
         raise ValueError(f"a damaged zip file: {one_line(error)}") from None
 
@@ -160,16 +162,16 @@ def parse_yaml(text: bytes) -> Any:
     """The value in a YAML text.
 
     Raises:
-        ValueError: It is not YAML, or no value that `check` takes; one line says why.
+        ValueError: It is not YAML, or `check` refuses the value.
     """
     try:
         value = yaml.load(text.decode("utf-8-sig"), _Loader)
     except yaml.MarkedYAMLError as error:
         where = error.problem_mark or error.context_mark
         line = f"line {where.line + 1}: " if where else ""
-        told = one_line(error.problem or error.context)
-        raise ValueError(f"not valid YAML: {line}{told}") from None
-    # The constructors of dates, numbers and tags have dozens of errors.
+        problem = one_line(error.problem or error.context)
+        raise ValueError(f"not valid YAML: {line}{problem}") from None
+    # The constructors of dates, numbers and tags raise dozens of error types.
     except Exception as error:
         raise ValueError(f"not valid YAML: {one_line(error)}") from None
     check(value)
@@ -180,7 +182,7 @@ def parse_json(text: bytes) -> Any:
     """The value in a JSON text.
 
     Raises:
-        ValueError: It is not JSON, or no value that `check` takes; one line says why.
+        ValueError: It is not JSON, or `check` refuses the value.
     """
     try:
         value = json.loads(text.decode("utf-8-sig"))
@@ -191,25 +193,25 @@ def parse_json(text: bytes) -> Any:
 
 
 def one_line(error: object) -> str:
-    """What an error says, in a line that is not too long."""
+    """The message of an error as one line of limited length."""
     return " ".join(str(error).split())[:LONGEST] or type(error).__name__
 
 
 def printable(name: str) -> str:
-    """The name of a file with `?` for what cannot be shown, not too long."""
+    """A file name of limited length, with `?` for unprintable characters."""
     return "".join(c if c.isprintable() else "?" for c in name[:LONGEST])
 
 
 def check(value: Any, *, any_text: bool = False) -> None:
-    """Refuses what no file of ours has, wherever it is in a value.
+    """Checks all parts of a value from a YAML or JSON file.
 
     Args:
-        value: As YAML or JSON has it.
-        any_text: Whether a text may have lone surrogates, as an answer of a model.
+        value: The parsed value.
+        any_text: Whether strings may have lone surrogates, as replies of models do.
 
     Raises:
-        ValueError: A number is not finite or has more than 64 bits, a text has a lone
-            surrogate, or it is nested too deeply.
+        ValueError: A number is not finite or has more than 64 bits, a string has a lone
+            surrogate, or the value is nested too deeply.
     """
     level: list[Any] = [value]
     for _ in range(_DEEPEST):
@@ -220,7 +222,7 @@ def check(value: Any, *, any_text: bool = False) -> None:
 
 
 def _parts(value: Any, any_text: bool) -> Iterator[Any]:
-    """What a value is made of, unless there is something wrong with it itself."""
+    """Yields the parts of a container; raises ValueError for an invalid scalar."""
     if isinstance(value, dict):
         yield from value.keys()
         yield from value.values()
@@ -229,9 +231,9 @@ def _parts(value: Any, any_text: bool) -> Iterator[Any]:
     elif isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{value} is not a finite number")
     elif isinstance(value, int) and value not in _INTEGERS:
-        raise ValueError("a whole number has more than 64 bits")
+        raise ValueError("an integer has more than 64 bits")
     elif isinstance(value, str) and not any_text and not _is_unicode(value):
-        raise ValueError("a text has half of a surrogate pair, which is no character")
+        raise ValueError("a string has a lone surrogate, which is not a character")
 
 
 def _is_unicode(text: str) -> bool:
@@ -243,7 +245,7 @@ def _is_unicode(text: str) -> bool:
 
 
 class _Loader(yaml.SafeLoader):
-    """Stops at many nodes, which aliases multiply, and at deep ones."""
+    """Limits the depth, and the number of nodes with aliases expanded."""
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)
@@ -253,7 +255,7 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: Any, index: Any) -> Any:
         event = self.peek_event()  # type: ignore[no-untyped-call]
         if isinstance(event, yaml.AliasEvent):
-            # An alias inside its own anchor would never end.
+            # An alias inside its own anchor would expand forever.
             self._nodes += self._nodes_of.get(str(event.anchor), _MOST_NODES)
             self._refuse_large(event)
             return super().compose_node(parent, index)
@@ -267,19 +269,19 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def construct_yaml_int(self, node: Any) -> int:
-        # One in base 60 or 2 takes the time of its length squared.
+        # Parsing takes quadratic time in base 60 and base 2.
         if len(self.construct_scalar(node)) > _MOST_DIGITS:
-            raise ValueError(f"a whole number has more than {_MOST_DIGITS} digits")
+            raise ValueError(f"an integer has more than {_MOST_DIGITS} digits")
         return super().construct_yaml_int(node)
 
     def _refuse_large(self, event: Any) -> None:
         if self._depth > _DEEPEST:
-            told = f"nested deeper than {_DEEPEST} levels"
+            problem = f"nested deeper than {_DEEPEST} levels"
         elif self._nodes > _MOST_NODES:
-            told = f"more than {_MOST_NODES} values"
+            problem = f"more than {_MOST_NODES} values"
         else:
             return
-        raise yaml.MarkedYAMLError(problem=told, problem_mark=event.start_mark)
+        raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
 
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)

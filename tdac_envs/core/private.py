@@ -1,4 +1,4 @@
-"""Folders that nobody else can have written to: what is executed may lie there."""
+"""Folders that no other user can write to, so that code in them can be trusted."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-# A full disk would be found out when a kernel has been compiled, by an error.
+# Bytes. On a full disk, numba would fail only after it has compiled a kernel.
 LEAST_FREE = 100_000_000
 
 
 def user_cache() -> Path | None:
-    """The user's folder for what can be made again; None for a user without a home."""
+    """The user's cache folder; None for a user without a home."""
     return _user_folder("XDG_CACHE_HOME", ".cache")
 
 
 def user_state() -> Path | None:
-    """The user's folder for what lasts, and is neither data nor a setting."""
+    """The user's folder for persistent state; None for a user without a home."""
     return _user_folder("XDG_STATE_HOME", ".local/state")
 
 
@@ -36,29 +36,28 @@ def _user_folder(variable: str, below_home: str) -> Path | None:
 
 
 def is_usable(folder: Path, mode: int = 0o700) -> bool:
-    """Whether code may be kept there and believed later.
+    """Whether code can be stored in the folder and trusted later.
 
-    Makes the folder if need be. It must be private and writable, with some room left
-    on the disk.
+    Creates the folder if needed. It must be private and writable, with at least
+    `LEAST_FREE` bytes free on the disk.
     """
     try:
         folder.mkdir(mode, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
-            room = os.statvfs(folder)
+            disk = os.statvfs(folder)
     except OSError:
         return False
-    return room.f_bavail * room.f_frsize >= LEAST_FREE and is_private(folder)
+    return disk.f_bavail * disk.f_frsize >= LEAST_FREE and is_private(folder)
 
 
 def is_private(folder: Path) -> bool:
-    """Whether only this user and the superuser can have written there.
+    """Whether only this user and the superuser can have written to the folder.
 
-    True where the folder, those above it and all that is in it belong to one of the
-    two, nobody else may write there (folders above may be sticky), and nothing in it
-    is a link.
+    True if the folder, its parents and its contents belong to one of the two, nobody
+    else may write to them (parents may be sticky), and nothing in it is a link.
     """
     try:
-        # A folder above may be a link that the owner of its parent has made.
+        # A parent may be a link: both its own parents and its target's are checked.
         parents = [*folder.parent.absolute().parents, folder.parent]
         above = {*parents, *folder.parent.resolve(strict=True).parents}
         above.add(folder.parent.resolve())
@@ -70,7 +69,7 @@ def is_private(folder: Path) -> bool:
 
 
 def copy(source: Path, target: Path) -> None:
-    """Copies a folder, to be read by this user alone: whole, or not at all."""
+    """Copies a folder completely or not at all; only this user can read the copy."""
     with contextlib.suppress(OSError):
         target.parent.mkdir(0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent) as aside:
@@ -81,7 +80,7 @@ def copy(source: Path, target: Path) -> None:
 
 
 def _inside(folder: Path) -> Iterator[os.stat_result]:
-    """Of the folder and everything in it, links not followed."""
+    """Status of the folder and of everything in it; links are not followed."""
     yield folder.lstat()
     with os.scandir(folder) as entries:
         for entry in entries:
@@ -102,7 +101,7 @@ def _is_ours(status: os.stat_result, *, sticky: bool = False) -> bool:
 
 
 def _has_no_others(group: int) -> bool:
-    """Whether a group is the user's own, of which nobody else is a member."""
+    """Whether a group is the user's own and has no other members."""
     with contextlib.suppress(KeyError):
         user, known = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
         alone = not set(known.gr_mem) - {user.pw_name}

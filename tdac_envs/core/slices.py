@@ -1,4 +1,4 @@
-"""A compiled loop over many rows, on several threads."""
+"""Runs a compiled loop over many rows on several threads."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 Rows = NDArray[np.int64]
 
-# Rows for which a further thread pays.
+# Rows per thread from which another thread is worthwhile.
 _LEAST = 64
 
 
 class Slices:
-    """Threads among which the rows of a loop are divided.
+    """A pool of threads that share the rows of a loop.
 
-    The caller's thread takes the first slice. A process that was forked has threads of
-    its own. Where they cannot be started, the caller's does all.
+    The caller's thread takes the first slice. A forked process starts its own threads.
+    If threads cannot be started, the caller's thread takes all rows.
 
     Args:
-        threads: How many work at a time; by default as many as there are cores.
+        threads: Number of threads, including the caller's; by default one per core.
     """
 
     def __init__(self, threads: int | None = None) -> None:
@@ -33,61 +33,61 @@ class Slices:
         self._process = os.getpid()
 
     def run(self, loop: Callable[[Rows], object], rows: Rows) -> None:
-        """Calls a loop on all rows, some at a time; returns when all of it is done.
+        """Calls the loop on slices of the rows in parallel; returns when all are done.
 
         Args:
-            loop: Takes numbers of rows, and releases the GIL.
-            rows: Their numbers, in any order, none of them twice.
+            loop: Takes row indices and releases the GIL.
+            rows: Row indices in any order, without duplicates.
         """
         count = min(self._threads, -(-len(rows) // _LEAST))
-        executor = self._at_work() if count > 1 else None
+        executor = self._running() if count > 1 else None
         if executor is None:
             loop(rows)
             return
         own, *others = np.array_split(rows, count)
         try:
-            given = [executor.submit(loop, each) for each in others]
+            futures = [executor.submit(loop, each) for each in others]
             loop(own)
-            for each in given:
-                each.result()
+            for future in futures:
+                future.result()
         except BaseException:
-            # Nobody may see, or change, rows that are still being worked on.
+            # The caller must not touch rows while threads still work on them.
             self.close(wait=True)
             raise
 
     def close(self, *, wait: bool = False) -> None:
-        """Ends the threads; the next call starts them again."""
+        """Stops the threads; the next `run` starts them again."""
         executor, self._executor = self._executor, None
         if executor is not None and self._process == os.getpid():
             executor.shutdown(wait=wait)
 
-    def _at_work(self) -> ThreadPoolExecutor | None:
-        # Threads do not outlive a fork.
+    def _running(self) -> ThreadPoolExecutor | None:
+        # Threads do not survive a fork.
         if self._executor is None or self._process != os.getpid():
             self._process = os.getpid()
             self._executor = self._started()
         return self._executor
 
     def _started(self) -> ThreadPoolExecutor | None:
-        """Threads that are there, so that no call fails half-way for want of one."""
+        """Starts all threads at once, so that no later call fails half-way."""
         executor = ThreadPoolExecutor(self._threads - 1, "tdac-rows")
-        there = threading.Barrier(self._threads)
+        barrier = threading.Barrier(self._threads)
         try:
             for _ in range(self._threads - 1):
-                executor.submit(there.wait)
+                executor.submit(barrier.wait)
         except (OSError, RuntimeError) as error:
-            there.abort()
+            barrier.abort()
             executor.shutdown()
-            told = f"1 thread instead of {self._threads}: {error}"
-            warnings.warn(told, RuntimeWarning, stacklevel=6)
+            warning = f"using 1 thread instead of {self._threads}: {error}"
+            warnings.warn(warning, RuntimeWarning, stacklevel=6)
             self._threads = 1
             return None
-        there.wait()
+        barrier.wait()
         return executor
 
 
 def _cores() -> int:
-    """How many this process may use; elsewhere than on Linux, how many there are."""
+    """Number of cores that this process may use; outside Linux, of all cores."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -91,7 +91,7 @@ def test_it_is_called_scripted_costs_nothing_and_gives_no_rules(chosen):
         ({"generate": [{"file": "a.py", "parameters": {"x": 1}}]}, "a file, or"),
         ({"generate": [{"weight": 0}]}, "generate.0.weight: .*greater than 0"),
         ({"edit": []}, "edit: .*at least 1 item"),
-        ({"speed": 1}, "speed: there is no such key"),
+        ({"speed": 1}, "speed: unknown key"),
     ],
 )
 def test_a_wrong_script_is_refused_in_a_line(content, message, chosen):

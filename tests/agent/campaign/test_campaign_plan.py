@@ -115,7 +115,7 @@ def test_a_setting_is_a_loop_and_the_loop_tells_the_setting(setting, loop, writt
         ({"runs": 0}, "few.yaml: runs: .*greater than or equal to 1"),
         (
             {"runz": 3},
-            r"few.yaml: runz: there is no such key \(did you mean 'runs'\?\)",
+            r"few.yaml: runz: unknown key \(did you mean 'runs'\?\)",
         ),
         ({"learners": ["nosuch"]}, "unknown model 'nosuch'; known: builtin"),
         ({"tasks": ["small", "small"]}, "tasks: 'small' is there twice"),

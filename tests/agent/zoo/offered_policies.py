@@ -157,7 +157,7 @@ OFFERS = [
     ),
     _offer("kwargs_list", policy(DATA | {"policy_kwargs": [1]}), "`data` is damaged"),
     _offer("kwargs_code", kwargs(features_extractor_class="<class 'os.X'>"), "is code"),
-    _offer("kwargs_unknown", kwargs(anything=1), "no such key"),
+    _offer("kwargs_unknown", kwargs(anything=1), "unknown key"),
     _offer("wide_layer", kwargs(net_arch=[10**9]), "net_arch"),
     _offer("many_layers", kwargs(net_arch=[8] * 10_000), "net_arch"),
     _offer("no_layer", kwargs(net_arch=[-1]), "net_arch"),
@@ -178,7 +178,7 @@ OFFERS = [
     _offer("said_torn", policy(said=b"{"), "tdac.json"),
     _offer("said_deep", policy(said=b"[" * 9999), "nested deeper"),
     _offer("said_wrapper", policy(said=SAID | {"wrappers": ["os"]}), "unknown wrapper"),
-    _offer("said_unknown", policy(said=SAID | {"run": "x"}), "no such key"),
+    _offer("said_unknown", policy(said=SAID | {"run": "x"}), "unknown key"),
     _offer("beside_pipe", _beside(pipe("policy.json")), "does not say which", True),
     _offer("beside_deep", _beside(text("policy.json", "[" * 9999)), "nested deeper"),
 ]

@@ -29,7 +29,7 @@ STEP = (
     "env.reset(seed=0)\n"
     "print(env.step(env.action_space.high)[0]['pose'].tolist())\n"
 )
-COMPILING = "tdac: compiling for this machine, kept for the next time: "
+COMPILING = "tdac: compiling for this machine, cached for later runs: "
 
 
 def run(script, **variables):

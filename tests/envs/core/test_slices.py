@@ -118,7 +118,7 @@ def test_where_no_thread_can_be_started_the_caller_s_does_all():
         "assert (values == 3 * (1 + np.arange(500))).all()\n"
         "print(*(str(each.message) for each in told), sep='\\n')\n"
     )
-    assert told == "1 thread instead of 4: can't start new thread\n"
+    assert told == "using 1 thread instead of 4: can't start new thread\n"
 
 
 def test_first_calls_in_two_threads_at_once():
