@@ -1,1 +1,1 @@
-"""Occupancy grids: distances to obstacles, shortest paths, metres."""
+"""Occupancy grids: distances to obstacles, shortest paths, map frames."""

@@ -1,7 +1,7 @@
 """A* on a grid: 8-connected, octile cost, no corner cutting.
 
-It leaves exact lengths on every shortest path, not just on one, so that a descent takes
-the path that it would take on a whole `plan.distance_field`.
+The lengths are exact on all shortest paths, not just on one: a descent takes the same
+path as on a complete `plan.distance_field`.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ Lengths = NDArray[np.float64]
 _DX = np.array([1, -1, 0, 0, 1, 1, -1, -1])
 _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _SQRT2 = 2.0**0.5
-_BITS, _WAY = 4, 15
-"""Of an entry in a bucket, the direction in which its pixel was reached."""
-_ALL_WAYS = 8
-"""Stands for no direction: nothing led here."""
+_BITS, _DIRECTION = 4, 15
+"""The low bits of a bucket's entry: the direction in which its pixel was reached."""
+_NO_DIRECTION = 8
+"""Direction of the first pixel, to which no step leads."""
 _ONWARD = np.array([1 << k for k in range(4)] + [0x15, 0x29, 0x46, 0x8A] + [0xFF])
-"""Bits of the directions in which to go on, by that from which a pixel was reached."""
+"""Bits of the directions to search, by the direction in which a pixel was reached."""
 _ASIDE = np.array([[0x14, 0x28], [0x44, 0x88], [0x11, 0x42], [0x21, 0x82]])
-"""Further ones after a straight step, for a wall on either side of where it began."""
+"""Bits to add after a straight step, for a wall on either side of its origin."""
 _PER_PIXEL = 2
-"""Buckets for each px of a way's length: within half a px few ways cross."""
+"""Buckets per px of path length: within half a px, few pixels are reached twice."""
 _BUCKETS = 8
-"""A power of two above `2 sqrt(2) _PER_PIXEL`, the most that one step adds."""
+"""A power of two above `2 sqrt(2) _PER_PIXEL`, the largest increase by one step."""
 _PIXELS_PER_ENTRY = 4
-"""Of the map, for each entry of a bucket at first."""
+"""Pixels of the map per entry of a bucket of initial size."""
 ROUNDING = 1e-6
-"""More than the rounding of a sum of steps; other lengths differ by above 1e-5 px."""
+"""Above the rounding error of a sum of steps; distinct lengths differ by > 1e-5 px."""
 _LEVEL, _DONE, _COUNTS = 0, 1, 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Guide:
-    """A search from the start, which tells later ones in less space how far it is.
+    """Lengths from the start, a heuristic for searches in subsets of the same space.
 
     Attributes:
         lengths: Shape (height + 2, width + 2), float64, from `lengths_between`.
@@ -59,13 +59,13 @@ def lengths_between(
 
     Args:
         free: Shape (height, width), bool, True where the path may go.
-        start: Pixel (x, y), which is free.
-        goal: Pixel (x, y), which is free.
-        guide: Of the search from this goal to this start in `free` or in more.
+        start: Free pixel (x, y).
+        goal: Free pixel (x, y).
+        guide: Result of a search in the other direction, in `free` or a superset.
 
     Returns:
-        Shape (height + 2, width + 2), float64, with a border: no less than the true
-        length elsewhere, inf at the start where there is no path, and -1 where no
+        Shape (height + 2, width + 2), float64, with a border: an upper bound of the
+        length at other pixels, inf at the start if there is no path, and -1 where no
         path may go.
     """
     height, width = free.shape
@@ -73,25 +73,25 @@ def lengths_between(
     _clear(constant(free), field)
     field[goal[1] + 1, goal[0] + 1] = 0.0
     known = np.empty(0) if guide is None else guide.lengths.ravel()
-    most = 0.0 if guide is None else guide.length
-    # Memory that is never written costs nothing.
+    shortest = 0.0 if guide is None else guide.length
+    # Not initialised: memory that is never written costs nothing.
     buckets = np.empty((_BUCKETS, free.size // _PIXELS_PER_ENTRY + 64), np.int64)
     straight = _octile(goal[0] - start[0], goal[1] - start[1])
     state = np.zeros(_COUNTS + _BUCKETS, np.int64)
-    state[_LEVEL] = int(_PER_PIXEL * max(most, straight))
+    state[_LEVEL] = int(_PER_PIXEL * max(shortest, straight))
     first = int(state[_LEVEL]) % _BUCKETS
     cell = (goal[1] + 1) * (width + 2) + goal[0] + 1
-    buckets[first, 0] = cell << _BITS | _ALL_WAYS
+    buckets[first, 0] = cell << _BITS | _NO_DIRECTION
     state[_COUNTS + first] = 1
     ends = np.array([[start[0], start[1]], [goal[0], goal[1]]]) + 1
-    while not _search(field.ravel(), width + 2, ends, known, most, buckets, state):
+    while not _search(field.ravel(), width + 2, ends, known, shortest, buckets, state):
         buckets = np.pad(buckets, ((0, 0), (0, 3 * buckets.shape[1])))
     return field
 
 
 @kernel
 def _clear(free: BoolGrid, field: Lengths) -> None:
-    """No length is known yet; there is a border that no path crosses."""
+    """Sets all lengths to unknown and the border to impassable."""
     field[0], field[-1], field[:, 0], field[:, -1] = -1.0, -1.0, -1.0, -1.0
     for y in range(free.shape[0]):
         for x in range(free.shape[1]):
@@ -100,45 +100,45 @@ def _clear(free: BoolGrid, field: Lengths) -> None:
 
 @kernel
 def _octile(dx: int, dy: int) -> float:
-    """Length of the shortest path over (dx, dy) where nothing is in the way."""
+    """Length of the shortest path over (dx, dy) without obstacles, px."""
     dx, dy = abs(dx), abs(dy)
     return max(dx, dy) + (_SQRT2 - 1.0) * min(dx, dy)
 
 
 @subkernel
-def _rest(
-    known: Lengths, most: float, ends: NDArray[np.int64], cell: int, x: int, y: int
+def _heuristic(
+    known: Lengths, shortest: float, ends: NDArray[np.int64], cell: int, x: int, y: int
 ) -> float:
-    """At most the length from a pixel to the start; falls no faster than a path grows.
+    """Consistent lower bound of the length from a pixel to the start, px.
 
-    What a guide's search did not settle is at least as far from its start as the rest
-    of its shortest path would be.
+    From a pixel that the guide's search did not settle, the path to the start and the
+    octile distance to the goal are together at least as long as the shortest path.
     """
     straight = _octile(x - ends[0, 0], y - ends[0, 1])
     if known.size == 0:
         return straight
-    beyond = most - _octile(x - ends[1, 0], y - ends[1, 1])
-    return float(max(min(known[cell], beyond), straight))
+    unsettled = shortest - _octile(x - ends[1, 0], y - ends[1, 1])
+    return float(max(min(known[cell], unsettled), straight))
 
 
 @subkernel
-def _ways(field: Lengths, width: int, cell: int, way: int) -> int:
-    """Bits of the directions in which to go on from a pixel that was found by a step.
+def _directions(field: Lengths, width: int, cell: int, direction: int) -> int:
+    """Bits of the directions to search from a pixel that was reached in a direction.
 
-    Where several ways to a pixel are equally long, it is enough to find the one that is
-    diagonal first; the others lead over pixels that are found so as well. Source:
+    Of several equally long paths to a pixel, only the one that starts with its diagonal
+    steps must be found; the pixels on the others are found in the same manner. Source:
     Harabor and Grastien, Online Graph Pruning for Pathfinding on Grid Maps, AAAI 2011,
-    here for steps that cut no corner.
+    adapted to steps that cut no corner.
     """
-    ways = _ONWARD[way]
-    if way < 4:
-        came = cell - _DY[way] * width - _DX[way]
-        side = width if way < 2 else 1
-        if field[came + side] < 0.0:
-            ways |= _ASIDE[way, 0]
-        if field[came - side] < 0.0:
-            ways |= _ASIDE[way, 1]
-    return int(ways)
+    found = _ONWARD[direction]
+    if direction < 4:
+        origin = cell - _DY[direction] * width - _DX[direction]
+        side = width if direction < 2 else 1
+        if field[origin + side] < 0.0:
+            found |= _ASIDE[direction, 0]
+        if field[origin - side] < 0.0:
+            found |= _ASIDE[direction, 1]
+    return int(found)
 
 
 @kernel
@@ -147,17 +147,17 @@ def _search(
     width: int,
     ends: NDArray[np.int64],
     known: Lengths,
-    most: float,
+    shortest: float,
     buckets: NDArray[np.int64],
     state: NDArray[np.int64],
 ) -> bool:
-    """Works the buckets off up to the length of the shortest path, or until all are.
+    """Processes the buckets up to the shortest path's length, or until all are empty.
 
-    A bucket holds the pixels whose length with the rest lies within 1/2 px; once it is
-    empty, their lengths are final. The first one is at the state's level.
+    The estimated total lengths of the pixels in a bucket differ by at most 1/2 px; when
+    it is empty, their lengths are final. `state[_LEVEL]` is the first bucket's number.
 
     Returns:
-        False where a bucket has no room; to be called again with more.
+        False if a bucket is full: call again with larger buckets.
     """
     end, room = ends[0, 1] * width + ends[0, 0], buckets.shape[1]
     level, done, empty, fullest = state[_LEVEL], state[_DONE], 0, room
@@ -174,14 +174,15 @@ def _search(
                 if fullest + 8 > room:
                     state[_LEVEL], state[_DONE] = level, done
                     return False
-            cell, way = buckets[bucket, done] >> _BITS, buckets[bucket, done] & _WAY
+            entry = buckets[bucket, done]
+            cell, direction = entry >> _BITS, entry & _DIRECTION
             done += 1
             y = cell // width
             x = cell - y * width
             length = field[cell]
-            ways = _ways(field, width, cell, way)
+            directions = _directions(field, width, cell, direction)
             for k in range(8):
-                if ways >> k & 1 == 0:
+                if directions >> k & 1 == 0:
                     continue
                 i, j = _DX[k], _DY[k]
                 to = cell + j * width + i
@@ -191,9 +192,9 @@ def _search(
                 if k >= 4 and (field[cell + i] < 0.0 or field[to - i] < 0.0):
                     continue
                 field[to] = through
-                whole = through + _rest(known, most, ends, to, x + i, y + j)
-                # Rounding must not reach back into a bucket that is done.
-                into = max(int(_PER_PIXEL * whole), level) & (_BUCKETS - 1)
+                total = through + _heuristic(known, shortest, ends, to, x + i, y + j)
+                # Rounding must not lead back to a bucket that is done.
+                into = max(int(_PER_PIXEL * total), level) & (_BUCKETS - 1)
                 count = state[_COUNTS + into]
                 buckets[into, count] = to << _BITS | k
                 state[_COUNTS + into] = count + 1

@@ -28,8 +28,8 @@ class OccupancyGrid:
     Attributes:
         cells: Shape (height, width), bool, indexed `[y, x]`; True = occupied.
             Stored read-only.
-        resolution: Metres per pixel, or None where the map has no scale.
-        origin: Pose (x, y, yaw) in metres of the lower-left pixel, as in ROS
+        resolution: Metres per pixel; None if the map has no scale.
+        origin: Pose (x, y, yaw) of the lower-left pixel, m and rad, as in ROS
             `map.yaml`.
     """
 
@@ -54,7 +54,7 @@ class OccupancyGrid:
         return hash(self._key())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # NumPy's own pickles are writable again.
+        # An array that NumPy unpickles would be writable.
         return OccupancyGrid, (self.cells, self.resolution, self.origin)
 
     def _key(self) -> tuple[Any, ...]:
@@ -71,7 +71,7 @@ class OccupancyGrid:
         return int(self.cells.shape[0])
 
     def is_occupied(self, x: float, y: float) -> bool:
-        """Whether the point (x, y), in pixels, lies in an obstacle or outside."""
+        """Whether the point (x, y), in pixels, is in an obstacle or outside the map."""
         i, j = int(np.floor(x + 0.5)), int(np.floor(y + 0.5))
         if not (0 <= i < self.width and 0 <= j < self.height):
             return True
@@ -116,10 +116,10 @@ def _clearance(
 ) -> None:
     """Distance transform after Felzenszwalb and Huttenlocher (2012), for squares.
 
-    From x, the square in another column x' is as far as its centre line is from
-    x - 1/2 or x + 1/2, whichever is nearer. So the lower envelope of the columns'
-    parabolas is read at half pixels; it is never too low, and the column x itself is
-    the vertical distance.
+    Horizontally, a square in another column x' is as far from x as its centre line is
+    from x - 1/2 or x + 1/2, whichever is nearer. So the lower envelope of the columns'
+    parabolas is read at half pixels, where it is never too low; in column x itself the
+    distance is vertical.
     """
     height, width = cells.shape
     _rows_to_obstacle(cells, up)
@@ -153,7 +153,7 @@ def _clearance(
 
 @subkernel
 def _rows_to_obstacle(cells: BoolGrid, rows: NDArray[np.int32]) -> None:
-    """Rows from each pixel to the nearest occupied one of its column."""
+    """Number of rows from each pixel to the nearest occupied one in its column."""
     height, width = cells.shape
     for x in range(width):
         rows[0, x] = 0 if cells[0, x] else 1
@@ -203,8 +203,8 @@ def inflate(cells: BoolGrid, radius: float) -> BoolGrid:
 def body_free(clear: FloatGrid, radius: float) -> BoolGrid:
     """Pixels where a disc of `radius` px may stand and step to a free neighbour.
 
-    A disc that is `sqrt(radius**2 + 1/2)` clear at both ends of a step to one of
-    the eight neighbours stays at least `radius` clear all along it.
+    If the clearance is at least `sqrt(radius**2 + 1/2)` at both ends of a step to one
+    of the eight neighbours, it is at least `radius` along the whole step.
 
     Args:
         clear: Shape (height, width), float32, from `clearance`.

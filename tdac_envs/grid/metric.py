@@ -1,4 +1,4 @@
-"""Pixels and metres of a map that has a resolution, as ROS `map.yaml` relates them."""
+"""Conversion between pixels and metres by the rules of ROS `map.yaml`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ Point = tuple[float, float]
 
 
 def to_pixels(grid: OccupancyGrid, x_m: float, y_m: float) -> Point:
-    """Pixel coordinates of a point of the map frame.
+    """Pixel coordinates of a point in the map frame.
 
-    The frame has x right and y up before `origin` turns it; the outer corner of the
-    lower-left pixel lies at `origin[:2]`.
+    The outer corner of the lower-left pixel is at `origin[:2]`. Right and up in the
+    image are the x and y axes of the map frame rotated by the yaw of `origin`.
 
     Args:
         grid: The map.
-        x_m: Metres in the map frame.
-        y_m: Metres in the map frame.
+        x_m: x in the map frame, m.
+        y_m: y in the map frame, m.
 
     Raises:
         MapError: The map has no resolution.
@@ -53,7 +53,7 @@ def resolution_of(grid: OccupancyGrid) -> float:
     """
     if grid.resolution is None:
         raise MapError(
-            "this map has no resolution, so lengths in metres mean nothing on it; "
+            "this map has no resolution, so lengths in metres cannot be converted; "
             "give pixels, or a ROS map.yaml with a resolution"
         )
     return grid.resolution

@@ -29,10 +29,10 @@ def _spread(
     settled: NDArray[np.bool_],
     buckets: NDArray[np.int64],
 ) -> bool:
-    """Dijkstra in buckets of width 1; False where these have no room.
+    """Dijkstra with buckets of width 1; returns False if a bucket is full.
 
-    No step is shorter than 1, so a bucket never receives a cell while it is
-    worked off, and three buckets in rotation suffice.
+    No step is shorter than 1, so a bucket receives no cells while it is processed, and
+    three buckets in rotation suffice.
     """
     height, width = free.shape
     room = buckets.shape[1]
@@ -81,7 +81,7 @@ def distance_field(free: BoolGrid, goal: tuple[int, int]) -> Field:
         goal: Pixel (x, y).
 
     Returns:
-        Shape (height, width), float64; inf where the goal cannot be reached.
+        Shape (height, width), float64; inf where there is no path to the goal.
     """
     if not _is_free(free, goal):
         return np.full(free.shape, np.inf)
@@ -104,7 +104,7 @@ def _is_free(free: BoolGrid, pixel: tuple[int, int]) -> bool:
 def _descend(
     free: BoolGrid, field: Field, start_x: int, start_y: int, path: NDArray[np.int64]
 ) -> int:
-    """Writes the pixels of the path; returns how many."""
+    """Writes the pixels of the path; returns their number."""
     height, width = field.shape
     x, y, count = start_x, start_y, 0
     while True:
@@ -131,8 +131,8 @@ def descend(free: BoolGrid, field: Field, start: tuple[int, int]) -> Path:
     """The shortest path from `start` down a `distance_field`.
 
     Returns:
-        Shape (n, 2), float64, columns x and y, start and goal included; empty
-        where the goal cannot be reached.
+        Shape (n, 2), float64, columns x and y, start and goal included; empty if there
+        is no path.
     """
     height, width = free.shape
     inside = 0 <= start[0] < width and 0 <= start[1] < height
@@ -150,18 +150,18 @@ def plan_path(
     goal: tuple[int, int],
     guide: Guide | None = None,
 ) -> Path:
-    """The shortest path between two pixels, as `descend` has it on the whole field.
+    """The shortest path between two pixels: that of `descend` on a complete field.
 
     Args:
         free: Shape (height, width), bool, True where the path may go.
         start: Pixel (x, y).
         goal: Pixel (x, y).
-        guide: From `guide_between`, for the same ends and pixels that hold all of
-            `free`; it makes the search faster and leaves its result as it is.
+        guide: From `guide_between`, for the same ends and a superset of `free`. It
+            speeds up the search and does not change the result.
     """
     if not (_is_free(free, start) and _is_free(free, goal)):
         return np.empty((0, 2))
-    return _among(free, lengths_between(free, start, goal, guide), start)
+    return _path_in(free, lengths_between(free, start, goal, guide), start)
 
 
 def plan_paths(
@@ -170,45 +170,45 @@ def plan_paths(
     goal: tuple[int, int],
     guide: Guide,
 ) -> list[Path]:
-    """The same as `plan_path` in each of several spaces, which have much in common.
+    """The results of `plan_path` in each of several similar spaces.
 
-    One search in all of them together mostly does: where the shortest path of a space
-    is no longer than that, it is found among the ones of all.
+    Usually a single search in their union is enough: it finds the path of each space
+    whose shortest path is as short as that of the union.
 
     Args:
-        spaces: Shape (height, width), bool, each; best with more space towards the end.
+        spaces: Each of shape (height, width), bool; fastest in order of free area.
         start: Pixel (x, y).
         goal: Pixel (x, y).
-        guide: From `guide_between`, for pixels that hold all of the spaces.
+        guide: From `guide_between`, for a superset of all spaces.
     """
     paths: list[Path] = [np.empty((0, 2))] * len(spaces)
     lengths: Lengths | None = None
     for number in reversed(range(len(spaces))):
-        path = _among(spaces[number], lengths, start)
+        path = _path_in(spaces[number], lengths, start)
         if len(path) == 0:
-            together = np.logical_or.reduce(spaces[: number + 1])
-            if not (_is_free(together, start) and _is_free(together, goal)):
+            union = np.logical_or.reduce(spaces[: number + 1])
+            if not (_is_free(union, start) and _is_free(union, goal)):
                 break
-            lengths = lengths_between(together, start, goal, guide)
+            lengths = lengths_between(union, start, goal, guide)
             if np.isinf(lengths[start[1] + 1, start[0] + 1]):
                 break
-            path = _among(spaces[number], lengths, start)
+            path = _path_in(spaces[number], lengths, start)
         if len(path) == 0:
             path = plan_path(spaces[number], start, goal, guide)
         paths[number] = path
     return paths
 
 
-def _among(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> Path:
-    """The path of `plan_path` in a part of a space, if it is as short as there.
+def _path_in(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> Path:
+    """The path of `plan_path` in a subset of a space, if as short as in the space.
 
     Args:
-        free: The part, or all of the space, shape (height, width).
-        lengths: From `lengths_between`, of the space; None where there is none.
+        free: The subset, shape (height, width).
+        lengths: From `lengths_between` in the space; None if not yet computed.
         start: Pixel (x, y).
 
     Returns:
-        Shape (n, 2); empty where it is longer, or where there is none.
+        Shape (n, 2); empty if the subset has no path of this length.
     """
     if lengths is None or not _is_free(free, start):
         return np.empty((0, 2))
@@ -231,10 +231,10 @@ def _walk(
     path: NDArray[np.int64],
     turns: NDArray[np.int64],
 ) -> int:
-    """Writes the first of the shortest ways down the lengths; returns how many pixels.
+    """Writes the first shortest path down the lengths; returns its number of pixels.
 
-    All ways to a pixel are equally long, so it need not be tried again after one of
-    them has led nowhere. Returns 0 where all do.
+    All paths to a pixel are equally long, so a pixel that leads to a dead end is not
+    tried again. Returns 0 if there is no path.
     """
     path[0, 0], path[0, 1] = start_x, start_y
     count = 1
@@ -262,10 +262,10 @@ def _walk(
 def guide_between(
     free: BoolGrid, start: tuple[int, int], goal: tuple[int, int]
 ) -> Guide | None:
-    """What speeds up searches between two pixels in parts of `free`.
+    """A guide that speeds up searches between two pixels in subsets of `free`.
 
     Returns:
-        None where there is no path, so that there is none in any part either.
+        None if there is no path in `free`, and so in no subset.
     """
     if not (_is_free(free, start) and _is_free(free, goal)):
         return None
@@ -282,7 +282,7 @@ def path_length(path: Path) -> float:
 
 
 def first_beyond(path: Path, x: float, y: float, far: float) -> tuple[float, float]:
-    """The first point of a path that is so far from (x, y), or its last one."""
+    """The first point of a path at a distance of `far` or more, or its last point."""
     distant = np.hypot(path[:, 0] - x, path[:, 1] - y) >= far
     to_x, to_y = path[int(np.argmax(distant)) if distant.any() else -1].tolist()
     return to_x, to_y
