@@ -1,1 +1,1 @@
-"""Pictures: canvas, marks, runs, close-ups, video, window."""
+"""Drawing: canvas, marks, runs, close-ups, video, window."""

@@ -1,4 +1,4 @@
-"""What a picture of a run is drawn upon: a task as a whole, and parts of it."""
+"""Backgrounds for pictures of runs: a whole map or world, and parts of it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tdac_envs.drawing.canvas import Canvas
 Points = NDArray[np.float64]
 
 CLOSE_UP = 372
-"""Width of an enlarged part, px."""
+"""Width of a close-up, frame px."""
 
 
 class Window(NamedTuple):
-    """A square part of a picture: its least x and y, and its side, as places are."""
+    """A square part of a map or world: least x and y, and side, in units of places."""
 
     x: float
     y: float
@@ -24,35 +24,35 @@ class Window(NamedTuple):
 
 
 class Chart(Protocol):
-    """A canvas, and where on it a place is."""
+    """A canvas and the conversion of places to its coordinates."""
 
     @property
     def canvas(self) -> Canvas:
-        """To draw on."""
+        """The canvas to draw on."""
 
     @property
     def scale(self) -> float:
-        """Frame px in a unit of length."""
+        """Frame px per unit of length."""
 
     def at(self, points: Points) -> Points:
-        """Places, shape (n, 2), in coordinates of the canvas."""
+        """Places, shape (n, 2), converted to canvas coordinates."""
 
     def turned(self, heading: float) -> float:
-        """A heading on the canvas, where y points down."""
+        """A heading converted to the canvas, where y points down; rad."""
 
 
 class Backdrop(Protocol):
-    """What the pictures of all runs of a task have in common."""
+    """The background of all pictures of the runs of a task."""
 
     @property
     def radius(self) -> float:
-        """Of the body."""
+        """Radius of the body, in units of places."""
 
     def whole(self) -> Chart:
-        """All of it, with start, goal and shortest path, to draw on."""
+        """A chart of the whole map or world, with start, goal and shortest path."""
 
     def window(self, middle: Points, extent: float) -> Window:
-        """A part of it around a place, which is at least so wide."""
+        """A part around a place, at least `extent` wide."""
 
     def close_up(self, window: Window) -> Chart:
-        """That part, `CLOSE_UP` px wide."""
+        """A chart of a part, `CLOSE_UP` px wide."""

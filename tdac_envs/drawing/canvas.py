@@ -1,4 +1,4 @@
-"""A picture of a map to draw on: map pixels in, anti-aliased frame pixels out."""
+"""A canvas for maps: it takes map pixels and draws anti-aliased frame pixels."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ class Canvas:
     Args:
         cells: Shape (height, width), bool, True = occupied.
         strip: Height of the strip, frame px.
-        scale: Frame pixels per map pixel; by default what suits the size.
+        scale: Frame pixels per map pixel; by default `frame_scale`.
         origin: Map pixel (x, y) of the first cell, for a part of a map.
-        narrowest: Least number of columns.
+        narrowest: Least width, frame px.
 
     Attributes:
-        image: Shape (rows, columns, 3), uint8 RGB; both sides even, as video codecs
-            want them.
+        image: Shape (rows, columns, 3), uint8 RGB; both sides are even, as video
+            codecs require.
         scale: Frame pixels per map pixel.
         strip_top: First row of the strip.
     """
@@ -88,18 +88,18 @@ class Canvas:
 
     @staticmethod
     def frame_width(cells: BoolGrid) -> int:
-        """Columns of the frame of a map."""
+        """Width of the frame of a map, frame px."""
         height, width = cells.shape
         columns = max(1, round(width * frame_scale(width, height)))
         return int(max(columns + columns % 2, NARROWEST))
 
     @staticmethod
     def text_width(text: str) -> int:
-        """Columns that `text` takes."""
+        """Width of `text`, frame px."""
         return int(_text_mask(text).shape[1])
 
     def copy(self) -> Canvas:
-        """A canvas of its own with the same content."""
+        """An independent canvas with the same content."""
         twin = object.__new__(Canvas)
         twin.scale, twin._left, twin.strip_top = self.scale, self._left, self.strip_top
         twin._origin = self._origin
@@ -107,7 +107,7 @@ class Canvas:
         return twin
 
     def to_frame(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Frame coordinates of map points, shape (n, 2); pixel centres are whole."""
+        """Frame coordinates of map points, shape (n, 2); pixel centres are integers."""
         at = np.asarray(points, np.float64).reshape(-1, 2) - self._origin
         return (at + 0.5) * self.scale - 0.5 + (self._left, 0.0)
 
@@ -127,7 +127,7 @@ class Canvas:
         alpha: float = 1.0,
         dash: float = 0.0,
     ) -> None:
-        """Draws a polyline, dashed where `dash` (length of a dash) is above 0."""
+        """Draws a polyline; `dash` is the length of its dashes, 0 for a solid line."""
         at = self.to_frame(points)
         if len(at) >= 2:
             pieces = _dashes(at, dash) if dash else [at]
@@ -164,13 +164,13 @@ class Canvas:
     def paste(
         self, centre: ArrayLike, heading: float, sprite: NDArray[np.float32]
     ) -> None:
-        """Puts a picture down, turned by `heading`.
+        """Draws a picture, rotated by `heading`.
 
         Args:
-            centre: Where its middle goes.
+            centre: Position of its centre.
             heading: rad, clockwise on the screen.
-            sprite: Shape (n, n, 4), colour multiplied by alpha, and alpha in [0, 1];
-                three times as large as it will appear.
+            sprite: Shape (n, n, 4): RGB premultiplied by alpha, and alpha in [0, 1];
+                three times as large as it is drawn.
         """
         at = self.to_frame(centre)
         half = sprite.shape[0] / 3 * 0.75 + 2
@@ -187,7 +187,7 @@ class Canvas:
         self._blend(np.clip(mixed + 0.5, 0, 255).astype(np.uint8), origin, 1.0)
 
     def text(self, x: int, baseline: int, text: str, colour: Colour) -> int:
-        """Writes ASCII text at frame coordinates; returns the x after it."""
+        """Writes ASCII text at frame coordinates; returns the x at its end."""
         return write_text(self.image, x, baseline, text, colour)
 
     def _lines(
@@ -199,7 +199,7 @@ class Canvas:
         alpha: float,
     ) -> None:
         patch, origin = self._patch(around, width + 2)
-        # Many joints in a straight line would show as dots.
+        # Many joints in a straight line would be visible as dots.
         fixed = [cv2.approxPolyDP(_fixed(p - origin), 4, False) for p in pieces]
         cv2.polylines(patch, fixed, False, colour, width, cv2.LINE_AA, _SHIFT)
         self._blend(patch, origin, alpha)
@@ -207,7 +207,7 @@ class Canvas:
     def _patch(
         self, points: NDArray[np.float64], margin: float
     ) -> tuple[Image, NDArray[np.int64]]:
-        """A copy of the part of the map around some points, and its corner (x, y)."""
+        """A copy of the map around some points, and its upper left corner (x, y)."""
         size = np.array([self.image.shape[1], self.strip_top])
         low = np.clip(np.floor(points.min(axis=0) - margin), 0, size - 1).astype(int)
         high = np.clip(np.ceil(points.max(axis=0) + margin) + 1, low + 1, size)
@@ -231,7 +231,7 @@ def blank(rows: int, columns: int, colour: Colour) -> Image:
 
 
 def write_text(image: Image, x: int, baseline: int, text: str, colour: Colour) -> int:
-    """Writes ASCII text on a picture; returns the x after it."""
+    """Writes ASCII text on a picture; returns the x at its end."""
     mask = _text_mask(text)
     rows, columns = mask.shape
     top = baseline - round(rows * 0.7)
@@ -247,19 +247,19 @@ def _fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def _map_picture(cells: BoolGrid, scale: float) -> Image:
-    """Walls and floor in colour, the floor a little darker along the walls."""
+    """A map in colour; the floor is slightly darker along the walls."""
     height, width = cells.shape
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
     cover: NDArray[Any] = cells.view(np.uint8)
     if scale < 1.0:
-        # Shrinking would fade thin walls away.
+        # The exponent keeps thin walls visible when the map is shrunk.
         cover = cv2.resize(255 * cover, size, interpolation=cv2.INTER_AREA)
         cover = (cover / np.float32(255)) ** 0.6
     elif scale > 1.0:
         cover = cv2.resize(cover, size, interpolation=cv2.INTER_NEAREST)
     floor = (cover < 0.5).astype(np.uint8)
     distance = cv2.distanceTransform(floor, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    # A table of colours: the picture of a whole map is wanted in milliseconds.
+    # A colour table, to draw a whole map within milliseconds.
     entries = cv2.convertScaleAbs(distance, alpha=_ENTRIES_PER_PX)
     picture: Any = cv2.applyColorMap(entries, _map_colours())
     partly = (cover > 0.0) & (cover < 1.0)
@@ -271,7 +271,7 @@ def _map_picture(cells: BoolGrid, scale: float) -> Image:
 
 
 def _map_colours() -> Image:
-    """Colours by distance to the nearest wall, shape (256, 1, 3); first the wall's."""
+    """Colours by distance to the nearest wall, shape (256, 1, 3); entry 0 is a wall."""
     distance = np.arange(256) / _ENTRIES_PER_PX
     shade = 1.0 - 0.10 * np.exp(-distance / 5.0)
     colours = np.rint(shade[:, None] * np.array(FREE)).astype(np.uint8)
@@ -292,7 +292,7 @@ def _dashes(points: NDArray[np.float64], dash: float) -> list[NDArray[np.float64
 
 
 def _text_mask(text: str) -> NDArray[np.float32]:
-    """Coverage of some text, drawn large and shrunk, since OpenCV's own is coarse."""
+    """Coverage of a text, drawn large and shrunk: OpenCV's small text is coarse."""
     zoom = TEXT_SIZE * _TEXT_ZOOM
     font, weight = cv2.FONT_HERSHEY_SIMPLEX, max(1, round(1.6 * zoom))
     (width, height), _ = cv2.getTextSize(text, font, zoom, weight)

@@ -24,29 +24,29 @@ from tdac_envs.drawing.canvas import (
     write_text,
 )
 
-# Told apart from the green of the goal by all kinds of colour vision.
+# Distinguishable from the goal's green with every kind of colour vision.
 EVENT: Colour = (213, 94, 0)
 EARLY: Colour = (176, 168, 232)
 COLUMN, MARGIN = 400, 14
 _LINE, _CHARACTERS = 21, 50
 _PIECES = 16
-# A close-up shows this much around the event at least, radii of the body.
+# Least margin around the event in a close-up, body radii.
 _AROUND = 5.0
-# Below this enlargement there is nothing to be gained from a close-up.
+# Least enlargement at which a close-up is worthwhile.
 _WORTH = 1.5
 _SMALLEST_BODY = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Event:
-    """What is to be seen in a run.
+    """The event that the picture of a run shows.
 
     Attributes:
         title: First line of the caption, ASCII.
-        facts: Further lines; long ones are wrapped.
-        where: Shape (n, 2): places that the close-up must hold.
+        facts: Further lines of the caption; long ones are wrapped.
+        where: Shape (n, 2): places that the close-up must contain.
         contact: Point of a wall that the body touched.
-        way: Shape (m, 2): the way that should have been taken from the end.
+        way: Shape (m, 2): the right path from the last position.
     """
 
     title: str
@@ -60,9 +60,9 @@ def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
     """The picture of a run, uint8 RGB.
 
     Args:
-        background: Of the run's task.
+        background: Background of the run's task.
         poses: Shape (T + 1, 3): x, y, heading.
-        event: What is to be seen.
+        event: The event to show.
     """
     chart, radius = background.whole(), background.radius
     canvas = chart.canvas
@@ -84,7 +84,7 @@ def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
 def _draw_run(
     chart: Chart, poses: Points, event: Event, radius: float, *, way: bool
 ) -> None:
-    """Trail, body at the end, the contact, and perhaps the way from there."""
+    """Draws the trail, the last pose, the contact and, if `way`, the right path."""
     canvas, places = chart.canvas, chart.at(poses[:, :2])
     if way and event.way is not None:
         canvas.line(chart.at(event.way), GREEN, 2, 0.9, dash=6)
@@ -105,7 +105,7 @@ def _draw_run(
 
 
 def _draw_trail(canvas: Canvas, places: Points) -> None:
-    """A line that gets darker along the way driven."""
+    """Draws a line that gets darker along the driven path."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
     cuts = np.searchsorted(along, np.linspace(0.0, along[-1], _PIECES + 1))
     early, late = np.array(EARLY), np.array(TRAIL)
@@ -118,7 +118,7 @@ def _draw_trail(canvas: Canvas, places: Points) -> None:
 def _window(
     background: Backdrop, event: Event, poses: Points, scale: float
 ) -> Window | None:
-    """The part to enlarge; None where the picture itself shows as much."""
+    """The part to enlarge; None if no close-up is worthwhile."""
     for where in (event.where, poses[-1:, :2]):
         low, high = where.min(axis=0), where.max(axis=0)
         extent = float((high - low).max()) + 2.0 * _AROUND * background.radius
@@ -133,13 +133,13 @@ def _draw_window(chart: Chart, window: Window) -> None:
     corners = np.array([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
     at = chart.at(corners + np.array([x, y]))
     for colour, width in ((FREE, 4), (EVENT, 2)):
-        # Not in one go: a closed line has no farthest point.
+        # Two lines, since one that ends where it begins would be simplified away.
         chart.canvas.line(at[:3], colour, width)
         chart.canvas.line(at[2:], colour, width)
 
 
 def _close_up(chart: Chart, poses: Points, event: Event, radius: float) -> Image:
-    """The part around the event with the run, framed."""
+    """The framed close-up of the run around the event."""
     _draw_run(chart, poses, event, radius, way=True)
     close = chart.canvas.image[: chart.canvas.strip_top]
     cv2.rectangle(close, (0, 0), (close.shape[1] - 1, close.shape[0] - 1), EVENT, 2)
@@ -178,7 +178,7 @@ def _column(event: Event, close: Image | None) -> Image:
 
 
 def _draw_key(column: Image, y: int, colour: Colour, dashed: bool) -> None:
-    """The line of a legend's entry."""
+    """Draws the line sample of a legend entry."""
     ends = ((0, 7), (10, 17), (20, 26)) if dashed else ((0, 26),)
     for first, last in ends:
         begin, end = (MARGIN + first, y), (MARGIN + last, y)

@@ -1,4 +1,4 @@
-"""The things that are drawn on a map: start, goal, robot, rays, outcome."""
+"""Marks on a map: start, goal, robot, rays, outcome."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Sprite = NDArray[np.float32]
 
 
 def load_sprite(file: Path, radius: float) -> Sprite | None:
-    """The robot's picture at three times a radius (frame px), for `Canvas.paste`.
+    """The robot's picture for `Canvas.paste`: three times a body of `radius` frame px.
 
     Returns:
-        None where there is no such picture.
+        None if there is no such picture.
     """
     picture = cv2.imread(str(file), cv2.IMREAD_UNCHANGED) if file.is_file() else None
     if picture is None or picture.dtype != np.uint8:
@@ -120,9 +120,9 @@ def draw_outcome(
 
     Args:
         canvas: Where to draw.
-        centre: Where the robot ended.
-        radius: Of the body, frame px.
-        outcome: One of `OUTCOMES`; nothing is drawn for another.
+        centre: Last position of the robot.
+        radius: Radius of the body, frame px.
+        outcome: One of `OUTCOMES`; any other draws nothing.
     """
     if outcome not in OUTCOMES:
         return

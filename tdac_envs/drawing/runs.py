@@ -1,4 +1,4 @@
-"""What pictures of any robot say of its runs: status, trajectories, legend."""
+"""Parts of the pictures of runs: status, trajectories, legend."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _ROW = 22
 
 
 class Status(NamedTuple):
-    """What the strip below the map says.
+    """Contents of the strip below the map.
 
     Attributes:
-        step: Steps so far.
-        horizon: Steps at most.
-        distance: Distance to the goal, px.
-        outcome: "reached", "collision", "out of time", or empty while it runs.
+        step: Number of steps so far.
+        horizon: Maximum number of steps.
+        distance: Distance to the goal, px or m.
+        outcome: "reached", "collision", "out of time", or empty during the episode.
     """
 
     step: int
@@ -42,7 +42,7 @@ class Status(NamedTuple):
 
 
 def ending(reached: bool, collided: bool, truncated: bool) -> str:
-    """The outcome that a step brings, for `Status`."""
+    """The outcome after a step, as in `Status`."""
     if reached:
         return "reached"
     if collided:
@@ -56,12 +56,12 @@ def draw_runs(
     outcomes: Sequence[str],
     body: float,
 ) -> None:
-    """Draws trajectories, each in its colour, and marks how they ended.
+    """Draws trajectories, each in its colour, and marks their outcomes.
 
     Args:
         canvas: Where to draw.
-        runs: Each of shape (T + 1, 3), x, y and heading, as the canvas has them.
-        outcomes: One for each.
+        runs: Each of shape (T + 1, 3): x, y and heading in canvas coordinates.
+        outcomes: Outcome of each run.
         body: Radius of the body, frame px.
     """
     for number, run in enumerate(runs):
@@ -71,14 +71,14 @@ def draw_runs(
 
 
 def run_colour(number: int) -> Colour:
-    """Colour of a trajectory among others."""
+    """Colour of the trajectory with this index."""
     return _RUN_COLOURS[number % len(_RUN_COLOURS)]
 
 
 def _draw_run(
     canvas: Canvas, run: NDArray[np.float64], colour: Colour, body: float
 ) -> None:
-    """The line of a run and the outline of its body every three radii."""
+    """Draws a run as a line, with the body's outline every three radii."""
     steps = np.hypot(*np.diff(run[:, :2], axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(steps)]) * canvas.scale
     stops = np.searchsorted(along, np.arange(0.0, along[-1], 3 * body))
@@ -90,7 +90,7 @@ def _draw_run(
 
 
 class Legend(NamedTuple):
-    """What the lines of trajectories mean: rows of (x, colour, text)."""
+    """Legend of trajectories: rows of (x, colour, text)."""
 
     rows: list[list[tuple[int, Colour, str]]]
 
@@ -101,10 +101,10 @@ class Legend(NamedTuple):
         """The legend of some trajectories.
 
         Args:
-            outcomes: One for each; may be empty.
-            labels: Their names, as far as they have one.
+            outcomes: Outcome of each trajectory; may be an empty string.
+            labels: Names of the first trajectories; the others are numbered.
             path: Whether the shortest path is drawn, too.
-            width: Columns that there are.
+            width: Available width, frame px.
         """
         entries = [(GREY, "shortest path")] if path else []
         for k, end in enumerate(outcomes):
@@ -114,18 +114,18 @@ class Legend(NamedTuple):
 
     @property
     def height(self) -> int:
-        """Rows that it takes, frame px."""
+        """Height of the legend, frame px."""
         return 10 + _ROW * len(self.rows)
 
     def write(self, canvas: Canvas) -> None:
-        """Writes it into the strip."""
+        """Draws the legend in the strip."""
         _write_legend(canvas, self.rows)
 
 
 def _legend_rows(
     entries: list[tuple[Colour, str]], width: int
 ) -> list[list[tuple[int, Colour, str]]]:
-    """Entries with their x, broken into rows as wide as the frame."""
+    """Arranges entries in rows that fit the width; each entry gets its x."""
     rows: list[list[tuple[int, Colour, str]]] = [[]]
     x = 10
     for colour, text in entries:

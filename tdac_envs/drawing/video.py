@@ -1,4 +1,4 @@
-"""Films: frames in, an MP4 or GIF file out, by the ffmpeg of imageio-ffmpeg."""
+"""Writes frames to an MP4 or GIF file with the ffmpeg of imageio-ffmpeg."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.drawing.canvas import Image
 
 SUFFIXES = (".mp4", ".gif")
-# Every browser plays H.264 in yuv420p; the matrix is tagged for players that
-# would guess another.
+# Every browser plays H.264 in yuv420p. The colour matrix is tagged, because some
+# players would guess another one.
 _PIXELS = "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"
 _CODEC = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20"]
 _TAGS = ["-colorspace", "bt709", "-movflags", "+faststart", "-f", "mp4"]
@@ -25,11 +25,11 @@ _LOSSLESS = ["-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0"]
 
 
 class VideoError(TdacError):
-    """A film cannot be written."""
+    """A video cannot be written."""
 
 
 def write_video(frames: Iterable[Image], path: str | Path, fps: float) -> None:
-    """Writes a film, frame by frame, and puts it in place when it is complete.
+    """Writes a video frame by frame; the file appears when it is complete.
 
     Args:
         frames: Each of shape (height, width, 3), uint8 RGB, all of one size. An MP4
@@ -38,13 +38,13 @@ def write_video(frames: Iterable[Image], path: str | Path, fps: float) -> None:
         fps: Frames per second; a GIF rounds the time of a frame to 1/100 s.
 
     Raises:
-        VideoError: The suffix is another, there are no frames, they differ in size,
-            or the file cannot be written.
+        VideoError: The suffix is unknown, there are no frames, they differ in size, or
+            the file cannot be written.
     """
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise VideoError(f"expected a film to end in .mp4 or .gif, got {path.name!r}")
+        raise VideoError(f"a video file must end in .mp4 or .gif, got {path.name!r}")
     try:
         scratch = tempfile.TemporaryDirectory(prefix=".film-", dir=path.parent)
     except OSError as error:
@@ -110,7 +110,7 @@ def _feed(
 
 
 def _palettise(film: Path, target: Path) -> None:
-    """Turns a film into a GIF with one palette, so that calm areas do not flicker."""
+    """Converts a video to a GIF with one palette, so that still areas never flicker."""
     palette = film.with_name("palette.png")
     use = "paletteuse=dither=none:diff_mode=rectangle"
     passes = (
@@ -124,13 +124,13 @@ def _palettise(film: Path, target: Path) -> None:
 
 
 def _failure(code: int, messages: bytes) -> VideoError:
-    """What ffmpeg said, or how it ended without a word."""
+    """The error with ffmpeg's messages, or with its exit status if it has none."""
     end = signal.Signals(-code).name if code < 0 else f"exit code {code}"
     return VideoError(f"ffmpeg failed: {messages.decode().strip() or end}")
 
 
 def _ffmpeg() -> list[str]:
-    """The bundled program with the options of every call."""
+    """The bundled ffmpeg with the options of every call."""
     from imageio_ffmpeg import get_ffmpeg_exe
 
     return [get_ffmpeg_exe(), "-hide_banner", "-loglevel", "error", "-nostdin", "-y"]

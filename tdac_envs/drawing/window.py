@@ -12,13 +12,13 @@ from tdac_envs.drawing.canvas import Image
 
 
 class Window:
-    """A pygame window; it opens with the first frame, in that frame's size.
+    """A pygame window, which opens with the first frame and has its size.
 
     Closing it by hand acts like Ctrl-C: the next `show` raises `KeyboardInterrupt`.
 
     Args:
         title: Text of the title bar.
-        fps: Frames per second that `show` keeps to.
+        fps: Frame rate of `show`, frames per second.
 
     Raises:
         DependencyNotInstalled: pygame is missing.

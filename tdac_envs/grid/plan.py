@@ -176,7 +176,7 @@ def plan_paths(
     whose shortest path is as short as that of the union.
 
     Args:
-        spaces: Each of shape (height, width), bool; fastest in order of free area.
+        spaces: Each of shape (height, width), bool; fastest with the largest last.
         start: Pixel (x, y).
         goal: Pixel (x, y).
         guide: From `guide_between`, for a superset of all spaces.
@@ -282,7 +282,7 @@ def path_length(path: Path) -> float:
 
 
 def first_beyond(path: Path, x: float, y: float, far: float) -> tuple[float, float]:
-    """The first point of a path at a distance of `far` or more, or its last point."""
+    """The first point of a path at least `far` from (x, y), or else its last point."""
     distant = np.hypot(path[:, 0] - x, path[:, 1] - y) >= far
     to_x, to_y = path[int(np.argmax(distant)) if distant.any() else -1].tolist()
     return to_x, to_y
