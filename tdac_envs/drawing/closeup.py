@@ -46,7 +46,7 @@ class Event:
         facts: Further lines of the caption; long ones are wrapped.
         where: Shape (n, 2): places that the close-up must contain.
         contact: Point of a wall that the body touched.
-        way: Shape (m, 2): the right path from the last position.
+        way: Shape (m, 2): the shortest path from the last position.
     """
 
     title: str
@@ -84,7 +84,7 @@ def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
 def _draw_run(
     chart: Chart, poses: Points, event: Event, radius: float, *, way: bool
 ) -> None:
-    """Draws the trail, the last pose, the contact and, if `way`, the right path."""
+    """Draws trail, last pose, contact and, if `way`, the shortest path from there."""
     canvas, places = chart.canvas, chart.at(poses[:, :2])
     if way and event.way is not None:
         canvas.line(chart.at(event.way), GREEN, 2, 0.9, dash=6)

@@ -1,4 +1,4 @@
-"""Readings of a picture: which pixels are dark, marked, unknown or unlike the floor."""
+"""Classifies pixels: light, saturated, unknown, outside, unlike the floor."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.mapping.image import ColourImage, GreyImage
 
 MARK_CHROMA = 80
-"""Largest minus smallest RGB value from which a pixel counts as saturated colour."""
+"""Chroma (largest minus smallest RGB value) from which a pixel is saturated."""
 
 
 def otsu(luminance: GreyImage) -> float:
     """Otsu's threshold: pixels above it are light.
 
-    It lies in the middle of the empty stretch of the histogram where there is one,
-    so that a picture and its negative are cut at the same place.
+    In an empty stretch of the histogram it is the middle of the stretch, so that a
+    picture and its negative are cut at the same level.
     """
     low = int(cv2.threshold(luminance, 0, 255, cv2.THRESH_OTSU)[0])
     counts = np.bincount(luminance.ravel(), minlength=256)
@@ -28,10 +28,10 @@ def otsu(luminance: GreyImage) -> float:
 
 
 def saved_level(luminance: GreyImage) -> int | None:
-    """The "unknown" grey of a picture with a map saver's levels and no other, or None.
+    """The "unknown" grey of a picture with only the levels of ROS `map_saver`, or None.
 
-    ROS `map_saver` writes 254 free, 205 unknown, 0 occupied; a negative has 1, 50, 255.
-    That holds however little of it has been seen.
+    These are 254 free, 205 unknown and 0 occupied; in a negative 1, 50 and 255. The
+    known area may be small.
     """
     share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
     for unknown, free, occupied in ((205, (254, 255), 0), (50, (1, 0), 255)):
@@ -43,10 +43,10 @@ def saved_level(luminance: GreyImage) -> int | None:
 
 
 def unknown_level(luminance: GreyImage) -> int | None:
-    """The grey that a mapping tool wrote for "not seen", or None.
+    """The grey that a mapping tool wrote for "unknown", or None.
 
-    Map savers write about 205 (ROS `map_saver`) or 128 between black and white; a
-    negative has 50 or 127. It counts only as one large, flat level between the two.
+    It is about 205 (ROS `map_saver`) or 128; in a negative 50 or 127. It counts only if
+    it is a large, flat level and there are black and white pixels, too.
     """
     share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
     written = saved_level(luminance)
@@ -54,7 +54,7 @@ def unknown_level(luminance: GreyImage) -> int | None:
         return written
     if min(share[:20].sum(), share[-20:].sum()) < 0.001:
         return None
-    # Grey walls are often about 128, so that level must fill an area.
+    # Walls are often of a grey near 128, so this level must cover a larger area.
     for usual, least in ((205, 0.01), (50, 0.01), (128, 0.12), (127, 0.12)):
         level = usual - 2 + int(np.argmax(share[usual - 2 : usual + 3]))
         around = share[level - 6 : level + 7].sum()
@@ -64,18 +64,18 @@ def unknown_level(luminance: GreyImage) -> int | None:
 
 
 def outside(luminance: GreyImage, light_free: bool, ignored: BoolGrid) -> BoolGrid:
-    """The paper around a plan: what joins the border without crossing any faint line.
+    """The paper around a plan: all that is connected to the border without a line.
 
-    Half the contrast of Otsu's threshold makes a line here, so that a window drawn
-    in grey counts.
+    Half the contrast of Otsu's threshold is enough for a line, so that windows drawn in
+    grey are lines.
 
     Args:
         luminance: Shape (height, width), uint8.
         light_free: Whether the paper is light.
-        ignored: Shape (height, width), bool; pixels that are no lines, e.g. marks.
+        ignored: Shape (height, width), bool; pixels that are not lines, e.g. marks.
 
     Returns:
-        Shape (height, width), bool; all False where no such piece holds half of the
+        Shape (height, width), bool; all False if no connected piece covers half of the
         border.
     """
     grey = luminance if light_free else 255 - luminance
@@ -84,10 +84,10 @@ def outside(luminance: GreyImage, light_free: bool, ignored: BoolGrid) -> BoolGr
     free = (grey > paper - 0.5 * (paper - cut)) | ignored
     labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
     rim = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    held = np.bincount(rim)
-    held[0] = 0
-    largest = int(held.argmax())
-    if held[largest] < 0.5 * rim.size:
+    on_rim = np.bincount(rim)
+    on_rim[0] = 0
+    largest = int(on_rim.argmax())
+    if on_rim[largest] < 0.5 * rim.size:
         return np.zeros(labels.shape, np.bool_)
     return np.asarray(labels == largest)
 
@@ -105,14 +105,14 @@ def saturated(colour: ColourImage) -> BoolGrid:
 
 
 def disc(shape: tuple[int, ...], x: float, y: float, radius: float) -> BoolGrid:
-    """Pixels within `radius` px of (x, y), at least the pixel itself."""
+    """Pixels within `radius` px of (x, y), always including that pixel."""
     rows, columns = np.ogrid[: shape[0], : shape[1]]
     within = (columns - x) ** 2 + (rows - y) ** 2 <= max(radius, 0.71) ** 2
     return np.asarray(within)
 
 
 def floor_distance(colour: ColourImage, floor: NDArray[np.float64]) -> GreyImage:
-    """How unlike the floor each pixel is: RGB distance, clipped to 255."""
+    """RGB distance of each pixel from the floor's colour, clipped to 255."""
     gap = colour.astype(np.float32) - floor.astype(np.float32)
     distance = np.rint(np.linalg.norm(gap, axis=2))
     return np.asarray(np.clip(distance, 0, 255), np.uint8)

@@ -16,7 +16,7 @@ class BundledMap:
     """A map image with a start, a goal and a robot that make a task on it.
 
     Attributes:
-        name: What `map=` takes.
+        name: Name for the `map` argument of the environment.
         image: The PNG file.
         start: Start (x, y), px.
         heading: Heading at the start, rad, from +x towards +y (down).
@@ -44,12 +44,12 @@ def bundled_map(name: str) -> BundledMap:
     """The bundled map of this name.
 
     Raises:
-        MapError: There is none; the message offers the closest name.
+        MapError: There is none; the message suggests the closest name.
     """
     names = bundled_maps()
     if name not in names:
         raise MapError(
-            f"no bundled map is called {name!r}{hint(name, names)}; there are "
+            f"no bundled map is called {name!r}{hint(name, names)}; the maps are "
             f"{', '.join(names)}"
         )
     task = json.loads((_FOLDER / f"{name}.json").read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Readings of a map with a planner's margin, looked for and ranked (Algorithm 1)."""
+"""Search and ranking of map readings with a planner's margin (Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ Preset = Literal["default", "paper"]
 INFLATIONS = (0, 1, 2, 3)
 PAPER_CLEANUPS = (0, 4, 8, 12, 16)
 MAX_DETOUR = 0.1
-"""Most that the planner's margin may lengthen the path, as a share."""
+"""Largest share by which the planner's margin may lengthen the path."""
 THREADS = 2
-"""Readings judged at a time; compiled code and OpenCV let other threads run."""
+"""Readings evaluated in parallel; compiled code and OpenCV release the GIL."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A reading of the map with a planner's margin, judged.
+    """An evaluated reading of the map with a planner's margin.
 
     Attributes:
         reading: Which pixels are obstacles.
         inflation: Planner's margin around the body, px.
-        reason: Tells why the task is infeasible on it; None where it is feasible.
-            To find out what would work takes longer than the verdict.
-        terms: Terms of the score; None without a task or where it is infeasible.
+        reason: Returns why the task is infeasible; None if it is feasible. It is lazy,
+            because the search for what would work is slow.
+        terms: Terms of the score; None without a task or if it is infeasible.
     """
 
     reading: Reading
@@ -50,39 +50,39 @@ class Candidate:
 
     @property
     def failure(self) -> str | None:
-        """Why the task is infeasible on it; None where it is feasible."""
+        """Why the task is infeasible; None if it is feasible."""
         return None if self.reason is None else self.reason()
 
     @property
     def score(self) -> float:
-        """Score of Algorithm 1; -inf where there is none."""
+        """Score of Algorithm 1; -inf without terms."""
         return -np.inf if self.terms is None else score(self.terms)
 
 
 def ranked(scene: Scene, preset: Preset) -> list[Candidate]:
-    """Every candidate that was looked at, the chosen one first.
+    """All evaluated candidates, the chosen one first.
 
-    Feasible ones come by falling score, then the infeasible ones in the order in
-    which they were tried, each with its failure.
+    Feasible candidates are sorted by descending score; infeasible ones follow in the
+    order in which they were tried.
 
     Raises:
-        TaskError: Start, goal or robot make no task on any map.
+        TaskError: Start equals goal, or the radius is out of range.
     """
     if scene.start is not None and scene.start == scene.goal:
         raise TaskError(
-            f"start and goal are the same pixel {scene.start}; give two places"
+            f"start and goal are the same pixel {scene.start}; choose two pixels"
         )
     if not scene.radius > 0:
         raise TaskError(f"expected a robot radius above 0 px, got {scene.radius:g}")
-    positive("robot_radius", scene.radius)  # nor too large to compute with
+    positive("robot_radius", scene.radius)  # checks the upper limit
     search = _paper_grid if preset == "paper" else _staged_search
     tried = list(search(scene))
-    # The plainest reading's failure comes first: the others only explain more away.
+    # The failure of the plainest reading comes first: later ones only ignore more.
     return sorted(tried, key=lambda c: (c.reason is not None, -c.score))
 
 
 def _staged_search(scene: Scene) -> Iterator[Candidate]:
-    """Reading after reading, up to the first feasible one; its margins by score."""
+    """Tries readings, each with all margins, up to the first feasible one."""
     for reading in readings(scene):
         candidates = _with_margins(scene, reading)
         yield candidates[0]
@@ -92,7 +92,7 @@ def _staged_search(scene: Scene) -> Iterator[Candidate]:
 
 
 def _without_detour(candidate: Candidate, plain: Candidate) -> Candidate:
-    """Refuses a margin that sends the robot another way: clearance is not all."""
+    """Makes a margin infeasible if it lengthens the path too much."""
     if candidate.terms is None or plain.terms is None:
         return candidate
     longer = candidate.terms.path_length / max(plain.terms.path_length, 1.0) - 1
@@ -103,7 +103,7 @@ def _without_detour(candidate: Candidate, plain: Candidate) -> Candidate:
 
 
 def _paper_grid(scene: Scene) -> list[Candidate]:
-    """Polarity x cleanup x inflation, literally, but nothing computed twice."""
+    """The full grid polarity x cleanup x inflation, without repeated computation."""
     given = scene.image.occupied
     bases = (
         [plain_reading(scene, polarity == "dark") for polarity in scene.polarities]
@@ -117,7 +117,7 @@ def _paper_grid(scene: Scene) -> list[Candidate]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Family:
-    """Readings of one polarity, and a guide for paths on all; None without any path."""
+    """Readings of one polarity, and a guide for their paths; None if there are none."""
 
     readings: list[Reading]
     guide: Guide | None
@@ -137,13 +137,13 @@ def _family(scene: Scene, base: Reading) -> _Family:
 
 
 def _judged(scene: Scene, family: _Family, pool: ThreadPoolExecutor) -> list[Candidate]:
-    """The readings with each margin, up to the first that is infeasible."""
+    """The readings with each margin, up to the first infeasible one."""
     trip, guide = scene.trip, family.guide
     if trip is None:
         return [Candidate(reading) for reading in family.readings]
     if guide is None:
         return [_candidate(reading, trip) for reading in family.readings]
-    # Readings of which cleanup has made the same share their array.
+    # Readings that are equal after cleanup share their array.
     grids = {id(reading.cells): reading.cells for reading in family.readings}
     grounds = list(pool.map(Ground.of, grids.values()))
     halves = pool.map(
@@ -159,7 +159,7 @@ def _judged(scene: Scene, family: _Family, pool: ThreadPoolExecutor) -> list[Can
 
 
 def _with_margins(scene: Scene, reading: Reading) -> list[Candidate]:
-    """The reading with each margin, up to the first that is infeasible."""
+    """The reading with each margin, up to the first infeasible one."""
     if scene.trip is None:
         return [Candidate(reading)]
     ground = Ground.of(reading.cells)

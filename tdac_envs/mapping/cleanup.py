@@ -23,13 +23,13 @@ def cleanings(cells: BoolGrid, strengths: Sequence[int]) -> list[BoolGrid]:
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
-        strengths: In rising order. Obstacle pieces (8-connected) and then holes (free
-            pieces, 4-connected) of fewer than this many pixels go; above 0 the
-            obstacles are then closed with a 3 x 3 square. 0 changes nothing.
+        strengths: In ascending order. Obstacle pieces (8-connected) and then holes
+            (free pieces, 4-connected) with fewer pixels are removed, and obstacles are
+            closed with a 3 x 3 square. 0 changes nothing.
 
     Returns:
-        One a strength, shape (height, width), bool; the same array twice where two
-        strengths have the same result.
+        One grid per strength, shape (height, width), bool; the same array again if two
+        successive strengths have the same result.
     """
     pieces, holes = _labels(cells, 8), _labels(~cells, 4)
     first_hole = int(pieces.max()) + 1
@@ -85,7 +85,7 @@ def _free_small(
     joined: Counts,
     parent: Counts,
 ) -> None:
-    """Joins the pieces that go with the holes beside them, which become one."""
+    """Joins each removed piece with the holes beside it, which become one hole."""
     height, width = pieces.shape
     for y in range(height):
         for x in range(width):
@@ -114,7 +114,7 @@ def _decide(
     parent: Counts,
     occupied: BoolGrid,
 ) -> None:
-    """Whether each piece stays, and whether each hole is filled."""
+    """Decides which pieces stay and which holes are filled."""
     for node in range(size.size):
         stays = node < first_hole and size[node] >= strength
         occupied[node] = stays or joined[_root(parent, node)] < strength
@@ -140,9 +140,9 @@ def _pieces(
 
 
 def without_specks(cells: BoolGrid, extent: int) -> BoolGrid:
-    """Drops obstacle pieces within a box of `extent` px: noise, letters, dashes.
+    """Drops obstacle pieces that fit in a box of `extent` px: noise, letters, dashes.
 
-    Solid ones of 6 px and more stay, since they are pillars rather than letters.
+    Solid pieces of at least 6 px stay: they are pillars rather than letters.
     """
     labels, stats = _pieces(cells, 8)
     sides = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]]

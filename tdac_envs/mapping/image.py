@@ -1,4 +1,4 @@
-"""Map files: what is in the picture, before anybody decides what is an obstacle."""
+"""Loads the pictures of map files; obstacles are decided later."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 MAX_PIXELS = 64_000_000
-"""Largest picture that is decoded, px."""
+"""Largest number of pixels of a picture."""
 
 # Formats that decode without a helper program, so that no file starts a process.
 _FORMATS = ("PNG", "JPEG", "PPM", "BMP", "GIF", "TIFF", "WEBP")
@@ -40,12 +40,12 @@ class MapImage:
     Attributes:
         colour: Shape (height, width, 3), uint8, RGB, alpha composited.
         name: File name, or "array".
-        sha256: Hash of the file's bytes (of the array's, where there is no file).
-        occupied: Shape (height, width), bool, True = occupied, where the file itself
-            says which cells are obstacles; None where that has to be found out.
-        method: Which rule of the file gave `occupied`.
+        sha256: Hash of the bytes of the file or the array.
+        occupied: Shape (height, width), bool, True = occupied, if the file defines the
+            obstacles; None if they must be inferred from the picture.
+        method: The rule of the file that gave `occupied`.
         resolution: Metres per pixel, or None.
-        origin: Pose (x, y, yaw) in metres of the lower-left pixel.
+        origin: Pose (x, y, yaw) of the lower-left pixel, m and rad.
     """
 
     colour: ColourImage
@@ -60,7 +60,7 @@ class MapImage:
         height, width = self.colour.shape[:2]
         if height < 2 or width < 2:
             raise MapError(
-                f"{self.name}: {width} x {height} pixels are no map; "
+                f"{self.name}: {width} x {height} pixels are too few for a map; "
                 "expected at least 2 x 2"
             )
         flat = self.colour.reshape(-1, 3)
@@ -73,7 +73,7 @@ class MapImage:
 
 
 def luminance(colour: ColourImage) -> GreyImage:
-    """Luminance after ITU-R BT.709, rounded, shape (height, width), uint8."""
+    """Luminance by ITU-R BT.709, rounded, shape (height, width), uint8."""
     return np.asarray(np.rint(colour @ _BT709), np.uint8)
 
 
@@ -81,7 +81,7 @@ def load_image(path: str | Path) -> MapImage:
     """Reads a map file: a picture, a ROS `map.yaml` or a MovingAI `.map`.
 
     Raises:
-        MapError: The file is missing, unreadable, too large or shows nothing.
+        MapError: The file is missing, unreadable, too large or of a single colour.
     """
     from tdac_envs.mapping.map_files import read_movingai, read_ros_yaml
 
@@ -127,7 +127,7 @@ def from_array(array: NDArray[np.generic]) -> MapImage:
 
 
 def read_bytes(path: Path, most: int = IMAGE_BYTES) -> bytes:
-    """The file's bytes, or a MapError that says why not."""
+    """The file's bytes; raises MapError if it cannot be read."""
     try:
         return read_file(path, most)
     except FileNotFoundError:
@@ -139,7 +139,7 @@ def read_bytes(path: Path, most: int = IMAGE_BYTES) -> bytes:
 
 
 def check_size(name: str, width: int, height: int) -> None:
-    """Refuses pictures above `MAX_PIXELS`."""
+    """Raises MapError if a picture has more than `MAX_PIXELS`."""
     if width * height > MAX_PIXELS:
         raise MapError(
             f"{name}: {width} x {height} pixels are {width * height / 1e6:.0f} "
@@ -159,19 +159,19 @@ def decode(data: bytes, name: str) -> ColourImage:
 
 
 def picture_size(data: bytes, name: str) -> tuple[int, int]:
-    """Width and height of the picture in a file's bytes, by its header."""
+    """Width and height of the picture in a file's bytes, from its header."""
     with _opened(data, name) as picture:
         return picture.size
 
 
 @contextmanager
 def _opened(data: bytes, name: str) -> Generator[Image.Image]:
-    """The picture in a file's bytes, whatever is wrong with it as a MapError."""
+    """Opens the picture in a file's bytes; every error is a MapError."""
     from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
-            # Pillow's own size warning comes before ours; its error is kept.
+            # Pillow's size warning is replaced by `check_size`; its size error is not.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             picture = Image.open(io.BytesIO(data), formats=_FORMATS)
             check_size(name, *picture.size)
@@ -187,7 +187,7 @@ def _opened(data: bytes, name: str) -> Generator[Image.Image]:
         ) from None
     except MapError:
         raise
-    # Pillow has dozens of errors for a damaged file.
+    # Pillow raises dozens of error types for a damaged file.
     except Exception as error:
         raise MapError(
             f"{name}: the image is damaged ({one_line(error)}); save it again"
@@ -205,7 +205,7 @@ def _to_rgb(picture: Image.Image) -> ColourImage:
 
 
 def _to_eight_bits(values: NDArray[np.float64]) -> GreyImage:
-    """Grey values of more than 8 bits; ones that use only 8 are taken as they are."""
+    """Scales grey values to 0..255; 8-bit values are kept."""
     low, high = float(values.min()), float(values.max())
     if low < 0 or high > 65535:
         values, high = values - low, high - low
@@ -216,10 +216,7 @@ def _to_eight_bits(values: NDArray[np.float64]) -> GreyImage:
 
 
 def _composite(rgba: NDArray[np.uint8]) -> ColourImage:
-    """Composites over white; over black where nothing could be seen on white.
-
-    Light walls drawn on a transparent sheet are the case for black.
-    """
+    """Composites over white, or over black for light ink on a transparent sheet."""
     alpha = rgba[..., 3:].astype(np.float32) / 255.0
     inked = rgba[..., :3] * alpha
     over_white = np.rint(inked + 255.0 * (1.0 - alpha)).astype(np.uint8)

@@ -1,8 +1,8 @@
-"""Photographs of plans: the light taken out, so that one threshold cuts them.
+"""Evens the light of photographed plans, so that one threshold separates the walls.
 
-Along the edges of walls the picture itself says where to cut: half-way between what is
-on either side. A smooth surface through these places follows the light (Yanowitz and
-Bruckstein, 1989), and does so alike for dark walls and for light ones.
+At the edge of a wall, the right threshold is half-way between the two sides. A smooth
+surface through these values follows the light (Yanowitz and Bruckstein, 1989), for dark
+walls as for light ones.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from tdac_envs.mapping.binarize import otsu
 from tdac_envs.mapping.image import ColourImage, GreyImage, luminance
 
 LEVEL = 127.5
-"""Where an evened picture is to be cut, luminance."""
+"""Luminance threshold of an evened picture."""
 _FEW_LEVELS, _DRAWN = 8, 0.7
-"""A drawing has this share of its pixels in so many levels; a photograph has not."""
+"""A drawing, unlike a photograph, has this share of its pixels in so few levels."""
 _CELL = 8
 """Side of the squares in which edges are summed up, px."""
 _WINDOW = np.ones((7, 7), np.uint8)
 _STRONG, _WEAK = 0.45, 0.25
-"""Contrast of an edge that counts, and of one that may part two areas, as shares of
-the strongest."""
+"""Least contrast of edges that set the threshold, and of edges that may separate two
+areas, as shares of the strongest."""
 
 Surface = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evened:
-    """A photograph as if its light were even; walls and floor part at `LEVEL`.
+    """A photograph with even light; `LEVEL` separates walls and floor.
 
     Attributes:
         colour: Shape (height, width, 3), uint8, RGB.
@@ -44,10 +44,10 @@ class Evened:
 
 
 def photographed(grey: GreyImage) -> bool:
-    """Whether the picture or its lighter side has many levels, as a camera makes them.
+    """Whether the picture is a photograph: it, or its lighter side, has many levels.
 
-    A drawing has most of its pixels in a few, also where its lines are smoothed; the
-    darker side of a photograph may have few as well.
+    A drawing has most of its pixels in a few levels, even if it is anti-aliased. The
+    darker side of a photograph may have few levels, too.
     """
     counts = np.bincount(grey.ravel(), minlength=256)
     lighter = counts[int(otsu(grey)) + 1 :]
@@ -55,12 +55,12 @@ def photographed(grey: GreyImage) -> bool:
 
 
 def _in_few(counts: NDArray[np.intp]) -> float:
-    """Share of the pixels that are in the fullest levels."""
+    """Share of the pixels in the fullest levels."""
     return float(np.sort(counts)[-_FEW_LEVELS:].sum() / max(counts.sum(), 1))
 
 
 def evened(colour: ColourImage, grey: GreyImage) -> Evened | None:
-    """The picture with its light evened, noise smoothed; None where it has no edges."""
+    """The picture with evened light and smoothed noise; None if it has no edges."""
     grey = _smoothed(grey)
     edges = _Edges.of(grey)
     if not edges.strength.any():
@@ -78,11 +78,11 @@ def _smoothed(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Edges:
-    """Where the picture changes quickly, each array of shape (height, width).
+    """The edges of a picture, as arrays of shape (height, width).
 
     Attributes:
         middle: Half-way between the lightest and the darkest pixel nearby.
-        strength: The difference of these, weighed against the light; 0..1.
+        strength: Their difference relative to the light; about 1 at the strongest.
     """
 
     middle: Surface
@@ -93,17 +93,17 @@ class _Edges:
         high = cv2.dilate(grey, _WINDOW).astype(np.float32)
         low = cv2.erode(grey, _WINDOW).astype(np.float32)
         middle = (high + low) / 2
-        # By the root: noise grows with the light less than the contrast does.
+        # Square root: with more light, noise grows less than contrast.
         strength = np.asarray((high - low) / np.sqrt(middle + 16.0), np.float32)
         most = max(float(np.percentile(strength[::4, ::4], 98)), 1e-6)
         return cls(np.asarray(middle, np.float32), strength / np.float32(most))
 
 
 def _surface(edges: _Edges) -> Surface:
-    """Where to cut each pixel: a smooth surface through the middles of the edges.
+    """The threshold of each pixel: a smooth surface through the middles of the edges.
 
-    In logarithms, since light multiplies: a paraboloid for the picture as a whole, then
-    what is left in ever smaller neighbourhoods.
+    It is fitted to logarithms, since light multiplies: first a paraboloid to the whole
+    picture, then the residuals in smaller and smaller neighbourhoods.
     """
     height, width = edges.middle.shape
     size = -(-width // _CELL), -(-height // _CELL)
@@ -123,13 +123,13 @@ def _surface(edges: _Edges) -> Surface:
 
 
 def _paraboloid(weight: Surface, values: Surface) -> Surface:
-    """The surface of second order nearest to `values / weight`, in weighted squares."""
+    """The weighted least-squares fit of a second-order surface to `values / weight`."""
     rows, columns = weight.shape
     y, x = np.meshgrid(
         np.linspace(-0.5, 0.5, rows), np.linspace(-0.5, 0.5, columns), indexing="ij"
     )
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1).reshape(-1, 6)
-    # Where the edges do not tell, the surface stays flat.
+    # Regularisation: without edges the surface stays flat.
     flat = 1e-3 * float(weight.sum()) * np.diag([1e-6, 1e-2, 1e-2, 1, 1, 1])
     normal = terms.T @ (terms * weight.reshape(-1, 1)) + flat
     found = np.linalg.solve(normal, terms.T @ values.ravel())
@@ -137,20 +137,20 @@ def _paraboloid(weight: Surface, values: Surface) -> Surface:
 
 
 def _without_ghosts(even: GreyImage, edges: _Edges) -> GreyImage:
-    """The picture without areas that end where there is no edge.
+    """The picture without areas whose boundary is not an edge.
 
-    Far from all edges the surface may miss the light. An area that no edge divides is
-    one thing: what it is at its rim, where the surface is good.
+    Far from edges the surface may be wrong. Therefore an area without edges inside gets
+    the class of its rim, where the surface is accurate.
     """
-    apart = edges.strength > _WEAK
-    count, labels = cv2.connectedComponents((~apart).astype(np.uint8), connectivity=4)
+    edge = edges.strength > _WEAK
+    count, labels = cv2.connectedComponents((~edge).astype(np.uint8), connectivity=4)
     light = even > LEVEL
-    rim = cv2.dilate(apart.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    rim = cv2.dilate(edge.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     every = np.bincount(labels[rim], minlength=count)
     share = np.bincount(labels[rim], light[rim], count) / np.maximum(every, 1)
     share[0] = 0.5
-    told = (every > 0) & (np.abs(share - 0.5) > 0.4)
-    wrong = told[labels] & (light != (share[labels] > 0.5))
+    clear = (every > 0) & (np.abs(share - 0.5) > 0.4)
+    wrong = clear[labels] & (light != (share[labels] > 0.5))
     if not wrong.any():
         return even
     levels = [np.median(even[side]) for side in (~light, light)]

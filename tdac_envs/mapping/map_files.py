@@ -1,4 +1,4 @@
-"""Map files that say themselves what is an obstacle: ROS `map.yaml`, MovingAI."""
+"""Map files that define their obstacles: ROS `map.yaml` and MovingAI `.map`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tdac_envs.mapping.params import Length, Place
 class RosMap(BaseModel):
     """Contents of a ROS `map.yaml` (wiki.ros.org/map_server)."""
 
-    # Tools add fields of their own (e.g. `lethal_cost`), which change nothing here.
+    # Tools add other fields (e.g. `lethal_cost`), which do not matter for the grid.
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     image: str = Field(description="Picture, relative to the yaml file.")
@@ -33,14 +33,14 @@ class RosMap(BaseModel):
     origin: tuple[Place, Place, Place] = Field(
         (0.0, 0.0, 0.0), description="Pose of the lower-left pixel, m and rad."
     )
-    negate: bool = Field(False, description="Light pixels are the obstacles.")
+    negate: bool = Field(False, description="Whether light pixels are the obstacles.")
     occupied_thresh: float = Field(0.65, ge=0, le=1)
     free_thresh: float = Field(0.196, ge=0, le=1)
     mode: Literal["trinary", "scale", "raw"] = "trinary"
 
 
 def read_ros_yaml(path: Path) -> MapImage:
-    """Reads a ROS map; what is not known to be free counts as occupied.
+    """Reads a ROS map; pixels that are not known to be free are occupied.
 
     Raises:
         MapError: The yaml or its picture cannot be used.
@@ -86,10 +86,10 @@ def _known_free(colour: ColourImage, ros: RosMap) -> BoolGrid:
 
 
 def read_movingai(path: Path) -> MapImage:
-    """Reads a MovingAI grid: `.`, `G` and `S` can be walked on, the rest cannot.
+    """Reads a MovingAI grid: `.`, `G` and `S` are free, the rest is occupied.
 
     Raises:
-        MapError: The header or the rows are not as the format has them
+        MapError: The header or the rows violate the format
             (movingai.com/benchmarks/formats.html).
     """
     data = read_bytes(path)

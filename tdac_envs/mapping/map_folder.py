@@ -1,4 +1,4 @@
-"""The files that preprocessing leaves: grid, picture, parameters, preview."""
+"""Writes the files of a preprocessed map: grid, picture, parameters, preview."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def write_map(
     obstacles black on white; `params.json` holds `params`; `preview.png` is for people.
 
     Args:
-        folder: Where to; made if missing.
+        folder: Target folder, created if missing.
         grid: From `preprocess`.
         params: From `preprocess`.
-        image: The source that `preprocess` got.
+        image: The source that was given to `preprocess`.
 
     Returns:
         The files, in the order above.
@@ -44,7 +44,7 @@ def write_map(
     Raises:
         MapError: The folder cannot be written.
     """
-    # A task that writes a grid alone has no use for what reads and draws images.
+    # Imported late: a task that writes only a grid needs no image code.
     from tdac_envs.mapping.preprocessing import as_image
 
     folder = Path(folder)
@@ -64,10 +64,10 @@ def write_map(
 
 
 def write_previews(error: PolarityError) -> list[Path]:
-    """Writes `preview-dark.png` and `preview-light.png` of a map that may be either.
+    """Writes `preview-dark.png` and `preview-light.png` of a map of unclear polarity.
 
     Args:
-        error: Of `preprocess`; its `folder`, or `NAME-map`, takes them.
+        error: From `preprocess`. The files go to its `folder`, by default `NAME-map`.
 
     Raises:
         MapError: The folder cannot be written.
@@ -87,7 +87,7 @@ def write_previews(error: PolarityError) -> list[Path]:
 
 
 def preview_of(colour: ColourImage, grid: OccupancyGrid, params: MapParams) -> Image:
-    """A picture of how a map was read, its task and the way, uint8 RGB.
+    """A picture of a map with its obstacles, task and shortest path, uint8 RGB.
 
     Args:
         colour: Shape (height, width, 3), uint8 RGB, the map's picture.

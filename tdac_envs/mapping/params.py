@@ -1,4 +1,4 @@
-"""`params.json`: what a map's preprocessing chose, and the task on it."""
+"""`params.json`: the choices of a map's preprocessing, and the task on the map."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ PIXELS_PER_METRE = 3779.52
 Place = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 """A coordinate."""
 Length = Annotated[float, Field(gt=0, ge=SMALLEST, le=LARGEST)]
-"""Above 0."""
+"""A length above 0."""
 MOST_RAYS = 4096
 Shade = Literal["dark", "light"]
 
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What the user says of a picture; None where it is to be found out.
+    """The user's settings for reading a picture; None where they are to be inferred.
 
     Attributes:
         polarity: Which pixels are obstacles.
@@ -64,21 +64,21 @@ class RobotParams(_Record):
         gt=0,
         ge=SMALLEST,
         le=2 * LARGEST,
-        description="Distance of the wheels, px; that of a disc is its diameter.",
+        description="Distance between the wheels, px; for `disc`, the diameter.",
     )
-    max_wheel_speed: Length = Field(75.59, description="Wheel limit, px/s.")
+    max_wheel_speed: Length = Field(75.59, description="Wheel speed limit, px/s.")
     n_rays: int = Field(18, ge=1, le=MOST_RAYS, description="Number of range rays.")
     field_of_view_deg: float = Field(
         110.0, gt=0, le=360, description="Whole angle of the fan, degrees."
     )
-    range_max: Length = Field(220.0, description="Range without a hit, px.")
+    range_max: Length = Field(220.0, description="Reading without a hit, px.")
 
     @classmethod
     def disc(cls, radius: float) -> RobotParams:
-        """The default robot with another body radius and its axle 2 x radius.
+        """The default robot with another body radius and an axle of 2 x radius.
 
         Raises:
-            TaskError: The radius is not usable.
+            TaskError: The radius is not positive, or too large.
         """
         radius = positive("robot_radius", radius)
         return cls(radius=radius, axle_length=2 * radius)
@@ -109,24 +109,24 @@ class MapParams(_Record):
     polarity: Literal["dark", "light", "mixed", "given"] = Field(
         description="Which pixels are obstacles; `given` where the file says so."
     )
-    method: str = Field(description="How the image was made black and white.")
+    method: str = Field(description="How the image was binarised.")
     threshold: float | None = Field(None, description="Luminance, 0..255.")
     cleanup: int = Field(0, ge=0, description="Strength of the noise removal, px.")
-    opening: int = Field(0, ge=0, description="Obstacle lines thinner are dropped, px.")
+    opening: int = Field(0, ge=0, description="Thinner obstacle lines are dropped, px.")
     inflation: float = Field(0, ge=0, le=LARGEST, description="Planner's margin, px.")
     score: float | None = None
     score_terms: ScoreTerms | None = None
     resolution: Length | None = Field(None, description="Metres per pixel.")
     origin: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
-    notes: tuple[str, ...] = Field((), description="What was changed, e.g. by snap.")
+    notes: tuple[str, ...] = Field((), description="Changes made, e.g. by snap.")
 
     def save(self, path: Path) -> None:
-        """Writes the file."""
+        """Writes the file `path`."""
         path.write_text(json.dumps(self.model_dump(mode="json"), indent=2) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> MapParams:
-        """Reads the file.
+        """Reads the file `path`.
 
         Raises:
             MapError: It is missing, not JSON, or has a wrong or unknown field.

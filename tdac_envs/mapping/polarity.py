@@ -1,4 +1,4 @@
-"""Which side of the threshold is free space, judged from the picture alone."""
+"""Estimates from the picture alone which side of the threshold is free space."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from tdac_envs.mapping.binarize import saved_level, unknown_level
 from tdac_envs.mapping.image import GreyImage
 
 # Weights of the evidence, from a logistic fit on 63 public maps whose free side is
-# known. Every term changes its sign with the picture's negative, so that a map and
-# its negative are decided alike.
+# known. Every term changes its sign in the negative of a picture, so that a map and its
+# negative get the same obstacles.
 _W_CONNECTED, _W_BORDER, _W_WIDTH, _W_PIECES = 1.5, -1.7, 1.1, -1.5
 _W_THIN, _W_OUTSIDE, _W_EXTREMES, _W_SAVER = 1.0, 1.0, 4.0, 3.0
 _W_SAVED = 15.0
-"""More than all other evidence: the file's own levels say what is free."""
+"""More than all other evidence, since the levels of the file define what is free."""
 _TOO_THIN = 2.5
 """Mean distance to the other side, px, below which no robot fits."""
 _WIDE = 0.01
-"""The same as a share of the picture's side, above which a shape is no wall."""
+"""The same as a share of the picture's side, above which a shape is not a wall."""
 
 
 def light_free_evidence(
@@ -29,13 +29,13 @@ def light_free_evidence(
 ) -> float:
     """Log-odds that the light pixels are the free ones.
 
-    Free space tends to be one connected, wide piece; walls are thin and in many
-    pieces, or they are the outside, which fills the border.
+    Free space tends to be one connected, wide piece. Obstacles are thin walls in many
+    pieces, or the outside, which fills the border.
 
     Args:
         luminance: Shape (height, width), uint8.
         light: Shape (height, width), bool, the pixels above the threshold.
-        photo: Whether a camera made it, so that single levels mean nothing.
+        photo: Whether it is a photograph, whose exact levels mean nothing.
     """
     light = _without_frame(light)
     share, border = float(light.mean()), float(_rim(light).mean())
@@ -55,7 +55,7 @@ def light_free_evidence(
 
 
 def _levels(luminance: GreyImage) -> float:
-    """What single grey levels tell of a file that a mapping tool wrote."""
+    """Evidence from the exact grey levels, which mapping tools write."""
     written = saved_level(luminance)
     if written is not None:
         return _W_SAVED if written > 127 else -_W_SAVED
@@ -86,9 +86,10 @@ def _thinness(width: float) -> float:
 
 
 def _outside(border: float, width_l: float, width_d: float, side: float) -> float:
-    """Whether the side that fills the border is the outside of a free area.
+    """Evidence from the side that fills the border.
 
-    It is if the other side is too wide for walls; else it is the paper around them.
+    It is the outside of a free area if the other side is too wide for walls; otherwise
+    it is the paper around the walls.
     """
     if abs(2 * border - 1) < 0.9:
         return 0.0
@@ -102,7 +103,7 @@ def _clip(value: float, limit: float) -> float:
 
 
 def _pieces(side: BoolGrid) -> tuple[float, int]:
-    """Share of the largest connected piece, and the number of pieces worth a look."""
+    """Share of the largest connected piece, and the number of pieces that matter."""
     stats = cv2.connectedComponentsWithStats(side.astype(np.uint8), connectivity=4)[2]
     areas = stats[1:, cv2.CC_STAT_AREA]
     smallest = max(20, side.size // 10000)
@@ -110,14 +111,14 @@ def _pieces(side: BoolGrid) -> tuple[float, int]:
 
 
 def _mean_width(side: BoolGrid) -> float:
-    """Mean distance to the other side, the border of the map counting as such."""
+    """Mean distance to the other side or to the border of the map, px."""
     framed = np.pad(side, 1).astype(np.uint8)
     distance = cv2.distanceTransform(framed, cv2.DIST_L2, 5)
     return float(distance[framed > 0].mean())
 
 
 def _extremes(luminance: GreyImage) -> float:
-    """With an "unknown" grey between black and white, the larger of those is free."""
+    """Evidence that, with an "unknown" grey, the larger of black and white is free."""
     level = unknown_level(luminance)
     if level is None:
         return 0.0
@@ -127,7 +128,7 @@ def _extremes(luminance: GreyImage) -> float:
 
 
 def _map_saver(luminance: GreyImage) -> float:
-    """ROS `map_saver` writes 254, not 255, for free, and 0 for occupied."""
+    """1 for the levels of ROS `map_saver` (254 free, 0 occupied), -1 for a negative."""
     counts = np.bincount(luminance.ravel(), minlength=256) / luminance.size
     free_light = counts[254] > 0.02 and counts[0] > 0.002 and counts[255] < 0.002
     free_dark = counts[1] > 0.02 and counts[255] > 0.002 and counts[0] < 0.002

@@ -1,4 +1,4 @@
-"""From a map picture to the occupancy grid that a task runs on (Algorithm 1)."""
+"""Preprocessing: from a map picture to the occupancy grid of a task (Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -35,26 +35,26 @@ def preprocess(
     polarity: Shade | None = None,
     threshold: float | None = None,
 ) -> tuple[OccupancyGrid, MapParams]:
-    """The occupancy grid of a map picture, and what was chosen to get it.
+    """The occupancy grid of a map picture, and the parameters that were chosen.
 
     Args:
         image: Path of a picture, a ROS `map.yaml` or a MovingAI `.map`; or an array:
             bool (True = occupied), or uint8 grey, RGB or RGBA.
-        start: Pixel (x, y), or None to judge by the picture alone.
+        start: Pixel (x, y), or None to use the picture alone.
         goal: Pixel (x, y), or None.
         robot_radius: Body radius, px.
-        preset: "default" searches from the plain reading outwards and stops at the
-            first that is feasible; "paper" is the literal grid of Algorithm 1.
+        preset: "default" tries readings from the plain one to bolder ones and takes the
+            first feasible one; "paper" is the literal grid of Algorithm 1.
         snap: Move start and goal to the nearest pixel that is free for the body;
-            `MapParams.notes` says from where.
+            `MapParams.notes` records the move.
         heading: Start heading, rad, from +x towards +y.
-        polarity: Which pixels are obstacles; found out from the picture if None.
-        threshold: Luminance, 0..255, above which a pixel is light; found out if None.
+        polarity: Which pixels are obstacles; inferred from the picture if None.
+        threshold: Luminance, 0..255, above which a pixel is light; inferred if None.
 
     Raises:
         MapError: The image cannot be used.
         PolarityError: There is a task, and both polarities are likely.
-        TaskError: No reading of it makes the task feasible; says why.
+        TaskError: An argument is invalid, or the task is feasible on no reading.
     """
     source, said = as_image(image), Said(polarity, threshold)
     scene, notes = _scene(source, start, goal, robot_radius, snap, said)
@@ -77,11 +77,11 @@ def examine(
     heading: float,
     said: Said,
 ) -> tuple[OccupancyGrid, MapParams, list[Candidate]]:
-    """The same as `preprocess`, and every candidate that was looked at; see `ranked`.
+    """The results of `preprocess`, and all evaluated candidates; see `ranked`.
 
     Raises:
         MapError: As `preprocess` does.
-        PolarityError: Both polarities are likely, also without a task.
+        PolarityError: Both polarities are likely, even without a task.
         TaskError: As `preprocess` does.
     """
     source = as_image(image)
@@ -101,11 +101,11 @@ def _scene(
     snap: bool,
     said: Said,
 ) -> tuple[Scene, list[str]]:
-    """The picture and what is asked of it, and notes on what was moved."""
+    """The picture with its task, and notes on moved points."""
     if source.occupied is not None and said != UNSAID:
         raise TaskError(
-            f"{source.name} says itself which cells are obstacles; leave out polarity "
-            "and threshold"
+            f"{source.name} itself defines which cells are obstacles; leave out "
+            "polarity and threshold"
         )
     notes: list[str] = []
     ends: list[Point | None] = []
@@ -120,7 +120,7 @@ def _scene(
 def _result(
     scene: Scene, best: Candidate, preset: Preset, heading: float, notes: list[str]
 ) -> tuple[OccupancyGrid, MapParams]:
-    """The chosen grid.
+    """The grid and the parameters of the best candidate.
 
     Raises:
         TaskError: The task is infeasible on it.
@@ -140,30 +140,30 @@ def _grid(scene: Scene, best: Candidate) -> OccupancyGrid:
 def _close_call(
     scene: Scene, colour: ColourImage, preset: Preset, heading: float
 ) -> PolarityError:
-    """The error that names both readings of a picture, and has what shows them.
+    """The error that describes both readings of a picture and has their previews.
 
     Args:
-        scene: The picture as it was judged.
-        colour: The picture as it came.
+        scene: The picture as it was evaluated.
+        colour: The original picture.
         preset: As for `preprocess`.
         heading: As for `preprocess`.
     """
-    told: list[str] = []
+    summaries: list[str] = []
     pictures: dict[str, Any] = {}
     for polarity in scene.polarities:
         one = replace(scene, said=replace(scene.said, polarity=polarity))
         best = ranked(one, preset)[0]
         free = float(1 - best.reading.cells.mean())
-        told.append(f"{polarity} obstacles leave {free:.0%} free{_way(best)}")
+        summaries.append(f"{polarity} obstacles leave {free:.0%} free{_path(best)}")
         params = _params(one, best, heading, [])
         pictures[polarity] = (colour, _grid(one, best), params)
-    message = f"{scene.image.name}: {_CLOSE_CALL}: {', '.join(told)}"
+    message = f"{scene.image.name}: {_CLOSE_CALL}: {', '.join(summaries)}"
     advice = "give polarity='dark' or 'light' (--polarity dark or --polarity light)"
     return PolarityError(f"{message}; {advice}", scene.image.name, pictures)
 
 
-def _way(best: Candidate) -> str:
-    """How far it is to the goal on a reading, as a remark."""
+def _path(best: Candidate) -> str:
+    """A remark on the length of the path."""
     if best.terms is not None:
         return f" and a path of {best.terms.path_length:.0f} px"
     return "" if best.reason is None else " and no path"
@@ -177,12 +177,12 @@ def rank_candidates(
     *,
     preset: Preset = "default",
 ) -> list[Candidate]:
-    """Every candidate that was looked at, the chosen one first; see `ranked`."""
+    """All evaluated candidates, the chosen one first; see `ranked`."""
     return ranked(Scene.of(as_image(image), start, goal, robot_radius), preset)
 
 
 def as_image(image: Source) -> MapImage:
-    """The decoded map of a path, an array, or itself."""
+    """The decoded map of a path or an array; a `MapImage` is returned as it is."""
     if isinstance(image, MapImage):
         return image
     if isinstance(image, np.ndarray):
@@ -191,7 +191,7 @@ def as_image(image: Source) -> MapImage:
 
 
 def _to_pixel(image: MapImage, name: str, point: tuple[float, float]) -> Point:
-    """The pixel that holds the point; refused outside the map."""
+    """The pixel that contains the point; raises TaskError outside the map."""
     height, width = image.colour.shape[:2]
     if not np.isfinite(point).all():
         raise TaskError(f"expected {name} to be two finite numbers, got {point}")
@@ -223,16 +223,16 @@ def _snapped(
 
 
 def _changed(reading: Reading, preset: Preset) -> list[str]:
-    """In what the reading goes beyond the picture."""
+    """Notes on the obstacles that the reading removes from the picture."""
     if not (reading.opening or reading.cleanup):
         return []
     if preset == "paper":
         what = f"pieces and holes under {reading.cleanup} px removed, gaps closed"
-        return [f"cleaned with strength {reading.cleanup}: {what}; look at the preview"]
+        return [f"cleaned with strength {reading.cleanup}: {what}; check the preview"]
     what = f"specks up to {reading.cleanup} px"
     if reading.opening:
         what = f"lines under {reading.opening} px and {what}"
-    return [f"taken for free space in the picture: {what}; look at the preview"]
+    return [f"treated as free space: {what}; check the preview"]
 
 
 def _params(

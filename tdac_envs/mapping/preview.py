@@ -1,4 +1,4 @@
-"""A picture of what preprocessing made of a map."""
+"""Draws the preview of a preprocessed map."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def draw_preview(
     Args:
         source: Shape (height, width, 3), uint8 RGB, as read.
         cells: Shape (height, width), bool, True = occupied.
-        params: What was chosen.
+        params: The parameters that preprocessing chose.
         path: Shape (n, 2), the shortest path for the body; may be empty.
     """
     lines = _lines(params)
@@ -64,12 +64,12 @@ def draw_preview(
 
 
 def _lay_source(canvas: Canvas, source: ColourImage, cells: BoolGrid) -> None:
-    """Puts the faded source where the canvas has its own map, and tints it."""
+    """Replaces the map on the canvas by the faded and tinted source."""
     height, width = cells.shape
     size = (round(width * canvas.scale), round(height * canvas.scale))
-    way = cv2.INTER_AREA if canvas.scale < 1 else cv2.INTER_NEAREST
-    picture = cv2.resize(source, size, interpolation=way).astype(np.float32)
-    wall = cv2.resize(cells.astype(np.float32), size, interpolation=way)[..., None]
+    method = cv2.INTER_AREA if canvas.scale < 1 else cv2.INTER_NEAREST
+    picture = cv2.resize(source, size, interpolation=method).astype(np.float32)
+    wall = cv2.resize(cells.astype(np.float32), size, interpolation=method)[..., None]
     tint = wall * np.array(_WALL_TINT) + (1 - wall) * np.array(_FREE_TINT)
     mixed = _mixed(picture, tint)
     left = int(np.ceil(canvas.to_frame((-0.5, -0.5))[0][0]))
@@ -132,7 +132,7 @@ def _faint(line: Picture) -> None:
 
 
 def _tick_step(scale: float) -> int:
-    """Distance of the numbered ticks, map px: at least 70 frame px apart."""
+    """Distance between numbered ticks, map px; at least 70 frame px."""
     for step in (5, 10, 25, 50, 100, 250, 500, 1000, 2500):
         if step * scale >= 70:
             return step
@@ -144,14 +144,14 @@ def _mixed(picture: NDArray[Any], tint: NDArray[Any]) -> Picture:
 
 
 def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
-    """What some pixels look like on average once they are tinted."""
+    """The average colour of the chosen pixels after tinting."""
     colour = np.array(cv2.mean(source, chosen.astype(np.uint8))[:3])
     red, green, blue = _mixed(colour, np.array(tint)).tolist()
     return red, green, blue
 
 
 def _places(params: MapParams) -> list[tuple[Colour, str]]:
-    """Start, goal and path, where there are some."""
+    """Legend entries of start, goal and path, as far as given."""
     entries: list[tuple[Colour, str]] = []
     if params.start is not None:
         entries.append((TRAIL, f"start {_text(params.start)}"))
@@ -173,7 +173,7 @@ def _draw_entries(
 
 
 def _lines(params: MapParams) -> list[str]:
-    """What the text below the legend says."""
+    """Lines of text below the legend."""
     size = f"{params.source}: {params.width} x {params.height} px"
     if params.resolution is not None:
         size += f", {params.resolution:g} m per px"

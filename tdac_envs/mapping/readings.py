@@ -1,9 +1,9 @@
-"""Readings of a map picture, from the plain one outwards.
+"""Readings of a map picture, from the plain one to bolder ones.
 
-A reading says which pixels are occupied. Later readings explain more of the picture
-away, and each does so only where the picture itself gives a reason: a strong colour,
-pieces too small for walls, lines too thin for this map's walls. None removes a stroke
-of the walls' own colour and thickness, so that a closed map stays closed.
+A reading says which pixels are occupied. Later readings ignore more obstacles, but only
+for a reason in the picture: a strong colour, pieces too small for walls, lines too thin
+for this map's walls. No reading removes a stroke with the colour and thickness of the
+walls, so that a closed map stays closed.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from tdac_envs.mapping.params import UNSAID
 from tdac_envs.mapping.scene import Reading, Scene, decide_light_free, touches
 
 SLIVER = 6.0
-"""Widest strip along the outside of a plan that belongs to it, px."""
+"""Largest width of a strip that counts as part of the outside, px."""
 _FAINT = 0.3
-"""From half-way between wall and floor towards the floor, where photographs are cut."""
+"""Share of the distance to the floor by which a photograph's threshold is shifted."""
 
 
 def readings(scene: Scene) -> Iterator[Reading]:
     """Readings of the likelier polarity, the plainest first.
 
-    Without start and goal there is only one, marks ignored: nothing could tell
+    Without start and goal there is only one, with marks ignored: nothing would show
     whether a bolder one is needed.
     """
     given = scene.image.occupied
@@ -52,7 +52,7 @@ def readings(scene: Scene) -> Iterator[Reading]:
         return
     beyond = _beyond_the_plan(scene, plain)
     for reading in _outwards(scene, plain, unmarked):
-        yield _walled_in(reading, beyond)
+        yield _with_outside_closed(reading, beyond)
 
 
 def _outwards(
@@ -69,14 +69,14 @@ def _outwards(
     if unmarked is not None:
         yield unmarked
     if scene.unknown is not None:
-        # A mapping tool's output: what is dark was measured, and none of it drawn.
+        # Output of a mapping tool: its dark pixels were measured, not drawn.
         yield _without(base, 4)
         return
     yield from _bolder(base)
 
 
 def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
-    """The outside, where start and goal are inside; empty otherwise."""
+    """The outside of the plan; empty if start or goal is in it."""
     strong = scene.saturated
     ignored = strong if _are_marks(scene, strong, plain) else np.zeros_like(strong)
     region = outside(scene.luminance, plain.polarity == "dark", ignored)
@@ -85,10 +85,10 @@ def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
     return region
 
 
-def _walled_in(reading: Reading, beyond: BoolGrid) -> Reading:
-    """The reading with the paper around the building closed.
+def _with_outside_closed(reading: Reading, beyond: BoolGrid) -> Reading:
+    """The reading with the paper around the building occupied.
 
-    Windows are drawn with thin or grey lines, and no robot leaves through them.
+    Windows are drawn with thin or grey lines, but no robot may leave through them.
     """
     if reading.polarity == "mixed" or not (beyond & ~reading.cells).any():
         return reading
@@ -98,7 +98,7 @@ def _walled_in(reading: Reading, beyond: BoolGrid) -> Reading:
 
 
 def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
-    """Free pieces that cling to the outside: blurred edges, gaps within letters."""
+    """Free pieces close to the outside: blurred edges, gaps in letters."""
     count, labels = cv2.connectedComponents((~cells).astype(np.uint8), connectivity=4)
     apart = cv2.distanceTransform((~beyond).astype(np.uint8), cv2.DIST_L2, 3) > SLIVER
     deep = np.bincount(labels[apart], minlength=count) > 0
@@ -107,10 +107,10 @@ def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
 
 
 def plain_reading(scene: Scene, light_free: bool) -> Reading:
-    """One threshold, with two things that it cannot know.
+    """The reading by one threshold, with two corrections.
 
-    A map saver's "unknown" grey counts as occupied, and where most walls are drawn in
-    strong colours, the light ones among these (green, yellow) are walls as well.
+    A map saver's "unknown" grey is occupied. If most walls are drawn in strong colours,
+    light strong colours such as yellow are walls, too.
     """
     threshold, method = scene.threshold, "otsu"
     if scene.said.threshold is not None:
@@ -121,7 +121,7 @@ def plain_reading(scene: Scene, light_free: bool) -> Reading:
         method += ", polarity as given"
     level = scene.unknown
     if level is not None:
-        threshold = _beside(level, threshold, light_free)
+        threshold = _threshold_beyond(level, threshold, light_free)
         method = f"otsu, unknown grey {level} not free"
     reading = _cut(scene.luminance, threshold, light_free, method)
     if scene.photo:
@@ -135,18 +135,18 @@ def plain_reading(scene: Scene, light_free: bool) -> Reading:
 
 
 def _of_photo(scene: Scene, light_free: bool, method: str) -> Reading:
-    """A photograph cut nearer to the floor: blur makes thin walls faint."""
+    """A photograph cut nearer to the floor, since blur makes thin walls faint."""
     grey = scene.luminance
     floor = float(np.median(grey[(grey > scene.threshold) == light_free]))
     cut = scene.threshold + _FAINT * (floor - scene.threshold)
-    # The threshold is none of the picture as it came.
+    # This threshold does not apply to the original picture.
     return replace(_cut(grey, cut, light_free, method), threshold=None)
 
 
-def _beside(level: int, threshold: float, light_free: bool) -> float:
-    """A threshold that leaves the unknown grey on the occupied side.
+def _threshold_beyond(level: int, threshold: float, light_free: bool) -> float:
+    """A threshold with the unknown grey on the occupied side.
 
-    Whatever is more free than a map saver's 205 is free by its own rule.
+    By the rule of ROS `map_saver`, every level beyond its unknown grey (205) is free.
     """
     safe = level + 0.5 if light_free else level - 0.5
     if level > 190 or level < 65:
@@ -161,7 +161,7 @@ def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Re
 
 
 def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
-    """Whether strong colours are marks: few, and most walls of another colour."""
+    """Whether strong colours are marks: few pixels, and few of the walls' pixels."""
     on_walls = int((strong & plain.cells).sum())
     allowed = 0.05 if touches(strong, scene.ends) else 0.02
     few = float(strong.mean()) <= allowed
@@ -169,7 +169,7 @@ def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
 
 
 def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
-    """Saturated marks and lines dropped; None where there are none."""
+    """The reading without saturated marks and lines; None if there are none."""
     colour = scene.image.colour
     strong = scene.saturated
     marks = strong & plain.cells
@@ -181,10 +181,10 @@ def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
 
 
 def _mixed(scene: Scene) -> Reading | None:
-    """What is unlike the floor at start and goal, where that is of a middle tone.
+    """The reading by colour distance from the floor, for a floor of a middle tone.
 
-    Only where much of the floor's rim is darker and much of it lighter: then no
-    threshold separates it.
+    None unless much of the floor's rim is darker and much of it is lighter, so that no
+    threshold separates the floor. Its colour is that at start and goal.
     """
     shape, colour = scene.luminance.shape, scene.image.colour
     spots = [disc(shape, x, y, scene.radius / 2) for x, y in scene.ends]
@@ -195,7 +195,7 @@ def _mixed(scene: Scene) -> Reading | None:
     grey = int(luminance(np.rint(floor).astype(np.uint8)[None, None])[0, 0])
     gap = scene.luminance.astype(np.int16) - grey
     like = (np.abs(gap) < 8).astype(np.uint8)
-    # Noise makes the floor of a photograph darker and lighter, too, but not by so much.
+    # Noise makes a photographed floor darker and lighter, too, but by less.
     far = max(20.0, abs(grey - LEVEL)) if scene.photo else 20.0
     rim = (cv2.dilate(like, np.ones((5, 5), np.uint8)) > 0) & (np.abs(gap) >= far)
     darker = float((gap[rim] < 0).mean()) if rim.any() else 0.0
@@ -207,7 +207,7 @@ def _mixed(scene: Scene) -> Reading | None:
 
 
 def _bolder(base: Reading) -> Iterator[Reading]:
-    """Drops specks, then lines that are thin beside this map's walls."""
+    """Drops specks, then lines that are thin compared with this map's walls."""
     shape = base.cells.shape
     for extent in (4, 8, 16, 32):
         if extent <= 0.04 * min(shape):

@@ -1,4 +1,4 @@
-"""A picture with what is asked of it, and what a reading of it is."""
+"""A map picture with its task, and the type of its readings."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from tdac_envs.mapping.score import Point, Trip
 
 Polarity = Shade | Literal["mixed", "given"]
 
-# Start and goal of a real task are free with the body's disc around them, so two
-# clean discs outweigh a doubtful picture but not a clear one.
+# In a real task, the body's disc at start and goal is free. So two clean discs outweigh
+# an unclear picture, but not a clear one.
 _W_TASK = 2.5
 CLOSE = 0.5
 """Log-odds below which the user is asked; public maps with a task are above 5."""
@@ -32,9 +32,9 @@ class Reading:
     Attributes:
         cells: Shape (height, width), bool, True = occupied.
         polarity: Which pixels are obstacles.
-        method: What was done, in words.
+        method: Description of how the picture was read.
         threshold: Luminance at which the picture was cut, 0..255.
-        cleanup: Strength of `cleanup.clean` or largest speck dropped, px.
+        cleanup: Strength of `cleanup.cleanings`, or largest size of dropped specks, px.
         opening: Lines thinner than this were dropped, px.
     """
 
@@ -48,15 +48,15 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A picture with what is asked of it, and what all its readings need.
+    """A picture with its task, and the data that all its readings need.
 
     Attributes:
-        image: The map; a photograph with its light evened.
-        luminance: Of its colours.
+        image: The map; the light of a photograph is evened.
+        luminance: Luminance of the map, shape (height, width), uint8.
         start: Pixel (x, y), or None.
         goal: Pixel (x, y), or None.
-        radius: Of the body, px.
-        said: What the user says of it.
+        radius: Body radius, px.
+        said: The user's settings.
         photo: Whether it is a photograph whose light was evened.
     """
 
@@ -87,35 +87,35 @@ class Scene:
 
     @property
     def ends(self) -> list[Point]:
-        """Start and goal, as far as given."""
+        """Start and goal, without those that are not given."""
         return [point for point in (self.start, self.goal) if point is not None]
 
     @property
     def polarities(self) -> tuple[Shade, ...]:
-        """Those that may be: both, unless the user says which."""
+        """The possible polarities: both, unless the user has chosen one."""
         said = self.said.polarity
         return ("dark", "light") if said is None else (said,)
 
     @property
     def trip(self) -> Trip | None:
-        """What the body has to do; None unless both start and goal are given."""
+        """The navigation task; None unless both start and goal are given."""
         if self.start is None or self.goal is None:
             return None
         return Trip(self.start, self.goal, self.radius)
 
     @cached_property
     def threshold(self) -> float:
-        """Above it a pixel is light: as given, of evened light, or Otsu's."""
+        """Luminance above which a pixel is light: given, `LEVEL` (photo), or Otsu's."""
         if self.said.threshold is not None:
             return self.said.threshold
         return LEVEL if self.photo else otsu(self.luminance)
 
     @cached_property
     def evidence(self) -> float:
-        """Log-odds that the light side is free, start and goal considered."""
+        """Log-odds that the light side is free, from the picture, start and goal."""
         light = self.luminance > self.threshold
         found = light_free_evidence(self.luminance, light, self.photo)
-        # A mark may cover start or goal; paper may be coloured all over.
+        # Ignores marks on start or goal, unless the whole paper is coloured.
         neutral = ~self.saturated
         neutral = neutral if neutral.mean() > 0.5 else np.ones_like(neutral)
         for x, y in self.ends:
@@ -132,7 +132,7 @@ class Scene:
 
     @cached_property
     def unknown(self) -> int | None:
-        """The "unknown" grey, unless start and goal both stand on it."""
+        """The "unknown" grey, unless all given ends are on it."""
         by_itself = self.said.threshold is None and not self.photo
         level = unknown_level(self.luminance) if by_itself else None
         if level is None:
@@ -142,7 +142,7 @@ class Scene:
 
 
 def decide_light_free(scene: Scene) -> bool:
-    """Whether the light side is free: as given, or from picture, start and goal."""
+    """Whether the light side is free: as given, or by the evidence."""
     if scene.said.polarity is not None:
         return scene.said.polarity == "dark"
     return scene.evidence > 0
@@ -158,5 +158,5 @@ def unclear(scene: Scene, polarity: Polarity) -> bool:
 
 
 def touches(mask: BoolGrid, points: list[Point]) -> bool:
-    """Whether any of the points lies on the mask."""
+    """Whether any of the points is in the mask."""
     return any(bool(mask[y, x]) for x, y in points)

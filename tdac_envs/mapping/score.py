@@ -1,4 +1,4 @@
-"""Is a grid feasible for the body, and how good is it (Algorithm 1)?"""
+"""Feasibility and score of a grid for a body (Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def score(terms: ScoreTerms) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Trip:
-    """What the body has to do: pixels (x, y), and its radius in px."""
+    """A navigation task: start and goal pixels (x, y), and the body's radius, px."""
 
     start: Point
     goal: Point
@@ -47,11 +47,11 @@ class Trip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """A grid with what its score needs of it.
+    """The properties of a grid that its score depends on.
 
     Attributes:
         clear: `clearance` of its cells.
-        sharpness: Of its cells.
+        sharpness: `sharpness` of its cells.
     """
 
     clear: FloatGrid
@@ -59,24 +59,23 @@ class Ground:
 
     @classmethod
     def of(cls, cells: BoolGrid) -> Ground:
-        """That of cells, shape (height, width), bool, True = occupied."""
+        """The properties of cells, shape (height, width), bool, True = occupied."""
         return cls(clearance(cells), sharpness(cells))
 
 
 def terms_of(
     grounds: Sequence[Ground], trip: Trip, margins: Sequence[int], guide: Guide
 ) -> list[list[ScoreTerms | None]]:
-    """Terms of the score with each margin that the planner keeps around the body.
+    """Terms of the score of each grid with each planner's margin.
 
     Args:
-        grounds: Of the same size, best with fewer obstacles towards the end.
+        grounds: Grids of the same size; fastest with the fewest obstacles last.
         trip: Start, goal and body.
-        margins: In rising order, px.
-        guide: From `guide_of`, for a grid without obstacles that a ground has not.
+        margins: Margins around the body in ascending order, px.
+        guide: From `guide_of`, for a grid whose obstacles are in all grids.
 
     Returns:
-        For each ground a list as long as `margins`; None where the body does not get
-        to the goal.
+        For each grid a list as long as `margins`; None where there is no path.
     """
     paths: list[Path] = [np.empty((0, 2))] * len(grounds)
     found: list[list[ScoreTerms | None]] = [[] for _ in grounds]
@@ -84,10 +83,10 @@ def terms_of(
         spaces = {
             number: body_free(ground.clear, trip.radius + margin)
             for number, ground in enumerate(grounds)
-            # Where a narrower body does not get to the goal, this one does not.
+            # Without a path for a smaller margin, there is none for this one.
             if margin == margins[0] or len(paths[number])
         }
-        spaces = {n: s for n, s in spaces.items() if not _leads_over(paths[n], s)}
+        spaces = {n: s for n, s in spaces.items() if not _stays_free(paths[n], s)}
         planned = plan_paths(list(spaces.values()), trip.start, trip.goal, guide)
         for number, path in zip(spaces, planned, strict=True):
             paths[number] = path
@@ -108,22 +107,22 @@ def _terms(ground: Ground, path: Path) -> ScoreTerms | None:
 
 
 def guide_of(clear: FloatGrid, trip: Trip) -> Guide | None:
-    """What speeds up `terms_of` a grid, or of one with more obstacles.
+    """A guide that speeds up `terms_of` for a grid, or for one with more obstacles.
 
     Args:
         clear: Clearance of the grid.
         trip: Start, goal and body.
 
     Returns:
-        None where the body does not get from start to goal.
+        None if there is no path.
     """
     return guide_between(body_free(clear, trip.radius), trip.start, trip.goal)
 
 
-def _leads_over(path: Path, free: BoolGrid) -> bool:
-    """Whether a path of single steps is still one where fewer pixels are free.
+def _stays_free(path: Path, free: BoolGrid) -> bool:
+    """Whether a path is still possible with fewer free pixels.
 
-    Then it is still the shortest one, and the one that `plan_path` takes.
+    If so, it is still the shortest path, and the one that `plan_path` finds.
     """
     columns, rows = path.astype(np.intp).T
     over = free[rows, columns].all() and free[rows[1:], columns[:-1]].all()
@@ -131,7 +130,7 @@ def _leads_over(path: Path, free: BoolGrid) -> bool:
 
 
 def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
-    """Why the body does not get from start to goal with a margin, and what would do.
+    """Why there is no path from start to goal with a margin, and what would work.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
@@ -149,11 +148,11 @@ def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
             if cells[y, x]
             else f"is {clear[y, x]:.1f} px from an obstacle, too near"
         )
-        near = _nearest_text(_joined(free, other), x, y, radius)
+        near = _nearest_text(_connected_to(free, other), x, y, radius)
         return f"{name} ({x}, {y}) {what}; {near}{_narrower(clear, trip)}"
     widest = widest_radius(clear, start, goal)
     advice = (
-        "no robot gets through: a wall closes the way"
+        "no robot gets through: a wall blocks the way"
         if widest < 0.5
         else f"the largest radius that gets through is {widest:.1f} px"
     )
@@ -163,8 +162,8 @@ def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
     )
 
 
-def _joined(free: BoolGrid, point: Point) -> BoolGrid:
-    """The pixels that are joined with a point; all where it is not free itself."""
+def _connected_to(free: BoolGrid, point: Point) -> BoolGrid:
+    """The free pixels connected with a point; all if the point is not free."""
     labels = _labels(free)
     label = labels[point[::-1]]
     joined: BoolGrid = labels == label
@@ -172,7 +171,7 @@ def _joined(free: BoolGrid, point: Point) -> BoolGrid:
 
 
 def _narrower(clear: FloatGrid, trip: Trip) -> str:
-    """What would do without another start or goal; empty where nothing would."""
+    """The radius that would work with this start and goal; empty if none would."""
     widest = widest_radius(clear, trip.start, trip.goal)
     if widest < 0.5:
         return ""
@@ -196,9 +195,9 @@ def nearest_free(free: BoolGrid, x: int, y: int) -> Point | None:
 
 
 def connected(free: BoolGrid, start: Point, goal: Point) -> bool:
-    """Whether two free pixels are joined, without cutting a corner.
+    """Whether two free pixels are connected without cutting a corner.
 
-    A diagonal step needs both pixels beside it, so 4-connectivity decides.
+    A diagonal step requires both pixels beside it, so 4-connectivity decides.
     """
     labels = _labels(free)
     at_start, at_goal = labels[start[::-1]], labels[goal[::-1]]
@@ -206,13 +205,13 @@ def connected(free: BoolGrid, start: Point, goal: Point) -> bool:
 
 
 def _labels(free: BoolGrid) -> NDArray[np.int32]:
-    """Of each free pixel the piece that it is in, from 1; 0 of the others."""
+    """Number of the connected piece of each free pixel, from 1; 0 for the others."""
     labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
     return labels.astype(np.int32, copy=False)
 
 
 def widest_radius(clear: FloatGrid, start: Point, goal: Point) -> float:
-    """Largest body radius that gets from start to goal, to 0.1 px; -1 if none."""
+    """Largest body radius that gets from start to goal, to 0.1 px; -1 for none."""
     if not connected(body_free(clear, 0.0), start, goal):
         return -1.0
     low, high = 0.0, float(min(clear[start[::-1]], clear[goal[::-1]]))

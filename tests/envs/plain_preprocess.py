@@ -79,7 +79,7 @@ def failure(cells, clear, free, start, goal, radius):
         return None
     room = widest(clear, start, goal)
     advice = f"the largest radius that gets through is {room:.1f} px"
-    advice = "no robot gets through: a wall closes the way" if room < 0.5 else advice
+    advice = "no robot gets through: a wall blocks the way" if room < 0.5 else advice
     return (
         f"start {start} and goal {goal} are not connected for a robot of "
         f"{radius:g} px radius; {advice}"

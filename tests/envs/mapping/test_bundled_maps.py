@@ -78,7 +78,7 @@ def test_there_are_enough_maps_and_the_maze_comes_first():
 def test_an_unknown_name_is_answered_with_the_closest():
     with pytest.raises(MapError, match="did you mean 'warehouse'"):
         bundled_map("werehouse")
-    with pytest.raises(MapError, match="there are maze, cave"):
+    with pytest.raises(MapError, match="the maps are maze, cave"):
         bundled_map("42")
 
 

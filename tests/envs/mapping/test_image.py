@@ -193,7 +193,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 
 def test_one_pixel(tmp_path: Path) -> None:
     Image.new("L", (1, 1)).save(tmp_path / "dot.png")
-    with pytest.raises(MapError, match=r"dot\.png: 1 x 1 pixels are no map"):
+    with pytest.raises(MapError, match=r"dot\.png: 1 x 1 pixels are too few for a map"):
         load_image(tmp_path / "dot.png")
 
 

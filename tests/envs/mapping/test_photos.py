@@ -145,7 +145,7 @@ def test_words_on_pictures_are_checked() -> None:
         preprocess(chessboard(), polarity="black")  # type: ignore[arg-type]
     with pytest.raises(TaskError, match="expected a threshold from 0 to below 255"):
         preprocess(chessboard(), threshold=300)
-    with pytest.raises(TaskError, match="says itself which cells are obstacles"):
+    with pytest.raises(TaskError, match="itself defines which cells are obstacles"):
         preprocess(chessboard() > 128, polarity="dark")
     assert prepare(chessboard() > 128, (20, 20), (60, 60)).params.polarity == "given"
 

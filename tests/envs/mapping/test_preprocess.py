@@ -171,7 +171,7 @@ def test_unknown_grey_is_not_free(negative: bool) -> None:
 def test_closed_map_is_refused(wall: int, negative: bool) -> None:
     """No reading opens a wall, however thin."""
     image = rooms(wall, closed=True)
-    with pytest.raises(TaskError, match="no robot gets through: a wall closes the way"):
+    with pytest.raises(TaskError, match="no robot gets through: a wall blocks the way"):
         preprocess(255 - image if negative else image, START, GOAL, 12.0)
 
 
