@@ -1,1 +1,1 @@
-"""The files that a controller gets beside its task."""
+"""The files that each controller gets with its task."""

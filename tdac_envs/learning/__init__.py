@@ -1,1 +1,1 @@
-"""What learning needs: observation wrappers, guidance, batches for SB3."""
+"""For learning: observation wrappers, guidance, batches for Stable-Baselines3."""

@@ -1,4 +1,4 @@
-"""The next way-point of a reference route, from wherever the robot is."""
+"""Reference routes to a goal, and the next waypoint from any place."""
 
 from __future__ import annotations
 
@@ -25,34 +25,34 @@ if TYPE_CHECKING:
 Lengths = NDArray[np.float32]
 
 MARGINS = (0.5, 0.25, 0.1)
-"""Room beyond the body that a route may keep, in radii of the body, widest first."""
+"""Margins around the body that a route may keep, in body radii, widest first."""
 REACH = 0.6
-"""How far ahead on the route its next way-point is, in radii of the body.
+"""Distance of the next waypoint along the route, in body radii.
 
-Who drives straight at way-points cuts corners, the more the farther ahead they are;
-this near, the body stays clear on every bundled map and world.
+A robot that drives straight at a waypoint cuts corners, the more the farther ahead it
+is; at this distance the body stays clear on every bundled map and world.
 """
-# A route with room is taken if it is at most so many times as long as the shortest.
+# Largest ratio of the length of a route with a margin to that of the shortest path.
 _DETOUR = 1.25
 _SQRT2 = 2.0**0.5
-# A way ends at most so many grid points beside its goal.
+# Largest distance between the end of a route and its goal, grid points.
 _BESIDE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """Ways to a goal over the whole of a map or a world.
+    """Routes to a goal from all places of a map or a world.
 
-    From each place the route leads along the shortest path for the body to where there
-    is room, and from there along the shortest path that keeps this room.
+    A route follows the shortest path for the body to where a margin is free, and from
+    there the shortest path that keeps this margin.
 
     Attributes:
-        goal: Point (x, y), px or m, as all places.
-        reach: How far ahead a way-point is, along the route.
-        roomy: Shape (height, width): length of the path with room from each grid
-            point, in spacings; inf where there is none.
-        shortest: The same of the shortest path.
-        frame: x and y of the first grid point, and the spacing.
+        goal: Point (x, y), px or m, like all places.
+        reach: Distance of a waypoint along the route, px or m.
+        roomy: Shape (height, width), float32: length of the path with the margin from
+            each grid point, in grid spacings; inf where there is none.
+        shortest: The same for the shortest path.
+        frame: x and y of the first grid point, and the grid spacing.
     """
 
     goal: tuple[float, float]
@@ -62,14 +62,14 @@ class Route:
     frame: tuple[float, float, float]
 
     def ahead(self, places: ArrayLike) -> NDArray[np.float64]:
-        """The next way-point from each place.
+        """The next waypoint from each place.
 
         Args:
             places: Points or poses, shape (n, 2) or (n, 3).
 
         Returns:
-            Shape (n, 2): `reach` further on the route, or the goal itself where that
-            is nearer, or no route is near.
+            Shape (n, 2): points `reach` further on the route, or the goal if it is
+            nearer or no route is near.
         """
         left, low, spacing = self.frame
         points = np.asarray(places, np.float64)[:, :2]
@@ -86,12 +86,12 @@ class Route:
 def route_to_goal(task: Map2DTask | EPuckTask, reach: float = REACH) -> Route:
     """The reference route of a task.
 
-    Its room is the widest of `MARGINS` for which it is hardly longer than the shortest
-    path from the task's start.
+    Its margin is the widest of `MARGINS` for which the route from the task's start is
+    not much longer than the shortest path.
 
     Args:
-        task: Gives map or world, body, start and goal.
-        reach: Of the way-points, in radii of the body.
+        task: Task with map or world, body, start and goal.
+        reach: Distance of the waypoints along the route, in body radii.
     """
     if isinstance(task, Map2DTask):
         place: Terrain | Ground = task.terrain
@@ -106,7 +106,7 @@ def route_to_goal(task: Map2DTask | EPuckTask, reach: float = REACH) -> Route:
     roomy = shortest
     for margin in MARGINS:
         wide = _roomy(place, goal, radius, margin)
-        if _near(wide, start, radius / spacing) <= _DETOUR * task.shortest / spacing:
+        if _length(wide, start, radius / spacing) <= _DETOUR * task.shortest / spacing:
             roomy = wide
             break
     return Route(task.goal, reach * radius, roomy, shortest, frame)
@@ -117,7 +117,7 @@ def _in_spacings(field: Lengths, spacing: float) -> Lengths:
 
 
 def _goal_cell(shortest: Lengths, at: Sequence[float]) -> tuple[int, int]:
-    """Column and row of the grid point where a way ends, looked for near a point."""
+    """Column and row of the grid point where routes end, if possible near a point."""
     top, left = (max(round(at[k]) - _BESIDE, 0) for k in (1, 0))
     part = shortest[top : top + 2 * _BESIDE + 1, left : left + 2 * _BESIDE + 1]
     if not part.size or part.min() > 0.0:
@@ -132,16 +132,16 @@ def _free(place: Terrain | Ground, radius: float) -> BoolGrid:
     return body_free(place.clear, radius)
 
 
-# Starts differ from episode to episode, goals seldom do.
+# Cached, since episodes differ in their starts, but seldom in their goals.
 @lru_cache(maxsize=8)
 def _roomy(
     place: Terrain | Ground, goal: tuple[int, int], radius: float, margin: float
 ) -> Lengths:
-    """Length of the path with room from each grid point, in spacings."""
+    """Length of the path with a margin from each grid point, in spacings."""
     spacing = place.spacing if isinstance(place, Ground) else 1.0
     wide = radius * (1.0 + margin)
     free = _free(place, wide).copy()
-    # The goal itself may be in a corner.
+    # No margin near the goal, which may be in a corner.
     reach, (column, row) = math.ceil(wide / spacing) + 2, goal
     near = np.s_[
         max(row - reach, 0) : row + reach + 1,
@@ -153,8 +153,8 @@ def _roomy(
     return field
 
 
-def _near(field: Lengths, at: Any, far: float) -> float:
-    """The least way by a field from a point over a grid point not far from it."""
+def _length(field: Lengths, at: Any, far: float) -> float:
+    """The shortest length from a point to the goal through a grid point nearby."""
     column, row, reach = round(at[0]), round(at[1]), math.ceil(far) + 1
     top, left = max(row - reach, 0), max(column - reach, 0)
     part = field[top : row + reach + 1, left : column + reach + 1]
@@ -165,11 +165,11 @@ def _near(field: Lengths, at: Any, far: float) -> float:
 
 @subkernel
 def _entry(shortest: Lengths, column: float, row: float) -> tuple[int, int, float]:
-    """The nearest grid point with a route, -1 for none, and its distance."""
+    """Column and row of the nearest grid point with a route, or -1; its distance."""
     height, width = shortest.shape
     x, y, best = -1, -1, math.inf
     at_x, at_y = round(column), round(row)
-    # A body may stand a little beside the points that have one.
+    # The body may be slightly beside the points with a route.
     for j in range(max(at_y - 3, 0), min(at_y + 4, height)):
         for i in range(max(at_x - 3, 0), min(at_x + 4, width)):
             hop = math.hypot(i - column, j - row)
@@ -186,7 +186,7 @@ def _next(field: Lengths, x: int, y: int) -> tuple[int, int, float]:
     for j in range(max(y - 1, 0), min(y + 2, height)):
         for i in range(max(x - 1, 0), min(x + 2, width)):
             straight = i == x or j == y
-            # No corner is cut.
+            # A diagonal step may not cut a corner.
             if straight or (field[y, i] < math.inf and field[j, x] < math.inf):
                 length = 1.0 if straight else _SQRT2
                 if field[j, i] < field[y, x] and field[j, i] + length < least:
@@ -202,13 +202,13 @@ def _look_ahead(
     reach: float,
     found: NDArray[np.float64],
 ) -> None:
-    """Finds the next way-point from a place; all lengths in spacings.
+    """Finds the next waypoint from a place; all lengths in spacings.
 
     Args:
         roomy: See `Route`.
         shortest: See `Route`.
-        place: Shape (2,), column and row, fractions too.
-        reach: How far to go.
+        place: Shape (2,), fractional column and row.
+        reach: Distance of the waypoint along the route.
         found: Shape (2,), overwritten with a grid point; inf for the goal itself.
     """
     found[0] = found[1] = math.inf
@@ -226,15 +226,15 @@ def _look_ahead(
 
 @kernel
 def look_ahead(batch: Words, rows: Words) -> None:
-    """Finds the next way-points of many robots, each on a route of its own.
+    """Finds the next waypoints of many robots, each on its own route.
 
     Args:
-        batch: Where these are, of a `tdac_envs.core.addresses.Addresses`: `words`,
-            shape (n, 2, 4), where `roomy` and `shortest` of a robot's route are;
-            places, shape (n, 2), columns and rows, fractions too; how far to go, shape
-            (n,), in spacings; and shape (n, 2), overwritten with grid points, inf for
-            the goal itself.
-        rows: Numbers of the robots, shape (k,).
+        batch: A row of `tdac_envs.core.addresses.Addresses` of four arrays: the
+            `words` of `roomy` and `shortest` of each robot's route, shape (n, 2, 4);
+            places, shape (n, 2), fractional columns and rows; reaches, shape (n,), in
+            spacings; waypoints, shape (n, 2), overwritten with grid points, inf for the
+            goal itself.
+        rows: Indices of the robots, shape (k,).
     """
     words, places = block(batch[0], np.int64), plane(batch[1], np.float64)
     reaches, found = line(batch[2], np.float64), plane(batch[3], np.float64)

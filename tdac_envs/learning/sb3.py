@@ -1,4 +1,4 @@
-"""A batched environment as Stable-Baselines3 takes it; needs the extra `sb3`.
+"""Adapter from batched environments to Stable-Baselines3; needs the extra `sb3`.
 
 ```python
 envs = SB3VecEnv(gym.make_vec("TDAC-Map2D-v0", 64, autoreset_mode="SameStep"))
@@ -32,17 +32,17 @@ Indices = int | Iterable[int] | None
 
 
 class SB3VecEnv(VecEnv):
-    """Passes the batch's own arrays on, without a copy.
+    """A batch as a Stable-Baselines3 `VecEnv`; arrays are passed on without a copy.
 
-    The `info` of a robot is empty but in the step in which its episode ends, where it
-    has all that a single environment tells, with `terminal_observation` and
-    `TimeLimit.truncated`: a thousand dictionaries would take longer than the step.
+    A robot's `info` is empty except in the last step of an episode, where it is that of
+    a single environment with `terminal_observation` and `TimeLimit.truncated`: filling
+    a thousand dictionaries would take longer than the step.
 
     Args:
-        batch: Made with `autoreset_mode="SameStep"`; also in a `WrappedVectorEnv`.
+        batch: Made with `autoreset_mode="SameStep"`; may be a `WrappedVectorEnv`.
 
     Raises:
-        TaskError: It is no batched environment of this package, or of another mode.
+        TaskError: It is not a batch of this package, or has another autoreset mode.
     """
 
     def __init__(self, batch: Any) -> None:
@@ -60,7 +60,7 @@ class SB3VecEnv(VecEnv):
         )
 
     def reset(self) -> Seen:
-        """Starts all episodes, with what `seed` and `set_options` said."""
+        """Starts all episodes with the values of `seed` and `set_options`."""
         if any(options != self._options[0] for options in self._options):
             raise TaskError("expected the same options for all robots")
         observations, infos = self.batch.reset(
@@ -75,8 +75,8 @@ class SB3VecEnv(VecEnv):
         """Seeds the next `reset`.
 
         Args:
-            seed: Of the first robot, the next ones having those that follow; or one
-                for each robot.
+            seed: Seed of the first robot, with consecutive seeds for the others; or one
+                seed for each robot.
         """
         if seed is None or isinstance(seed, int):
             return super().seed(seed)
@@ -92,20 +92,20 @@ class SB3VecEnv(VecEnv):
     def step_wait(
         self,
     ) -> tuple[Seen, NDArray[Any], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Makes the step: observations, rewards, ends and infos."""
-        observations, rewards, terminated, truncated, told = self.batch.step(
+        """Steps once; returns observations, rewards, dones and infos."""
+        observations, rewards, terminated, truncated, info = self.batch.step(
             self._actions
         )
         over = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(over).tolist():
-            infos[i] = _row(told["final_info"], i)
+            infos[i] = _row(info["final_info"], i)
             infos[i]["TimeLimit.truncated"] = bool(truncated[i])
-            infos[i]["terminal_observation"] = told["final_obs"][i]
+            infos[i]["terminal_observation"] = info["final_obs"][i]
         return observations, rewards.astype(np.float32), over, infos
 
     def close(self) -> None:
-        """Ends the threads."""
+        """Stops the threads."""
         self.batch.close()
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
@@ -119,8 +119,8 @@ class SB3VecEnv(VecEnv):
         value: Any,  # noqa: ARG002 - SB3's signature
         indices: Indices = None,  # noqa: ARG002
     ) -> None:
-        """Refused: the robots of a batch are no objects of their own."""
-        raise TaskError(f"cannot set {attr_name!r}: give it to gym.make_vec")
+        """Not supported: the robots of a batch are not separate objects."""
+        raise TaskError(f"cannot set {attr_name!r}: pass it to gym.make_vec")
 
     def env_method(
         self,
@@ -129,20 +129,20 @@ class SB3VecEnv(VecEnv):
         indices: Indices = None,  # noqa: ARG002
         **__: Any,
     ) -> list[Any]:
-        """Refused: the robots of a batch are no objects of their own."""
-        raise TaskError(f"cannot call {method_name!r} of single robots of a batch")
+        """Not supported: the robots of a batch are not separate objects."""
+        raise TaskError(f"cannot call {method_name!r} for single robots of a batch")
 
     def env_is_wrapped(
         self,
         wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]],  # noqa: ARG002
         indices: Indices = None,
     ) -> list[bool]:
-        """False for each: robots of a batch are not wrapped."""
+        """False for each robot: the robots of a batch are not wrapped."""
         return [False for _ in self._get_indices(indices)]
 
 
 def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:
-    """The info of one robot, as Python's own numbers."""
+    """The info of one robot, as plain Python numbers."""
     return {
         key: value[i].item()
         for key, value in infos.items()

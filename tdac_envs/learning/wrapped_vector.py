@@ -1,4 +1,4 @@
-"""The observation wrappers for a batched environment: no loop runs over its robots."""
+"""Observation wrappers for batched environments, vectorised over the robots."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ Seen = Any
 
 
 class Routes:
-    """The routes of many robots, which are asked for all way-points in one call.
+    """The routes of all robots of a batch; all waypoints are found in one call.
 
     Args:
-        batch: Whose tasks they lead through.
+        batch: The batch, with the tasks of its robots.
     """
 
     def __init__(self, batch: DrivenVectorEnv) -> None:
@@ -39,19 +39,19 @@ class Routes:
         self._goals, self._corners = np.zeros((count, 2)), np.zeros((count, 2))
         self._reaches = np.zeros(count)
         self._spacings, self.reach = np.ones((count, 1)), np.ones((count, 1))
-        # Robots of one setup mostly have one task in the beginning.
+        # At first, robots of one setup usually share their task.
         known = {id(task): task for task in self._tasks}
         routes = {key: route_to_goal(task) for key, task in known.items()}
         own = [routes[id(task)] for task in self._tasks]
         self._addresses = Addresses((route.roomy, route.shortest) for route in own)
         for i, route in enumerate(own):
-            self._place(i, route)
+            self._store(i, route)
         shared = self._addresses.words, self._cells, self._reaches, self._found
         self._shared = Addresses([shared])
         self._slices, self._all = Slices(batch.threads), np.arange(count)
 
     def refresh(self) -> None:
-        """Has the routes lead to the goals of the episodes that have begun."""
+        """Updates the routes of the robots whose task has changed."""
         tasks = self._batch.tasks
         if self._tasks == tasks:
             return
@@ -59,42 +59,42 @@ class Routes:
             if task is not self._tasks[i]:
                 route = route_to_goal(task)
                 self._addresses.put(i, (route.roomy, route.shortest))
-                self._place(i, route)
+                self._store(i, route)
         self._tasks = list(tasks)
 
     def ahead(self, poses: Array) -> Array:
-        """The next way-point of each robot, shape (n, 2), as of `Route.ahead`."""
+        """The next waypoint of each robot, shape (n, 2); see `Route.ahead`."""
         np.divide(poses[:, :2] - self._corners, self._spacings, out=self._cells)
         self._slices.run(partial(look_ahead, self._shared.words[0]), self._all)
         at = self._found * self._spacings + self._corners
         return np.where(np.isfinite(self._found), at, self._goals)
 
     def close(self) -> None:
-        """Ends the threads."""
+        """Stops the threads."""
         self._slices.close()
 
-    def _place(self, i: int, route: Route) -> None:
-        """Keeps where a robot's route lies."""
+    def _store(self, i: int, route: Route) -> None:
+        """Stores frame, goal and reach of a robot's route."""
         *self._corners[i], self._spacings[i] = route.frame
         self._goals[i], self.reach[i] = route.goal, route.reach
         self._reaches[i] = route.reach / route.frame[2]
 
 
 class WrappedVectorEnv(VectorWrapper):
-    """A batched environment that is observed through some wrappers.
+    """A batched environment with observation wrappers.
 
-    Robot i is told, to the last bit, what `wrap` tells in a single environment.
+    The observations are bit-identical to those of `wrap` for single environments.
 
         batch = gym.make_vec("TDAC-Map2D-v0", 64, autoreset_mode="SameStep")
         batch = WrappedVectorEnv(batch, ("goal-relative", "guidance", "flatten"))
 
     Args:
-        batch: Of this package.
-        names: Of `tdac_envs.wrappers.WRAPPERS`, the first innermost.
+        batch: A batched environment of this package.
+        names: Names in `tdac_envs.wrappers.WRAPPERS`, the innermost first.
 
     Raises:
-        TaskError: It is no batch of this package, a name is unknown, or a wrapper
-            cannot be used on what is inside.
+        TaskError: The batch is not of this package, a name is unknown, or a wrapper
+            does not support the observations.
     """
 
     def __init__(self, batch: VectorEnv[Any, Any, Any], names: Sequence[str]) -> None:
@@ -116,7 +116,7 @@ class WrappedVectorEnv(VectorWrapper):
     ) -> tuple[Seen, dict[str, Any]]:
         """Starts episodes; see `DrivenVectorEnv.reset`."""
         observations, infos = self.batch.reset(seed=seed, options=options)
-        return self._begun(observations), infos
+        return self._current(observations), infos
 
     def step(
         self, actions: NDArray[np.float32]
@@ -124,11 +124,11 @@ class WrappedVectorEnv(VectorWrapper):
         """Steps once; see `DrivenVectorEnv.step`."""
         observations, rewards, terminated, truncated, infos = self.batch.step(actions)
         if "final_obs" in infos:
-            self._last(observations, infos)
-        return self._begun(observations), rewards, terminated, truncated, infos
+            self._wrap_final(observations, infos)
+        return self._current(observations), rewards, terminated, truncated, infos
 
     def close(self, **kwargs: Any) -> None:
-        """Ends the threads."""
+        """Stops the threads."""
         if self._routes is not None:
             self._routes.close()
         super().close(**kwargs)
@@ -141,7 +141,7 @@ class WrappedVectorEnv(VectorWrapper):
         self._bind()
 
     def _bind(self) -> None:
-        """Prepares what each wrapper computes."""
+        """Prepares the computation of each wrapper."""
         self._routes: Routes | None = None
         self._space: spaces.Space[Any] = self.batch.single_observation_space
         self._stages = [self._stage(name) for name in self.names]
@@ -164,18 +164,18 @@ class WrappedVectorEnv(VectorWrapper):
         keys = tuple(own.spaces)
         return lambda seen, _: np.concatenate([seen[key] for key in keys], axis=-1)
 
-    def _begun(self, observations: Observations) -> Seen:
+    def _current(self, observations: Observations) -> Seen:
         if self._routes is not None:
             self._routes.refresh()
-        return self._seen(observations, self.batch.pose())
+        return self._wrapped(observations, self.batch.pose())
 
-    def _seen(self, observations: Observations, poses: Array) -> Seen:
+    def _wrapped(self, observations: Observations, poses: Array) -> Seen:
         seen: Any = observations
         for stage in self._stages:
             seen = stage(seen, poses)
         return seen
 
-    def _last(self, observations: Observations, infos: dict[str, Any]) -> None:
+    def _wrap_final(self, observations: Observations, infos: dict[str, Any]) -> None:
         """Wraps the last observations of the episodes that have ended."""
         final = infos["final_obs"]
         over = np.flatnonzero(infos["_final_obs"]).tolist()
@@ -183,14 +183,14 @@ class WrappedVectorEnv(VectorWrapper):
         for i in over:
             for key, value in final[i].items():
                 last[key][i] = value
-        seen = self._seen(last, self.batch.last_poses)
+        seen = self._wrapped(last, self.batch.last_poses)
         for i in over:
             single = not isinstance(seen, dict)
             final[i] = seen[i] if single else {key: v[i] for key, v in seen.items()}
 
 
 def _frame(batch: DrivenVectorEnv) -> Frame:
-    """The frame of all robots, with a radius and a largest reading for each."""
+    """The frame of all robots, with a radius and a largest reading for each robot."""
     frames = [Frame.of_task(setup.nominal) for setup in batch.setups]
     first = frames[0]
     radii = np.array([[frame.radius] for frame in frames])

@@ -1,14 +1,14 @@
-"""Observation wrappers for learning: the same form on every map, and guidance.
+"""Observation wrappers for learning: map-independent observations, and guidance.
 
-Robots that learn on one map and drive on another must not be told where they are on
-it. `GoalRelativeObservation` says where the goal is from the robot, `Guidance` where to
-go next; both are Gymnasium wrappers for either environment:
+A policy for maps on which it was not trained must not observe its position.
+`GoalRelativeObservation` gives the goal relative to the robot, `Guidance` the next
+waypoint. Both are Gymnasium wrappers for either environment:
 
     env = gym.make("TDAC-Map2D-v0", map="office", variation="jitter")
     env = wrap(env, ("goal-relative", "guidance", "flatten"))
 
-What they compute, they compute for one observation or for a batch of them;
-`tdac_envs.learning.wrapped_vector` has the same for batched environments.
+Their computations accept one observation or a batch of observations;
+`tdac_envs.learning.wrapped_vector` wraps batched environments.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ if TYPE_CHECKING:
 Env = gym.Env[Any, NDArray[np.float32]]
 
 MIDDLE = 10.0
-"""Distance of the goal that is told as 1/2, in radii of the body."""
+"""Distance of the goal that is observed as 1/2, in body radii."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What an observation is told in: the robot's frame, and its sizes.
+    """Frame and scales of relative observations.
 
     Attributes:
-        radius: Of the body, px or m; of a batch, shape (n, 1).
+        radius: Body radius, px or m; for a batch, shape (n, 1).
         up: Whether y points up, and headings are counter-clockwise.
         readings: Key of the distance sensors.
-        largest: Their largest reading; of a batch, shape (n, 1).
+        largest: Their largest reading; for a batch, shape (n, 1).
     """
 
     radius: float | NDArray[np.float64]
@@ -59,7 +59,7 @@ class Frame:
         """The frame of an environment, wrapped or not.
 
         Raises:
-            TaskError: It is none of ours.
+            TaskError: It is not an environment of `tdac_envs`.
         """
         plain: Any = env.unwrapped
         if not hasattr(plain, "nominal"):
@@ -74,7 +74,7 @@ class Frame:
         return cls(task.body_radius, True, "ps", float(LARGEST))
 
     def seen(self, poses: ArrayLike, places: ArrayLike) -> NDArray[np.float64]:
-        """Places as seen from the robot: how far ahead, and how far to its left.
+        """Places in the robot's frame: distances ahead and to its left.
 
         Args:
             poses: Shape (…, 3): x, y, heading.
@@ -87,7 +87,7 @@ class Frame:
         return np.stack([dx * cos + dy * sin, left if self.up else -left], axis=-1)
 
     def goal_relative(self, observation: Observation) -> Observation:
-        """What `GoalRelativeObservation` makes of an observation, or of a batch."""
+        """An observation or a batch as `GoalRelativeObservation` returns it."""
         seen = self.seen(observation["pose"], observation["goal"])
         distance = np.hypot(seen[..., 0], seen[..., 1])[..., None]
         near = distance / (distance + MIDDLE * self.radius)
@@ -100,13 +100,13 @@ class Frame:
         }
 
     def guidance(self, route: Route, poses: ArrayLike) -> NDArray[np.float32]:
-        """What `Guidance` says at some poses, shape (n, 3), of one route."""
+        """The `guidance` of one route at poses of shape (n, 3)."""
         return self.guidance_to(route.ahead(poses), poses, route.reach)
 
     def guidance_to(
         self, places: ArrayLike, poses: ArrayLike, reach: float | NDArray[np.float64]
     ) -> NDArray[np.float32]:
-        """The same of way-points that are known, shape (n, 2)."""
+        """The `guidance` to given waypoints, shape (n, 2)."""
         seen = self.seen(poses, places) / reach
         return np.clip(seen, -1.0, 1.0).astype(np.float32)
 
@@ -114,7 +114,7 @@ class Frame:
         """The space of `goal_relative`.
 
         Args:
-            own: Of what is observed.
+            own: Space of the original observations.
 
         Raises:
             TaskError: It has no pose.
@@ -132,10 +132,10 @@ class Frame:
 
 
 def guided_space(own: spaces.Space[Any]) -> spaces.Dict:
-    """The space of what is observed, with `guidance`.
+    """An observation space with `guidance` added.
 
     Raises:
-        TaskError: It is no `Dict`.
+        TaskError: It is not a `Dict`.
     """
     if not isinstance(own, spaces.Dict):
         raise TaskError(f"expected observations in a Dict, got {own}")
@@ -147,7 +147,7 @@ class GoalRelativeObservation(
     gym.ObservationWrapper[Observation, NDArray[np.float32], Observation],
     gym.utils.RecordConstructorArgs,
 ):
-    """The goal as seen from the robot, and the sensors as shares; no place, no map.
+    """The goal relative to the robot, and normalised sensors; no position, no map.
 
     `Dict` of float32 arrays:
 
@@ -158,10 +158,10 @@ class GoalRelativeObservation(
     | `wheel_speeds` | (2,) | [-1, 1] | left, right, as last applied |
     | `ranges` or `ps` | (n,) | [0, 1] | share of the largest reading |
 
-    Left is the robot's left as a person sees it, in either environment.
+    Left is the robot's left in the picture, in both environments.
 
     Args:
-        env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0` with its own observations.
+        env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0` with its original observations.
     """
 
     def __init__(self, env: Env) -> None:
@@ -180,22 +180,21 @@ class Guidance(
     gym.ObservationWrapper[Observation, NDArray[np.float32], Observation],
     gym.utils.RecordConstructorArgs,
 ):
-    """Adds the next way-point of the reference route, as seen from the robot.
+    """Adds the next waypoint of the reference route, relative to the robot.
 
     | key | shape | range | content |
     |---|---|---|---|
-    | `guidance` | (2,) | [-1, 1] | how far ahead and how far to the robot's left, in |
-    | | | | shares of `reach` |
+    | `guidance` | (2,) | [-1, 1] | distances ahead and to the robot's left, as shares |
+    | | | | of `reach` |
 
-    The route is the shortest path for the body that keeps some room
-    (`tdac_envs.learning.guidance`), from wherever the robot is at the moment; the
-    way-point is `reach` further on it, or the goal where that is nearer. It knows the
-    whole map and the true pose, which is what a policy that sees it is given beside its
-    sensors.
+    The route is the shortest path for the body that keeps a margin
+    (`tdac_envs.learning.guidance`), from the robot's current position. The waypoint is
+    `reach` further on it, or the goal if that is nearer. The route is computed from the
+    whole map and the true pose, so a policy with guidance has more than its sensors.
 
     Args:
         env: Either environment; its observations must be a `Dict`.
-        reach: How far ahead the way-point is, in radii of the body.
+        reach: Distance of the waypoint along the route, in body radii.
     """
 
     def __init__(self, env: Env, reach: float = REACH) -> None:
@@ -225,14 +224,14 @@ WRAPPERS: dict[str, Callable[[Env], Env]] = {
     "guidance": Guidance,
     "flatten": FlattenObservation,
 }
-"""By the names that `wrap`, `tdac train` and `tdac evaluate` take."""
+"""Wrappers by the names that `wrap`, `tdac train` and `tdac evaluate` accept."""
 
 
 def check_wrappers(names: Sequence[str]) -> None:
-    """Refuses a name that is not of `WRAPPERS`.
+    """Checks that all names are in `WRAPPERS`.
 
     Raises:
-        TaskError: There is one.
+        TaskError: A name is unknown.
     """
     for name in names:
         if name not in WRAPPERS:
@@ -241,14 +240,14 @@ def check_wrappers(names: Sequence[str]) -> None:
 
 
 def wrap(env: Env, names: Sequence[str]) -> Env:
-    """The environment in some wrappers, the first of them innermost.
+    """Wraps an environment, the first wrapper innermost.
 
     Args:
         env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0`.
-        names: Of `WRAPPERS`; `flatten` makes one `Box` of the `Dict`, by sorted keys.
+        names: Names in `WRAPPERS`; `flatten` makes the `Dict` a `Box`, by sorted keys.
 
     Raises:
-        TaskError: A name is unknown, or a wrapper cannot be used on what is inside.
+        TaskError: A name is unknown, or a wrapper does not support the observations.
     """
     check_wrappers(names)
     for name in names:
