@@ -132,10 +132,10 @@ def steps_of(horizon: float) -> int:
 
 
 def check_reset_options(options: dict[str, Any]) -> None:
-    """Checks that `reset` has no options other than `start` and `goal`.
+    """Checks the options of `reset`.
 
     Raises:
-        TaskError: It has.
+        TaskError: There is an option other than `start` and `goal`.
     """
     unknown = sorted(map(str, options.keys() - {"start", "goal"}))
     if unknown:

@@ -35,7 +35,7 @@ is; at this distance the body stays clear on every bundled map and world.
 # Largest ratio of the length of a route with a margin to that of the shortest path.
 _DETOUR = 1.25
 _SQRT2 = 2.0**0.5
-# Largest distance between the end of a route and its goal, grid points.
+# Distance from a goal within which the end of its routes is searched, grid points.
 _BESIDE = 4
 
 

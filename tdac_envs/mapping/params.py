@@ -107,7 +107,7 @@ class MapParams(_Record):
     goal: tuple[Place, Place] | None = None
     robot: RobotParams = RobotParams()
     polarity: Literal["dark", "light", "mixed", "given"] = Field(
-        description="Which pixels are obstacles; `given` where the file says so."
+        description="Which pixels are obstacles; `given` if the file defines it."
     )
     method: str = Field(description="How the image was binarised.")
     threshold: float | None = Field(None, description="Luminance, 0..255.")

@@ -51,11 +51,11 @@ def readings(scene: Scene) -> Iterator[Reading]:
         yield unmarked or plain
         return
     beyond = _beyond_the_plan(scene, plain)
-    for reading in _outwards(scene, plain, unmarked):
+    for reading in _plain_to_bold(scene, plain, unmarked):
         yield _with_outside_closed(reading, beyond)
 
 
-def _outwards(
+def _plain_to_bold(
     scene: Scene, plain: Reading, unmarked: Reading | None
 ) -> Iterator[Reading]:
     mixed = _mixed(scene) if scene.said == UNSAID else None
