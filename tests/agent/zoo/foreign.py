@@ -216,7 +216,7 @@ def program_that_draws_on_the_terminal(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
-@attack("run.json: a text has half of a surrogate pair", works=False)
+@attack("run.json: a string has a lone surrogate", works=False)
 def half_of_a_character(place: Place) -> list[str | Path]:
     place.change(learner="command:true \udc1b")
     return ["synth", "--resume", place.run]
