@@ -17,9 +17,9 @@ TABLES = ("runs.csv", "candidates.csv", "summary.csv")
 
 
 def collect(plan: Plan, runs: Path) -> Frames:
-    """What is on record of all runs of a plan, finished or not.
+    """The records of all runs of a plan, finished or not.
 
-    Runs are called by their names, `KIND/rNNNN`, wherever the folder is.
+    The column `run` has their names, `KIND/rNNNN`, wherever the folder is.
     """
     frames = frames_of(_records(plan, runs))
     for frame in (frames.runs, frames.candidates):
@@ -38,7 +38,7 @@ def write_tables(frames: Frames, out: Path) -> pd.DataFrame:
 
 
 def _records(plan: Plan, runs: Path) -> Iterator[Run]:
-    """The records that can be read; a torn one is told of where it is run again."""
+    """Yields the readable records; making the run again reports a damaged one."""
     for planned in plan.all():
         folder = runs / planned.name
         if (folder / RUN_FILE).is_file():

@@ -1,4 +1,4 @@
-"""What a campaign is asked for: a YAML file."""
+"""The campaign file (YAML): its schema, how it is found and read."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_agent.storage.yaml_file import read_yaml
 
 SAME = "same"
-"""As an optimizer: the learner itself."""
+"""Optimizer name for the learner itself."""
 Keep = Literal["all", "records"]
 
 
 class CampaignError(RunError):
-    """A campaign cannot be run as it was asked for."""
+    """A campaign cannot be run with the given file or flags."""
 
 
 class CampaignConfig(BaseModel):
-    """Contents of a campaign's file, schema 1."""
+    """Contents of a campaign file, schema 1."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -32,39 +32,37 @@ class CampaignConfig(BaseModel):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
     about: str = ""
     tasks: tuple[str, ...] = Field(
-        min_length=1, description="Bundled names, or files relative to this one."
+        min_length=1, description="Bundled names, or files relative to this file."
     )
     learners: tuple[str, ...] = Field(min_length=1, description="As for --learner.")
     optimizers: tuple[str, ...] = Field(
-        (SAME,), min_length=1, description="As for --optimizer; `same` as the learner."
+        (SAME,), min_length=1, description="As for --optimizer; `same`: the learner."
     )
     settings: tuple[Setting, ...] = Field(("dual tier",), min_length=1)
     prompts: tuple[str, ...] = Field(
         ("full",), min_length=1, description="As for --prompt."
     )
-    runs: int = Field(5, ge=1, description="R, of each kind.")
-    iterations: int = Field(20, ge=1, description="K of the settings that repair.")
-    patience: int = Field(1, ge=1, description="J of those that edit.")
+    runs: int = Field(5, ge=1, description="R: runs of each kind.")
+    iterations: int = Field(20, ge=1, description="K, for the settings that repair.")
+    patience: int = Field(1, ge=1, description="J, for the settings that edit.")
     samples: int | None = Field(
         None,
         ge=2,
         description="N of `best of N`; by default as many answers as the dual tier "
-        "may have: K·(J + 2).",
+        "may request: K·(J + 2).",
     )
     seed: int | None = Field(
         None,
         ge=0,
-        description="Of the moved starts of the first run; the next has the next. By "
-        "default they follow from a secret of the installation, and differ elsewhere.",
+        description="Seed of the jittered starts of the first run; later runs count up "
+        "from it. The default is derived from a secret of the installation.",
     )
     base_url: str | None = Field(None, description="As for --base-url.")
     max_output: int = Field(MAX_OUTPUT_TOKENS, ge=1, description="As for --max-output.")
-    max_cost: float | None = Field(
-        None, ge=0, description="USD that all runs together may spend."
-    )
-    max_tokens: int | None = Field(None, ge=0, description="That all may spend.")
+    max_cost: float | None = Field(None, ge=0, description="Limit for all runs, USD.")
+    max_tokens: int | None = Field(None, ge=0, description="Limit for all runs.")
     keep: Keep = Field(
-        "all", description="`records`: of a finished run only what the tables need."
+        "all", description="`records`: of finished runs, only what the tables need."
     )
 
     @model_validator(mode="after")
@@ -73,9 +71,9 @@ class CampaignConfig(BaseModel):
             values = getattr(self, name)
             again = {value for value in values if values.count(value) > 1}
             if again:
-                raise ValueError(f"{name}: {again.pop()!r} is there twice")
+                raise ValueError(f"{name}: {again.pop()!r} is listed twice")
         if any(name.partition(":")[0] == "manual" for name in self.models):
-            raise ValueError("a manual: folder is for one run, not for a campaign")
+            raise ValueError("manual: works for one run, not for a campaign")
         for name in self.models:
             try:
                 check_name(name)
@@ -84,22 +82,22 @@ class CampaignConfig(BaseModel):
         online = sorted(n for n in self.models if n.partition(":")[0] not in OFFLINE)
         if online and self.max_cost is None and self.max_tokens is None:
             raise ValueError(
-                f"max_cost: say how many USD all runs together may spend on {online[0]}"
+                f"max_cost: required for {online[0]}: a limit in USD for all runs"
             )
         return self
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Names of all learners and optimizers."""
+        """Names of all learners and optimizers, without duplicates."""
         others = [name for name in self.optimizers if name != SAME]
         return tuple(dict.fromkeys([*self.learners, *others]))
 
 
 def find_config(given: str) -> Path:
-    """The file that is meant: a path, or the name of a shipped one.
+    """Finds a campaign file by its path, or a shipped one by its name.
 
     Raises:
-        CampaignError: There is none.
+        CampaignError: There is no such file.
     """
     if Path(given).is_file():
         return Path(given)
@@ -111,7 +109,7 @@ def find_config(given: str) -> Path:
 
 
 def read_config(file: Path) -> CampaignConfig:
-    """What a campaign's file says.
+    """Reads a campaign file.
 
     Raises:
         CampaignError: It cannot be read, or has a wrong or unknown key.

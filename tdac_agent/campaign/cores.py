@@ -1,9 +1,9 @@
-"""A core for each worker of a machine, and one verification at a time on it.
+"""Binds each worker to a core, and allows one verification at a time per core.
 
-The locks are the system's: whoever dies, has let go. Workers of all campaigns on a
-machine share them; where there are more workers than cores, which is sensible as long
-as they wait for models, several share a core and verify one after the other. So a
-verdict is never the result of a crowd.
+The locks are file locks, which the OS releases when a process dies; workers of all
+campaigns on a machine share them. With more workers than cores, which is useful while
+workers wait for models, several share a core and verify one after another, so that
+contention does not affect verdicts.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from tdac_agent.storage.locks import open_lock
 
 @contextmanager
 def own_core() -> Generator[Path]:
-    """Moves this process, and all that it starts, to a core; the least crowded one.
+    """Binds this process and its children to a free core, or else to a random one.
 
     Yields:
-        A file whose lock is to be held while something is verified there.
+        Lock file to hold during a verification on this core.
 
     Raises:
-        Fault: There is no place for the locks.
+        Fault: There is no private folder for the locks.
     """
     folder = core_locks()
     before = os.sched_getaffinity(0)
@@ -40,10 +40,10 @@ def own_core() -> Generator[Path]:
 
 
 def core_locks() -> Path:
-    """The folder of the locks, which nobody else can read or write.
+    """The folder of the core locks, which is accessible to this user only.
 
     Raises:
-        Fault: What has its name is somebody else's.
+        Fault: No candidate is a writable folder of this user.
     """
     places = [Path(tempfile.gettempdir()) / f"tdac-cores-{os.geteuid()}"]
     if os.environ.get("XDG_RUNTIME_DIR"):
@@ -52,13 +52,13 @@ def core_locks() -> Path:
         if _is_private(place):
             return place
     raise Fault(
-        f"no place for the locks of the cores: {places[0]} is not a folder of your own "
-        "that can be written to; remove it, or set TMPDIR to another folder"
+        f"no folder for the core locks: {places[0]} is not a folder of your own that "
+        "is writable; remove it, or set TMPDIR to another folder"
     )
 
 
 def _is_private(folder: Path) -> bool:
-    """Whether this is a folder of this user, not by a link; makes it, and closes it."""
+    """Makes a folder with mode 0700; whether it is owned, writable and no symlink."""
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
@@ -74,7 +74,7 @@ def _is_private(folder: Path) -> bool:
 
 
 def _take(folder: Path, cores: list[int], stack: ExitStack) -> int:
-    """The first core that nobody has; one by chance where all are taken."""
+    """Takes the first free core; returns a random one if all are taken."""
     for core in cores:
         handle = open_lock(folder / f"{core}.taken")
         try:

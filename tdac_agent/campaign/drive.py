@@ -1,4 +1,4 @@
-"""Carries out a campaign: what is to be done, in which order, and when to stop."""
+"""Carries out a campaign: which runs are left, their order, and when to stop."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ Watch = Callable[[Update], None]
 
 @dataclass(slots=True)
 class _Queue:
-    """The runs that are left."""
+    """The runs that are left, and those to retry."""
 
     progress: Progress
     todo: deque[PlannedRun]
-    again: deque[tuple[PlannedRun, Outcome]] = field(default_factory=deque)
-    _second: set[str] = field(default_factory=set)
+    retries: deque[tuple[PlannedRun, Outcome]] = field(default_factory=deque)
+    _retried: set[str] = field(default_factory=set)
 
     def next(self) -> PlannedRun | None:
-        """The next run; after all others, those that a fault ended, once more."""
+        """The next run; those that a fault ended come once more after all others."""
         while self.todo:
             planned = self.todo.popleft()
             if not (self.progress.exhausted and planned.cell.asks_models):
                 return planned
-        if not self.again:
+        if not self.retries:
             return None
-        planned, outcome = self.again.popleft()
+        planned, outcome = self.retries.popleft()
         self.progress.take_back(planned, outcome)
         return planned
 
     def ended(self, update: Ended) -> None:
-        """Remembers a run that a fault has ended for the first time."""
+        """Queues a run for a retry when a fault ends it for the first time."""
         name = update.planned.name
-        if update.outcome.status == "fault" and name not in self._second:
-            self._second.add(name)
-            self.again.append((update.planned, update.outcome))
+        if update.outcome.status == "fault" and name not in self._retried:
+            self._retried.add(name)
+            self.retries.append((update.planned, update.outcome))
 
 
 def look(plan: Plan, shard: Shard, runs: Path) -> tuple[Progress, list[PlannedRun]]:
-    """How far a campaign is, by its folder, and the runs that are left."""
+    """Reads the progress of a campaign from its folder, and the runs that are left."""
     progress, left = Progress.of(plan, shard), []
     for planned in plan.all(shard):
         known = read_outcome(planned.name, runs)
@@ -68,16 +68,16 @@ def carry_out(
     run: Executor,
     watch: Watch,
 ) -> None:
-    """Makes all runs that are left; one that fails stops no other.
+    """Makes all runs that are left; a run that fails does not stop the others.
 
-    Where the budget is exhausted, no run is begun that may ask a model.
+    Once the budget is exhausted, no further run begins that may cost money.
 
     Args:
-        progress: Kept up to date.
-        left: In their order.
-        terms: What all runs share.
+        progress: Updated in place.
+        left: The runs that are left, in order.
+        terms: Settings that all runs share.
         run: The executor.
-        watch: Called with each update, after the progress was updated.
+        watch: Called with each update, after `progress` is updated.
     """
     queue = _Queue(progress, deque(left))
     with closing(run(terms, queue.next)) as updates:
@@ -90,15 +90,15 @@ def carry_out(
 
 @contextmanager
 def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
-    """Makes a campaign's folder, and keeps a second driver of the shard out of it.
+    """Makes a campaign's folder, and locks it against other drivers of the shard.
 
     Args:
         out: The folder.
-        shard: Which part is carried out.
-        config: Text of the campaign's file, of which a copy is kept.
+        shard: The part that is carried out.
+        config: Text of the campaign file, which is copied to the folder.
 
     Raises:
-        CampaignError: It cannot be used.
+        CampaignError: The folder cannot be used, or another driver uses it.
     """
     lock = out / f".driver-{shard.i}-of-{shard.n}.lock"
     with ExitStack() as stack:
@@ -118,6 +118,6 @@ def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
 
 
 def foreign(plan: Plan, runs: Path) -> list[str]:
-    """Folders of runs that are not of the plan: of other files, tasks or versions."""
+    """Run folders that are not in the plan: of other files, tasks or versions."""
     known = {cell.folder for cell in plan.cells}
     return sorted(path.name for path in runs.iterdir() if path.name not in known)

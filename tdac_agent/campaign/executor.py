@@ -1,4 +1,4 @@
-"""What an executor is: where the runs of a campaign are made."""
+"""The interface of executors, which make the runs of a campaign."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from tdac_agent.campaign.perform import Outcome, Terms
 from tdac_agent.campaign.plan import PlannedRun
 
 MOST_DEATHS = 3
-"""Of the processes that a run was in, before it is given up."""
+"""Number of process deaths after which a run is given up."""
 
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A run is under way."""
+    """A run has begun."""
 
     planned: PlannedRun
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """A run has told a record of its journal."""
+    """A run has reported a journal record."""
 
     planned: PlannedRun
     record: dict[str, Any]
@@ -31,7 +31,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """A run has ended, one way or another."""
+    """A run has ended, with whatever status."""
 
     planned: PlannedRun
     outcome: Outcome
@@ -39,11 +39,11 @@ class Ended:
 
 @dataclass(frozen=True, slots=True)
 class Died:
-    """The process of a run has died; the run goes on in another one.
+    """The process of a run has died; another process will continue the run.
 
     Attributes:
         planned: The run.
-        reason: Of the death.
+        reason: Cause of the death.
     """
 
     planned: PlannedRun
@@ -52,16 +52,16 @@ class Died:
 
 Update = Begun | Told | Ended | Died
 Next = Callable[[], PlannedRun | None]
-"""The next run; None where there is none for now: for good, if nothing is under way."""
+"""Returns the next run, or None; None is final if no run is under way."""
 Executor = Callable[[Terms, Next], Generator[Update]]
 
 
 @dataclass(slots=True)
 class Bereaved:
-    """Runs whose processes have died; they come before all others.
+    """Hands out runs; those whose process has died come before all others.
 
     Attributes:
-        then: Where further runs come from.
+        then: Source of the other runs.
     """
 
     then: Next
@@ -73,10 +73,10 @@ class Bereaved:
         return self._waiting.pop() if self._waiting else self.then()
 
     def died(self, planned: PlannedRun, reason: str) -> Update:
-        """What becomes of a run whose process has died."""
+        """Queues a run whose process died, or ends it after `MOST_DEATHS` deaths."""
         self._deaths[planned.name] += 1
         if self._deaths[planned.name] < MOST_DEATHS:
             self._waiting.append(planned)
             return Died(planned, reason)
-        told = f"its process died {MOST_DEATHS} times, at last: {reason}"
-        return Ended(planned, Outcome(planned.name, "error", told))
+        message = f"its process died {MOST_DEATHS} times; last reason: {reason}"
+        return Ended(planned, Outcome(planned.name, "error", message))

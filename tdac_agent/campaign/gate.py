@@ -1,8 +1,8 @@
-"""How many questions a provider is asked at a time: as many as it bears.
+"""An adaptive limit on concurrent requests to a provider.
 
-Each answer lets a little more through, a rate limit half as much (additive increase,
-multiplicative decrease, as TCP does it). All workers of a campaign share a gate through
-a folder; who dies has let go of its place, since the places are locks of the system.
+Each answer raises the limit a little, and a rate limit halves it (additive increase,
+multiplicative decrease, as in TCP). All workers of a campaign share a gate through a
+folder. Its places are file locks, so that a process that dies frees its place.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from tdac_agent.storage.locks import wait_for
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
 FIRST = 8.0
-"""Places in the beginning."""
+"""Initial number of places."""
 CUT = 0.5
 LOOK_SECONDS = 0.2
-"""Between two looks for a free place, about."""
+"""Mean time between two tries for a free place."""
 
 
 class Gate:
-    """Places before a provider.
+    """The places of a provider; each allows one request at a time.
 
     Args:
-        folder: Shared by all who ask it; made where it is not there.
-        most: Places at most.
-        sleep: Waits.
+        folder: Folder that all workers share; made if missing.
+        most: Maximum number of places.
+        sleep: Sleeps for the given seconds.
     """
 
     def __init__(
@@ -55,12 +55,12 @@ class Gate:
 
     @property
     def places(self) -> float:
-        """How many may be asked at a time; what is behind the point is on its way."""
+        """Number of places, of which only whole ones are used."""
         return self._read()[0]
 
     @contextmanager
     def place(self) -> Generator[float]:
-        """Waits for a place; yields when it was taken, for `limited`."""
+        """Waits for a place; yields the time it was taken, to pass to `limited`."""
         handle = self._free()
         while handle is None:
             self._sleep(random.uniform(0.5, 1.5) * LOOK_SECONDS)
@@ -71,20 +71,20 @@ class Gate:
             os.close(handle)
 
     def answered(self) -> None:
-        """An answer came: one place more when all places have been answered once."""
+        """Counts an answer; n answers at n places add about one place."""
         with wait_for(self._folder / "lock"):
             places, cut_at = self._read()
             self._write(min(self._most, places + 1.0 / places), cut_at)
 
     def limited(self, asked_at: float) -> None:
-        """A rate limit: half of the places, once for all who asked before that."""
+        """Halves the places after a rate limit, unless halved since `asked_at`."""
         with wait_for(self._folder / "lock"):
             places, cut_at = self._read()
             if asked_at > cut_at:
                 self._write(max(1.0, CUT * places), time.time())
 
     def _free(self) -> int | None:
-        """A descriptor that holds a place; None where all are taken."""
+        """Locks a place and returns its descriptor; None if all are taken."""
         for number in range(int(self.places)):
             file = self._folder / f"place-{number:03d}"
             handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
@@ -97,7 +97,7 @@ class Gate:
         return None
 
     def _read(self) -> tuple[float, float]:
-        """Places, and when they were last cut."""
+        """The number of places, and when it was last halved."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             known = parse_json(read_file(self._folder / "state.json", TEXT_BYTES))
             return min(self._most, float(known["places"])), float(known["cut_at"])
@@ -113,7 +113,7 @@ class Gated:
 
     Args:
         model: The provider.
-        gate: Its gate.
+        gate: Gate that each request passes.
     """
 
     def __init__(self, model: Provider, gate: Gate) -> None:
@@ -137,7 +137,7 @@ class Gated:
 
 
 def gated(model: Provider, folder: Path, most: int) -> Provider:
-    """A provider behind the gate of its vendor or server; a free one as it is."""
+    """Puts a provider behind the gate of its vendor or server, unless it is free."""
     if not model.paid:
         return model
     kind = model.name.partition(":")[0]

@@ -1,4 +1,4 @@
-"""The executor `local`: worker processes of this machine."""
+"""The executor `local`: worker processes on this machine."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from tdac_agent.campaign.plan import PlannedRun
 
 ERRORS = "errors.log"
 FAREWELL_SECONDS = 15.0
-"""In which interrupted workers write down how far they came."""
+"""Time for interrupted workers to save their progress."""
 MOST_RUNS = 500
-"""Of one process, lest something grows in it."""
+"""Maximum for one process, in case its memory grows."""
 CHUNK = 1 << 16
 ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "VECLIB_MAXIMUM")
 
 
 @dataclass(slots=True, eq=False)
 class _Worker:
-    """A worker process, and what it is at."""
+    """A worker process, and its current run."""
 
     process: subprocess.Popen[bytes]
     planned: PlannedRun | None = None
     runs: int = 0
-    last_word: str = ""
-    _torn: bytes = b""
+    reported_death: str = ""
+    _partial: bytes = b""
 
     @property
     def answers(self) -> IO[bytes]:
@@ -45,7 +45,7 @@ class _Worker:
         return self.process.stdout
 
     def begin(self, planned: PlannedRun) -> None:
-        """Hands over a run; that the process has died shows in its answers."""
+        """Sends a run; a dead process is noticed when its answers are read."""
         assert self.process.stdin is not None
         self.planned = planned
         self.runs += 1
@@ -54,23 +54,23 @@ class _Worker:
             self.process.stdin.flush()
 
     def messages(self) -> list[dict[str, Any]] | None:
-        """What it has said since; None where it has ended."""
+        """Reads new messages; None if the process has ended."""
         raw = os.read(self.answers.fileno(), CHUNK)
-        *lines, self._torn = (self._torn + raw).split(b"\n")
+        *lines, self._partial = (self._partial + raw).split(b"\n")
         return [json.loads(line) for line in lines] if raw else None
 
     @property
     def death(self) -> str:
-        """Why it has ended, in its own words where it had time for some."""
+        """Why the process ended, by its own report if it sent one."""
         code = self.process.returncode
-        if self.last_word:
-            return self.last_word
+        if self.reported_death:
+            return self.reported_death
         if code < 0:
             return f"killed by {signal.Signals(-code).name}"
         return f"ended with exit code {code}; see {ERRORS}"
 
     def end(self) -> None:
-        """Lets go of it; one that is idle ends by itself."""
+        """Closes its input, at which an idle process ends, and waits for it."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):
             self.process.stdin.close()
@@ -95,7 +95,7 @@ class _Pool:
         return [worker for worker in self.workers if worker.planned is not None]
 
     def idle(self) -> _Worker | None:
-        """A worker that has nothing to do; a new one while there are too few."""
+        """An idle worker, or a new one while there are too few."""
         for worker in self.workers:
             if worker.planned is None and worker.runs < MOST_RUNS:
                 return worker
@@ -110,14 +110,14 @@ class _Pool:
         worker.end()
 
     def _start(self) -> _Worker:
-        words = [str(os.getpid()), json.dumps(asdict(self.terms))]
+        arguments = [str(os.getpid()), json.dumps(asdict(self.terms))]
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tdac_agent.campaign.worker", *words],
+            [sys.executable, "-P", "-m", "tdac_agent.campaign.worker", *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.errors,
             env=os.environ | {f"{name}_NUM_THREADS": "1" for name in ONE_THREAD},
-            # An interrupt is for the driver, which passes it on.
+            # Ctrl-C interrupts only the driver, which passes it on.
             start_new_session=True,
         )
         worker = _Worker(process)
@@ -125,7 +125,7 @@ class _Pool:
         return worker
 
     def close(self) -> None:
-        """Interrupts those that are at work, and waits until all have ended."""
+        """Interrupts busy workers, kills late ones, and waits until all have ended."""
         for worker in self.busy:
             worker.process.send_signal(signal.SIGINT)
         deadline = time.monotonic() + FAREWELL_SECONDS
@@ -142,13 +142,13 @@ def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
     """Makes runs in worker processes, `terms.workers` at a time.
 
     Args:
-        terms: What all runs share.
-        next_run: Where they come from.
+        terms: Settings that all runs share.
+        next_run: Returns the next run.
 
     Raises:
-        Fault: Workers could not share the cores.
+        Fault: There is no private folder for the core locks.
     """
-    core_locks()  # where there is no place for them, every worker would die
+    core_locks()  # fails here once instead of in every worker
     runs = Bereaved(next_run)
     with (Path(terms.folder) / ERRORS).open("ab") as errors:
         pool = _Pool(terms, errors)
@@ -156,7 +156,7 @@ def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
             yield from _hand_out(pool, runs)
             while pool.busy:
                 for key, _ in pool.selector.select():
-                    yield from _hear(pool, key.data, runs)
+                    yield from _receive(pool, key.data, runs)
                 yield from _hand_out(pool, runs)
         finally:
             pool.close()
@@ -173,8 +173,8 @@ def _hand_out(pool: _Pool, runs: Bereaved) -> Iterator[Update]:
         yield Begun(planned)
 
 
-def _hear(pool: _Pool, worker: _Worker, runs: Bereaved) -> Iterator[Update]:
-    """What a worker says, or that it has died."""
+def _receive(pool: _Pool, worker: _Worker, runs: Bereaved) -> Iterator[Update]:
+    """The updates in a worker's messages, or its death."""
     planned, messages = worker.planned, worker.messages()
     if messages is None:
         pool.dismiss(worker)
@@ -183,7 +183,7 @@ def _hear(pool: _Pool, worker: _Worker, runs: Bereaved) -> Iterator[Update]:
         return
     for message in messages:
         if "death" in message:
-            worker.last_word = message["death"]
+            worker.reported_death = message["death"]
             continue
         assert planned is not None
         if "outcome" in message:

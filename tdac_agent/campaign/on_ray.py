@@ -1,7 +1,7 @@
-"""The executor `ray`: tasks on a Ray cluster, or on one that is started here.
+"""The executor `ray`: tasks on an existing Ray cluster, or on a new local one.
 
-The folder of the campaign must be the same on all machines, and keys must be in the
-environment of Ray's own processes there.
+All machines must share the campaign folder under the same path, and the environment of
+Ray's processes must have the API keys.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.extras import install_command
 
 STORE_BYTES = 96 << 20
-"""Of a cluster that is started here: runs pass through folders, not through Ray."""
+"""Object store of a local cluster; small, since data pass through folders."""
 WAIT_SECONDS = 1.0
 
 
@@ -28,15 +28,15 @@ def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
     """Makes runs as Ray tasks of one CPU each, `terms.workers` at a time.
 
     Args:
-        terms: What all runs share.
-        next_run: Where they come from.
+        terms: Settings that all runs share.
+        next_run: Returns the next run.
 
     Raises:
         ProviderError: Ray is not installed.
         Fault: Ray does not start, or cannot be reached.
     """
     ray = _start(terms.workers)
-    # A task whose process dies is ours to put again, as with the other executor.
+    # No retries by Ray: `Bereaved` repeats a task whose process has died.
     task = ray.remote(num_cpus=1, max_retries=0)(_in_task)
     runs = Bereaved(next_run)
     pending: dict[Any, PlannedRun] = {}
@@ -71,7 +71,7 @@ def _update(ray: Any, reference: Any, planned: PlannedRun, runs: Bereaved) -> Up
 
 
 def _in_task(planned: PlannedRun, terms: Terms) -> Outcome:
-    """One run, in a process of Ray's."""
+    """Makes one run, in a process of Ray."""
     try:
         with own_core() as turn, WarmJudge(turn=turn) as judge:
             return perform(planned, terms, judge)
@@ -80,15 +80,15 @@ def _in_task(planned: PlannedRun, terms: Terms) -> Outcome:
 
 
 def _start(workers: int) -> Any:
-    """Ray, connected to the cluster that `RAY_ADDRESS` names or to one of its own.
+    """Returns Ray, connected to the cluster in `RAY_ADDRESS` or to a new local one.
 
     Raises:
-        ProviderError: It is not installed.
-        Fault: It does not start, or cannot be reached.
+        ProviderError: Ray is not installed.
+        Fault: Ray does not start, or cannot be reached.
     """
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    # By default tasks give way to whatever else is at work, and a judge would starve.
+    # By default Ray runs tasks at low priority, and the judge would starve.
     os.environ.setdefault("RAY_worker_niceness", "0")
     try:
         import ray
@@ -96,15 +96,15 @@ def _start(workers: int) -> Any:
         raise ProviderError(
             f"--executor ray needs a package: {install_command('ray')}"
         ) from error
-    own: dict[str, Any] = {
+    local: dict[str, Any] = {
         "num_cpus": workers,
         "object_store_memory": STORE_BYTES,
         "include_dashboard": False,
     }
-    given = {} if os.environ.get("RAY_ADDRESS") else own
+    options = {} if os.environ.get("RAY_ADDRESS") else local
     try:
-        ray.init(log_to_driver=False, logging_level=logging.ERROR, **given)
-    except Exception as error:  # of all kinds, also a bare one after 30 s
+        ray.init(log_to_driver=False, logging_level=logging.ERROR, **options)
+    except Exception as error:  # any kind, also a bare one after 30 s
         reason = " ".join(str(error).split())[:300]
         raise Fault(f"Ray did not start: {reason}") from error
     return ray

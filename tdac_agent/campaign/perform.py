@@ -1,4 +1,4 @@
-"""One run of a campaign, in whichever process: the same for all executors."""
+"""Makes one run of a campaign, for every executor."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
-"""Nobody waits for a single answer of a campaign."""
+"""Longer than for a single run, since nobody waits for an answer of a campaign."""
 RUNS = "runs"
-"""Folder of the runs, in that of a campaign."""
+"""Folder of the runs, inside the campaign folder."""
 KEPT = frozenset({RUN_FILE, JOURNAL, TASK_FILE, "controller.py", "report.json"})
 
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What all runs of a campaign share.
+    """Settings that all runs of a campaign share.
 
     Attributes:
-        folder: Of the campaign, absolute.
-        workers: How many runs are under way at a time.
-        max_cost: USD of all together.
-        max_tokens: Of all together.
+        folder: Folder of the campaign, absolute.
+        workers: Number of runs at a time.
+        max_cost: Limit for all runs together, USD.
+        max_tokens: Limit for all runs together.
         keep: `all`, or `records`.
         key_over_http: As for `synthesize`.
     """
@@ -60,7 +60,7 @@ class Terms:
         return Path(self.folder) / RUNS
 
     def budget(self, planned: PlannedRun) -> Budget:
-        """The budget of a run: of its own where no model is asked."""
+        """The shared budget, or an unlimited one if the run asks only free models."""
         if not planned.cell.asks_models:
             return Budget()
         return _budget(self)
@@ -68,16 +68,16 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a run.
+    """The outcome of a run.
 
     Attributes:
-        name: Of the run.
-        status: As in `run.json`; `error` where there is no run to speak of.
-        reason: Why it did not come to its end.
-        tau: Iteration of its success.
-        tokens: In and out.
-        cost: USD; None where it is unknown.
-        seconds: That it took, all of its processes together.
+        name: Name of the run.
+        status: As in `run.json`; `error` if the run could not be made.
+        reason: Why it is not finished.
+        tau: Iteration of the first success.
+        tokens: Input and output tokens.
+        cost: USD; None if unknown.
+        seconds: Duration, all of its processes together.
     """
 
     name: str
@@ -94,7 +94,7 @@ class Outcome:
         return self.status in {"verified", "not verified"}
 
     def to_json(self) -> dict[str, Any]:
-        """For another process."""
+        """The outcome as JSON, for another process."""
         return asdict(self)
 
 
@@ -104,13 +104,13 @@ Tell = Callable[[dict[str, Any]], None]
 def perform(
     planned: PlannedRun, terms: Terms, judge: WarmJudge | None, tell: Tell | None = None
 ) -> Outcome:
-    """Makes a run, or goes on with it; whatever goes wrong is an outcome.
+    """Makes or resumes a run; an error becomes an outcome.
 
     Args:
-        planned: Which.
-        terms: What all runs share.
-        judge: A warm one; one of its own by default.
-        tell: Called with each record of its journal.
+        planned: The run.
+        terms: Settings that all runs share.
+        judge: A warm judge; None starts one for this run.
+        tell: Called with each journal record.
     """
     try:
         run = _synthesize(planned, terms, judge, tell)
@@ -119,7 +119,7 @@ def perform(
         return known or Outcome(planned.name, "error", str(error))
     except (TdacError, OSError) as error:
         return Outcome(planned.name, "error", " ".join(str(error).split()))
-    except Exception as error:  # the others go on
+    except Exception as error:  # must not stop the other runs
         traceback.print_exc(file=sys.stderr)
         reason = " ".join(str(error).split())
         return Outcome(planned.name, "error", f"{type(error).__name__}: {reason}")
@@ -166,9 +166,9 @@ def _synthesize(
 
 
 def _seed(planned: PlannedRun, task: Task, folder: Path) -> int:
-    """The seed of a run: the file's, the one on record, or one that nobody can guess.
+    """The seed of a run: the planned one, the recorded one, or an unpredictable one.
 
-    It is the same for the runs of all kinds on a task that have the same number.
+    Runs of all kinds with the same index on the same task share it.
     """
     if planned.seed is not None:
         return planned.seed
@@ -180,23 +180,23 @@ def _seed(planned: PlannedRun, task: Task, folder: Path) -> int:
 
 @functools.lru_cache(maxsize=1)
 def _budget(terms: Terms) -> Budget:
-    """The budget of all runs together, which has read its file as far as it is."""
+    """The shared budget; cached, since it reads only what is new in its ledger."""
     ledger = Path(terms.folder) / "ledger.jsonl"
     return Budget(terms.max_cost, terms.max_tokens, ledger)
 
 
 @functools.lru_cache(maxsize=4)
 def _task(name: str) -> Task:
-    """A task, which a worker has many runs of."""
-    return load_task(name, trust=True)  # asked for when the campaign was planned
+    """A task; cached, since a worker makes many runs of it."""
+    return load_task(name, trust=True)  # permitted when the campaign was planned
 
 
 def read_outcome(name: str, runs: Path) -> Outcome | None:
-    """What is on record of a run; None where there is none that can be read.
+    """The recorded outcome of a run; None if there is no readable record.
 
     Args:
-        name: Of the run.
-        runs: The folder of all runs.
+        name: Name of the run.
+        runs: Folder of all runs.
     """
     try:
         known = parse_json(read_file(runs / name / RUN_FILE, RECORD_BYTES))
@@ -220,7 +220,7 @@ def _outcome(name: str, run: Run) -> Outcome:
 
 
 def _thin_out(folder: Path) -> None:
-    """Leaves of a finished run what the tables need, and the evidence of its end."""
+    """Deletes all but the files in `KEPT` from the folder of a finished run."""
     for path in folder.iterdir():
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)

@@ -1,4 +1,4 @@
-"""From a campaign's file to its runs, each with a name that is always the same."""
+"""Plans the runs of a campaign; a run's name follows from its configuration."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from tdac_agent.verification.verify import suite_sha256
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Runs that differ in their number alone.
+    """A kind of run: its runs differ only in index and seed.
 
     Attributes:
-        folder: Name of their folder.
-        task: Name or absolute path.
-        task_name: For people.
+        folder: Name of the folder of its runs.
+        task: Bundled name or absolute path of the task.
+        task_name: Name of the task, for display.
         learner: LLM1.
         optimizer: LLM2.
-        setting: What of the loop is in use.
-        prompt: Template of the first question; a name, or an absolute path.
+        setting: Which parts of the loop are used.
+        prompt: Template of the first question, a name or an absolute path.
         iterations: K.
         patience: J.
         refine: Whether failures become rules.
-        base_url: Where the models are served.
-        max_output: Tokens of an answer.
+        base_url: URL of the models' server; None for the default.
+        max_output: Token limit of an answer.
     """
 
     folder: str
@@ -58,7 +58,7 @@ class Cell:
 
     @property
     def asks_models(self) -> bool:
-        """Whether its runs may cost something."""
+        """Whether its runs may cost money."""
         return not {n.partition(":")[0] for n in (self.learner, self.optimizer)} <= FREE
 
 
@@ -67,9 +67,9 @@ class PlannedRun:
     """One run of a campaign.
 
     Attributes:
-        cell: What it is of.
-        index: Its number among those of its cell, from 1.
-        seed: Of its jittered starts; None where the file has none.
+        cell: Kind of the run.
+        index: Number of the run within its cell, from 1.
+        seed: Seed of its jittered starts; None if the file has none.
     """
 
     cell: Cell
@@ -78,33 +78,33 @@ class PlannedRun:
 
     @property
     def name(self) -> str:
-        """Its folder below that of all runs; the same whenever it is planned."""
+        """Its folder, relative to the folder of all runs; the same in every plan."""
         return f"{self.cell.folder}/r{self.index:04d}"
 
     def to_json(self) -> str:
-        """All of it, for another process."""
+        """Serializes the run for another process."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> PlannedRun:
-        """What `to_json` wrote."""
+        """The run that `to_json` serialized."""
         content = json.loads(text)
         return cls(**{**content, "cell": Cell(**content["cell"])})
 
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """Every n-th run, beginning with the i-th."""
+    """Every n-th run of a plan, starting with the i-th."""
 
     i: int = 1
     n: int = 1
 
     @classmethod
     def parse(cls, text: str) -> Shard:
-        """From `i/n`.
+        """Parses `i/n`.
 
         Raises:
-            CampaignError: It is no such thing.
+            CampaignError: The text is not `i/n` with 1 <= i <= n.
         """
         found = re.fullmatch(r"(\d+)/(\d+)", text)
         if found is None or not 1 <= int(found[1]) <= int(found[2]):
@@ -121,9 +121,9 @@ class Plan:
 
     Attributes:
         cells: The kinds of run, in the file's order.
-        tasks: By `Cell.task`.
-        runs: R of each.
-        seed: Of the first run, where one is given.
+        tasks: Tasks by `Cell.task`.
+        runs: R: runs of each kind.
+        seed: Seed of the first run; None if the file has none.
     """
 
     cells: tuple[Cell, ...]
@@ -135,9 +135,9 @@ class Plan:
         return len(self.cells) * self.runs
 
     def all(self, shard: Shard = WHOLE) -> Iterator[PlannedRun]:
-        """All runs, or those of a shard: first of all the first one of each kind.
+        """Yields the runs of a shard: the first of each kind, then the second, etc.
 
-        So what there is of a campaign that was stopped is of all kinds alike.
+        So a stopped campaign has about equally many runs of every kind.
         """
         numbered = product(range(1, self.runs + 1), self.cells)
         for number, (index, cell) in enumerate(numbered):
@@ -147,23 +147,24 @@ class Plan:
 
 
 def make_plan(config: CampaignConfig, base: Path, *, trust: bool = False) -> Plan:
-    """The plan of a campaign; its tasks are read and found feasible.
+    """Plans a campaign; reads its tasks, which must be feasible.
 
     Args:
-        config: The file's contents.
-        base: Its folder.
-        trust: Whether it may run, and reach, what it names.
+        config: Contents of the campaign file.
+        base: Folder of the campaign file.
+        trust: Whether the file has all permissions that it needs.
 
     Raises:
-        NotTrustedError: It names a program, a server, a template or tests.
+        NotTrustedError: The file names a program, a server, a template or tests, and
+            `trust` is false.
         TdacError: A task or a prompt cannot be used.
     """
     tasks = {
-        name: (place := _task(name, base), load_task(place)) for name in config.tasks
+        name: (path := _task(name, base), load_task(path)) for name in config.tasks
     }
     wishes = wishes_of(config, base, [task for _, task in tasks.values()])
     permit(f"the campaign {config.name}", wishes, trust=trust)
-    tasks = {n: (place, replace(t, trusted=True)) for n, (place, t) in tasks.items()}
+    tasks = {n: (path, replace(t, trusted=True)) for n, (path, t) in tasks.items()}
     prompts = {name: _prompt(name, base) for name in config.prompts}
     kinds = product(
         config.tasks,
@@ -184,7 +185,7 @@ def make_plan(config: CampaignConfig, base: Path, *, trust: bool = False) -> Pla
 
 def _cell(
     config: CampaignConfig,
-    place: str,
+    path: str,
     task: Task,
     learner: str,
     optimizer: str,
@@ -192,7 +193,7 @@ def _cell(
     template: str,
     setting: Setting,
 ) -> Cell:
-    """One kind of run; its folder is named after all that its runs depend on."""
+    """One kind of run; its folder name has a hash of all that its runs depend on."""
     iterations, patience, refine = loop_of(config, setting)
     facts: dict[str, Any] = {
         "task_name": task.name,
@@ -205,11 +206,11 @@ def _cell(
         "base_url": config.base_url,
         "max_output": config.max_output,
     }
-    words = generate_prompt(task, (), load_template(template))
-    about = facts | {
+    question = generate_prompt(task, (), load_template(template))
+    hashed = facts | {
         "task": task.sha256(),
         "suite": suite_sha256(task),
-        "prompt": hashlib.sha256(words.encode("utf-8", "surrogatepass")).hexdigest(),
+        "prompt": hashlib.sha256(question.encode("utf-8", "surrogatepass")).hexdigest(),
         "version": importlib.metadata.version("tdac"),
         "seed": config.seed,
     }
@@ -217,33 +218,33 @@ def _cell(
     for model in {facts["learner"], facts["optimizer"]}:
         answers = answers_sha256(model, options)
         if answers is not None:
-            about[f"answers of {model}"] = answers
-    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
+            hashed[f"answers of {model}"] = answers
+    digest = hashlib.sha256(json.dumps(hashed, sort_keys=True).encode()).hexdigest()
     shown = [task.name, learner, setting, *([prompt] if prompt != "full" else [])]
     folder = f"{slug('-'.join(shown))}-{digest[:8]}"
-    return Cell(folder=folder, task=place, prompt=template, **facts)
+    return Cell(folder=folder, task=path, prompt=template, **facts)
 
 
 def loop_of(config: CampaignConfig, setting: Setting) -> tuple[int, int, bool]:
-    """K, J and whether failures become rules, of a setting."""
-    most, edits = config.iterations, config.patience
-    samples = config.samples or most * (edits + 2)
+    """K, J and whether failures become rules, for a setting."""
+    iterations, edits = config.iterations, config.patience
+    samples = config.samples or iterations * (edits + 2)
     return {
-        "dual tier": (most, edits, True),
-        "edit only": (most, edits, False),
-        "prompt only": (most, 0, True),
+        "dual tier": (iterations, edits, True),
+        "edit only": (iterations, edits, False),
+        "prompt only": (iterations, 0, True),
         "best of N": (samples, 0, False),
         "one shot": (1, 0, False),
     }[setting]
 
 
 def slug(text: str, most: int = 60) -> str:
-    """A text as part of a file's name."""
+    """Turns a text into part of a file name, of at most `most` characters."""
     return re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:most].rstrip("-.")
 
 
 def _task(name: str, base: Path) -> str:
-    """The name of a bundled task, or where a task is."""
+    """The name of a bundled task, or the absolute path of another one."""
     return name if bundled_task(name) is not None else str((base / name).resolve())
 
 
@@ -252,5 +253,5 @@ def _prompt(name: str, base: Path) -> str:
 
 
 def models_of(cells: Sequence[Cell]) -> tuple[str, ...]:
-    """The models of some cells."""
+    """The models of the cells, without duplicates."""
     return tuple(dict.fromkeys(n for c in cells for n in (c.learner, c.optimizer)))

@@ -1,4 +1,4 @@
-"""How far a campaign is: counts, not runs, so that it stays small."""
+"""Progress of a campaign: counts instead of runs, so that memory stays bounded."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tdac_agent.campaign.perform import Outcome
 from tdac_agent.campaign.plan import Cell, Plan, PlannedRun, Shard
 
 REASONS = 50
-"""Different reasons that are told apart."""
+"""Number of different reasons that are counted separately."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """Of the runs of one kind.
+    """Counts of the runs of one kind.
 
     Attributes:
         cell: The kind.
-        planned: How many there are to be.
-        ended: How many ended how.
-        tokens: Of those that ended.
-        cost: USD of those that ended; None once one is unknown.
+        planned: Number of planned runs.
+        ended: Number of ended runs by status.
+        tokens: Tokens of the runs that ended.
+        cost: USD of the runs that ended; None once one is unknown.
     """
 
     cell: Cell
@@ -35,16 +35,16 @@ class Tally:
 
     @property
     def finished(self) -> int:
-        """Runs with nothing left to do."""
+        """Number of runs with nothing left to do."""
         return self.ended["verified"] + self.ended["not verified"]
 
     @property
     def halted(self) -> int:
-        """Runs that did not come to their end."""
+        """Number of ended runs that are not finished."""
         return self.ended.total() - self.finished
 
     def add(self, outcome: Outcome, sign: int = 1) -> None:
-        """Counts a run, or takes it out again."""
+        """Counts a run; removes it if `sign` is -1."""
         self.ended[outcome.status] += sign
         self.tokens += sign * outcome.tokens
         unknown = self.cost is None or outcome.cost is None
@@ -53,7 +53,7 @@ class Tally:
 
 @dataclass(slots=True)
 class Doing:
-    """What a run under way is at."""
+    """A run under way, and its current activity."""
 
     planned: PlannedRun
     since: float
@@ -62,16 +62,16 @@ class Doing:
 
 @dataclass(slots=True)
 class Progress:
-    """Of a campaign, or of a shard of it.
+    """Progress of a campaign, or of a shard of it.
 
     Attributes:
-        tallies: By the folder of the kind.
-        before: Runs that had come to their end when it began.
-        now: Runs that have since.
-        doing: What is under way, by the run's name.
-        problems: Why runs did not come to their end, and how often.
-        deaths: Processes that died and were replaced.
-        exhausted: Whether the budget is.
+        tallies: Counts by the folder of the kind.
+        before: Number of runs that were finished when the command began.
+        now: Number of runs finished since.
+        doing: Runs under way, by name.
+        problems: Why runs were not finished, and how often.
+        deaths: Number of processes that died and were replaced.
+        exhausted: Whether the budget is exhausted.
     """
 
     tallies: dict[str, Tally]
@@ -85,7 +85,7 @@ class Progress:
 
     @classmethod
     def of(cls, plan: Plan, shard: Shard) -> Progress:
-        """Nothing done yet."""
+        """The progress of a plan before its first run."""
         tallies = {cell.folder: Tally(cell) for cell in plan.cells}
         for planned in plan.all(shard):
             tallies[planned.cell.folder].planned += 1
@@ -93,53 +93,53 @@ class Progress:
 
     @property
     def planned(self) -> int:
-        """Runs in all."""
+        """Number of all runs."""
         return sum(tally.planned for tally in self.tallies.values())
 
     @property
     def finished(self) -> int:
-        """Runs with nothing left to do."""
+        """Number of runs with nothing left to do."""
         return sum(tally.finished for tally in self.tallies.values())
 
     @property
     def tokens(self) -> int:
-        """Of the runs that ended."""
+        """Tokens of the runs that ended."""
         return sum(tally.tokens for tally in self.tallies.values())
 
     @property
     def cost(self) -> float:
-        """USD of the runs that ended, as far as it is known."""
+        """USD of the runs that ended, as far as known."""
         return sum(tally.cost or 0.0 for tally in self.tallies.values())
 
     @property
     def seconds(self) -> float:
-        """Since it began."""
+        """Seconds since the command began."""
         return time.monotonic() - self._began
 
     @property
     def seconds_left(self) -> float | None:
-        """By the runs so far; None before the first one."""
+        """Estimate from the runs so far; None before the first one."""
         left = self.planned - self.before - self.now
         return self.seconds / self.now * left if self.now else None
 
     def had(self, planned: PlannedRun, outcome: Outcome) -> None:
-        """Counts a run that had come to its end before."""
+        """Counts a run that was finished when the command began."""
         self.before += 1
         self.tallies[planned.cell.folder].add(outcome)
 
     def take_back(self, planned: PlannedRun, outcome: Outcome) -> None:
-        """A run that had been halted is begun again."""
+        """Removes an unfinished run, which begins again."""
         self.tallies[planned.cell.folder].add(outcome, -1)
         self.problems -= Counter([_problem(outcome)])
 
     def update(self, update: Update) -> None:
-        """Takes in what an executor says."""
+        """Applies an update of an executor."""
         name = update.planned.name
         match update:
             case Begun():
                 self.doing[name] = Doing(update.planned, time.monotonic())
             case Told() if name in self.doing:
-                self.doing[name].said = _said(update.record)
+                self.doing[name].said = _activity(update.record)
             case Died():
                 self.deaths += 1
                 self.doing.pop(name, None)
@@ -159,19 +159,19 @@ class Progress:
 
 
 def _problem(outcome: Outcome) -> str:
-    """Status and reason, without what is of this run alone."""
+    """Status and reason, with the run's name replaced."""
     reason = outcome.reason.replace(outcome.name, "RUN")
     return f"{outcome.status}: {reason}" if reason else outcome.status
 
 
-def _said(record: dict[str, Any]) -> str:
+def _activity(record: dict[str, Any]) -> str:
     at = f"k={record.get('k')} j={record.get('j')}"
     match record.get("event"):
         case "call.intent":
             verb = {"generate": "writing", "edit": "editing"}
-            return f"{at} {verb.get(str(record.get('kind')), 'learning')}"
+            return f"{at} {verb.get(str(record.get('kind')), 'writing rules')}"
         case "call.fault":
-            return f"{at} waiting: {record.get('fault')} fault"
+            return f"{at} waiting after a {record.get('fault')} fault"
         case "verify.start":
             return f"{at} testing"
     return at

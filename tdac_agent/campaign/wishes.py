@@ -1,4 +1,4 @@
-"""What a campaign's file wants to run, or to reach."""
+"""The permissions that a campaign file needs."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish
 def wishes_of(
     config: CampaignConfig, base: Path, tasks: Iterable[Task]
 ) -> Iterator[Wish]:
-    """All that the user has to allow; nothing of a shipped file.
+    """Yields each permission that the user must grant; none for a shipped file.
 
-    The models of the vendors are what a campaign is for, and `max_cost` bounds them.
+    Vendors' models need none: `max_cost` or `max_tokens` bounds what they cost.
 
     Args:
-        config: What the file says.
-        base: Its folder.
-        tasks: Those that it names.
+        config: Contents of the campaign file.
+        base: Folder of the campaign file.
+        tasks: Tasks of the campaign.
     """
     if base.resolve() == shipped("offline.yaml").parent.resolve():
         return

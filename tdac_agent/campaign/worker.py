@@ -1,10 +1,10 @@
-"""A process that makes one run after the other.
+"""A worker process of a campaign: makes one run after another.
 
     python -m tdac_agent.campaign.worker PARENT TERMS
 
-Reads a planned run per line, as JSON, and writes records of its journal and in the end
-its outcome, or what it died of. It has a judge for all of them, a core of its own, and
-one thread for whatever libraries compute with; it ends with the one that started it.
+Reads one planned run per line, as JSON. Writes lines of JSON: journal records of the
+run, then its outcome, or the reason why the worker dies. One judge serves all runs. The
+process is bound to a core, and ends with its parent.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.judge.workers import end_with_parent
 
-TOLD = frozenset({"call.intent", "call.fault", "verify.start"})
-FACTS = ("event", "kind", "k", "j", "fault")
+REPORTED_EVENTS = frozenset({"call.intent", "call.fault", "verify.start"})
+REPORTED_KEYS = ("event", "kind", "k", "j", "fault")
 
 
 def main(parent: int, terms: Terms) -> None:
-    """Does what is asked for until nothing more is."""
+    """Makes the runs that arrive on stdin, until it is closed."""
     end_with_parent()
     if os.getppid() != parent:
         return
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what others print is no answer
+    os.dup2(2, 1)  # keeps prints of libraries out of the answers
     try:
         with own_core() as turn, WarmJudge(turn=turn) as judge:
             for line in iter(sys.stdin.readline, ""):
                 planned = PlannedRun.from_json(line)
-                outcome = perform(planned, terms, judge, lambda r: _tell(answers, r))
-                _say(answers, {"outcome": outcome.to_json()})
+                outcome = perform(planned, terms, judge, lambda r: _report(answers, r))
+                _send(answers, {"outcome": outcome.to_json()})
     except Exception as error:
         reason = " ".join(str(error).split())
-        _say(answers, {"death": f"{type(error).__name__}: {reason}"})
+        _send(answers, {"death": f"{type(error).__name__}: {reason}"})
         raise
 
 
-def _tell(answers: BinaryIO, record: dict[str, Any]) -> None:
-    if record.get("event") in TOLD:
-        facts = {name: record[name] for name in FACTS if name in record}
-        _say(answers, {"record": facts})
+def _report(answers: BinaryIO, record: dict[str, Any]) -> None:
+    if record.get("event") in REPORTED_EVENTS:
+        facts = {name: record[name] for name in REPORTED_KEYS if name in record}
+        _send(answers, {"record": facts})
 
 
-def _say(answers: BinaryIO, message: dict[str, Any]) -> None:
+def _send(answers: BinaryIO, message: dict[str, Any]) -> None:
     answers.write(json.dumps(message).encode() + b"\n")
     answers.flush()
 

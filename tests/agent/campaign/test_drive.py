@@ -89,7 +89,7 @@ def test_a_run_whose_processes_die_is_given_up_at_last():
     ended = bereaved.died(runs[0], "out of memory")
     assert isinstance(ended, Ended)
     assert ended.outcome.status == "error"
-    assert ended.outcome.reason.endswith("at last: out of memory")
+    assert ended.outcome.reason.endswith("last reason: out of memory")
     assert bereaved.next() == runs[1]
 
 
