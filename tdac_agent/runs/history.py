@@ -1,4 +1,4 @@
-"""What is on disk of a run, as far as it can be read."""
+"""Reads a run folder as far as possible, also a damaged one."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ State = Literal["passed", "failed", "no code", "unfinished"]
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """A candidate (k, j) and what came of it.
+    """A candidate (k, j) and its result.
 
     Attributes:
-        k: Its iteration.
-        j: Its edit, 0 for what the Learner wrote.
-        folder: Of its files.
-        state: What came of it; `unfinished` where nobody knows.
+        k: Iteration.
+        j: Edit; 0 for the Learner's code.
+        folder: Folder of its files.
+        state: Its result; `unfinished` if it was not judged.
         attempt: Its record, if it was judged.
-        report: Of its verification, if there is a readable one.
-        source: Its code.
-        diff: Against the candidate before it, unified.
-        learnt: Rules that it was written under, and what changed them afterwards.
+        report: Its verification report, if there is a readable one.
+        source: Its code, if there is any.
+        diff: Unified diff from the previous candidate.
+        learnt: Rules in force when it was written, and later changes to them.
     """
 
     k: int
@@ -64,7 +64,7 @@ class Tried:
         return self.attempt.failed_tests if self.attempt else ()
 
     def trajectories(self) -> Iterator[tuple[str, Trajectory]]:
-        """Episode names and trajectories; one that is damaged is left out."""
+        """Yields episode names and trajectories; skips damaged ones."""
         files = (self.folder / "trajectories").glob("*.npz")
         for path in sorted(files, key=nominal_first):
             try:
@@ -75,17 +75,17 @@ class Tried:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """A run with all that is known of it.
+    """A run with all that can be read of it.
 
     Attributes:
         run: Its record.
-        status: Of the moment: `running` and `killed` are told apart.
+        status: Its present status; see `status_now`.
         task: Its task, unless that cannot be read.
         tried: Its candidates, oldest first.
-        report: On the verified controller, or on the last candidate that has one.
-        source: The verified controller, or the last candidate that has code.
+        report: Report on the verified controller, or else the last report.
+        source: The verified controller, or else the last candidate with code.
         book: Its rules.
-        problems: What could not be read, a line each.
+        problems: What could not be read, one line each.
     """
 
     run: Run
@@ -99,13 +99,13 @@ class Told:
 
 
 def learner_named(learner: str) -> str:
-    """A learner for people: what is no language model says so."""
+    """The name of a learner for display; `builtin` is marked as no language model."""
     plain = learner == "builtin"
     return f"{learner} (a tuned template, no language model)" if plain else learner
 
 
 def gather_run(source: Path | Run) -> Told:
-    """A run, also one that is torn, or still going on.
+    """Reads a run, also a damaged one or one that is still running.
 
     Args:
         source: Its folder, or its record.
@@ -120,29 +120,29 @@ def gather_run(source: Path | Run) -> Told:
     tried = tuple(_candidates(run, problems))
     reports = [one.report for one in tried if one.report is not None]
     sources = [one.source for one in tried if one.source is not None]
-    report = sources_of = None
+    report = verified_source = None
     if run.verified:
         report = _report(folder / "report.json", problems)
-        sources_of = read_text(run.controller)
-        if sources_of is None:
+        verified_source = read_text(run.controller)
+        if verified_source is None:
             problems.append("controller.py of the verified run is missing")
     return Told(
         run,
         status,
-        _kept(problems, lambda: load_task(folder)),
+        _try_to(problems, lambda: load_task(folder)),
         tried,
         report or (reports[-1] if reports else None),
-        sources_of or (sources[-1] if sources else None),
-        _kept(problems, lambda: load_rules(folder)) or RuleBook(),
+        verified_source or (sources[-1] if sources else None),
+        _try_to(problems, lambda: load_rules(folder)) or RuleBook(),
         tuple(dict.fromkeys(problems)),
     )
 
 
 def run_folders(place: Path) -> list[Path]:
-    """The run folders at or below a place, in the order of their names.
+    """The run folders at or below a place, sorted by path.
 
     Raises:
-        RunError: There is none.
+        RunError: There is no such folder, or no run in it.
     """
     if not place.is_dir():
         raise RunError(f"there is no folder {place}")
@@ -153,7 +153,7 @@ def run_folders(place: Path) -> list[Path]:
 
 
 def read_text(path: Path, most: int = MOST_BYTES) -> str | None:
-    """A text as far as it is one; None where there is no file, or a huge one."""
+    """Reads text leniently; None if the file is missing or has over `most` bytes."""
     try:
         return read_file(path, most).decode("utf-8", "replace")
     except OSError:
@@ -161,21 +161,21 @@ def read_text(path: Path, most: int = MOST_BYTES) -> str | None:
 
 
 def _candidates(run: Run, problems: list[str]) -> Iterator[Tried]:
-    """Those on record, and those whose folder is there although nobody judged them."""
+    """Yields the candidates on record, and those with a folder but no result."""
     learnt = what_was_learnt(read_records(run.folder / JOURNAL))
     judged = {(attempt.k, attempt.j): attempt for attempt in run.attempts}
     begun = {_numbers(path) for path in (run.folder / "iterations").glob("k*/j*")}
     for k, j in sorted({*judged, *begun} - {(0, 0)}):
         attempt = judged.get((k, j))
         folder = run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
-        wanted = attempt is not None and attempt.valid and not attempt.unchanged
+        has_report = attempt is not None and attempt.valid and not attempt.unchanged
         yield Tried(
             k,
             j,
             folder,
             _state(attempt),
             attempt,
-            _report(folder / "report.json", problems) if wanted else None,
+            _report(folder / "report.json", problems) if has_report else None,
             read_text(folder / "controller.py"),
             read_text(folder / "controller.diff") or "",
             learnt.get((k, j), Learnt()),
@@ -183,7 +183,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[Tried]:
 
 
 def _numbers(folder: Path) -> tuple[int, int]:
-    """K and j of a candidate's folder; (0, 0) where it is something else."""
+    """(k, j) of a candidate's folder; (0, 0) for any other path."""
     k, j = folder.parent.name[1:], folder.name[1:]
     return (int(k), int(j)) if k.isdecimal() and j.isdecimal() else (0, 0)
 
@@ -205,8 +205,8 @@ def _report(path: Path, problems: list[str]) -> Report | None:
         return None
 
 
-def _kept(problems: list[str], read: Callable[[], T]) -> T | None:
-    """What is read, or None and a problem more."""
+def _try_to(problems: list[str], read: Callable[[], T]) -> T | None:
+    """The result of `read`, or None with its error added to `problems`."""
     try:
         return read()
     except (TdacError, OSError) as error:

@@ -1,4 +1,4 @@
-"""Which rules were in force when a candidate was written, as the journal tells it."""
+"""Which rules were in force when a candidate was written, according to the journal."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ At = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Learnt:
-    """The rules of the prompt around one candidate.
+    """The rules of the prompt before and after one candidate.
 
     Attributes:
-        rules: In force when it was written, oldest first.
-        fresh: Ids of those that are new since the iteration before.
-        changes: What changed the rules after it failed, a line each.
+        rules: Rules in force when it was written, oldest first.
+        fresh: Ids of the rules that the previous candidate did not have.
+        changes: Changes to the rules after it failed, one line each.
     """
 
     rules: tuple[RepairRule, ...] = ()
@@ -29,9 +29,9 @@ class Learnt:
 
 
 def what_was_learnt(journal: Iterable[JournalRecord]) -> Mapping[At, Learnt]:
-    """The rules around each candidate (k, j); records that make no sense are skipped.
+    """The rules before and after each candidate (k, j); skips malformed records.
 
-    Rules change only between iterations, so that those of k hold for all of its j.
+    Rules change only between iterations, so that all j of one k have the same rules.
     """
     found: dict[At, Learnt] = {}
     rules: tuple[RepairRule, ...] = ()
@@ -53,7 +53,7 @@ def what_was_learnt(journal: Iterable[JournalRecord]) -> Mapping[At, Learnt]:
 
 
 def _place(record: JournalRecord) -> At | None:
-    """K and j of a record that is about writing or testing a candidate."""
+    """(k, j) of a record about writing or testing a candidate, else None."""
     k, j = record.get("k"), record.get("j")
     if record.get("kind") == "summarise" or not isinstance(record.get("event"), str):
         return None

@@ -1,4 +1,4 @@
-"""Runs that this installation began, and what those of others want."""
+"""Which runs this installation began, and which permissions other runs need."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish, tree_sha256
 
 OWN_SUITE = "suite"
-"""Folder of a run's tests, beside the shipped ones."""
+"""Subfolder of a run with the tests of its task."""
 OURS = "builtin"
-"""The learner that runs nothing and asks nobody."""
+"""The learner that needs no permission."""
 
 
 def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
-    """What a run of somebody else's wants when it goes on, but for what is given.
+    """Yields the permissions that resuming another installation's run needs.
 
     Args:
-        run: As its folder tells.
-        task: As its folder tells.
-        given: Names of the arguments of `synthesize` that the user gave, and `suite`.
+        run: The run as recorded.
+        task: Its task as recorded.
+        given: Arguments of `synthesize`, or `suite`, that the user gave; these need no
+            permission.
     """
     if "learner" not in given and run.learner != OURS:
         yield Wish(asking("learner", run.learner), ("--learner", run.learner))
@@ -51,10 +52,10 @@ def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
 
 
 def sign(run: Run, suite: Path | None) -> str:
-    """The mark of a run that this installation begins; empty where no secret lasts.
+    """The mark of a run of this installation; empty if no secret can be kept.
 
-    It is a MAC over all of the run that can run, reach out or spend. Its files are in
-    its folder by now.
+    It is a MAC over everything in the run that can execute code, reach a server or
+    spend money. The files of the run must be in its folder already.
     """
     facts = _facts(run, suite)
     if facts is None or lasting_secret() is None:
@@ -63,24 +64,24 @@ def sign(run: Run, suite: Path | None) -> str:
 
 
 def is_own(run: Run, suite: Path | None) -> bool:
-    """Whether this installation has begun a run, and what it may do is as it was.
+    """Whether this installation began a run, and what its mark covers is unchanged.
 
     Args:
-        run: As its folder tells.
-        suite: Of its task, as its folder tells.
+        run: The run as recorded.
+        suite: Folder with the tests of its task, as recorded.
     """
     mark = run.mark.encode("utf-8", "surrogatepass")
     return bool(mark) and hmac.compare_digest(mark, sign(run, suite).encode())
 
 
 def is_own_folder(run: Run) -> bool:
-    """The same of a run whose task is not read: its tests lie in its folder."""
+    """Like `is_own`, without reading the task: its tests are in the run folder."""
     suite = run.folder / OWN_SUITE
     return is_own(run, suite if suite.is_dir() else None)
 
 
 def _facts(run: Run, suite: Path | None) -> bytes | None:
-    """All of a run that matters, as one text; None where a suite is none."""
+    """What the mark of a run covers; None if the suite cannot be hashed."""
     template, tests = run.folder / PROMPT_FILE, ""
     if suite is not None:
         found = tree_sha256(suite)

@@ -1,4 +1,4 @@
-"""What a run's journal tells of the processes that wrote it before this one."""
+"""What earlier processes of a run have recorded in its journal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tdac_agent.models.provider import Provider, Reply, Request, served_at
 from tdac_agent.storage.journal import JournalRecord
 
 KEY_SCHEMA = 1
-# What is the same when the same loop runs again; calls and processes are told apart.
+# Steps that a resumed run repeats, and does not record again.
 REPEATED = (
     *("prove.start", "prove.end", "verify.start", "verify.end"),
     *("call.unused", "rules"),
@@ -30,7 +30,7 @@ _REPORTED = (
 
 
 def call_key(model: Provider, request: Request) -> str:
-    """Hash of all that shapes an answer, and of which sample of it this is."""
+    """Hash of all that shapes an answer, including which sample it is."""
     facts = {
         "schema": KEY_SCHEMA,
         "model": model.name,
@@ -45,7 +45,7 @@ def call_key(model: Provider, request: Request) -> str:
 
 
 def reply_of(record: JournalRecord, text: str) -> Reply | None:
-    """The answer that a record `call.reply` is about; None where it is damaged."""
+    """The answer of a record `call.reply`; None if the record is damaged."""
     reported = {name: record[name] for name in _REPORTED if name in record}
     try:
         return _REPLY.validate_python({"text": text, **reported})
@@ -58,14 +58,14 @@ class Past:
     """Calls and steps on record.
 
     Attributes:
-        replies: Records of the answers by their keys.
+        replies: Answer records by key.
         taken: What each call took or may have taken of the budget, by `KEY/ATTEMPT`.
-        lost: The calls whose answer was lost: there may have been one, and a bill.
-        open: Those of them of which nothing at all is known.
-        attempts: How often each key was asked.
-        steps: What need not be written again, counted.
-        started: Whether the run's files were all written.
-        seconds: That the run took so far.
+        lost: Calls whose answer was lost, but may have been billed.
+        open: Calls with neither an answer nor a fault on record.
+        attempts: Number of calls by key.
+        steps: Number of records of each step that need not be recorded again.
+        started: Whether all files of a new run were written.
+        seconds: Duration of the run so far.
     """
 
     replies: dict[str, JournalRecord] = field(default_factory=dict)
@@ -79,27 +79,27 @@ class Past:
 
     @property
     def proven(self) -> bool:
-        """Whether the suite has proven itself."""
+        """Whether the check of the suite is on record."""
         return any(step.startswith('["prove.end"') for step in self.steps)
 
     @property
     def lost_usd(self) -> float:
-        """What the lost answers may have cost."""
+        """Maximum cost of the lost answers, USD."""
         return sum(self.taken[call].usd for call in self.lost)
 
     @property
     def unanswered(self) -> int:
-        """How many questions were put and have no answer to this day."""
+        """Number of questions that were asked and have no answer."""
         keys = {call.rpartition("/")[0] for call in self.open}
         return len(keys - self.replies.keys())
 
     def next_call(self, key: str) -> str:
-        """Name of the next attempt to ask a question."""
+        """Counts a call for a key, and returns its name."""
         self.attempts[key] += 1
         return f"{key}/{self.attempts[key]}"
 
     def has_step(self, event: str, facts: dict[str, Any]) -> bool:
-        """Whether a step is on record; each record stands for one step."""
+        """Whether a step is on record; uses up one record of it."""
         step = _step(event, facts)
         known = self.steps[step] > 0
         self.steps[step] -= known
@@ -107,7 +107,7 @@ class Past:
 
 
 def read_past(records: Iterable[JournalRecord]) -> Past:
-    """Reads a journal; what is damaged in it is left out."""
+    """Reads a journal; ignores damaged records."""
     past, asked = Past(), ""
     for record in records:
         event = record.get("event")

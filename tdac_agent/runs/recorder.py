@@ -1,4 +1,4 @@
-"""Writes a run folder: everything that happens, when it happens."""
+"""Writes a run folder: each step when it happens."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.mapping.map_folder import png
 
 MOST_LINES = 5000
-"""Of a source that is compared with the last one: the time grows with their square."""
+"""Longest source that is diffed; the time grows with the square of the length."""
 PREVIEW_FILE = "preview.png"
-"""How map or world was read, for people."""
+"""Picture of the map or world as it was read."""
 Event = Callable[[dict[str, Any]], None]
 
 
@@ -47,12 +47,12 @@ Event = Callable[[dict[str, Any]], None]
 class Recorder:
     """Writes a run folder while the run goes on.
 
-    A run that is resumed goes through all of its steps again: those on record are
-    told, but not written again.
+    A resumed run repeats all of its steps; those on record are passed to `on_event`,
+    but not written again.
 
     Attributes:
         run: The record so far.
-        past: What is on record of earlier processes.
+        past: What earlier processes have recorded.
         on_event: Called with each journal record, for live progress.
     """
 
@@ -71,9 +71,9 @@ class Recorder:
 
         Args:
             task: What the controller must do.
-            template: Of the first question; one of the user's own is kept.
-            given: Source of a controller to begin with, if there is one.
-            **facts: For the journal.
+            template: Template of the first question; a copy is kept unless shipped.
+            given: Source of an initial controller, if there is one.
+            **facts: Further fields of the journal record.
         """
         folder = self.run.folder
         self.save()
@@ -92,23 +92,23 @@ class Recorder:
             write_atomic(folder / GIVEN_FILE, given)
         self.run.mark = sign(self.run, folder / OWN_SUITE if task.suite else None)
         self.save()
-        # What has a task and no mark was not begun here.
+        # Written after the mark: a run with a task but no mark was not begun here.
         write_atomic(folder / TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE))
         self.event("run.start", task=task.name, learner=self.run.learner, **facts)
 
     def resume(self, before: Run, **facts: Any) -> None:
-        """Says that the run goes on, and what is on record of it.
+        """Records that the run is resumed, and what is on record already.
 
         Args:
-            before: As the last process left it; it stays until there is more.
-            **facts: For the journal.
+            before: The record of the last process; it stays in `run.json` for now.
+            **facts: Further fields of the journal record.
         """
         past = self.past
         kept = ("max_cost", "max_tokens", "mark")
         limits = {name: getattr(self.run, name) for name in kept}
-        going = {"status": "running", "censored": False}
+        running = {"status": "running", "censored": False}
         ended = dict.fromkeys(("reason", "enough", "outlook"), "")
-        self._write(before.model_copy(update={**going, **ended, **limits}))
+        self._write(before.model_copy(update={**running, **ended, **limits}))
         self.run.cost_lost = past.lost_usd
         self.event(
             "run.resume",
@@ -121,7 +121,7 @@ class Recorder:
         )
 
     def event(self, name: str, /, **facts: Any) -> bool:
-        """Appends to the journal, unless it is on record; returns whether it did."""
+        """Appends to the journal unless on record already; returns whether it did."""
         record = {"event": name, "seconds": round(self._elapsed(), 3), **facts}
         new = name not in REPEATED or not self.past.has_step(name, facts)
         if new:
@@ -130,12 +130,12 @@ class Recorder:
         return new
 
     def tell(self, record: dict[str, Any]) -> None:
-        """Shows a record, and keeps nothing of it."""
+        """Passes a record to `on_event` without writing it."""
         if self.on_event is not None:
             self.on_event(record)
 
     def numbered(self, request: Request) -> Request:
-        """A question that knows how many came before it that are like it."""
+        """The request with `turn` and `repeat`, counted from earlier requests."""
         _, k, j = request.sample
         turn, repeat = self._turns[request.kind, k, j], self._prompts[request.prompt]
         self._turns[request.kind, k, j] += 1
@@ -143,7 +143,7 @@ class Recorder:
         return replace(request, turn=turn, repeat=repeat)
 
     def asked(self, request: Request, model: str, key: str, reserved: Amount) -> None:
-        """Keeps a prompt before it is sent to a model."""
+        """Records a prompt before it is sent to a model."""
         keep(self._call_file(request, "prompt"), request.prompt)
         self.event(
             "call.intent",
@@ -155,7 +155,7 @@ class Recorder:
         )
 
     def missed(self, request: Request, key: str, miss: Missed, worst: Amount) -> None:
-        """Keeps a fault, and whether the question is put again."""
+        """Records a fault, and the wait before the next attempt, if any."""
         wait = None if miss.wait is None else round(miss.wait, 3)
         self.event(
             "call.fault",
@@ -177,7 +177,7 @@ class Recorder:
         spent: Amount,
         cost: float | None,
     ) -> None:
-        """Keeps an answer as it came."""
+        """Records an answer as it came."""
         record = {
             **_about(request, key),
             **{k: v for k, v in asdict(reply).items() if k != "text"},
@@ -190,12 +190,12 @@ class Recorder:
         self._count(request, reply, cost)
 
     def unused(self, request: Request, **facts: Any) -> None:
-        """Keeps why an answer could not be used, and how often it was asked for."""
+        """Records why an answer could not be used, and how often it was asked for."""
         _, k, j = request.sample
         self.event("call.unused", kind=request.kind, k=k, j=j, **facts)
 
     def recall(self, request: Request, key: str) -> Reply | None:
-        """The answer on record to this very question, if there is one."""
+        """The answer on record to this question, if there is one."""
         record = self.past.replies.get(key, {})
         text = self._blobs.get(str(record.get("blob")))
         reply = None if text is None else reply_of(record, text)
@@ -216,7 +216,7 @@ class Recorder:
             run.models = (*run.models, reply.model)
 
     def candidate(self, k: int, j: int, source: str) -> Path:
-        """Keeps a candidate's source and its difference from the last one."""
+        """Writes a candidate's source and its diff; returns the folder."""
         folder = self._folder(k, j)
         keep(folder / "controller.py", source)
         keep(folder / "controller.diff", difference(self._previous, source))
@@ -232,13 +232,13 @@ class Recorder:
         *,
         unchanged: bool = False,
     ) -> bool:
-        """Keeps what came of a candidate; returns whether it is not on record yet.
+        """Records the result of a candidate; returns whether it is new.
 
         Args:
-            k: Of the candidate.
-            j: Of the candidate.
-            report: On it; None where the model gave no code.
-            notes: Of the model.
+            k: Iteration of the candidate.
+            j: Edit of the candidate.
+            report: Its report; None if the model gave no code.
+            notes: Notes on the model's answer.
             unchanged: Whether the report is that of the attempt before.
         """
         failed = () if report is None else tuple(f.test for f in report.failures)
@@ -259,13 +259,13 @@ class Recorder:
         return new
 
     def rules(self, k: int, book: RuleBook, notes: tuple[str, ...] = ()) -> None:
-        """Keeps the rules of the run, and what changed them in iteration k."""
+        """Records the rules of the run, and how iteration k changed them."""
         rules = [rule.model_dump(mode="json") for rule in book.in_force]
         keep(self.run.folder / RULES_FILE, book.model_dump_json(indent=2) + "\n")
         self.event("rules", k=k, rules=rules, notes=list(notes))
 
     def finish(self, status: Status, **facts: Any) -> None:
-        """Closes the run."""
+        """Records the end of the run."""
         self.run.status = status
         self.run.reason = str(facts.get("reason", ""))
         self.run.enough = str(facts.get("enough", ""))
@@ -287,7 +287,7 @@ class Recorder:
         return Blobs(self.run.folder / "blobs")
 
     def _call_file(self, request: Request, what: str) -> Path:
-        """`edit.reply.md`, or `edit.reply-2.md` of the second question of its kind."""
+        """Path such as `edit.reply.md`; `edit.reply-2.md` for the second question."""
         _, k, j = request.sample
         suffix = f"-{request.turn + 1}" if request.turn else ""
         return self._folder(k, j) / f"{request.kind}.{what}{suffix}.md"
@@ -307,7 +307,7 @@ def _about(request: Request, key: str) -> dict[str, Any]:
 
 
 def difference(before: str, after: str) -> str:
-    """The unified difference of two sources; a note where it would take too long."""
+    """The unified diff of two sources; a note instead if they are too long."""
     old, new = before.splitlines(keepends=True), after.splitlines(keepends=True)
     if max(len(old), len(new)) > MOST_LINES:
         return f"(not compared: more than {MOST_LINES} lines)\n"

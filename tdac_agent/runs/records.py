@@ -1,4 +1,4 @@
-"""A run on disk: what it was asked for, how far it came, and what it took."""
+"""The record of a run: its settings, progress and cost."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ PROMPT_FILE = "prompt.j2"
 
 
 class Attempt(PrintableRecord):
-    """One candidate (k, j)."""
+    """The result of one candidate (k, j)."""
 
     model_config = ConfigDict(extra="forbid")
 
     k: int
     j: int
-    valid: bool = Field(description="False where the model gave no code.")
+    valid: bool = Field(description="False if the model gave no code.")
     passed: bool
     failed_tests: tuple[str, ...] = ()
-    seed: int | None = Field(None, description="Of its moved starts.")
+    seed: int | None = Field(None, description="Seed of its jittered starts.")
     notes: tuple[str, ...] = ()
     unchanged: bool = Field(
-        False, description="The code of the attempt before, whose report stands."
+        False, description="Same code as the attempt before, whose report is reused."
     )
 
 
 class Run(PrintableRecord):
-    """`run.json`: one synthesis."""
+    """`run.json`: the record of one synthesis."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -56,44 +56,44 @@ class Run(PrintableRecord):
     iterations: int = Field(description="K")
     patience: int = Field(description="J")
     seed: int | None = Field(
-        description="Of the moved starts of all candidates; None: each has its own."
+        description="Seed of the jittered starts; None: each candidate has its own."
     )
     status: Status = "running"
     tau: int | None = Field(None, description="Iteration k of the first success.")
     attempts: list[Attempt] = Field(default_factory=list)
     tokens_in: int = 0
     tokens_out: int = 0
-    tokens_cached: int = Field(0, description="Of tokens_in, read from a cache.")
-    models: tuple[str, ...] = Field((), description="As the providers report them.")
+    tokens_cached: int = Field(0, description="Part of tokens_in, read from a cache.")
+    models: tuple[str, ...] = Field((), description="As reported by the providers.")
     base_url: str | None = Field(None, description="As given.")
     served_at: dict[str, str] = Field(
-        {}, description="Address of each model's server that is not the vendor's."
+        {}, description="Server address by model, unless it is the vendor's."
     )
     prompt: str = Field("full", description="Template of the first question.")
     refine: bool = Field(True, description="Whether failures become rules.")
-    max_output: int = Field(0, description="Tokens that an answer may have.")
-    index: int = Field(0, description="Of several runs of the same.")
-    version: str = Field("", description="Of this program.")
+    max_output: int = Field(0, description="Token limit of an answer.")
+    index: int = Field(0, description="Index among equal runs.")
+    version: str = Field("", description="Version of tdac.")
     suite_sha256: str = ""
-    prompt_sha256: str = Field("", description="Of the first question.")
+    prompt_sha256: str = Field("", description="Hash of the first question.")
     given_sha256: str | None = Field(
-        None, description="Of the controller to begin with."
+        None, description="Hash of the controller to start from."
     )
-    max_cost: float | None = Field(None, description="USD.")
+    max_cost: float | None = Field(None, description="Limit, USD.")
     max_tokens: int | None = None
     cost: float | None = Field(None, description="USD of all answers; None if unknown.")
     cost_lost: float = Field(
-        0.0, description="USD at most of calls whose answer was lost, on top."
+        0.0, description="Upper bound for lost answers, USD, in addition to `cost`."
     )
     mark: str = Field(
-        "", description="By which the installation that began it knows it again."
+        "", description="MAC by which an installation recognises its own runs."
     )
     id: str = ""
     started: str
     seconds: float = 0.0
-    reason: str = Field("", description="Why it ended, of a fault or the budget.")
-    enough: str = Field("", description="Flag with which it can go on, of the budget.")
-    outlook: str = Field("", description="How much is enough for what, of the budget.")
+    reason: str = Field("", description="Why it ended, if by a fault or the budget.")
+    enough: str = Field("", description="Flag to resume with, if the budget ended it.")
+    outlook: str = Field("", description="Limits that suffice, if the budget ended it.")
     censored: bool = Field(False, description="Ended before success or K.")
 
     @property
@@ -108,12 +108,12 @@ class Run(PrintableRecord):
 
     @property
     def setting(self) -> Setting:
-        """What of the loop was in use."""
+        """Which parts of the loop were used."""
         return setting_of(self.iterations, self.patience, refine=self.refine)
 
     @property
     def tokens(self) -> int:
-        """In and out together."""
+        """Input and output tokens together."""
         return self.tokens_in + self.tokens_out
 
     @property
@@ -123,10 +123,10 @@ class Run(PrintableRecord):
 
 
 def setting_of(iterations: int, patience: int, *, refine: bool) -> Setting:
-    """The loop that K, J and the prompt's refinement make.
+    """The setting that results from K, J and the refinement of the prompt.
 
-    Both repairs are the paper's dual tier; with neither, a run draws one candidate
-    after the other until one passes.
+    With both kinds of repair it is the paper's dual tier. With neither, a run draws new
+    candidates until one passes.
     """
     if refine and iterations > 1:
         return "dual tier" if patience else "prompt only"
@@ -141,12 +141,12 @@ def at_work(folder: Path) -> bool:
 
 
 def status_now(run: Run, *, before: bool) -> str:
-    """Its status; `killed` where the process that wrote `running` is gone.
+    """Its present status; `killed` if the process that wrote `running` is gone.
 
     Args:
         run: The run.
-        before: Whether it was at work before its record was read. Without that, one
-            that ends in between would seem to have been killed.
+        before: Whether a process was at work before the record was read; otherwise a
+            run that ended in between would seem to be killed.
     """
     if run.finished:
         return run.status
@@ -159,7 +159,7 @@ def load_run(folder: Path) -> Run:
     """Reads a run folder.
 
     Raises:
-        RunError: It holds no readable `run.json`.
+        RunError: The folder has no readable `run.json`.
     """
     path = folder / RUN_FILE
     try:
@@ -174,7 +174,7 @@ def load_run(folder: Path) -> Run:
 
 
 def _missing(folder: Path) -> str:
-    """Why there is no `run.json`, and which run beside it may be meant."""
+    """Why there is no `run.json`; suggests the run folder with the nearest name."""
     if folder.is_dir():
         return f"it has no {RUN_FILE}"
     beside = [path.parent.name for path in folder.parent.glob(f"*/{RUN_FILE}")]
@@ -185,10 +185,10 @@ def _missing(folder: Path) -> str:
 
 
 def load_rules(folder: Path) -> RuleBook:
-    """The rules of a run folder; none where no iteration came to an end.
+    """The rules of a run folder; none before the end of the first iteration.
 
     Raises:
-        RunError: Their file is damaged.
+        RunError: The file is damaged.
     """
     path = folder / RULES_FILE
     try:
@@ -196,4 +196,4 @@ def load_rules(folder: Path) -> RuleBook:
     except FileNotFoundError:
         return RuleBook()
     except (OSError, ValueError) as error:
-        raise RunError(f"{path} holds no rules: {why(error)}") from error
+        raise RunError(f"{path} is not a rules file: {why(error)}") from error

@@ -1,6 +1,6 @@
-"""`replay:RUN`: the answers of a recorded run; no model is asked, nothing is paid.
+"""`replay:RUN`: the answers of a recorded run; no model is asked, no cost arises.
 
-`replay:demo` is the run of `tdac demo`, which is shipped.
+`replay:demo` is the shipped run of `tdac demo`.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ Place = tuple[str, int, int]
 
 
 def make(words: str, options: Options) -> Replay:
-    """A recorded run.
+    """The provider for a recorded run.
 
     Raises:
-        ProviderError: There is none.
+        ProviderError: There is no such run, or it cannot be read.
     """
     del options
     if not words:
@@ -49,15 +49,15 @@ def make(words: str, options: Options) -> Replay:
 
 
 class Replay:
-    """A provider; see `Provider`. A question that was not put in that run is a fault.
+    """Answers from a recorded run; see `Provider`. Any other question is a fault.
 
     Args:
-        words: What the user calls the run.
-        folder: Of the run.
+        words: The run as the user named it.
+        folder: Folder of the run.
         journal: Its records.
-        reworded: Whether what follows on the task, as how failures are told, may be
-            worded otherwise by now; it is noted where it is.
-        seed: Of the run's moved starts, where it had one and nobody else chose it.
+        reworded: Whether a question may begin with additional text, and may differ from
+            the repair rules on; differences are noted.
+        seed: Seed of its jittered starts; None if it has none, or is not trusted.
     """
 
     paid = False
@@ -78,7 +78,7 @@ class Replay:
         self._replies = [r for r in journal if r.get("event") == "call.reply"]
 
     def answers_sha256(self) -> str:
-        """Hash of all that it may answer."""
+        """Hash of all recorded answers."""
         return sha256_of(json.dumps(self._replies, sort_keys=True).encode())
 
     def complete(self, request: Request) -> Reply:
@@ -99,7 +99,7 @@ class Replay:
                 f"answer {number + 1} to {at} is not in {self._folder}"
             ) from None
         except ValueError:
-            raise PermanentFault(f"{at} in {self._folder} is no text") from None
+            raise PermanentFault(f"{at} in {self._folder} is not UTF-8") from None
         reply = reply_of(record, text)
         if reply is None:
             raise PermanentFault(f"the journal of {self._folder} is damaged at {at}")
@@ -113,10 +113,10 @@ class Replay:
         )
 
     def _compare(self, recorded: str, request: Request, where: str) -> tuple[str, ...]:
-        """Refuses an answer to another question, or notes how it is another one.
+        """Compares a question with the recorded one; notes a permitted difference.
 
         Raises:
-            PermanentFault: It names the first line that differs.
+            PermanentFault: The questions differ; names the first line that does.
         """
         asked = request.prompt
         if recorded == asked:
@@ -125,16 +125,18 @@ class Replay:
         same = sum(
             1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
         )
-        line = f"line {same + 1} differs"
-        # What is said before the question, to whom it is put, may have changed.
+        line = f"line {same + 1}"
+        # The introduction may have become longer.
         question = recorded.partition(BEGIN)[0]
         if self._reworded and asked.partition(BEGIN)[0].endswith(question):
-            return (f"recorded when this question was worded otherwise: {line}",)
-        raise PermanentFault(f"another question than {where}: {line}")
+            return (f"the recorded question was worded differently from {line} on",)
+        raise PermanentFault(
+            f"the question differs from the recorded one in {line}: {where}"
+        )
 
 
 def _files(folder: Path, place: Place, number: int) -> tuple[Path, Path]:
-    """Question and answer of the numbered call of its kind for a candidate."""
+    """Files of question and answer of the numbered call of its kind."""
     kind, k, j = place
     calls = folder / "iterations" / f"k{k:02d}" / f"j{j}"
     suffix = "" if number == 1 else f"-{number}"

@@ -1,4 +1,4 @@
-"""Going on with a run: what a folder holds, and whether it is the run that is meant."""
+"""Resuming a run: which run a folder has, and whether it is the requested one."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from tdac_agent.tasks.trust import permit
 from tdac_envs.core.errors import why
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
-# What decides the questions of a run and what becomes of the answers, in plain words;
-# two runs that differ in none of it are one run.
+# Fields that determine the questions of a run and the use of the answers, as named in
+# messages. Runs that agree in all of them are the same run.
 CONFIGURATION = {
     "version": "version of tdac",
     "task": "task",
@@ -35,16 +35,16 @@ CONFIGURATION = {
     "seed": "seed",
     "index": "index",
     "max_output": "max output",
-    "given_sha256": "controller to begin with",
+    "given_sha256": "initial controller",
     "prompt_sha256": "first question",
 }
 
 
 def run_there(folder: Path) -> Run | None:
-    """The run that a folder holds; None where the folder is empty or not there.
+    """The run in a folder; None if the folder is empty or missing.
 
     Raises:
-        RunError: It holds something else, or a run that cannot be read.
+        RunError: The folder has other contents, or a run that cannot be read.
     """
     try:
         names = [path.name for path in folder.iterdir()] if folder.exists() else []
@@ -52,17 +52,17 @@ def run_there(folder: Path) -> Run | None:
         raise RunError(f"cannot write to {folder}: {error.strerror}") from error
     if RUN_FILE in names:
         return load_run(folder)
-    # A process that was killed at once may have left these.
+    # A process that was killed at its start may have left these.
     if any(name != LOCK_FILE and not name.endswith(UNFINISHED) for name in names):
         raise RunError(f"the folder {folder} is not empty; give a new one with --out")
     return None
 
 
 def check_same(before: Run, now: Run) -> None:
-    """Refuses to go on with another run than the one that is there.
+    """Checks that the run in the folder is the one to make.
 
     Raises:
-        RunError: It names all that differs.
+        RunError: They differ; names all differences.
     """
     differences = [
         _difference(words, getattr(before, name), getattr(now, name))
@@ -71,56 +71,56 @@ def check_same(before: Run, now: Run) -> None:
     ]
     if differences:
         raise RunError(
-            f"{before.folder} holds another run ({'; '.join(differences)}): give a new "
-            f"folder with --out, or go on with that one: tdac synth --resume "
+            f"{before.folder} contains another run ({'; '.join(differences)}): give a "
+            "new folder with --out, or resume that run: tdac synth --resume "
             f"{before.folder}"
         )
 
 
 def check_own(before: Run) -> None:
-    """Refuses to take the verdict of a run that somebody else has made.
+    """Refuses the verdict of a run that another installation began.
 
     Raises:
-        RunError: It is one.
+        RunError: Another installation began the run.
     """
     if not is_own_folder(before):
         raise RunError(
-            f"{before.folder} holds a run that was not begun here, {before.status} by "
-            f"its own account: test it with tdac verify {before.folder}, or give a new "
+            f"{before.folder} contains a run that was not begun here and claims to be "
+            f"{before.status}: test it with tdac verify {before.folder}, or give a new "
             "folder with --out"
         )
 
 
-def _difference(words: str, there: object, here: object) -> str:
-    """Short values are told; of hashes it is enough that they differ."""
+def _difference(words: str, before: object, now: object) -> str:
+    """A difference in words, with the values unless they are hashes."""
     if words == "seed":
-        there, here = ("none" if value is None else value for value in (there, here))
-    if isinstance(there, int) or words in {"learner", "optimizer", "task", "seed"}:
-        return f"{words} {there} there, {here} here"
-    return f"another {words}"
+        before, now = ("none" if value is None else value for value in (before, now))
+    if isinstance(before, int) or words in {"learner", "optimizer", "task", "seed"}:
+        return f"{words} {before} instead of {now}"
+    return f"different {words}"
 
 
 def asked_for(
     folder: Path, given: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> dict[str, Any]:
-    """The arguments of `synthesize` with which a run was begun.
+    """The arguments of `synthesize` that resume a run.
 
     Args:
-        folder: Of the run.
-        given: Arguments in the place of those on record, `suite` among them; they
-            allow what a run of somebody else's wants.
-        trust: Whether such a run may do all that it wants.
+        folder: Folder of the run.
+        given: Arguments that replace recorded ones, also `suite`; they need no
+            permission.
+        trust: Whether another installation's run has all permissions that it needs.
 
     Raises:
-        NotTrustedError: It is somebody else's, and something is not allowed.
-        RunError: There is no run that can be read.
-        TaskError: Its task cannot be read.
+        NotTrustedError: Another installation's run needs a permission.
+        RunError: There is no readable run.
+        TaskError: The task cannot be read.
     """
     run = load_run(folder)
     if not (folder / TASK_FILE).is_file():
         raise RunError(
-            f"the run in {folder} ended before it had begun: give its command again, "
-            f"with --out {folder}"
+            f"the run in {folder} ended before its files were written: repeat its "
+            f"command with --out {folder}"
         )
     flags = {name: value for name, value in (given or {}).items() if value is not None}
     task = _task(folder)
@@ -129,7 +129,7 @@ def asked_for(
     suite = flags.pop("suite", None)
     if task.suite is not None:
         task = replace(task, suite=suite or task.suite, trusted=True)
-    beginning, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
+    initial, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
     on_record = {
         "task": task,
         "learner": run.learner,
@@ -138,7 +138,7 @@ def asked_for(
         "patience": run.patience,
         "seed": run.seed,
         "index": run.index,
-        "start_from": _text(beginning) if beginning.is_file() else None,
+        "start_from": _text(initial) if initial.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
         "prompt": run.prompt if run.prompt in VARIANTS else str(prompt),
@@ -149,7 +149,7 @@ def asked_for(
 
 
 def _text(file: Path) -> str:
-    """A controller of a run.
+    """Reads the initial controller of a run.
 
     Raises:
         RunError: It cannot be read, or is not UTF-8.
@@ -161,10 +161,9 @@ def _text(file: Path) -> str:
 
 
 def _task(folder: Path) -> Task:
-    """A run's task with the parameters that it was begun with.
+    """Loads the task of a run with its original parameters.
 
-    The map or world of the folder is the same, but was read from another file, which
-    the parameters tell.
+    The folder has a copy of the map or world; `params.json` names the original file.
 
     Raises:
         RunError: The parameters are damaged.
@@ -175,6 +174,5 @@ def _task(folder: Path) -> Task:
         raw = read_file(folder / "params.json", TEXT_BYTES)
         params = type(setting.params).model_validate(parse_json(raw))
     except (OSError, ValueError) as error:
-        told = f"cannot go on with {folder}: params.json: {why(error)}"
-        raise RunError(told) from error
+        raise RunError(f"cannot resume {folder}: params.json: {why(error)}") from error
     return replace(task, setting=replace(setting, params=params))

@@ -27,7 +27,7 @@ def test_runs_that_fail_stop_no_other_and_say_why(once):
     complaints = [line for line in complained.splitlines() if "compiling" not in line]
     assert (code, complaints) == (3, [])
     assert said.count("replay") > 0
-    assert "2 × fault: replay:demo: another question than" in said
+    assert "2 × fault: replay:demo: the question differs from" in said
     assert "2 of 4 runs have ended, 2 of them now" in said
     assert "go on: tdac campaign broken.yaml --workers 2 --out out" in said
     assert said.count(" fault, ") == 4  # tried once more, after all others

@@ -168,7 +168,7 @@ def damaged(folder, name, content=None):
         ("iterations/k01/j0/report.json", "k01/j0/report.json: damaged"),
         ("report.json", "report.json: damaged"),
         ("task.yaml", "Not readable"),
-        ("rules.json", "holds no rules"),
+        ("rules.json", "is not a rules file"),
         ("journal.jsonl", "verified in iteration 1"),
         ("iterations/k01/j1/trajectories/nominal.npz", "jitter 1: reached"),
         ("iterations/k01/j1/controller.py", "verified in iteration 1"),

@@ -136,16 +136,16 @@ def test_another_run_is_refused(policy_task, small_task, halted, warm):
     """One line names all that differs; the folder stays as it is."""
     before = {path: path.read_bytes() for path in halted.rglob("*") if path.is_file()}
     expected = (
-        r"holds another run \(learner script there, builtin here; "
-        r"optimizer script there, builtin here; J 1 there, 2 here; "
-        r"seed none there, 4 here"
+        r"contains another run \(learner script instead of builtin; "
+        r"optimizer script instead of builtin; J 1 instead of 2; "
+        r"seed none instead of 4"
     )
     with pytest.raises(RunError, match=expected) as caught:
         synthesize(policy_task, "builtin", out=halted, seed=4, patience=2, judge=warm)
     assert "\n" not in str(caught.value)
-    with pytest.raises(RunError, match="another first question"):
+    with pytest.raises(RunError, match="different first question"):
         synthesize(small_task, Script(), out=halted, judge=warm)
-    with pytest.raises(RunError, match="another controller to begin with"):
+    with pytest.raises(RunError, match="different initial controller"):
         synthesize(policy_task, Script(), out=halted, start_from=STILL, judge=warm)
     after = {path: path.read_bytes() for path in halted.rglob("*") if path.is_file()}
     assert after == before
@@ -250,7 +250,7 @@ def test_resume_takes_no_other_flags(tdac, halted):
     assert "a run goes on as it was begun: leave out -K, --out" in err
     code, _, err = tdac("synth", "--resume", halted, "--learner", "builtin")
     assert code == 2
-    assert "holds another run (learner " in err
+    assert "contains another run (learner " in err
     code, _, err = tdac("synth", "--resume", halted.parent)
     assert code == 2
     assert "is not a run folder" in err
@@ -263,7 +263,7 @@ def test_a_run_that_ended_before_it_had_begun_is_begun_again(tdac, halted, tmp_p
     (folder / "run.json").write_bytes((halted / "run.json").read_bytes())
     code, _, err = tdac("synth", "--resume", folder)
     assert code == 2
-    assert f"give its command again, with --out {folder}" in err
+    assert f"repeat its command with --out {folder}" in err
 
 
 def test_a_full_disk_is_one_clear_line(tmp_path, good):

@@ -286,4 +286,4 @@ def test_builtin_learns_by_rules(tmp_path, tdac):
     (Path("run") / "rules.json").write_text("[1")
     code_, _, told = tdac("rules", "run")
     assert code_ == 2
-    assert "holds no rules" in told
+    assert "is not a rules file" in told

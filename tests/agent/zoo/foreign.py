@@ -249,7 +249,7 @@ def limit_of_cost(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
-@attack("verified by its own account: test it with tdac verify", works=False)
+@attack("claims to be verified: test it with tdac verify", works=False)
 def verdict_of_its_own(place: Place) -> list[str | Path]:
     (place.run / "controller.py").write_text(STILL)
     place.change(status="verified", max_tokens=12345)
