@@ -1,1 +1,1 @@
-"""Policies of any kind on the same tasks, from the same seeds."""
+"""Evaluation of policies of any kind on the same tasks and seeds."""

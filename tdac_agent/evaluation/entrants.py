@@ -1,4 +1,4 @@
-"""The policies of an evaluation, from the words that name them."""
+"""The policies of an evaluation, from the names and paths that the user gives."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Entrant:
     """A policy as the user named it.
 
     Attributes:
-        name: In tables and files.
-        contender: Who drives; of `builtin`, whose file is written for each task, a
-            controller without a file.
-        sha256: Of its file.
-        env: Environment that it was written for, where its run folder says so.
+        name: Name in tables and files.
+        contender: The policy for the judge; for `builtin`, whose file is written for
+            each task, a controller without a file.
+        sha256: Hash of its file.
+        env: Environment of its run folder, if it has one.
     """
 
     name: str
@@ -50,16 +50,16 @@ class Entrant:
 def entrants_of(
     policies: Sequence[str | Path], wrappers: Sequence[str] | None = None
 ) -> tuple[Entrant, ...]:
-    """The entrants that some words or paths name.
+    """The entrants for names and paths of policies.
 
     Args:
         policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
             controller files, run folders, policies saved by stable-baselines3.
-        wrappers: Of saved policies that do not say which they were trained with.
+        wrappers: Wrappers of saved policies that do not name their own.
 
     Raises:
-        TaskError: There is none, one comes twice, or a wrapper is unknown.
-        ControllerFileError: A file is missing or is no policy.
+        TaskError: No policy is given, one is given twice, or a wrapper is unknown.
+        ControllerFileError: A file is missing or is not a policy.
     """
     for name in wrappers or ():
         if name not in WRAPPERS:
@@ -75,31 +75,31 @@ def entrants_of(
     return found
 
 
-def _entrant(word: str, wrappers: Sequence[str] | None) -> Entrant:
-    if word in OURS:
-        return Entrant(word, Contender(word))
-    if word == BUILTIN:
-        return Entrant(word, Contender("controller"))
-    path = Path(word)
+def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
+    if given in OURS:
+        return Entrant(given, Contender(given))
+    if given == BUILTIN:
+        return Entrant(given, Contender("controller"))
+    path = Path(given)
     if path.is_dir():
-        return replace(_controller(word, path / "controller.py"), env=_env_of(path))
+        return replace(_controller(given, path / "controller.py"), env=_env_of(path))
     if not path.is_file():
         names = (*OURS, BUILTIN)
         raise ControllerFileError(
-            f"no policy {word!r}: expected a controller.py, a run folder, a .zip of "
+            f"no policy {given!r}: expected a controller.py, a run folder, a .zip of "
             f"stable-baselines3, or one of {', '.join(sorted(names))}"
-            f"{hint(word, names)}"
+            f"{hint(given, names)}"
         )
     if path.suffix == ".zip":
-        return _learned(word, path, wrappers)
-    return _controller(word, path)
+        return _learned(given, path, wrappers)
+    return _controller(given, path)
 
 
-def _controller(word: str, file: Path) -> Entrant:
+def _controller(name: str, file: Path) -> Entrant:
     if not file.is_file():
-        raise ControllerFileError(f"no controller.py in {word!r}")
+        raise ControllerFileError(f"no controller.py in {name!r}")
     sha256 = sha256_of(read_source(file))
-    return Entrant(word, Contender("controller", file.resolve()), sha256)
+    return Entrant(name, Contender("controller", file.resolve()), sha256)
 
 
 def _env_of(run_folder: Path) -> str | None:
@@ -110,7 +110,7 @@ def _env_of(run_folder: Path) -> str | None:
         return None
 
 
-def _learned(word: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
+def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     found = read_policy(file)
     saved = found.saved
     if saved is not None:
@@ -120,20 +120,20 @@ def _learned(word: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     else:
         known = ", ".join(WRAPPERS)
         raise ControllerFileError(
-            f"{word!r} does not say which observations it was trained with: give "
+            f"{name!r} does not say which observations it was trained with: give "
             f"--wrapper NAME for each of its wrappers ({known}), or --wrapper none"
         )
     check_wrappers(names)
     check_kind(found)
     load_weights(found.weights)
     sha256 = sha256_of(read_file(file, MOST_BYTES))
-    return Entrant(word, Contender("sb3", file.resolve(), names), sha256)
+    return Entrant(name, Contender("sb3", file.resolve(), names), sha256)
 
 
 def write_builtin(task: Task) -> tuple[bytes, bool]:
-    """What `tdac synth` without a model writes for a task, and whether it is verified.
+    """The controller that `tdac synth` writes without a model; whether it is verified.
 
-    Where nothing is verified, it is the last candidate.
+    If no candidate is verified, it is the last one.
     """
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
         run = synthesize(task, BUILTIN, out=Path(name) / "run")

@@ -1,4 +1,4 @@
-"""Evaluation: policies of any kind on the same tasks, from the same seeds."""
+"""Evaluates policies of any kind on the same tasks and seeds."""
 
 from __future__ import annotations
 
@@ -42,8 +42,7 @@ from tdac_envs.drive.task import VARIATIONS
 
 EPISODES = 100
 NO_DISTURBANCE = Disturbance(0.0, 0.0, 0.0, 0)
-NOT_VERIFIED = "tdac synth verified none here: its last candidate"
-# Told where what goes on: the task, the policy, episodes and successes so far.
+NOT_VERIFIED = "tdac synth verified no candidate; this is its last one"
 Watch = Callable[[str, str, int, int], None]
 
 
@@ -61,34 +60,34 @@ def evaluate(
     judge: WarmJudge | None = None,
     watch: Watch | None = None,
 ) -> Evaluation:
-    """Lets policies drive the same episodes, and compares them.
+    """Runs policies on the same episodes, and compares them.
 
-    The episodes of a seed are the same for all: their seeds are drawn from it, and an
-    environment draws start and noise from its own. Controllers run in the sandbox, in a
-    fresh process for each episode; of saved networks only the weights are read.
+    Each episode has a seed that is drawn from `seed`, and from which the environment
+    draws start and noise. Controllers run in the sandbox, in a fresh process for each
+    episode. Only the weights are read from saved networks.
 
     Args:
         policies: Any mix of controller files, run folders, `.zip` files saved by
             stable-baselines3, and the names `reference`, `builtin`, `random`,
             `go-to-goal` and `follow-guidance`.
-        tasks: Tasks, or what `load_task` takes.
-        episodes: Of each policy on each task.
-        seed: Of the episodes.
-        variation: Of the starts: `nominal`, `jitter`, `mixed`, or `random` with the
-            goals too.
-        wrappers: Of saved policies that do not say what they were trained with.
-        tier: Sandbox tier, `auto` for the best one here.
-        limits: Of a controller's process in each episode.
+        tasks: Tasks, or names and paths for `load_task`.
+        episodes: Number of episodes of each policy on each task.
+        seed: Seed from which the seeds of the episodes are drawn.
+        variation: Variation of the starts: `nominal`, `jitter`, `mixed`, or `random`,
+            which also varies the goals.
+        wrappers: Wrappers of saved policies that do not name their own.
+        tier: Sandbox tier; `auto` for the best one on this machine.
+        limits: Limits of a controller's process in each episode.
         out: Folder for `evaluation.json`, `episodes.csv`, `timing.csv`, and a picture
-            of each task; none by default.
-        judge: A warm one; one of its own by default.
-        watch: Called now and then.
+            of each task; by default nothing is written.
+        judge: A warm judge; None starts one for this call.
+        watch: Called repeatedly with task, policy, episodes and successes so far.
 
     Returns:
-        The evaluation. A policy that fails, however it does, is a row of failures.
+        The evaluation. Any error of a policy counts as a failed episode.
 
     Raises:
-        TaskError: A task or a number makes no sense, or a run is of another
+        TaskError: A task or a number is invalid, or a run folder is for another
             environment than a task.
         ControllerFileError: A policy's file cannot be read.
         Fault: The sandbox is broken.
@@ -156,23 +155,23 @@ def evaluate(
 
 
 def episode_seeds(seed: int, episodes: int) -> tuple[int, ...]:
-    """The seeds of the episodes of an evaluation, drawn from its own."""
+    """Seeds of the episodes, drawn from the seed of an evaluation."""
     return tuple(np.random.SeedSequence(seed).generate_state(episodes).tolist())
 
 
 def write_evaluation(found: Evaluation, out: Path) -> None:
-    """Writes the figures into a folder; what the clock says is in a file of its own."""
+    """Writes the results to a folder; wall times go to a separate file."""
     write_atomic(out / "evaluation.json", found.model_dump_json(indent=2) + "\n")
     write_atomic(out / "episodes.csv", found.to_frame().to_csv(index=False))
     write_atomic(out / "timing.csv", found.timing_frame().to_csv(index=False))
 
 
 def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:
-    """Some tasks, as they are or as `load_task` reads them.
+    """Loads the tasks that are given by name or path.
 
     Raises:
-        TaskError: There is none, one cannot be used, or two have one name, by which
-            figures and pictures go.
+        TaskError: No task is given, one cannot be used, or two have the same name,
+            which results and pictures go by.
     """
     loaded = [task if isinstance(task, Task) else load_task(task) for task in tasks]
     if not loaded:
@@ -187,7 +186,7 @@ def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:
 def _compete(
     entrant: Entrant, task: Task, job: SeededJob, judge: WarmJudge, watch: Watch | None
 ) -> tuple[Result, NDArray[np.float32], list[NDArray[np.float32]]]:
-    """The episodes of one policy on one task, seconds of its calls, and its poses."""
+    """Runs a policy on a task: the result, its call times in s, and its poses."""
     contender, sha256, note = entrant.contender, entrant.sha256, None
     if entrant.is_builtin:
         if watch is not None:
@@ -198,13 +197,13 @@ def _compete(
         contender, sha256 = replace(contender, file=file), sha256_of(source)
         note = None if verified else NOT_VERIFIED
 
-    def seen(count: int, successes: int) -> None:
+    def progress(count: int, successes: int) -> None:
         if watch is not None:
             watch(task.name, entrant.name, count, successes)
 
-    seen(0, 0)
-    asked = job.model_copy(update={"contender": contender})
-    episodes, ending = run_seeds(asked, task.nominal, Measured, judge, seen)
+    progress(0, 0)
+    request = job.model_copy(update={"contender": contender})
+    episodes, ending = run_seeds(request, task.nominal, Measured, judge, progress)
     result = Result(
         task=task.name,
         policy=entrant.name,
@@ -215,8 +214,8 @@ def _compete(
         note=note,
     )
     with np.load(job.out / POSES_FILE) as poses:
-        ways = [poses[f"arr_{number}"] for number in range(len(episodes))]
-    return result, np.load(job.out / CALLS_FILE), ways
+        trajectories = [poses[f"arr_{number}"] for number in range(len(episodes))]
+    return result, np.load(job.out / CALLS_FILE), trajectories
 
 
 def _about_task(task: Task) -> EvaluatedTask:

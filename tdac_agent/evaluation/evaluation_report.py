@@ -1,4 +1,4 @@
-"""What an evaluation says: a row for each policy on each task, and who beats whom."""
+"""The results of an evaluation: a row per policy and task, and comparisons."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ class _Record(PrintableRecord):
 
 
 class EvaluatedTask(_Record):
-    """What was to be done."""
+    """A task of the evaluation."""
 
     name: str
-    called: str = Field("", description="In words, not by its name alone.")
+    called: str = Field("", description="Display name, detailed unless bundled.")
     task_sha256: str
     map_sha256: str
-    unit: Place = Field(description="Of lengths.")
+    unit: Place = Field(description="Unit of lengths.")
     body_radius: float
 
 
 class EvaluatedPolicy(_Record):
-    """Who drove."""
+    """A policy of the evaluation."""
 
     name: str
     kind: Kind
-    knows: str = Field(description="What it may know.")
+    knows: str = Field(description="Information that it may use.")
     wrappers: tuple[str, ...] = ()
-    sha256: str | None = Field(None, description="Of its file, where it has one.")
+    sha256: str | None = Field(None, description="Hash of its file, if any.")
 
 
 class Row(_Record):
-    """One policy on one task. What is of successes is None where there is none."""
+    """One policy on one task. Medians over successes are None without a success."""
 
     task: str
     policy: str
@@ -65,10 +65,10 @@ class Row(_Record):
     collided: int = Field(description="Episodes with a contact.")
     outcomes: dict[Outcome, int]
     time_ratio: float | None = Field(
-        description="Median over successes: time to the shortest way at full speed."
+        description="Median over successes: time / shortest path's time at full speed."
     )
     path_ratio: float | None = Field(
-        description="Median over successes: way driven to the shortest."
+        description="Median over successes: length driven / shortest path's length."
     )
     spl: float = Field(
         description="Success weighted by path length (Anderson et al. 2018)."
@@ -76,26 +76,26 @@ class Row(_Record):
     smoothness: float | None = Field(
         description="Median over successes: spectral arc length of the speed (SPARC)."
     )
-    clearance_min: float = Field(description="Least gap beside the body; 0: a contact.")
+    clearance_min: float = Field(description="Smallest gap to the body; 0: a contact.")
     clearance_mean: float = Field(description="Mean over the episodes' mean gaps.")
-    reasons: dict[str, int] = Field(description="Errors, the most frequent ones.")
+    reasons: dict[str, int] = Field(description="Most frequent errors, counted.")
     controller_sha256: str | None = None
-    sandbox: str = Field(description="Tier that held it; none for what needs none.")
+    sandbox: str = Field(description="Sandbox tier; none if it needs no sandbox.")
     note: str | None = None
 
 
 class Comparison(_Record):
     """Two policies on the same seeds of a task: exact McNemar test, two-sided.
 
-    Of the episodes in which just one of them succeeds, under the null hypothesis half
-    are the one's. The p-value is not corrected for the number of comparisons.
+    Under the null hypothesis, either policy wins half of the episodes in which exactly
+    one of them succeeds. The p-value is not corrected for multiple comparisons.
     """
 
     task: str
     one: str
     other: str
     equal_information: str | None = Field(
-        description="What both may know, where that is the same."
+        description="Information that both may use; None if it differs."
     )
     both: int
     only_one: int
@@ -105,7 +105,7 @@ class Comparison(_Record):
 
 
 class Timing(_Record):
-    """Wall time of the calls of a policy; different in every evaluation."""
+    """Wall time of the calls of a policy; differs between evaluations."""
 
     task: str
     policy: str
@@ -127,15 +127,15 @@ class Result(_Record):
 
 
 class Evaluation(_Record):
-    """Some policies on the same tasks from the same seeds, by the same judge.
+    """Policies on the same tasks and seeds, by the same judge.
 
-    The JSON form depends on the arguments alone, not on the clock.
+    The JSON form depends on the arguments only, not on wall times.
     """
 
     schema_version: Literal[1] = 1
     variation: str
     seed: int
-    episodes: int = Field(description="Of each policy on each task.")
+    episodes: int = Field(description="Episodes of each policy on each task.")
     tasks: tuple[EvaluatedTask, ...]
     policies: tuple[EvaluatedPolicy, ...]
     rows: tuple[Row, ...]
@@ -145,7 +145,7 @@ class Evaluation(_Record):
     timings: tuple[Timing, ...] = Field(exclude=True)
 
     def to_frame(self) -> pd.DataFrame:
-        """A row for each episode, tidy; lengths in the unit of its task."""
+        """Tidy data with a row for each episode; lengths in the unit of its task."""
         import pandas as pd
 
         units = {task.name: task.unit for task in self.tasks}
@@ -166,14 +166,14 @@ class Evaluation(_Record):
         )
 
     def timing_frame(self) -> pd.DataFrame:
-        """A row for each policy on each task: time of a call, ms."""
+        """A row for each policy on each task: call times, ms."""
         import pandas as pd
 
         return pd.DataFrame([timing.model_dump() for timing in self.timings])
 
 
 def row_of(result: Result) -> Row:
-    """The figures of one policy on one task."""
+    """The row for one policy on one task."""
     episodes = result.episodes
     successes = [episode for episode in episodes if episode.success]
     reasons = Counter(e.error for e in episodes if e.error is not None)
@@ -209,7 +209,7 @@ def _median(values: Iterable[float | None]) -> float | None:
 
 
 def comparisons_of(results: Sequence[Result]) -> tuple[Comparison, ...]:
-    """Each pair of policies on each task; those at equal information first."""
+    """Compares all pairs of policies on each task; equal information first."""
     pairs = [
         compare(one, other)
         for one, other in combinations(results, 2)
@@ -219,10 +219,10 @@ def comparisons_of(results: Sequence[Result]) -> tuple[Comparison, ...]:
 
 
 def compare(one: Result, other: Result) -> Comparison:
-    """Two policies on the same seeds.
+    """Compares two policies.
 
     Raises:
-        ValueError: They are not of the same task and seeds.
+        ValueError: The results are not of the same task and seeds.
     """
     seeds = [[episode.seed for episode in r.episodes] for r in (one, other)]
     if one.task != other.task or seeds[0] != seeds[1]:
@@ -245,7 +245,7 @@ def compare(one: Result, other: Result) -> Comparison:
 
 
 def timing_of(task: str, policy: str, calls: NDArray[np.float32]) -> Timing:
-    """Median and 99th percentile of the seconds of some calls."""
+    """Median and 99th percentile of call times, which are given in s."""
     times = 1000.0 * np.asarray(calls, np.float64) if len(calls) else np.zeros(1)
     middle, late = np.percentile(times, (50, 99)).tolist()
     return Timing(

@@ -1,4 +1,4 @@
-"""One picture of a task with the ways of all policies laid over each other."""
+"""One picture of a task with the trajectories of all policies."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tdac_envs.drawing.canvas import (
     write_text,
 )
 
-# Okabe and Ito's, told apart by all kinds of colour vision, without black and yellow.
+# Okabe and Ito's colour-blind-safe palette, without black and yellow.
 COLOURS: tuple[Colour, ...] = (
     (0, 114, 178),
     (213, 94, 0),
@@ -35,18 +35,18 @@ COLOURS: tuple[Colour, ...] = (
     (86, 180, 233),
 )
 _ROW, _SWATCH = 22, 24
-# How much all ways of a policy cover where they run over each other.
+# Opacity where all trajectories of a policy overlap.
 _COVER = 0.85
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlay:
-    """The ways of one policy.
+    """The trajectories of one policy.
 
     Attributes:
-        label: Who, and how many reached the goal.
-        ways: Each of shape (T + 1, 3).
-        collided: Whether each ended at a wall.
+        label: Name of the policy, and number of successes.
+        ways: Poses of each episode, shape (T + 1, 3).
+        collided: Whether each episode had a contact.
     """
 
     label: str
@@ -55,7 +55,7 @@ class Overlay:
 
     @classmethod
     def of(cls, result: Result, ways: Sequence[NDArray[np.float32]]) -> Overlay:
-        """That of a result."""
+        """The overlay of a result."""
         reached = sum(episode.success for episode in result.episodes)
         label = f"{result.policy}: {reached} of {len(result.episodes)}"
         ascii_label = label.encode("ascii", "replace").decode()
@@ -64,14 +64,14 @@ class Overlay:
 
 
 def draw_overlay(task: Task, overlays: Sequence[Overlay], path: Path) -> None:
-    """Writes a PNG of the map or the world with the ways of all policies."""
+    """Writes a PNG of the map or world with the trajectories of all policies."""
     write_png(overlay_picture(task, overlays), path)
 
 
 def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
-    """The map or the world with all ways, and a legend, uint8 RGB.
+    """The map or world with all trajectories and a legend, uint8 RGB.
 
-    The first policy lies on top; a dot is where a robot touched something.
+    The first policy is on top; a dot marks a contact.
     """
     chart = pictures_of(task.setting).backdrop().whole()
     canvas = chart.canvas
@@ -81,36 +81,36 @@ def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
             canvas.to_frame(chart.at(np.asarray(way[:, :2], np.float64)))
             for way in overlay.ways
         ]
-        _draw_ways(canvas.image, places, colour)
+        _draw_paths(canvas.image, places, colour)
         _draw_contacts(canvas.image, places, overlay.collided, colour)
     return np.vstack([canvas.image, _legend(overlays, canvas.image.shape[1])])
 
 
-def _draw_ways(
-    image: Image, ways: Sequence[NDArray[np.float64]], colour: Colour
+def _draw_paths(
+    image: Image, paths: Sequence[NDArray[np.float64]], colour: Colour
 ) -> None:
-    """Lays lines over a picture, the denser the more of them there are at a place."""
+    """Draws lines, more opaque where more of them overlap."""
     count = np.zeros(image.shape[:2], np.float32)
-    for way in ways:
+    for path in paths:
         line = np.zeros(image.shape[:2], np.uint8)
-        fixed = np.rint(way * 16.0).astype(np.int32)
+        fixed = np.rint(path * 16.0).astype(np.int32)
         cv2.polylines(line, [fixed], False, 255, 2, cv2.LINE_AA, 4)
         count += line
-    # A single way is seen, and where all run there is nearly nothing else.
-    each = max(0.25, 1.0 - (1.0 - _COVER) ** (3.0 / max(len(ways), 1)))
-    cover = _COVER * (1.0 - (1.0 - each) ** (count / 255.0))[..., None]
+    # A single path is visible; where all overlap, the opacity is nearly `_COVER`.
+    opacity = max(0.25, 1.0 - (1.0 - _COVER) ** (3.0 / max(len(paths), 1)))
+    cover = _COVER * (1.0 - (1.0 - opacity) ** (count / 255.0))[..., None]
     image[...] = np.rint(image * (1.0 - cover) + np.array(colour) * cover)
 
 
 def _draw_contacts(
     image: Image,
-    ways: Sequence[NDArray[np.float64]],
+    paths: Sequence[NDArray[np.float64]],
     collided: Sequence[bool],
     colour: Colour,
 ) -> None:
-    for way, touched in zip(ways, collided, strict=True):
+    for path, touched in zip(paths, collided, strict=True):
         if touched:
-            x, y = (round(16.0 * value) for value in way[-1])
+            x, y = (round(16.0 * value) for value in path[-1])
             cv2.circle(image, (x, y), 72, INK, cv2.FILLED, cv2.LINE_AA, 4)
             cv2.circle(image, (x, y), 52, colour, cv2.FILLED, cv2.LINE_AA, 4)
 

@@ -18,12 +18,12 @@ from tdac_envs.drive.env import Observation
 class Policy:
     """A controller that runs in its sandbox and answers observations.
 
-    Call `reset` at the start of each episode: it gives the controller a fresh
-    process. A context manager; `close` ends the process.
+    Call `reset` at the start of each episode: it starts a fresh process. `close` ends
+    the process, as does the end of a `with` block.
 
     Args:
         source: Bytes of `controller.py`.
-        task: Whose working folder it sees.
+        task: Task whose files are in its working folder.
         tier: Sandbox tier, or `auto`.
     """
 
@@ -38,7 +38,7 @@ class Policy:
         """Starts the controller afresh and gives it the first observation.
 
         Raises:
-            ControllerFault: It cannot be imported, or its `reset` fails.
+            ControllerFault: The controller cannot be imported, or its `reset` fails.
         """
         self._end()
         self._child = start(Path(self._folder.name), self._source, tier=self._tier)
@@ -50,7 +50,7 @@ class Policy:
 
         Raises:
             ControllerFault: The controller raises, hangs or ends its process.
-            ValueError: Its answer is not two finite numbers.
+            ValueError: The answer is not two finite numbers.
         """
         if self._child is None:
             self.reset(observation)
@@ -79,11 +79,11 @@ class Policy:
 
 
 def load_controller(path: str | Path, task: Task, *, tier: str = "auto") -> Policy:
-    """The policy in a controller file.
+    """Loads a controller file as a policy.
 
     Args:
         path: The file.
-        task: Whose working folder it sees.
+        task: Task whose files are in its working folder.
         tier: Sandbox tier, or `auto`.
 
     Raises:

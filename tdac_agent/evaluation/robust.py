@@ -1,4 +1,4 @@
-"""Robust verification: many disturbed episodes in, a success rate out."""
+"""Robust verification: the success rate over many disturbed episodes."""
 
 from __future__ import annotations
 
@@ -48,30 +48,31 @@ def verify_robust(
     judge: WarmJudge | None = None,
     watch: Callable[[int, int], None] | None = None,
 ) -> RobustReport:
-    """Counts how often a controller reaches the goal when it is disturbed.
+    """Measures how often a controller reaches the goal under disturbances.
 
-    Each episode depends on the task, the disturbance and its seed alone, and has a
-    fresh process. The suite is not run; see `verify`.
+    Each episode depends only on the task, the disturbance and its seed, and has a
+    fresh process. The test suite is not run; see `verify`.
 
     Args:
         controller: Path of the file, or its source (text of several lines, or bytes).
         task: What it must do.
-        episodes: How many; with `accept_at`, how many at most.
-        disturbance: Of the environment.
-        first_seed: The episodes have this seed and the following ones; by default one
-            that no author can know, as for `verify`.
-        accept_at: Stop as soon as a sequential test decides whether the success rate
-            is at least this, or at most `margin` less; then there is no interval.
+        episodes: Number of episodes; with `accept_at`, the maximum.
+        disturbance: Disturbance of the environment.
+        first_seed: Seed of the first episode; the following episodes count up from it.
+            By default the author of a controller cannot predict it, as for `verify`.
+        accept_at: Stops as soon as a sequential test decides whether the success rate
+            is at least `accept_at`, or at most `accept_at - margin`. The report then
+            has no rate and no interval.
         margin: See `accept_at`.
-        tier: Sandbox tier, `auto` for the best one here.
-        limits: Of the controller's process in each episode, `cpu_seconds` too.
-        out: Folder for `robust.json`; none by default.
-        judge: A warm one; one of its own by default.
-        watch: Called now and then with the number of episodes and of successes.
+        tier: Sandbox tier; `auto` for the best one on this machine.
+        limits: Limits of the controller's process in each episode, `cpu_seconds` too.
+        out: Folder for `robust.json`; by default nothing is written.
+        judge: A warm judge; None starts one for this call.
+        watch: Called repeatedly with the numbers of episodes and successes so far.
 
     Raises:
         ControllerFileError: The file cannot be read.
-        TaskError: A number makes no sense.
+        TaskError: A number is invalid.
         Fault: The sandbox is broken: neither pass nor fail.
     """
     began = time.monotonic()

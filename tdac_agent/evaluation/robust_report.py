@@ -1,4 +1,4 @@
-"""`robust.json`: how often a controller gets there when it is disturbed."""
+"""`robust.json`: the success rate of a controller under disturbances."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ class _Record(PrintableRecord):
 
 
 class RobustProvenance(_Record):
-    """What the figures are about; together with a seed, all of an episode."""
+    """What the results apply to; together with a seed it determines an episode."""
 
     task: str
     task_sha256: str
-    unit: Place = Field("px", description="Of places and lengths.")
+    unit: Place = Field("px", description="Unit of positions and lengths.")
     left_out: tuple[str, ...] = Field(
         (), description="Nodes of the world that may be solid and were ignored."
     )
-    map_sha256: str = Field(description="Of the map or the world.")
+    map_sha256: str = Field(description="Hash of the map or world.")
     params_sha256: str
     sensors_sha256: str
     controller_sha256: str
     disturbance: Disturbance
     first_seed: int
-    sandbox: str = Field(description="Tier that held the controller.")
-    limits: dict[str, float] = Field(description="Of each episode.")
+    sandbox: str = Field(description="Sandbox tier.")
+    limits: dict[str, float] = Field(description="Limits of each episode.")
     warnings: tuple[str, ...] = ()
     versions: dict[str, str]
 
 
 class Interval(_Record):
-    """An interval that holds the true success rate with some confidence.
+    """A confidence interval for the success rate.
 
-    Exact (Clopper and Pearson 1934): for any rate it holds it at least so often.
+    Exact (Clopper and Pearson 1934): its coverage is at least `confidence` at any rate.
     """
 
     low: float
@@ -61,7 +61,7 @@ class Interval(_Record):
 
 
 class SequentialResult(_Record):
-    """What a sequential test decided, and how often such a test errs."""
+    """The decision of a sequential test, and its error rates."""
 
     decision: Decision
     test: SequentialTest
@@ -71,20 +71,20 @@ class SequentialResult(_Record):
 
 
 class RobustReport(_Record):
-    """A robust verification: independent episodes, each from its seed."""
+    """A robust verification: independent episodes, each with its own seed."""
 
     schema_version: Literal[1] = 1
     provenance: RobustProvenance
-    episodes: int = Field(description="That count; with a test, up to its decision.")
+    episodes: int = Field(description="Episodes; with a test, up to its decision.")
     successes: int = Field(description="Goal reached, no contact, no error.")
     rate: float | None = Field(description="None with a test: it would be biased.")
     interval: Interval | None = Field(description="None with a test, likewise.")
     outcomes: dict[Outcome, int]
     time_outs: int = Field(
-        description="Failures by time-out: perhaps of a busy machine."
+        description="Failures by time-out, which a busy machine may cause."
     )
     failed_seeds: tuple[int, ...]
-    worst: tuple[SeededEpisode, ...] = Field(description="The worst first.")
+    worst: tuple[SeededEpisode, ...] = Field(description="Worst episodes first.")
     sequential: SequentialResult | None = None
     child_cpu_seconds: float
     seconds: float
@@ -101,7 +101,7 @@ def summarise(
     test: SequentialTest | None,
     seconds: float,
 ) -> RobustReport:
-    """The report of some episodes, which are in the order of their seeds."""
+    """Summarises episodes, which are in the order of their seeds."""
     failed = [episode.seed for episode in episodes if not episode.success]
     count, successes = len(episodes), len(episodes) - len(failed)
     return RobustReport(
@@ -127,14 +127,14 @@ def success_interval(successes: int, episodes: int) -> Interval:
 
 
 def badness(episode: SeededEpisode) -> tuple[bool, float, int]:
-    """Sorts the worst first: failures by the share of the way left, then the slow."""
+    """Sort key, worst first: failures by share of path left, then slow successes."""
     if episode.success:
         return True, -episode.steps, episode.seed
     return False, -episode.d_min / episode.d0, episode.seed
 
 
 def result_of(test: SequentialTest, successes: int, failures: int) -> SequentialResult:
-    """What a test decides on some episodes, with its error rates."""
+    """The decision of a test, with its error rates."""
     return SequentialResult(
         decision=test.decide(successes, failures),
         test=test,

@@ -1,4 +1,4 @@
-"""Has the judge's process run many episodes, and reads what it found."""
+"""Runs many episodes in the judge's process, and reads their results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import DEADLINE_SECONDS
 
 E = TypeVar("E", SeededEpisode, Measured)
-# A policy twice too slow is cut off, and a time-out is tried once more.
+# A policy is stopped when twice too slow, and a time-out is repeated once.
 SLOWEST = 4.0
 
 
@@ -35,14 +35,14 @@ def run_seeds(
     judge: WarmJudge | None = None,
     watch: Callable[[int, int], None] | None = None,
 ) -> tuple[list[E], Ending]:
-    """Has a job done; returns the episodes and what else was found.
+    """Runs a job; returns its episodes and its ending.
 
     Args:
-        job: With a folder for its results whose parent is there.
-        nominal: Its task, which says how long an episode may take.
-        kind: Of the episodes.
-        judge: A warm one; one of its own by default.
-        watch: Called now and then with the number of episodes and of successes.
+        job: The job; the parent of its result folder must exist.
+        nominal: The nominal task, which limits the duration of an episode.
+        kind: Type of the episodes.
+        judge: A warm judge; None starts one for this call.
+        watch: Called repeatedly with the numbers of episodes and successes so far.
 
     Raises:
         Fault: The judge or the sandbox is broken.
@@ -74,13 +74,13 @@ def _ending(path: Path, output: Path) -> Ending:
 
 @dataclass(slots=True)
 class _Tail(Generic[E]):
-    """Reads what the judge's process appends, as it comes.
+    """Reads the episodes that the judge's process appends to a file.
 
     Attributes:
-        kind: Of the episodes.
-        path: File with a line for each episode; not there at first.
-        watch: Told the number of episodes and of successes, where both grew.
-        episodes: Those read so far.
+        kind: Type of the episodes.
+        path: File with a line for each episode; does not exist at first.
+        watch: Called with the numbers of episodes and successes after new episodes.
+        episodes: Episodes read so far.
     """
 
     kind: type[E]
@@ -91,7 +91,7 @@ class _Tail(Generic[E]):
     _successes: int = 0
 
     def read(self) -> None:
-        """Takes the lines that are whole by now."""
+        """Reads the lines that are complete."""
         if not self.path.is_file():
             return
         with self.path.open("rb") as file:
