@@ -1,1 +1,1 @@
-"""Training of baselines with stable-baselines3, on the tasks that controllers have."""
+"""Training of baselines with stable-baselines3, on the tasks of the controllers."""

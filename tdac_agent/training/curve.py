@@ -14,22 +14,22 @@ from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 CURVE_FILE = "learning_curve.csv"
 PLAN_FILE = "training.json"
-"""Of the same folder."""
+"""In the same folder."""
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """An evaluation by the most likely actions, and what was seen in training.
+    """An evaluation with deterministic actions, and the success rate in training.
 
     Attributes:
-        steps: Of training so far, of all robots together.
+        steps: Training steps so far, all robots together.
         seconds: Wall time so far, evaluations included.
         success_rate: Share of the evaluation's episodes in which the goal was reached.
-        collision_rate: Share in which something was touched.
-        mean_return: Of an episode.
-        mean_length: Of an episode, steps.
-        train_success_rate: Of the last 100 episodes of training, with exploration; nan
-            before there is one.
+        collision_rate: Share of episodes with a contact.
+        mean_return: Mean return of an episode.
+        mean_length: Mean length of an episode, steps.
+        train_success_rate: Success rate of the last 100 training episodes, with
+            exploration; nan before the first one.
     """
 
     steps: int
@@ -42,7 +42,7 @@ class Point:
 
     @property
     def worth(self) -> tuple[float, float, float]:
-        """By which the best policy is chosen: successes, then what they are worth."""
+        """Sort key for the best policy: successes, fewer contacts, return."""
         return self.success_rate, -self.collision_rate, self.mean_return
 
 
@@ -57,7 +57,7 @@ def write_curve(folder: Path, points: list[Point]) -> None:
 
 
 def read_curve(folder: Path) -> list[Point]:
-    """The points of a training; none where nothing was evaluated yet.
+    """The points of a training; none before the first evaluation.
 
     Raises:
         RunError: The file cannot be read.

@@ -1,4 +1,4 @@
-"""Hyperparameters of the baselines, from files in the form of rl-zoo3."""
+"""Hyperparameters of the baselines, from files in the format of rl-zoo3."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _LINEAR = "lin_"
 
 @dataclass(frozen=True, slots=True)
 class Hyperparameters:
-    """What a file says for one algorithm and one environment.
+    """The hyperparameters of one algorithm for one environment.
 
     Attributes:
         wrappers: Names of `WRAPPERS`, innermost first.
-        n_envs: Robots that are driven at a time.
-        steps: Of training, of all robots together.
-        policy: Of stable-baselines3.
-        env: Arguments of the environments that are trained in.
-        model: Further arguments of the algorithm's class, as the file has them.
+        n_envs: Number of robots in parallel.
+        steps: Training steps, all robots together.
+        policy: Name of the policy class in stable-baselines3.
+        env: Arguments of the training environments.
+        model: Further arguments of the algorithm's class, as written in the file.
     """
 
     wrappers: tuple[str, ...]
@@ -40,31 +40,31 @@ class Hyperparameters:
 
 
 def config_file(algo: Algo) -> Path:
-    """The file that is shipped for an algorithm."""
+    """The shipped file of an algorithm."""
     return shipped(f"sb3/{algo}.yml")
 
 
 def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
-    """What a file says for an environment.
+    """Reads the hyperparameters for an environment.
 
     Args:
-        file: In the form of rl-zoo3.
-        env: Its id, a key of the file.
+        file: File in the format of rl-zoo3.
+        env: Id of the environment, a key of the file.
 
     Raises:
-        TaskError: The file cannot be read, or lacks or misuses a key.
+        TaskError: The file cannot be read, or a key is missing or invalid.
     """
     try:
         data = parse_yaml(read_file(file, TEXT_BYTES))
     except (OSError, ValueError) as error:
-        told = f"cannot read hyperparameters {file}: {why(error)}"
-        raise TaskError(told) from error
+        message = f"cannot read hyperparameters {file}: {why(error)}"
+        raise TaskError(message) from error
     if not isinstance(data, dict) or not isinstance(data.get(env), dict):
         raise TaskError(f"{file} has no hyperparameters for {env}")
     model = dict(data[env])
     try:
         return Hyperparameters(
-            _names(model.pop("env_wrapper", [])),
+            _wrapper_names(model.pop("env_wrapper", [])),
             int(model.pop("n_envs", 1)),
             int(model.pop("n_timesteps")),
             str(model.pop("policy", "MlpPolicy")),
@@ -76,14 +76,14 @@ def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
 
 
 def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
-    """Arguments as stable-baselines3 takes them.
+    """Converts arguments of a file to those of stable-baselines3.
 
     Args:
-        model: As in the file: rates that fall to zero are told as `lin_1e-3`, the
-            noise of actions as `noise_type: normal` and `noise_std`.
+        model: Arguments as in the file: `lin_1e-3` for a rate that falls to zero,
+            `noise_type: normal` and `noise_std` for action noise.
 
     Raises:
-        TaskError: A rate or a noise is told otherwise.
+        TaskError: A rate or noise has another form.
     """
     found = {key: _scheduled(key, value) for key, value in model.items()}
     kind, spread = found.pop("noise_type", None), found.pop("noise_std", 0.0)
@@ -92,14 +92,14 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
     if kind is not None:
         from stable_baselines3.common.noise import NormalActionNoise
 
-        zeros = np.zeros(2)  # of both wheels
+        zeros = np.zeros(2)  # one per wheel
         found["action_noise"] = NormalActionNoise(zeros, zeros + float(spread))
     return found
 
 
-def _names(paths: list[str] | str) -> tuple[str, ...]:
+def _wrapper_names(paths: list[str] | str) -> tuple[str, ...]:
     known = {f"{w.__module__}.{w.__qualname__}": name for name, w in WRAPPERS.items()}
-    # Packages offer their wrappers in one place, and have them in another.
+    # Packages export their wrappers from a module that does not define them.
     known |= {
         f"{w.__module__.partition('.')[0]}.wrappers.{w.__qualname__}": name
         for name, w in WRAPPERS.items()
@@ -121,5 +121,5 @@ def _scheduled(key: str, value: Any) -> Any:
 
 
 def linear(first: float) -> Callable[[float], float]:
-    """A value that falls to zero with the share of the training that is left."""
+    """A schedule that falls from `first` to zero with the remaining training."""
     return lambda left: left * first

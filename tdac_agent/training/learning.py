@@ -1,6 +1,6 @@
 """A training with stable-baselines3: steps, evaluations, checkpoints.
 
-Needs the extra `tdac[sb3]`: import it where it is used.
+Needs the extra `tdac[sb3]`, so import this module only where it is used.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ from tdac_agent.training.vouched import CHECKPOINT, REPLAY, put
 
 ALGOS = {"ppo": PPO, "sac": SAC, "td3": TD3}
 EVALUATION_SEED = 1_000_000
-"""Added to a training's seed; `tdac evaluate` draws other episodes."""
+"""Added to the training seed; `tdac evaluate` uses other episodes."""
 Watch = Callable[[int, Point | None, Point | None], None]
-"""Told the steps so far, an evaluation where there is a new one, and the best."""
+"""Called with the steps so far, the new evaluation if any, and the best one."""
 
 
 def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
     """Trains to the end of a plan, from the folder's last checkpoint if it has one.
 
-    Every evaluation is followed by a checkpoint, so that no more than what came after
-    the last one is lost, whatever ends the process. Who goes on begins new episodes.
+    A checkpoint follows each evaluation, so that a crash loses only the training since
+    the last one. A resumed training begins new episodes.
 
     Args:
-        plan: What is to be done.
-        folder: Of the training.
-        watch: Told of what goes on.
+        plan: Plan of the training.
+        folder: Folder of the training.
+        watch: Called with the progress; see `Watch`.
 
     Returns:
         The learning curve.
@@ -49,7 +49,7 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
     Raises:
         RunError: The checkpoint cannot be read.
     """
-    # More threads than one make networks of this size slower.
+    # Networks of this size are slower with more than one thread.
     torch.set_num_threads(1)
     envs = VecMonitor(
         make_batch(plan, plan.n_envs, training=True), info_keywords=("is_success",)
@@ -71,15 +71,15 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
 
 
 def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> Point:
-    """One episode of each robot of a batch, by the most likely actions.
+    """Runs one episode of each robot of a batch, with deterministic actions.
 
     Args:
-        model: With `predict`.
-        envs: Of which each robot drives its first episode.
-        seed: Of the first robot's episode, or of that of each robot.
+        model: Model with a method `predict`.
+        envs: The batch; the first episode of each robot counts.
+        seed: Seed of the first robot's episode, or a seed for each robot.
 
     Returns:
-        What is known from the episodes; steps, seconds and training are nought.
+        The results, with 0 steps, 0 seconds and no success rate in training (nan).
     """
     envs.venv.seed(seed)  # type: ignore[arg-type]
     observations: Any = envs.reset()
@@ -106,7 +106,7 @@ def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> P
 
 
 class _Evaluations(BaseCallback):
-    """Evaluates now and then, keeps the best policy, and writes checkpoints."""
+    """Evaluates at intervals, keeps the best policy, and writes checkpoints."""
 
     def __init__(
         self,
@@ -135,7 +135,7 @@ class _Evaluations(BaseCallback):
             self._evaluate(steps)
 
     def finish(self) -> None:
-        """Evaluates what was learnt since the last time."""
+        """Evaluates any training since the last evaluation."""
         steps = int(self.model.num_timesteps)
         if not self.points or self.points[-1].steps < steps:
             self._evaluate(steps)
@@ -182,10 +182,10 @@ def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
         model = kind.load(file, envs, device="cpu", tensorboard_log=log)
         if (folder / REPLAY).is_file():
             model.load_replay_buffer(folder / REPLAY)
-    # A torn or foreign file raises whatever the pickles in it do.
+    # The pickles in a damaged or foreign file may raise anything.
     except Exception as error:
         reason = " ".join(str(error).split())[:160]
-        raise RunError(f"cannot go on from {file}: {reason}") from error
+        raise RunError(f"cannot resume from {file}: {reason}") from error
     return model
 
 

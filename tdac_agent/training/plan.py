@@ -1,4 +1,4 @@
-"""What a training is to do: all that a folder needs to go on with it."""
+"""The plan of a training: all that is needed to resume it from its folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tdac_envs.learning.wrappers import check_wrappers
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
 MOST_ROBOTS = 100_000
-"""That are driven at a time; an evaluation drives all its episodes so."""
+"""Largest batch; an evaluation runs all of its episodes in one batch."""
 MOST_SEED = 2**31
 
 
@@ -40,23 +40,23 @@ class TrainingPlan(BaseModel):
 
     schema_version: Literal[1] = 1
     algo: Algo
-    tasks: tuple[str, ...] = Field(description="Robot i has the task i modulo these.")
+    tasks: tuple[str, ...] = Field(description="Robot i has task i modulo their count.")
     task_sha256: tuple[str, ...]
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
-    variation: Variation = Field("jitter", description="Of the evaluations' starts.")
+    variation: Variation = Field("jitter", description="Starts in evaluations.")
     env_kwargs: dict[str, Any] = Field(
         default_factory=dict,
-        description="Of the environments that are trained in, where they differ from "
-        "those of the evaluations.",
+        description="Arguments of the training environments that differ from those of "
+        "the evaluations.",
     )
     disturbance: Disturbance
-    steps: int = Field(description="Of all robots together.")
+    steps: int = Field(description="Training steps, all robots together.")
     seed: int = 0
     n_envs: int
     policy: str = "MlpPolicy"
     hyperparameters: dict[str, Any]
-    evaluate_every: int = Field(description="Steps.")
-    episodes: int = Field(EPISODES, description="Of each evaluation.")
+    evaluate_every: int = Field(description="Steps between evaluations.")
+    episodes: int = Field(EPISODES, description="Episodes of each evaluation.")
 
 
 def make_plan(
@@ -72,24 +72,24 @@ def make_plan(
     episodes: int = EPISODES,
     config: Path | None = None,
 ) -> TrainingPlan:
-    """The plan of a training, with what is not given from the hyperparameters' file.
+    """Plans a training; what is not given comes from the hyperparameter file.
 
     Args:
         tasks: Names or files of tasks of one environment.
         algo: Algorithm.
-        steps: Of all robots together.
-        seed: Of networks, starts and noise.
-        variation: Of the starts in training and evaluation; by default `jitter` to
-            evaluate, and to train what the hyperparameters' file says.
-        disturbance: Noise and lateness; none by default.
+        steps: Training steps, all robots together.
+        seed: Seed of networks, starts and noise.
+        variation: Variation of the starts in training and evaluation. The default is
+            `jitter` in evaluation, and in training as in the hyperparameter file.
+        disturbance: Noise and delay; none by default.
         wrappers: Names of wrappers, innermost first.
-        n_envs: Robots that are driven at a time.
-        episodes: Of each evaluation.
-        config: File with hyperparameters, in the form of rl-zoo3.
+        n_envs: Number of robots in parallel.
+        episodes: Episodes of each evaluation.
+        config: Hyperparameter file, in the format of rl-zoo3.
 
     Raises:
-        TaskError: A task, a wrapper or a number cannot be used, or the tasks are of
-            several environments.
+        TaskError: A task, a wrapper or a number is invalid, or the tasks are of
+            different environments.
     """
     whole_number("seed", seed, 0, MOST_SEED)
     for name, robots in (("n_envs", n_envs or 1), ("episodes", episodes)):
@@ -102,14 +102,14 @@ def make_plan(
     check_wrappers(names)
     if len(loaded) > 1 and "goal-relative" not in names:
         raise TaskError(
-            "several tasks need --wrapper goal-relative: places on one map mean "
+            "several tasks need --wrapper goal-relative: positions on one map mean "
             "nothing on another"
         )
     count = n_envs or given.n_envs
     wanted = steps or given.steps
     return TrainingPlan(
         algo=algo,
-        tasks=tuple(map(_lasting, tasks)),
+        tasks=tuple(map(_lasting_name, tasks)),
         task_sha256=tuple(task.sha256() for task in loaded),
         wrappers=names,
         variation=variation or "jitter",
@@ -131,10 +131,10 @@ def write_plan(folder: Path, plan: TrainingPlan) -> None:
 
 
 def read_plan(folder: Path) -> TrainingPlan:
-    """The plan of a training that was begun.
+    """Reads the plan of a training.
 
     Raises:
-        RunError: There is none, or it cannot be read.
+        RunError: The folder has no readable plan.
     """
     file = folder / PLAN_FILE
     try:
@@ -147,10 +147,10 @@ def read_plan(folder: Path) -> TrainingPlan:
 
 
 def tasks_of(plan: TrainingPlan) -> list[Task]:
-    """The tasks of a plan, as they were when it was made.
+    """Loads the tasks of a plan.
 
     Raises:
-        TaskError: One has changed since, or cannot be used.
+        TaskError: A task has changed since the plan was made, or cannot be used.
     """
     tasks = [load_task(name) for name in plan.tasks]
     for name, task, sha256 in zip(plan.tasks, tasks, plan.task_sha256, strict=True):
@@ -160,12 +160,12 @@ def tasks_of(plan: TrainingPlan) -> list[Task]:
 
 
 def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any:
-    """Robots on a plan's tasks, seen through its wrappers, in one batch for SB3.
+    """Makes a batch of robots on a plan's tasks, with its wrappers, for SB3.
 
     Args:
-        plan: Of the training.
+        plan: Plan of the training.
         count: Number of robots.
-        training: Whether they are to learn; else they are to be evaluated.
+        training: Whether the batch is for training instead of evaluation.
 
     Raises:
         TaskError: A task has changed since the plan was made, or cannot be used.
@@ -186,31 +186,31 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
         make: Any = load_env_creator(name)
         batch = make(count, autoreset_mode="SameStep", each=each)
     except TypeError as error:
-        told = str(error).partition("() ")[2]
-        raise TaskError(f"env_kwargs of the hyperparameters: {told}") from error
+        reason = str(error).partition("() ")[2]
+        raise TaskError(f"env_kwargs of the hyperparameters: {reason}") from error
     return SB3VecEnv(WrappedVectorEnv(batch, plan.wrappers))
 
 
 def _env_kwargs(
     given: Hyperparameters, variation: Variation | None, task: Task
 ) -> dict[str, Any]:
-    """Arguments of the environments that are trained in.
+    """Arguments of the training environments.
 
     Raises:
-        TaskError: They contradict the task.
+        TaskError: The task sets one of them.
     """
     for name in given.env:
         if name in task.env_kwargs():
-            raise TaskError(f"env_kwargs: {name} is the task's; leave it out")
+            raise TaskError(f"env_kwargs: {name} is set by the task; leave it out")
     return given.env | ({} if variation is None else {"variation": variation})
 
 
 def _policy(given: Hyperparameters, wrappers: tuple[str, ...]) -> str:
-    """The network's class, for one array or for several."""
+    """The policy class, for observations of one array or of several."""
     flat = given.policy.replace("MultiInput", "Mlp")
     return flat if "flatten" in wrappers else flat.replace("Mlp", "MultiInput")
 
 
-def _lasting(name: str) -> str:
-    """The name of a task that means the same in every folder."""
+def _lasting_name(name: str) -> str:
+    """The name of a task, valid in any working directory."""
     return name if bundled_task(name) is not None else str(Path(name).resolve())

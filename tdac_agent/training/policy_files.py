@@ -1,4 +1,4 @@
-"""The files of a trained policy: its weights, and all that is to be known of it."""
+"""The files of a trained policy: its weights and metadata."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ LEARNERS = ("stable_baselines3", "torch")
 
 
 def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> None:
-    """Writes `policy.zip`, as `tdac evaluate` takes it, and `policy.json`.
+    """Writes `policy.zip`, which `tdac evaluate` reads, and `policy.json`.
 
     Args:
-        model: Of stable-baselines3.
-        folder: Of the training.
-        plan: Of the training.
-        found: Its evaluation.
+        model: Model of stable-baselines3.
+        folder: Folder of the training.
+        plan: Plan of the training.
+        found: Evaluation of the model.
     """
     saved = SavedPolicy(
         algo=plan.algo,
@@ -48,14 +48,14 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> 
         "seconds": found.seconds,
         "evaluation": asdict(found),
         "cores": os.cpu_count(),
-        "versions": {**versions(), **_of_learners()},
+        "versions": {**versions(), **_learner_versions()},
     }
-    # JSON has no nan: there was no episode in training yet.
-    told = json.dumps(_without_nan(facts), indent=2, allow_nan=False)
-    write_atomic(folder / FACTS, told + "\n")
+    # JSON has no nan, the success rate in training before its first episode ends.
+    text = json.dumps(_without_nan(facts), indent=2, allow_nan=False)
+    write_atomic(folder / FACTS, text + "\n")
 
 
-def _of_learners() -> dict[str, str]:
+def _learner_versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in LEARNERS}
 
 

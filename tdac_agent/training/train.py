@@ -1,4 +1,4 @@
-"""`train`: a baseline of stable-baselines3 on some tasks, in a folder of its own."""
+"""`train`: trains a baseline of stable-baselines3 in a folder of its own."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ def train(
     *,
     trust: bool = False,
 ) -> list[Point]:
-    """Trains, and leaves the best policy and its learning curve in a folder.
+    """Trains, and writes the best policy and its learning curve to a folder.
 
-    Where the folder has the same training already, interrupted or killed, it goes on
-    from its last checkpoint; where it is finished, nothing is done.
+    If the folder has the same training already, it is resumed from its last checkpoint;
+    a finished training is left as it is.
 
     Args:
-        plan: See `make_plan`.
-        folder: Is made if it is missing.
-        watch: Told the steps so far, new evaluations, and the best one.
-        trust: Whether a checkpoint may be loaded that was not written here.
+        plan: Plan from `make_plan`.
+        folder: Folder of the training; made if missing.
+        watch: Called with the steps so far, a new evaluation or None, and the best one.
+        trust: Whether another installation's checkpoint may be loaded.
 
     Returns:
         The learning curve.
 
     Raises:
-        NotTrustedError: The checkpoint was not written here.
-        RunError: The folder holds another training or something else, or cannot be
+        NotTrustedError: The checkpoint was not written by this installation.
+        RunError: The folder contains another training or something else, cannot be
             used, or another process trains in it.
         TaskError: The extra is missing, or a task has changed.
     """
@@ -56,10 +56,10 @@ def train(
 
 
 def check_extra() -> None:
-    """Whether what trains is installed.
+    """Checks that the extra for training is installed.
 
     Raises:
-        TaskError: It is not, with the command that does it.
+        TaskError: It is missing; the message has the install command.
     """
     try:
         import tdac_agent.training.learning  # noqa: F401
@@ -81,9 +81,9 @@ def _prepare(folder: Path, plan: TrainingPlan) -> None:
         )
         if longer != plan:
             raise RunError(
-                f"{folder} holds another training: give another --out, or go on with "
-                f"it as it was begun by --resume {folder}"
+                f"{folder} contains another training: give another folder with --out, "
+                f"or resume it unchanged with --resume {folder}"
             )
     elif used:
-        raise RunError(f"{folder} is not empty, and holds no training")
+        raise RunError(f"{folder} is not empty and contains no training")
     write_plan(folder, plan)

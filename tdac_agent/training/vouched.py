@@ -1,4 +1,4 @@
-"""Checkpoints that this installation has written: to load one runs what is in it."""
+"""Marks the checkpoints of this installation, since loading one can run any code."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tdac_agent.tasks.trust import Wish, permit
 
 CHECKPOINT, REPLAY = "checkpoint.zip", "replay.pkl"
 MARKS = "checkpoint.mark"
-"""MACs of the latest files, a line each; those before them are good, too."""
+"""MACs of the last `KEPT` files, one per line; the previous files stay valid."""
 KEPT = 4
 
 
 def put(draft: Path, file: Path) -> None:
-    """Moves a file that was written into its place, and vouches for it before."""
+    """Adds the mark of a draft, then moves the draft to its final place."""
     marks = file.parent / MARKS
     if lasting_secret() is not None:
         lines = [*_lines(marks)[1 - KEPT :], _mark(file.name, draft)]
@@ -30,20 +30,20 @@ def put(draft: Path, file: Path) -> None:
 
 
 def check(folder: Path, *, trust: bool) -> None:
-    """Refuses to load what somebody else may have written.
+    """Refuses checkpoints that this installation did not write.
 
     Args:
-        folder: Of a training.
-        trust: Whether the user trusts it, this time.
+        folder: Folder of a training.
+        trust: Whether the user trusts the files this time.
 
     Raises:
-        NotTrustedError: There is such a file.
+        NotTrustedError: There is such a file, and `trust` is false.
     """
     files = [folder / name for name in (CHECKPOINT, REPLAY)]
     permit(
         folder,
         [
-            Wish(f"load {file}, which may run anything", (), _sha256(file))
+            Wish(f"load {file}, which can run any code", (), _sha256(file))
             for file in files
             if file.is_file() and not _is_own(file)
         ],
@@ -63,7 +63,7 @@ def _mark(name: str, file: Path) -> str:
 
 
 def _sha256(file: Path) -> str:
-    """Hash of a file of any size: steps to learn from again may take gigabytes."""
+    """Hash of a file of any size; a replay buffer can take gigabytes."""
     with file.open("rb") as content:
         return hashlib.file_digest(content, "sha256").hexdigest()
 

@@ -154,7 +154,7 @@ def test_a_finished_training_goes_on_to_another_end(tmp_path, small, config):
     before = (tmp_path / "out" / "checkpoint.zip").read_bytes()
     assert without_seconds(train(longer, tmp_path / "out")) == without_seconds(points)
     assert (tmp_path / "out" / "checkpoint.zip").read_bytes() == before
-    with pytest.raises(RunError, match="holds another training"):
+    with pytest.raises(RunError, match="contains another training"):
         train(make_plan((small,), steps=512, seed=1, **given), tmp_path / "out")
 
 
@@ -245,7 +245,7 @@ def test_a_torn_checkpoint_is_told(tmp_path, small, config):
     train(plan, tmp_path / "out")
     file = tmp_path / "out" / "checkpoint.zip"
     file.write_bytes(file.read_bytes()[:1000])
-    with pytest.raises(RunError, match=r"cannot go on from .*checkpoint"):
+    with pytest.raises(RunError, match=r"cannot resume from .*checkpoint"):
         train(plan, tmp_path / "out", trust=True)
     assert file.stat().st_size == 1000
 
@@ -349,7 +349,7 @@ def test_wrong_hyperparameters_are_refused(tmp_path, small, config):
         train(plan, tmp_path / "rate")
     with pytest.raises(TaskError, match="env_wrapper: expected some of"):
         make_plan((small,), config=config(env_wrapper=["gymnasium.wrappers.Other"]))
-    with pytest.raises(TaskError, match="env_kwargs: goal is the task's; leave it out"):
+    with pytest.raises(TaskError, match="goal is set by the task; leave it out"):
         make_plan((small,), config=config(env_kwargs={"goal": [1, 2]}))
     plan = make_plan((small,), **given, config=config(env_kwargs={"walls": 3}))
     with pytest.raises(TaskError, match=r"env_kwargs .*: got an unexpected .*'walls'"):
@@ -368,7 +368,7 @@ def test_folders_and_tasks_of_others_are_left_alone(tmp_path, small, config):
     plan = make_plan((small,), steps=64, episodes=2, config=config())
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").touch()
-    with pytest.raises(RunError, match="is not empty, and holds no training"):
+    with pytest.raises(RunError, match="is not empty and contains no training"):
         train(plan, tmp_path / "full")
     with pytest.raises(RunError, match="cannot use"):
         train(plan, tmp_path / "full" / "thesis.txt")

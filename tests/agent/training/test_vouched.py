@@ -16,5 +16,5 @@ def test_steps_to_learn_from_again_may_be_large(tmp_path):
     vouched.check(tmp_path, trust=False)
     with file.open("r+b") as content:
         content.write(b"another")
-    with pytest.raises(NotTrustedError, match=r"replay\.pkl, which may run anything"):
+    with pytest.raises(NotTrustedError, match=r"replay\.pkl, which can run any code"):
         vouched.check(tmp_path, trust=False)
