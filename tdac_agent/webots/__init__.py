@@ -1,1 +1,1 @@
-"""Webots controllers in the sandbox."""
+"""Runs Webots controllers in the sandbox."""

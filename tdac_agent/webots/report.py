@@ -1,4 +1,4 @@
-"""What a Webots controller did, as the judge saw it."""
+"""The report on a run of a Webots controller, from the judge's record."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ Outcome = Literal[
 
 @dataclass(frozen=True, slots=True)
 class WebotsReport:
-    """What a controller did, as the judge saw it; metres, seconds.
+    """The report on a run, from the judge's record; lengths in m, times in s.
 
     Attributes:
-        passed: Whether the goal was reached (where there is one) without a contact,
-            and nothing was done that may not be done.
+        passed: Whether the goal (if any) was reached, without contact, teleport or
+            error.
         outcome: How the run ended.
-        why_not: Why it has not passed; empty where it has.
-        controller: File name.
-        world: File name.
-        goal: Where the goal is, or None.
-        steps: Steps of the world.
-        time: Simulated.
-        collisions: Steps with a contact.
-        first_contact: Step, x and y of the first.
-        way: Length of what the robot drove.
-        d0: Shortest way to the goal from the start; None without a goal.
-        d_min: Shortest way left to the goal at any time.
-        d_min_euclidean: The same straight.
-        start: x, y, heading.
-        end: x, y, heading.
-        teleport: What a supervisor did that it may not do.
-        error: How the controller failed.
-        traceback: The controller's own lines.
+        why_not: Why the run did not pass; empty if it passed.
+        controller: File name of the controller.
+        world: File name of the world.
+        goal: x and y of the goal, or None.
+        steps: Number of simulation steps.
+        time: Simulated time.
+        collisions: Number of steps with a contact.
+        first_contact: Step, x and y of the first contact, or None.
+        way: Length of the path that the robot drove.
+        d0: Shortest path from the start to the goal; None without a goal.
+        d_min: Smallest remaining path to the goal; None without a goal.
+        d_min_euclidean: Smallest straight distance to the goal; None without a goal.
+        start: x, y and heading at the start.
+        end: x, y and heading at the end.
+        teleport: Forbidden action of a supervisor, or None.
+        error: How the controller failed, or None.
+        traceback: The controller's own lines of the traceback.
         left_out: Nodes that may be solid and were ignored.
-        sandbox: Tier.
-        output: What the controller printed: the beginning, and the end of much.
+        sandbox: Sandbox tier.
+        output: Output of the controller; of long output, its beginning and end.
     """
 
     passed: bool
@@ -80,7 +80,7 @@ def report_of(
     tier: str,
 ) -> WebotsReport:
     """The report on a run that has ended."""
-    # What it does after the end is of no interest.
+    # An error after the end of the run does not count.
     error = None if fault is None or log.outcome is not None else fault
     outcome: Outcome = log.outcome or ("controller ended" if error is None else "error")
     why = _why_not(outcome, log, stage, error)
@@ -114,7 +114,7 @@ def report_of(
 def _why_not(
     outcome: Outcome, log: Log, stage: Stage, error: ControllerFault | None
 ) -> str:
-    """Why a run has not passed; empty where it has."""
+    """Why a run did not pass; empty if it passed."""
     if log.teleport is not None:
         return f"teleport: {log.teleport}"
     if error is not None:

@@ -1,4 +1,4 @@
-"""Run a Webots controller in the sandbox, in a world that the judge holds."""
+"""Runs a Webots controller in the sandbox, in a world that the judge simulates."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tdac_envs.webots.stage import Stage
 PACKAGE = Path(tdac_envs.webots.__file__).parent / "controller"
 LIMITS = Limits(output_bytes=16 << 20)
 GRACE_SECONDS = 1.0
-"""Of a controller after the end, as in Webots."""
+"""Time for a controller after the end of a run, as in Webots."""
 START_SECONDS = 10.0
 LARGEST_FOLDER = 64 << 20
 Watch = Callable[[int], None]
@@ -41,7 +41,7 @@ Watch = Callable[[int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WebotsRun:
-    """A run: its report, and what is needed to draw it.
+    """The report on a run, and the record for drawing it.
 
     Attributes:
         report: The report.
@@ -53,7 +53,7 @@ class WebotsRun:
 
 
 class _World:
-    """A step server that refuses in the words of the sandbox."""
+    """A step server whose refusals are errors of the sandbox."""
 
     def __init__(self, server: StepServer, watch: Watch | None) -> None:
         self._server, self._watch = server, watch
@@ -87,14 +87,14 @@ def run_controller(
     limits: Limits = LIMITS,
     watch: Watch | None = None,
 ) -> WebotsRun:
-    """Runs a controller's file, with the files beside it, until the end.
+    """Runs a controller with all files of its folder until the run ends.
 
     Args:
         controller: The file.
         stage: The world.
-        env: Of the stage; see `Stage.make_env`.
+        env: Environment of the stage; see `Stage.make_env`.
         tier: Sandbox tier, or `auto`.
-        limits: What the controller may use.
+        limits: Resource limits of the controller.
         watch: Called with the number of steps so far.
 
     Raises:
@@ -106,7 +106,7 @@ def run_controller(
     seconds = START_SECONDS + env.nominal.horizon * env.nominal.dt
     fault: ControllerFault | None = None
     with tempfile.TemporaryDirectory(prefix="tdac-webots-") as folder:
-        _furnish(Path(folder), controller, stage)
+        _copy_files(Path(folder), controller, stage)
         try:
             child = start(Path(folder), source, tier=tier, limits=limits)
         except ControllerError as error:
@@ -136,11 +136,11 @@ def run_controller(
 
 
 def frames(env: EPuckEnv, log: Log, stride: int) -> Iterator[NDArray[np.uint8]]:
-    """Pictures of a run: every so many steps, and the last one.
+    """Yields pictures of a run: one every `stride` steps, and the last one.
 
     Args:
-        env: A second one of the same stage, with `render_mode="rgb_array"`.
-        log: Of the run.
+        env: Another environment of the stage, with `render_mode="rgb_array"`.
+        log: Record of the run.
         stride: Steps between two pictures.
     """
     env.reset(seed=0)
@@ -157,11 +157,11 @@ def _picture(env: EPuckEnv) -> NDArray[np.uint8]:
     return frame
 
 
-def _furnish(folder: Path, controller: Path, stage: Stage) -> None:
-    """Copies the files beside the controller, and the world.
+def _copy_files(folder: Path, controller: Path, stage: Stage) -> None:
+    """Copies all files of the controller's folder, and the world.
 
     Raises:
-        ControllerFileError: They cannot be read, or are far too large.
+        ControllerFileError: The files cannot be read, or are too large.
     """
     room = LARGEST_FOLDER
     try:
@@ -171,7 +171,7 @@ def _furnish(folder: Path, controller: Path, stage: Stage) -> None:
             room -= entry.stat().st_size
             if room < 0:
                 raise ControllerFileError(
-                    f"{entry.parent} holds more than {LARGEST_FOLDER >> 20} MB; put "
+                    f"{entry.parent} has more than {LARGEST_FOLDER >> 20} MB; put "
                     "the controller in a folder of its own"
                 )
             shutil.copyfile(entry, folder / entry.name)
