@@ -1,4 +1,4 @@
-"""What a run is, what bounds it, and its folder: before the first question."""
+"""Prepares a run before its first question: its record, budget and folder."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Account:
     """What a run may spend, and what its models cost.
 
     Attributes:
-        budget: Of this run, or of several.
-        tariffs: By the names of the models.
-        notes: What a user should know of it.
+        budget: Budget of this run, or shared by several.
+        tariffs: Tariffs by model name.
+        notes: Notes for the user.
     """
 
     budget: Budget
@@ -52,17 +52,17 @@ def account_of(
     max_tokens: int | None,
     shared: Budget | None,
 ) -> Account:
-    """The account of a run; limits that are not given are those it had before.
+    """The account of a run; limits that are not given are those of `before`.
 
     Raises:
-        ProviderError: Nothing bounds what a model costs, or it lacks a key or package;
-            all of that is said at once.
+        ProviderError: Nothing bounds what a model costs, or a key or package is
+            missing; the message lists everything.
         PriceError: The user's price file is broken.
     """
     tariffs = tariffs_of(models)
     if shared is not None:
         if max_cost is not None or max_tokens is not None:
-            raise ValueError("a shared budget has limits of its own")
+            raise ValueError("give either a shared budget, or max_cost and max_tokens")
         bounds = bounds_of(models, tariffs, shared.max_cost, shared.max_tokens)
         return Account(shared, tariffs, bounds.notes)
     if before is not None:
@@ -80,14 +80,14 @@ def describe(
     start_from: str | None,
     **facts: Any,
 ) -> Run:
-    """A run that has not begun.
+    """The record of a run that has not begun.
 
     Args:
         task: What the controller must do.
         models: Learner and optimizer.
-        template: Of the first question.
-        start_from: Source of a controller to begin with, if there is one.
-        **facts: Further fields.
+        template: Template of the first question.
+        start_from: Source of an initial controller, if there is one.
+        **facts: Further fields of `Run`.
 
     Raises:
         PromptError: The template cannot be used.
@@ -112,9 +112,9 @@ def describe(
 
 
 def settled_seed(given: int | None, learner: Provider, out: Path) -> int | None:
-    """The seed of a run; None where each of its candidates has its own.
+    """The seed of a run; None if each of its candidates has its own.
 
-    Where no secret can be kept, a run is given one at its beginning.
+    If no secret can be kept, a seed is drawn for a new run.
     """
     known = recorded_seed(learner) if given is None else given
     if known is not None or lasting_secret() is not None:
@@ -125,10 +125,10 @@ def settled_seed(given: int | None, learner: Provider, out: Path) -> int | None:
 
 @contextmanager
 def hold_folder(out: Path) -> Generator[None]:
-    """Makes a run's folder, and keeps other processes out of it meanwhile.
+    """Makes a run folder, and locks it against other processes.
 
     Raises:
-        RunError: It cannot be made, or another process is at work in it.
+        RunError: The folder cannot be made, or another process is at work in it.
     """
     with ExitStack() as stack:
         try:
@@ -137,7 +137,7 @@ def hold_folder(out: Path) -> Generator[None]:
         except OSError as error:
             raise RunError(f"cannot write to {out}: {error.strerror}") from error
         if not mine:
-            raise RunError(f"another process is at work on {out}; wait for its end")
+            raise RunError(f"another process is at work on {out}; wait until it ends")
         yield
 
 
@@ -150,7 +150,7 @@ def open_record(
     account: Account,
     on_event: Event | None,
 ) -> Recorder:
-    """The recorder of a run that begins or goes on; what is on record is counted.
+    """The recorder of a new or resumed run; recorded calls count in the budget.
 
     Raises:
         RunError: The folder cannot be written.
@@ -164,7 +164,7 @@ def open_record(
     }
     if before is not None:
         run.id, run.started, run.prompt = before.id, before.started, before.prompt
-        # What somebody else began stays theirs, whatever was allowed this time.
+        # Another installation's run gets no mark, even if it is trusted this time.
         if is_own_folder(before):
             run.mark = sign(run, run.folder / OWN_SUITE if task.suite else None)
     try:

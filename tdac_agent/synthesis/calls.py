@@ -1,7 +1,7 @@
-"""The one place through which every question to a model passes.
+"""Asks the models: every question of a run passes through this module.
 
-A question that is on record is answered from there. Of any other the most that it can
-cost is reserved; it is written down, then asked, and what it took is settled.
+A question on record is answered from there. For any other question, the maximum cost is
+reserved, the question is recorded and asked, and the actual cost is settled.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from tdac_agent.runs.recorder import Recorder
 from tdac_agent.synthesis.workload import Rest, rest_of
 
 MIN_FREE_BYTES = 16 << 20
-"""On the disk before a question: what an answer and its verification may need."""
+"""Free disk space that an answer and its verification may need."""
 
 
 class OutOfBudget(Exception):
-    """The worst case of a question is more than what is left; the run ends here.
+    """The maximum cost of a question exceeds the remaining budget; the run ends.
 
     Args:
-        error: Of the budget.
-        worst: That the question can take.
-        rest: Of the run, the question included.
+        error: Error of the budget.
+        worst: Maximum cost of the question.
+        rest: What may be left of the run, including the question.
 
     Attributes:
-        way_on: The flag with which the run can go on.
-        outlook: What that is to be measured by, in a line.
+        way_on: Flag to resume the run with.
+        outlook: Limits that suffice for the rest of the run, in one line.
     """
 
     def __init__(self, error: BudgetExhausted, worst: Amount, rest: Rest) -> None:
         super().__init__(str(error))
         least, whole = error.flag(worst), error.flag(rest.most)
-        # Twice what is needed at least, so that it does not stop at once again.
+        # Twice the minimum, so that the resumed run does not stop again at once.
         twice = error.flag(worst, times=2)
         self.way_on = min(twice, whole, key=lambda flag: float(flag.split()[1]))
         self.outlook = f"at most this question is left: {least} is enough"
@@ -56,7 +56,7 @@ class OutOfBudget(Exception):
                 f"the next one, {whole} for all of them"
             )
             if self.way_on != whole:
-                self.outlook += "; to go on, twice the first is proposed"
+                self.outlook += "; the suggested limit is twice the first"
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +64,11 @@ class Calls:
     """The questions of one run.
 
     Attributes:
-        recorder: Keeps every question and answer.
-        budget: Of this run, or of several.
-        tariffs: By the names of the models.
-        retry: How patiently a model is asked.
-        max_output: Tokens that an answer may have.
+        recorder: Records every question and answer.
+        budget: Budget of this run, or shared by several.
+        tariffs: Tariffs by model name.
+        retry: Retry policy after faults.
+        max_output: Token limit of an answer.
     """
 
     recorder: Recorder
@@ -80,16 +80,16 @@ class Calls:
     def ask(self, model: Provider, request: Request) -> Reply:
         """The answer to a question, from the record or from the model.
 
-        Not every model may give as long an answer as one is allowed that was truncated
-        before: where that is refused, it is asked for one of the usual length.
+        After a truncated answer, a request may have a higher token limit than usual. If
+        the model refuses that limit, it is asked again with the usual one.
 
         Raises:
-            OutOfBudget: There is not enough left for the worst case.
-            Fault: It did not answer; the run ends, and no iteration is used up.
+            OutOfBudget: The maximum cost exceeds the remaining budget.
+            Fault: The model did not answer; the run ends, and no iteration is used up.
         """
         request = self.recorder.numbered(request)
-        rooms = sorted({request.max_tokens, self.max_output}, reverse=True)
-        variants = [replace(request, max_tokens=room) for room in rooms]
+        limits = sorted({request.max_tokens, self.max_output}, reverse=True)
+        variants = [replace(request, max_tokens=limit) for limit in limits]
         for variant in variants:
             reply = self.recorder.recall(variant, call_key(model, variant))
             if reply is not None:
@@ -108,7 +108,7 @@ class Calls:
             raise Fault(f"{model.name}: {fault}{times}") from None
 
     def _answer(self, model: Provider, request: Request, missed: list[Missed]) -> Reply:
-        """Asks a model again and again; each time is a call of its own."""
+        """Asks a model with retries; each try is a call of its own."""
 
         def note(miss: Missed) -> None:
             missed.append(miss)
@@ -118,7 +118,7 @@ class Calls:
         return answer(lambda again: self._call(model, again), request, self.retry, note)
 
     def _call(self, model: Provider, request: Request) -> Reply:
-        """One call, within the budget and on record."""
+        """Makes one call, within the budget and on record."""
         self._check_disk()
         recorder, tariff = self.recorder, self.tariffs[model.name]
         key, worst = call_key(model, request), tariff.worst(request)
@@ -144,7 +144,7 @@ class Calls:
         return rest_of(run, self.tariffs, request, worst, self.max_output)
 
     def _check_disk(self) -> None:
-        """Refuses to ask where an answer could not be kept.
+        """Checks that there is room on the disk for an answer.
 
         Raises:
             Fault: The disk is nearly full.
@@ -154,6 +154,6 @@ class Calls:
         left = disk.f_bavail * disk.f_frsize
         if left < MIN_FREE_BYTES:
             raise Fault(
-                f"{folder}: the disk is full: {left >> 20} MB are left, "
-                f"{MIN_FREE_BYTES >> 20} MB are needed to keep what comes"
+                f"{folder}: the disk is full: {left >> 20} MB are free, "
+                f"{MIN_FREE_BYTES >> 20} MB are needed for the next answer"
             )

@@ -1,4 +1,4 @@
-"""Asking the two models: questions out, sources and rules back, all on record."""
+"""Asks the two models of a run for controllers and rules."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ MAX_ASKS = 3
 MAX_EARLIER = 12
 EXCERPT_CHARS = 160
 _AGAIN = "\n## Your last answer could not be used\nThe reason: "
-_SAME = "the code of the attempt before came back"
-_ENDED = {"length": "it was cut off at its end", "refusal": "it was refused"}
+_SAME = "same code as the attempt before"
+_ENDED = {"length": "it was truncated", "refusal": "it was refused"}
 
 
 class Candidate(NamedTuple):
-    """A controller's source, None where the model gave no code, and what it noted."""
+    """Source of a controller (None if the model gave no code), notes on the answer."""
 
     source: str | None
     notes: tuple[str, ...] = ()
@@ -44,10 +44,10 @@ class Dialogue:
         task: What the controller must do.
         learner: Generates controllers.
         optimizer: Edits them and writes rules.
-        calls: Through which every question passes.
+        calls: Asks every question.
         book: Rules of this run, in force and ended.
-        template: Of the question for a new controller.
-        earlier: The attempts so far, a line each.
+        template: Template of the question for a new controller.
+        earlier: The attempts so far, one line each.
     """
 
     task: Task
@@ -61,7 +61,7 @@ class Dialogue:
     _unchanged: bool = False
 
     def generate(self, k: int) -> Candidate:
-        """A new controller under the rules in force."""
+        """Asks for a new controller under the rules in force."""
         request = Request(
             "generate",
             self._question(),
@@ -73,14 +73,14 @@ class Dialogue:
         return self._code(self.learner, request)
 
     def edit(self, k: int, j: int, source: str, report: Report) -> Candidate:
-        """A repaired controller, candidate (k, j)."""
+        """Asks for a repaired controller, candidate (k, j)."""
         request = self._repair("edit", source, report, self._at(k, j))
         return self._code(self.optimizer, request)
 
     def summarise(self, k: int, j: int, source: str, report: Report) -> None:
-        """Has the rules changed by what is to be learnt from a failure.
+        """Asks for changes of the rules after a failure, and applies them.
 
-        An answer that is malformed is asked for again twice; then the rules stay.
+        After a malformed answer, asks again up to twice; then the rules stay.
         """
         request = self._repair("summarise", source, report, self._at(k, j))
         evidence = tuple(failure.test for failure in report.failures)
@@ -96,15 +96,15 @@ class Dialogue:
             self.book, notes = apply(self.book, operations, k, evidence)
             self.calls.recorder.rules(k, self.book, notes or ("no change",))
             return
-        self.calls.recorder.rules(k, self.book, ("no usable answer: the rules stay",))
+        self.calls.recorder.rules(k, self.book, ("no usable answer: rules unchanged",))
 
     def saw_no_change(self, k: int, j: int) -> None:
-        """Remembers that candidate (k, j) is the one before it."""
+        """Notes that candidate (k, j) has the same code as the attempt before."""
         self.earlier = (*self.earlier, f"k={k} j={j}: no change: {_SAME}")
         self._unchanged = True
 
     def saw(self, k: int, j: int, report: Report) -> None:
-        """Remembers what came of candidate (k, j), and of the rules behind it."""
+        """Notes the result of candidate (k, j), also for the rules in force."""
         self._unchanged = False
         failed = tuple(failure.test for failure in report.failures)
         if j == 0 and self.book.in_force:
@@ -125,7 +125,7 @@ class Dialogue:
             self._question(),
             source,
             report,
-            # The last one is what the question is about.
+            # Without the last attempt, which the question is about.
             earlier=self.earlier[:-1][-MAX_EARLIER:],
             rules=self.book.in_force,
             unchanged=self._unchanged,
@@ -143,10 +143,10 @@ class Dialogue:
         )
 
     def _code(self, model: Provider, request: Request) -> Candidate:
-        """Asks until a whole answer holds code; a refused one is asked again twice.
+        """Asks for code, again up to twice after an unusable answer.
 
-        The question is then put with what was wrong; a truncated answer is never used,
-        and asked for again with more room.
+        The repeated question says what was wrong. A truncated answer is never used; it
+        is requested again with a higher token limit.
         """
         problems = []
         for asked in range(1, MAX_ASKS + 1):
@@ -163,17 +163,17 @@ class Dialogue:
     def _again(
         self, request: Request, reply: Reply, problem: str, asked: int
     ) -> Request:
-        """The same question with what was wrong with the answer; the last word only."""
-        # It may be long, and begin with white space.
+        """The same question, with what was wrong with the last answer."""
+        # The answer may be long, and begin with white space.
         says = one_line(reply.text[:2000], EXCERPT_CHARS)
         facts = {"problem": problem, "says": says, "asked": asked, "most": MAX_ASKS}
         self.calls.recorder.unused(request, **facts)
         first = request.prompt.partition(_AGAIN)[0]
-        prompt = f"{first}{_AGAIN}{problem}. Give the whole answer anew.\n"
-        room = request.max_tokens
+        prompt = f"{first}{_AGAIN}{problem}. Give the whole answer again.\n"
+        limit = request.max_tokens
         if reply.stop == "length":
-            room = 2 * self.calls.max_output
-        return replace(request, prompt=prompt, max_tokens=room)
+            limit = 2 * self.calls.max_output
+        return replace(request, prompt=prompt, max_tokens=limit)
 
     def _texts(self) -> tuple[str, ...]:
         return tuple(rule.text for rule in self.book.in_force)
@@ -183,12 +183,12 @@ class Dialogue:
 
 
 def _stable(prompt: str) -> int:
-    """How much of a prompt is the same in all of a run: all before its rules."""
+    """Length of the part before the rules, which is the same in the whole run."""
     return max(0, prompt.find(BEGIN))
 
 
 def _file_in(reply: Reply) -> Answer:
-    """The file in a reply; there is none in a truncated or refused one."""
+    """The file in a reply; a truncated or refused reply has none."""
     if reply.stop != "end":
         return Answer(None, _ENDED[reply.stop])
     return read_answer(reply.text, must_define="policy")

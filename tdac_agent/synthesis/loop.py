@@ -33,7 +33,7 @@ from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
 
 MOST_SPENT = 3
-"""Iterations in a row in which a model that costs something may give no code."""
+"""Iterations in a row without code, after which a paid model is given up."""
 
 
 def synthesize(
@@ -61,46 +61,48 @@ def synthesize(
 ) -> Run:
     """Writes, tests and repairs controllers until one is verified.
 
-    Where `out` holds an unfinished run of the same, it goes on with that: answers and
-    verifications on record are not asked or made again (docs/models.md).
+    If `out` contains the same run, unfinished, that run is resumed: recorded answers
+    and verifications are reused (docs/models.md).
 
     Args:
         task: What the controller must do.
-        learner: LLM1 of the paper, writes controllers: a provider, or its name as in
-            `anthropic:MODEL` (docs/models.md).
-        optimizer: LLM2, edits code and writes rules; the learner by default.
+        learner: LLM1 of the paper, which writes controllers: a provider, or its name
+            such as `anthropic:MODEL` (docs/models.md).
+        optimizer: LLM2, which edits code and writes rules; the learner by default.
         out: New or empty folder for the run, or one with the same run.
-        iterations: K.
+        iterations: K, the maximum number of iterations.
         patience: J, edits per iteration.
-        seed: Of the jittered starts of all candidates; by default each has its own, as
-            for `verify`; those of a recorded run have its seed.
-        start_from: Source of a controller to begin with instead of a generated one.
-        base_url: Where `anthropic:` or `openai:` models are served, else by the vendor.
-        key_over_http: Whether a key may go to such a server unencrypted, where it is
-            on another machine.
+        seed: Seed of the jittered starts of all candidates. By default each candidate
+            has its own, as for `verify`; a replay uses the seed of its recorded run.
+        start_from: Source of an initial controller instead of a generated one.
+        base_url: URL of a server for `anthropic:` or `openai:` models; by default the
+            vendor's.
+        key_over_http: Whether a key may be sent unencrypted to such a server on
+            another machine.
         prompt: Template of the question for a new controller: `full`,
             `underspecified`, or a file (docs/prompts.md).
-        refine: Whether failures become rules of the prompt; without, each new
-            controller is asked for in the same words.
-        max_output: Tokens that an answer may have; twice as many after a cut one.
-        max_cost: USD that the run may spend; by default what it was begun with, or 2.
-        max_tokens: That it may spend, in and out together; the same, or no limit.
-        budget: Shared with other runs, in the place of these limits.
-        index: Of several runs of the same, which keeps their samples apart.
-        retry: How patiently a model is asked after faults.
-        judge: A warm one, for several runs one after the other; its own by default.
-        on_event: Called with each journal record, if given.
+        refine: Whether failures become rules of the prompt; if not, the question for
+            a new controller never changes.
+        max_output: Token limit of an answer; twice that after a truncated answer.
+        max_cost: Limit in USD; by default the one the run was begun with, or 2.
+        max_tokens: Limit of input and output tokens together; by default the one the
+            run was begun with, or none.
+        budget: Budget shared with other runs, instead of these limits.
+        index: Index among equal runs, which keeps their samples apart.
+        retry: Retry policy after faults.
+        judge: A warm judge, to reuse in consecutive runs; None starts one.
+        on_event: Called with each journal record.
 
     Returns:
-        The run; `run.verified` tells whether `run.controller` was written.
+        The run; if `run.verified`, `run.controller` is the verified controller.
 
     Raises:
-        RunError: The folder cannot be used, or holds another run.
-        ProviderError: A model cannot be chosen so, e.g. without its key, or nothing
-            bounds what it costs.
+        RunError: The folder cannot be used, or contains another run.
+        ProviderError: A model cannot be used, e.g. without its key, or nothing bounds
+            what it costs.
         PriceError: The user's price file is broken.
         PromptError: The template cannot be used.
-        Fault: Sandbox, suite or provider broken; the run's record says so, too.
+        Fault: The sandbox, suite or provider is broken, which is also recorded.
     """
     template = load_template(prompt)
     models = choose_models(
@@ -146,7 +148,7 @@ def synthesize(
 
 
 def _run(dialogue: Dialogue, given: str | None, judge: WarmJudge, *, paid: bool) -> Run:
-    """The loop, and how it ended on record."""
+    """Runs the loop, and records how it ended."""
     recorder = dialogue.calls.recorder
     try:
         if paid:
@@ -159,7 +161,7 @@ def _run(dialogue: Dialogue, given: str | None, judge: WarmJudge, *, paid: bool)
         recorder.finish("interrupted")
         raise
     except Exception as error:
-        # A disk that is full is told as it was met first.
+        # On a full disk, the first error is the one to report.
         with suppress(OSError):
             recorder.finish("fault", reason=str(error))
         raise
@@ -171,8 +173,8 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
     recorder = dialogue.calls.recorder
     run = recorder.run
     first = None if given is None else Candidate(given)
-    # Those on record do not count: who goes on with a run wants it to be tried again.
-    spent = 0
+    # Recorded answers do not count, so that a resumed run asks as often again.
+    empty = 0
     for k in range(1, run.iterations + 1):
         candidate = (k == 1 and first) or dialogue.generate(k)
         parent, report = "", None
@@ -180,11 +182,11 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
             source, notes = candidate
             if source is None:
                 new = recorder.judged(k, j, None, notes)
-                spent += new and j == 0
-                if dialogue.learner.paid and spent >= MOST_SPENT and k < run.iterations:
-                    raise _given_up(dialogue.learner, spent, notes)
+                empty += new and j == 0
+                if dialogue.learner.paid and empty >= MOST_SPENT and k < run.iterations:
+                    raise _given_up(dialogue.learner, empty, notes)
                 break
-            spent = 0
+            empty = 0
             folder = recorder.candidate(k, j, source)
             if report is not None and same_code(source, parent):
                 recorder.judged(k, j, report, notes, unchanged=True)
@@ -204,21 +206,21 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
     recorder.finish("not verified")
 
 
-def _given_up(model: Provider, spent: int, notes: tuple[str, ...]) -> Fault:
-    """That a model gives no code, with what was noted of its last answers."""
+def _given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
+    """The fault of a model that gives no code, with the note on its last answers."""
     return Fault(
-        f"{model.name}: {spent} iterations in a row without a controller; of the last "
+        f"{model.name}: {count} iterations in a row without a controller; in the last "
         f"one, {notes[-1]}"
     )
 
 
 def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
-    """Has the suite prove itself before an answer is paid for, once in a run.
+    """Checks the test suite before an answer is paid for, once per run.
 
     Raises:
-        Fault: It does not: no controller can pass it, or one that does nothing can.
+        Fault: The reference fails the suite, or a controller that does nothing passes.
     """
-    # Nothing is believed of a run that somebody else began.
+    # The record of another installation's run is not trusted.
     if recorder.past.proven and recorder.run.mark:
         return
 
@@ -241,7 +243,7 @@ def _verify(
     folder: Path,
     judge: WarmJudge,
 ) -> Report:
-    """The report on a candidate; one on record is not made again."""
+    """The report on a candidate; a recorded one is reused."""
     seed = recorder.run.seed
     recorder.event("verify.start", k=k, j=j)
     kept = kept_report(folder, task, source, seed) if recorder.run.mark else None
@@ -253,7 +255,7 @@ def _verify(
 def _deliver(
     recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
 ) -> None:
-    """Puts the verified controller and its evidence at the top of the run."""
+    """Copies the verified controller and its evidence to the top of the run folder."""
     folder = recorder.run.folder
     write_atomic(folder / "controller.py", source)
     write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")

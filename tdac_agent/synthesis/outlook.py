@@ -1,4 +1,4 @@
-"""What a run would ask first, and what it can cost at most, before it is begun."""
+"""The first question and the maximum cost of a run, before it begins."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tdac_agent.tasks.task import Task
 
 
 class Outlook(PrintableRecord):
-    """The first question of a run, and bounds of the whole; tokens are estimates."""
+    """The first question of a run, and cost bounds; token numbers are estimates."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -28,27 +28,27 @@ class Outlook(PrintableRecord):
     patience: int = Field(description="J")
     prompt: str = Field(description="The first prompt, exactly.")
     prompt_tokens: int = Field(description="Estimated from its length in bytes.")
-    answer_tokens: int = Field(description="That the first answer may have.")
+    answer_tokens: int = Field(description="Token limit of the first answer.")
     first_cost: float | None = Field(
-        description="USD that are reserved for the first question; None if unknown."
+        description="USD reserved for the first question; None if unknown."
     )
     max_cost: float | None = Field(
-        description="USD that the run may spend; None where nothing has a price."
+        description="Limit in USD; None if nothing has a price."
     )
-    max_tokens: int | None = Field(description="That it may spend; None for no limit.")
+    max_tokens: int | None = Field(description="Limit of tokens; None for no limit.")
     first_needs: str = Field(
-        description="Flag that pays the first question; empty where the limits do."
+        description="Flag that the first question needs; empty if the limits suffice."
     )
-    questions: int = Field(description="Of the whole run, if nothing ever passes.")
+    questions: int = Field(description="Questions of the run, if no candidate passes.")
     cost_once: float | None = Field(
-        description="USD at most, each question being answered at once."
+        description="Maximum in USD if each question is answered at once."
     )
     cost_most: float | None = Field(
-        description="USD at most, each answer being cut off, and asked for three times."
+        description="Maximum in USD if each answer is truncated and requested thrice."
     )
     unknown_prices: tuple[str, ...] = Field(description="Models without a price.")
     uncounted: tuple[str, ...] = Field(
-        description="Programs and people, whose cost is not for this program to know."
+        description="Programs and people, whose cost cannot be known."
     )
     prices_dated: str
 
@@ -68,21 +68,21 @@ def foresee(
     max_cost: float | None = None,
     max_tokens: int | None = None,
 ) -> Outlook:
-    """The first prompt of a run and its worst case; no model is asked, no key needed.
+    """Predicts the first prompt and the cost bounds of a run, without a model or key.
 
     Args:
         task: What the controller must do.
         learner: Name of LLM1.
         optimizer: Name of LLM2.
-        prices: Of the models.
+        prices: Prices of the models.
         iterations: K.
         patience: J.
         refine: Whether failures become rules.
-        template: Of the question for a new controller.
-        base_url: Where the models are served, if not by the vendor.
-        max_output: Tokens that an answer may have.
-        max_cost: USD that the run may spend; by default 2.
-        max_tokens: That it may spend; by default what `bounds_of` says.
+        template: Template of the question for a new controller.
+        base_url: URL of the models' server; by default the vendor's.
+        max_output: Token limit of an answer.
+        max_cost: Limit in USD; by default 2.
+        max_tokens: Limit of tokens; by default as in `bounds_of`.
 
     Raises:
         PromptError: The template cannot be used.
@@ -97,11 +97,11 @@ def foresee(
     if first is not None:
         first_cost = first.most(most_tokens(prompt), max_output)
     if first is not None and second is not None:
-        said = max_output * (1 + 2 * (MAX_ASKS - 1))
+        answers = max_output * (1 + 2 * (MAX_ASKS - 1))
         once, most = (
             work.learner * first.most(times * sizes.learner, out)
             + work.optimizer * second.most(times * sizes.optimizer, out)
-            for times, out in ((1, max_output), (MAX_ASKS, said))
+            for times, out in ((1, max_output), (MAX_ASKS, answers))
         )
     without = [
         name
@@ -139,7 +139,7 @@ def foresee(
 
 
 def _needed(budget: Budget, worst: Amount) -> str:
-    """The flag with which a question can be paid; empty where the budget is enough."""
+    """The flag that a question needs; empty if the budget suffices."""
     try:
         budget.reserve("first", worst)
     except BudgetExhausted as error:

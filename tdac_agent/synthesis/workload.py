@@ -1,4 +1,4 @@
-"""How many questions a run may still put, and what all of them may take."""
+"""How many questions a run may still ask, and their maximum cost."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ from tdac_agent.prompting.rules import MAX_RULE_TOKENS
 from tdac_agent.runs.records import Run
 
 FEEDBACK_TOKENS = 12_000
-"""Room for what failed, the earlier attempts and the words around them."""
+"""Allowance for the failures, the earlier attempts and the text around them."""
 
 
 class Workload(NamedTuple):
-    """Questions to the Learner, and to the Optimizer."""
+    """Number of questions to the Learner and to the Optimizer."""
 
     learner: int
     optimizer: int
 
     @property
     def questions(self) -> int:
-        """All of them."""
+        """Number of all questions."""
         return self.learner + self.optimizer
 
 
 class Rest(NamedTuple):
-    """What may be left of a run: so many questions, which take so much at most."""
+    """What may be left of a run: a number of questions, and their maximum cost."""
 
     questions: int
     most: Amount
 
 
 def whole(iterations: int, patience: int, *, refine: bool = True) -> Workload:
-    """The questions of a run in which nothing ever passes."""
+    """The questions of a run in which no candidate passes."""
     return Workload(iterations, iterations * (patience + refine))
 
 
 def from_here(
     request: Request, iterations: int, patience: int, *, refine: bool = True
 ) -> Workload:
-    """A question, and all that may come after it where nothing ever passes."""
+    """A question and all that follow it if no candidate passes."""
     _, k, j = request.sample
     later = whole(iterations - k, patience, refine=refine)
     left = {"generate": patience, "edit": patience - j + 1, "summarise": 0}
@@ -57,11 +57,11 @@ def tokens_asked(question: int, max_output: int) -> Workload:
     """Tokens of a question for a controller, and of one about a controller.
 
     Args:
-        question: Of the first one, without rules.
-        max_output: That an answer may have.
+        question: Tokens of the first question, without rules.
+        max_output: Token limit of an answer.
     """
     asked = question + MAX_RULE_TOKENS
-    # A controller that was cut off may have twice the tokens when it comes.
+    # A controller that follows a truncated one may have twice the tokens.
     return Workload(asked, asked + FEEDBACK_TOKENS + 2 * max_output)
 
 
@@ -72,14 +72,14 @@ def rest_of(
     worst: Amount,
     max_output: int,
 ) -> Rest:
-    """What a run may take from a question on, each being answered at once.
+    """What may be left of a run from a question on, if each is answered at once.
 
     Args:
         run: Its models, K and J.
-        tariffs: By the names of the models.
+        tariffs: Tariffs by model name.
         request: The question.
-        worst: That it may take.
-        max_output: Tokens that an answer may have.
+        worst: Its maximum cost.
+        max_output: Token limit of an answer.
     """
     left = from_here(request, run.iterations, run.patience, refine=run.refine)
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)

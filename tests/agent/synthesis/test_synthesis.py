@@ -137,7 +137,7 @@ def test_a_model_without_a_usable_answer_is_given_up(
     """After three spent iterations the run is censored; to go on asks it once more."""
     paid = Script(*[GARBAGE] * 9)
     paid.paid = True
-    expected = r"^script: 3 iterations in a row without a controller; of the last one, "
+    expected = r"^script: 3 iterations in a row without a controller; in the last one, "
     with pytest.raises(Fault, match=expected + "none of 3 answers could be used: it "):
         synthesize(policy_task, paid, out=out, iterations=9, judge=warm)
     run = load_run(out)

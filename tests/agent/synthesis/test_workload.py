@@ -106,7 +106,7 @@ def test_what_is_enough_for_what():
     assert told.way_on == "--max-cost 0.35"
     assert told.outlook == (
         "at most 58 questions are left: --max-cost 0.18 is enough for the next one, "
-        "--max-cost 12.18 for all of them; to go on, twice the first is proposed"
+        "--max-cost 12.18 for all of them; the suggested limit is twice the first"
     )
     told = exhausted({"max_tokens": 20_000}, SPENT, NEXT, Rest(2, Amount(40_000, 0)))
     assert told.way_on == "--max-tokens 42000"
