@@ -60,9 +60,9 @@ class CampaignConfig(BaseModel):
     base_url: str | None = Field(None, description="As for --base-url.")
     max_output: int = Field(MAX_OUTPUT_TOKENS, ge=1, description="As for --max-output.")
     max_cost: float | None = Field(None, ge=0, description="Limit for all runs, USD.")
-    max_tokens: int | None = Field(None, ge=0, description="Limit for all runs.")
+    max_tokens: int | None = Field(None, ge=0, description="Token limit for all runs.")
     keep: Keep = Field(
-        "all", description="`records`: of finished runs, only what the tables need."
+        "all", description="`records`: only what the tables need of finished runs."
     )
 
     @model_validator(mode="after")

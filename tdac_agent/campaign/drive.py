@@ -68,7 +68,7 @@ def carry_out(
     run: Executor,
     watch: Watch,
 ) -> None:
-    """Makes all runs that are left; a run that fails does not stop the others.
+    """Executes the runs that are left; a run that fails does not stop the others.
 
     Once the budget is exhausted, no further run begins that may cost money.
 

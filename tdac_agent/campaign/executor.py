@@ -1,4 +1,4 @@
-"""The interface of executors, which make the runs of a campaign."""
+"""The interface of executors, which execute the runs of a campaign."""
 
 from __future__ import annotations
 

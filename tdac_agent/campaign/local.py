@@ -24,7 +24,7 @@ ERRORS = "errors.log"
 FAREWELL_SECONDS = 15.0
 """Time for interrupted workers to save their progress."""
 MOST_RUNS = 500
-"""Maximum for one process, in case its memory grows."""
+"""Maximum number of runs of one process, in case its memory grows."""
 CHUNK = 1 << 16
 ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "VECLIB_MAXIMUM")
 
@@ -139,7 +139,7 @@ class _Pool:
 
 
 def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
-    """Makes runs in worker processes, `terms.workers` at a time.
+    """Executes runs in worker processes, `terms.workers` at a time.
 
     Args:
         terms: Settings that all runs share.

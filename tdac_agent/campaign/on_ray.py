@@ -25,7 +25,7 @@ WAIT_SECONDS = 1.0
 
 
 def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
-    """Makes runs as Ray tasks of one CPU each, `terms.workers` at a time.
+    """Executes runs as Ray tasks of one CPU each, `terms.workers` at a time.
 
     Args:
         terms: Settings that all runs share.
@@ -71,7 +71,7 @@ def _update(ray: Any, reference: Any, planned: PlannedRun, runs: Bereaved) -> Up
 
 
 def _in_task(planned: PlannedRun, terms: Terms) -> Outcome:
-    """Makes one run, in a process of Ray."""
+    """Executes one run, in a process of Ray."""
     try:
         with own_core() as turn, WarmJudge(turn=turn) as judge:
             return perform(planned, terms, judge)
@@ -104,7 +104,7 @@ def _start(workers: int) -> Any:
     options = {} if os.environ.get("RAY_ADDRESS") else local
     try:
         ray.init(log_to_driver=False, logging_level=logging.ERROR, **options)
-    except Exception as error:  # any kind, also a bare one after 30 s
+    except Exception as error:  # of any type, after 30 s a bare Exception
         reason = " ".join(str(error).split())[:300]
         raise Fault(f"Ray did not start: {reason}") from error
     return ray

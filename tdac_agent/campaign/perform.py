@@ -1,4 +1,4 @@
-"""Makes one run of a campaign, for every executor."""
+"""Executes one run of a campaign, for every executor."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Terms:
         folder: Folder of the campaign, absolute.
         workers: Number of runs at a time.
         max_cost: Limit for all runs together, USD.
-        max_tokens: Limit for all runs together.
+        max_tokens: Token limit for all runs together.
         keep: `all`, or `records`.
         key_over_http: As for `synthesize`.
     """
@@ -72,7 +72,7 @@ class Outcome:
 
     Attributes:
         name: Name of the run.
-        status: As in `run.json`; `error` if the run could not be made.
+        status: As in `run.json`; `error` if the run could not be executed.
         reason: Why it is not finished.
         tau: Iteration of the first success.
         tokens: Input and output tokens.
@@ -104,7 +104,7 @@ Tell = Callable[[dict[str, Any]], None]
 def perform(
     planned: PlannedRun, terms: Terms, judge: WarmJudge | None, tell: Tell | None = None
 ) -> Outcome:
-    """Makes or resumes a run; an error becomes an outcome.
+    """Executes or resumes a run; an error becomes an outcome.
 
     Args:
         planned: The run.
@@ -187,7 +187,7 @@ def _budget(terms: Terms) -> Budget:
 
 @functools.lru_cache(maxsize=4)
 def _task(name: str) -> Task:
-    """A task; cached, since a worker makes many runs of it."""
+    """A task; cached, since a worker executes many runs of it."""
     return load_task(name, trust=True)  # permitted when the campaign was planned
 
 

@@ -1,4 +1,4 @@
-"""A worker process of a campaign: makes one run after another.
+"""A worker process of a campaign: executes one run after another.
 
     python -m tdac_agent.campaign.worker PARENT TERMS
 
@@ -25,7 +25,7 @@ REPORTED_KEYS = ("event", "kind", "k", "j", "fault")
 
 
 def main(parent: int, terms: Terms) -> None:
-    """Makes the runs that arrive on stdin, until it is closed."""
+    """Executes the runs that arrive on stdin, until it is closed."""
     end_with_parent()
     if os.getppid() != parent:
         return

@@ -26,8 +26,7 @@ def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
     Args:
         run: The run as recorded.
         task: Its task as recorded.
-        given: Arguments of `synthesize`, or `suite`, that the user gave; these need no
-            permission.
+        given: Arguments of `synthesize`, or `suite`, which need no permission.
     """
     if "learner" not in given and run.learner != OURS:
         yield Wish(asking("learner", run.learner), ("--learner", run.learner))

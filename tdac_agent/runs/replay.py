@@ -130,9 +130,7 @@ class Replay:
         question = recorded.partition(BEGIN)[0]
         if self._reworded and asked.partition(BEGIN)[0].endswith(question):
             return (f"the recorded question was worded differently from {line} on",)
-        raise PermanentFault(
-            f"the question differs from the recorded one in {line}: {where}"
-        )
+        raise PermanentFault(f"the question differs from the record in {line}: {where}")
 
 
 def _files(folder: Path, place: Place, number: int) -> tuple[Path, Path]:

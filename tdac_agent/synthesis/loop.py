@@ -75,18 +75,15 @@ def synthesize(
         seed: Seed of the jittered starts of all candidates. By default each candidate
             has its own, as for `verify`; a replay uses the seed of its recorded run.
         start_from: Source of an initial controller instead of a generated one.
-        base_url: URL of a server for `anthropic:` or `openai:` models; by default the
-            vendor's.
+        base_url: Server of `anthropic:` or `openai:` models; by default the vendor's.
         key_over_http: Whether a key may be sent unencrypted to such a server on
             another machine.
         prompt: Template of the question for a new controller: `full`,
             `underspecified`, or a file (docs/prompts.md).
-        refine: Whether failures become rules of the prompt; if not, the question for
-            a new controller never changes.
+        refine: Whether failures become rules of the prompt for new controllers.
         max_output: Token limit of an answer; twice that after a truncated answer.
         max_cost: Limit in USD; by default the one the run was begun with, or 2.
-        max_tokens: Limit of input and output tokens together; by default the one the
-            run was begun with, or none.
+        max_tokens: Limit of input plus output; by default the earlier one, or none.
         budget: Budget shared with other runs, instead of these limits.
         index: Index among equal runs, which keeps their samples apart.
         retry: Retry policy after faults.
