@@ -21,7 +21,7 @@ class WebotsReport:
     """The report on a run, from the judge's record; lengths in m, times in s.
 
     Attributes:
-        passed: Whether the goal, if any, was reached without contact, teleport or error.
+        passed: Whether it reached the goal, if any, with no contact, teleport or error.
         outcome: How the run ended.
         why_not: Why the run did not pass; empty if it passed.
         controller: File name of the controller.
