@@ -1,7 +1,7 @@
-"""Metrics of synthesis runs: what the paper defines, and how sure one can be of it.
+"""Metrics of synthesis runs as the paper defines them, with confidence intervals.
 
-Everything goes in and out as pandas frames with one row per thing (`RUN_COLUMNS`,
-`CANDIDATE_COLUMNS`); each interval says what it assumes in `ASSUMPTIONS`.
+Runs are given as pandas frames: one row per run (`RUN_COLUMNS`) and one per candidate
+(`CANDIDATE_COLUMNS`). `ASSUMPTIONS` states what each kind of interval assumes.
 """
 
 from __future__ import annotations
@@ -97,12 +97,12 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    """Imports a part on first use: most of them load pandas."""
+    """Imports a submodule on first use, because most of them load pandas."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    """What there is, imported yet or not."""
+    """All public names, imported yet or not."""
     return sorted({*globals(), *__all__})

@@ -1,4 +1,4 @@
-"""Which of two is better: on the same tasks and seeds, and for the same money."""
+"""Comparisons of two kinds of runs: paired by task and seed, or at equal cost."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from tdac_agent.metrics.rates import solved
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two kinds of runs over the same pairs of task and seed.
+    """Two kinds of runs, compared on the same (task, seed) pairs.
 
     Attributes:
         pairs: Number of pairs.
-        first_only: Pairs that only the first solved within K.
-        second_only: Pairs that only the second solved.
-        p_solved: Exact McNemar test of these two (two-sided); 1 where there are none.
-        sooner: Pairs in which the first needed fewer iterations; no success counts as
-            more than any.
-        later: Pairs in which it needed more.
-        p_tau: Exact sign test of these two (two-sided).
+        first_only: Pairs that only the first kind solved within K iterations.
+        second_only: Pairs that only the second kind solved within K iterations.
+        p_solved: Two-sided p-value of the exact McNemar test of `first_only` against
+            `second_only`; 1 if both are 0.
+        sooner: Pairs in which the first kind needed fewer iterations. A run without
+            success counts as slower than any success.
+        later: Pairs in which the first kind needed more iterations.
+        p_tau: Two-sided p-value of the exact sign test of `sooner` against `later`.
     """
 
     pairs: int
@@ -44,22 +45,24 @@ def compare_paired(
 ) -> Comparison:
     """Compares runs that share a task and a seed.
 
-    Assumes independent pairs. Pairs of which one was censored are left out.
+    Assumes that pairs are independent. Pairs with a censored run are left out.
 
     Args:
-        first: Runs of one kind, one of each pair.
-        second: Runs of the other kind.
-        on: Columns that make a pair.
+        first: Runs of one kind, one per pair.
+        second: Runs of the other kind, one per pair.
+        on: Columns that identify a pair.
 
     Raises:
-        RunError: They have no pair in common, or several runs for one.
+        RunError: The two kinds share no pair, or one has several runs for a pair.
     """
     keys = list(on)
     sides = [frames.runs[~frames.runs["censored"]] for frames in (first, second)]
     for side in sides:
         if side.duplicated(keys).any():
-            again = side.loc[side.duplicated(keys), keys].iloc[0].to_dict()
-            raise RunError(f"there are several runs with {again}")
+            duplicate = side.loc[side.duplicated(keys), keys].iloc[0].to_dict()
+            raise RunError(
+                f"expected one run per pair, got several runs with {duplicate}"
+            )
     both = sides[0].merge(sides[1], on=keys, suffixes=("_1", "_2"))
     if both.empty:
         raise RunError(f"no two runs share {' and '.join(keys)}")
@@ -80,10 +83,10 @@ def compare_paired(
 
 
 def pass_at_n(tried: int, passed: int, n: int) -> float:
-    """Probability that one of n one-shot candidates passes, without bias.
+    """Unbiased estimate of the probability that one of n one-shot candidates passes.
 
-    From `tried` independent candidates of which `passed` did (Chen et al. 2021, eq.
-    1). NaN for n above `tried`: there is no unbiased estimate.
+    Computed from `tried` independent candidates, of which `passed` passed (Chen et al.
+    2021, eq. 1). NaN if n is greater than `tried`: no unbiased estimate exists.
     """
     if n > tried:
         return math.nan
@@ -94,17 +97,18 @@ def pass_at_n(tried: int, passed: int, n: int) -> float:
 
 
 def best_of_n(frames: Frames, loop: Frames, within: int | None = None) -> pd.DataFrame:
-    """One-shot candidates for what the loop costs, beside the loop.
+    """Compares one-shot candidates with the repair loop at equal cost.
 
     Args:
-        frames: Runs whose first candidates are the one-shot ones.
+        frames: Runs whose first candidates are the one-shot candidates.
         loop: Runs of the loop.
-        within: Iterations of the loop; all by default.
+        within: Iterations of the loop to count; all by default.
 
     Returns:
-        A row per measure of cost that both have (`cost` in USD, `tokens`): what one
-        shot and a run of the loop cost on average, n that fit into the latter, pass@n
-        of the one-shot candidates (NaN where there were fewer than n), CS of the loop.
+        A row per `measure` of cost known for both (`cost` in USD, `tokens`): mean cost
+        of one shot (`one_shot`) and of a loop run (`run`), the number `n` of shots that
+        a loop run pays for, pass@n of the shots (`best_of_n`; NaN with fewer than n
+        candidates), and the CS of the loop (`cs`).
     """
     tried = frames.candidates
     first = tried[(tried["k"] == 1) & (tried["j"] == 0)]

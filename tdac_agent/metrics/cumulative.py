@@ -1,4 +1,4 @@
-"""CS(k): how many runs have succeeded by iteration k."""
+"""CS(k): the fraction of runs that have succeeded by iteration k."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from tdac_agent.metrics.rates import solved
 
 
 def cumulative_success(runs: pd.DataFrame, most: int | None = None) -> pd.DataFrame:
-    """CS(k) of the paper, the distribution function of tau, with pointwise intervals.
+    """CS(k) of the paper: the distribution function of tau, with pointwise intervals.
 
-    Where no run was censored it is the fraction of runs with tau <= k, with exact
-    intervals. Where money, time or a fault ended some, they are at risk up to their
-    last whole iteration only (Kaplan and Meier 1958; Greenwood, log-log).
+    Without censored runs, CS(k) is the fraction of runs with tau <= k, with exact
+    intervals. A run that budget, time or a fault ended is at risk up to its last
+    complete iteration; CS(k) is then the Kaplan-Meier estimate (1958), with log-log
+    intervals from Greenwood's formula.
 
     Args:
-        runs: With the columns tau, done, censored, K.
+        runs: Frame with the columns tau, done, censored and K.
         most: Largest k; the largest K by default.
 
     Returns:
-        A row per k from 1: k, cs, low, high, solved (runs with success by then),
-        at_risk (runs that came as far as iteration k without success before it),
-        method.
+        A row per k from 1: k, cs, low, high, solved (runs that succeeded by iteration
+        k), at_risk (runs that reached iteration k without an earlier success), method.
     """
     if runs.empty:
         columns = ["k", "cs", "low", "high", "solved", "at_risk", "method"]
@@ -37,7 +37,7 @@ def cumulative_success(runs: pd.DataFrame, most: int | None = None) -> pd.DataFr
     frame = pd.DataFrame({"k": np.arange(1, last + 1)})
     frame["solved"] = [int(solved(runs, k).sum()) for k in frame["k"]]
     frame["at_risk"] = [int((reach >= k).sum()) for k in frame["k"]]
-    # Of a run that came to a smaller K of its own nothing is known after that.
+    # A run with a smaller K is censored after its own K.
     ended_early = runs["tau"].isna() & (runs["done"] < last)
     if ended_early.any():
         return _kaplan_meier(runs, frame)
@@ -52,7 +52,7 @@ def cumulative_success(runs: pd.DataFrame, most: int | None = None) -> pd.DataFr
 def _kaplan_meier(runs: pd.DataFrame, frame: pd.DataFrame) -> pd.DataFrame:
     has = runs["tau"].notna()
     first = runs.loc[has, "tau"].astype(float).to_numpy()
-    # Ended after iteration d: at risk in d, no more in d + 1.
+    # A run that ended after iteration d is at risk in d, but not in d + 1.
     ended = runs.loc[~has, "done"].astype(float).to_numpy()
     if not len(first):
         frame["cs"], frame["low"], frame["high"] = 0.0, 0.0, 1.0
@@ -64,10 +64,10 @@ def _kaplan_meier(runs: pd.DataFrame, frame: pd.DataFrame) -> pd.DataFrame:
         k = frame["k"].to_numpy(float)
         frame["cs"] = cdf.evaluate(k)
         low = np.nan_to_num(ends.low.evaluate(k), nan=0.0)
-        # What holds by an earlier k holds by a later one.
+        # CS(k) never decreases, so a lower bound at k holds at k + 1 as well.
         frame["low"] = np.maximum.accumulate(low)
         frame["high"] = np.nan_to_num(ends.high.evaluate(k), nan=1.0)
-        nobody = frame["cs"] == 0
-        frame.loc[nobody, ["low", "high"]] = (0.0, 1.0)
+        unsolved = frame["cs"] == 0
+        frame.loc[unsolved, ["low", "high"]] = (0.0, 1.0)
     frame["method"] = "Kaplan-Meier"
     return frame[["k", "cs", "low", "high", "solved", "at_risk", "method"]]

@@ -1,4 +1,4 @@
-"""Exact statistics of counts, for all that reports rates and compares them."""
+"""Exact statistics of counts, used wherever rates are reported or compared."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ CONFIDENCE = 0.95
 def exact_interval(
     successes: int, trials: int, confidence: float = CONFIDENCE
 ) -> tuple[float, float]:
-    """Interval of Clopper and Pearson (1934); [0, 1] without a trial."""
+    """Clopper-Pearson interval (1934) of a success rate; [0, 1] without trials."""
     if trials == 0:
         return 0.0, 1.0
     found = binomtest(successes, trials).proportion_ci(confidence, method="exact")
@@ -18,9 +18,9 @@ def exact_interval(
 
 
 def sign_test(ups: int, downs: int) -> float:
-    """Two-sided p of so many ups and downs, if both are equally likely.
+    """Two-sided p-value of the exact sign test; 1 if both counts are 0.
 
-    Of discordant pairs this is McNemar's exact test; 1 where there are none.
+    For the counts of discordant pairs this is McNemar's exact test.
     """
     total = ups + downs
     return float(binomtest(ups, total).pvalue) if total else 1.0

@@ -12,37 +12,37 @@ from tdac_agent.errors import RunError
 from tdac_agent.runs.records import Attempt, Run, load_run
 
 RUN_COLUMNS = {
-    "run": "Its folder, or another name that no other run has.",
+    "run": "Run folder, or another unique name.",
     "task": "Name of the task.",
-    "learner": "LLM1, as named for `--learner`.",
-    "optimizer": "LLM2.",
-    "prompt": "Template of the first question.",
-    "K": "Most iterations.",
-    "J": "Edits per iteration.",
-    "setting": "What of the loop was in use, as in `tdac_agent.runs.records.Setting`.",
-    "seed": "Of the jittered starts where it was given, else the number of the run.",
-    "status": "As in `run.json`.",
-    "tau": "Iteration of the first success; missing where there was none.",
-    "done": "Iterations that were judged to their end, with success or without.",
-    "censored": "Whether money, time or a fault ended it before success or K.",
-    "tokens": "Of all questions and answers; missing where nobody counted.",
-    "cost": "USD; missing where a price is unknown.",
-    "seconds": "Wall time.",
+    "learner": "LLM1, as given to `--learner`.",
+    "optimizer": "LLM2, as given to `--optimizer`.",
+    "prompt": "Template of the first prompt.",
+    "K": "Maximum number of iterations.",
+    "J": "Maximum number of edits per iteration.",
+    "setting": "Parts of the loop in use; see `tdac_agent.runs.records.Setting`.",
+    "seed": "Seed of the jittered starts if one was given, else the run's number.",
+    "status": "Status in `run.json`.",
+    "tau": "Iteration of the first success; missing if there was none.",
+    "done": "Number of iterations judged to their end, successful or not.",
+    "censored": "Whether budget, time or a fault ended the run before success or K.",
+    "tokens": "Tokens of all prompts and answers; missing if not counted.",
+    "cost": "Cost, USD; missing if a price is unknown.",
+    "seconds": "Wall time, s.",
 }
 CANDIDATE_COLUMNS = {
-    "run": "As above.",
+    "run": "As in `RUN_COLUMNS`.",
     "k": "Iteration, from 1.",
-    "j": "Edit, 0 for what the Learner wrote.",
-    "valid": "Whether there was a controller; the paper's set of valid pairs.",
+    "j": "Edit, from 1; 0 is the Learner's own answer.",
+    "valid": "Whether the answer had a controller (the paper's set of valid pairs).",
     "passed": "Whether all of its tests passed.",
-    "failed": "Number of failed tests; missing where there was no controller.",
+    "failed": "Number of failed tests; missing without a controller.",
 }
 Row = dict[str, object]
 
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """What is known of some runs.
+    """Runs and their candidates.
 
     Attributes:
         runs: A row per run, with `RUN_COLUMNS`.
@@ -53,7 +53,7 @@ class Frames:
     candidates: pd.DataFrame
 
     def only(self, **columns: object) -> Frames:
-        """The runs whose columns have these values, and their candidates."""
+        """Selects the runs whose columns have these values, and their candidates."""
         chosen = self.runs
         for name, value in columns.items():
             chosen = chosen[chosen[name] == value]
@@ -62,10 +62,10 @@ class Frames:
 
 
 def find_runs(folder: Path) -> Iterator[Run]:
-    """The runs at or below a folder, in the order of their names.
+    """Yields the runs at or below a folder, sorted by path.
 
     Raises:
-        RunError: There is none, or one cannot be read.
+        RunError: There is no run, or one cannot be read.
     """
     found = sorted(path.parent for path in folder.rglob("run.json"))
     if not found:
@@ -74,16 +74,16 @@ def find_runs(folder: Path) -> Iterator[Run]:
 
 
 def load_frames(*folders: Path) -> Frames:
-    """The runs at or below some folders.
+    """Loads the runs at or below some folders.
 
     Raises:
-        RunError: There is none in one of them, or one cannot be read.
+        RunError: A folder has no run, or a run cannot be read.
     """
     return frames_of(run for folder in folders for run in find_runs(folder))
 
 
 def frames_of(runs: Iterable[Run]) -> Frames:
-    """Frames of run records."""
+    """Builds frames from run records."""
     rows: list[Row] = []
     candidates: list[Row] = []
     for run in runs:
@@ -93,10 +93,10 @@ def frames_of(runs: Iterable[Run]) -> Frames:
 
 
 def join_frames(*frames: Frames) -> Frames:
-    """The runs of several frames in one.
+    """Joins several frames into one.
 
     Raises:
-        RunError: There are none, or a run is in two of them.
+        RunError: No frames are given, or a run is in two of them.
     """
     if not frames:
         raise RunError("there are no runs to join")
@@ -153,16 +153,16 @@ def frames_from_tau(
     invalid: int = 0,
     **labels: str,
 ) -> Frames:
-    """Frames of runs of which only the first successes are known, as in a paper.
+    """Builds frames of runs known only by their first success, as in a paper.
 
     Args:
-        tau: Iteration of the first success of each run, None where there was none.
-        most: K.
-        ended: Iterations of further runs that money, time or a fault ended without
-            success.
-        invalid: How many of the iterations gave no controller; they are taken to be
-            the first ones of the longest runs, which no metric depends on.
-        labels: Columns such as `learner` and `task`.
+        tau: Iteration of the first success of each run; None if it had none.
+        most: K, the maximum number of iterations.
+        ended: Number of iterations of each further run that budget, time or a fault
+            ended without success.
+        invalid: Number of iterations without a controller. They are assigned to the
+            first iterations of the longest runs; no metric depends on which.
+        labels: Values of columns such as `learner` and `task`.
     """
     left = invalid
     rows: list[Row] = []
@@ -187,12 +187,12 @@ def frames_from_tau(
 
 
 def iterations_of(candidates: pd.DataFrame) -> pd.DataFrame:
-    """A row per iteration: what the paper counts, edits being part of it.
+    """Groups candidates by iteration, the unit that the paper counts.
 
     Returns:
-        Columns run, k, valid (a controller was generated), passed (one of its
-        candidates passed), failed (tests that its last valid candidate failed, the
-        paper's f), candidates (how many there were).
+        A row per iteration: run, k, valid (a controller was generated), passed (one of
+        its candidates passed), failed (tests that its last valid candidate failed, the
+        paper's f), candidates (their number).
     """
     ordered = candidates.sort_values(["run", "k", "j"])
     grouped = ordered.groupby(["run", "k"], sort=False)
@@ -218,5 +218,5 @@ def _frames(rows: list[Row], candidates: list[Row]) -> Frames:
 
 def _check_unique(runs: pd.DataFrame) -> None:
     if runs["run"].duplicated().any():
-        again = runs["run"][runs["run"].duplicated()].iloc[0]
-        raise RunError(f"the run {again} is there twice")
+        duplicate = runs["run"][runs["run"].duplicated()].iloc[0]
+        raise RunError(f"the run {duplicate} occurs twice")

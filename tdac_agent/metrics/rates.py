@@ -1,4 +1,4 @@
-"""Rates and their intervals."""
+"""Success rates and their confidence intervals."""
 
 from __future__ import annotations
 
@@ -15,33 +15,32 @@ from tdac_agent.metrics.frames import Frames, iterations_of
 RESAMPLES = 9_999
 ASSUMPTIONS = {
     "Clopper-Pearson": (
-        "independent trials with one probability; exact: holds it at least as often "
-        "as it says"
+        "independent trials with the same probability of success; exact: covers the "
+        "true value at least as often as stated"
     ),
     "runs resampled": (
-        "independent runs of one kind, whatever goes on within each (percentile "
+        "independent runs of one kind, with any dependence within a run (percentile "
         "bootstrap; too narrow with few runs)"
     ),
     "Kaplan-Meier": (
-        "independent runs; that money or time ended some of them has nothing to do "
-        "with how near they were (Greenwood, log-log)"
+        "independent runs; whether budget, time or a fault ended a run does not depend "
+        "on how close it was to success (Greenwood, log-log)"
     ),
-    "none": "one run, none, or runs that are all alike: no interval",
+    "none": "no interval: fewer than two runs, or all runs have the same counts",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """A fraction with its interval.
+    """A success rate with its interval.
 
     Attributes:
-        value: The fraction; NaN where there was no trial.
-        successes: Its numerator.
-        trials: Its denominator.
-        low: The interval's lower end; NaN where there is none.
-        high: Its upper end.
-        method: How the interval was made; `ASSUMPTIONS` says what that takes for
-            granted.
+        value: Fraction of successes; NaN without trials.
+        successes: Number of successes.
+        trials: Number of trials.
+        low: Lower end of the interval; NaN if there is no interval.
+        high: Upper end of the interval; NaN if there is no interval.
+        method: How the interval was computed, a key of `ASSUMPTIONS`.
     """
 
     value: float
@@ -60,30 +59,29 @@ class Rate:
 
 
 def success_rate(frames: Frames, *, invalid: bool = False, seed: int = 0) -> Rate:
-    """SR of the paper: valid iterations that passed, over all valid iterations.
+    """SR of the paper: the fraction of valid iterations that passed.
 
-    A run stops at its first success, so that without censoring and invalid iterations
-    this is R / (tau_1 + ... + tau_R). Iterations of a run are not independent (they
-    share its rules, and the last one is the one that passed), so its interval comes
-    from resampling runs; where each run had just one iteration, they are independent,
-    and the interval is exact.
+    A run stops at its first success, so that without censored runs and invalid
+    iterations SR is R / (tau_1 + ... + tau_R). The iterations of a run are not
+    independent (they share rules, and only the last one can pass), so the interval is
+    computed by resampling runs. If each run had one iteration, the interval is exact.
 
     Args:
         frames: The runs.
-        invalid: Whether iterations without a controller count, too, as failed: not
-            the paper's formula, but what some of its figures show.
-        seed: Of the resampling.
+        invalid: Whether iterations without a controller also count, as failed. This is
+            not the paper's formula, but some of its figures count this way.
+        seed: Seed of the resampling.
     """
     iterations = iterations_of(frames.candidates)
     return _over_runs(iterations[iterations["valid"] | invalid], seed)
 
 
 def unbiased_success_rate(frames: Frames) -> float:
-    """Probability that an iteration passes, if that is the same in all: (R-1)/(N-1).
+    """Unbiased estimate of the probability that an iteration passes: (R-1)/(N-1).
 
-    With N valid iterations until the R-th success SR = R/N is too high on average
-    (Haldane 1945). NaN with fewer than two runs that passed, or where a run ended
-    without success: N is not random in that way then.
+    Assumes the same probability in all iterations. For N valid iterations up to the
+    R-th success, SR = R/N is too high on average (Haldane 1945). NaN with fewer than
+    two successes, or if a run ended without success: N is not negative binomial then.
     """
     rate = success_rate(frames)
     if rate.successes < max(2, len(frames.runs)):
@@ -92,9 +90,9 @@ def unbiased_success_rate(frames: Frames) -> float:
 
 
 def first_pass(frames: Frames) -> Rate:
-    """Runs whose very first candidate (k = 1, j = 0) passed: true one-shot success.
+    """Fraction of runs whose first candidate (k = 1, j = 0) passed: one-shot success.
 
-    A run whose first answer held no controller counts as one that did not.
+    A run whose first answer had no controller counts as failed.
     """
     tried = frames.candidates
     first = tried[(tried["k"] == 1) & (tried["j"] == 0)]
@@ -102,12 +100,12 @@ def first_pass(frames: Frames) -> Rate:
 
 
 def candidate_rate(frames: Frames, *, seed: int = 0) -> Rate:
-    """Candidates (k, j) that passed, over all with a controller; runs resampled."""
+    """Fraction of the candidates (k, j) with a controller that passed."""
     return _over_runs(frames.candidates[frames.candidates["valid"]], seed)
 
 
 def solved(runs: pd.DataFrame, k: int) -> pd.Series:
-    """Whether each run had a success by iteration k."""
+    """Whether each run succeeded by iteration k."""
     return runs["tau"].le(k).fillna(value=False).astype(bool)
 
 
@@ -119,7 +117,7 @@ def _exact(successes: int, trials: int) -> Rate:
 
 
 def _over_runs(tries: pd.DataFrame, seed: int) -> Rate:
-    """Of rows with run and passed: how many passed, each run being a unit."""
+    """Pass rate of rows with the columns `run` and `passed`, resampled by run."""
     per_run = tries.groupby("run")["passed"].agg(["sum", "size"])
     return rate_of_runs(
         per_run["sum"].to_numpy(int), per_run["size"].to_numpy(int), seed
@@ -127,12 +125,12 @@ def _over_runs(tries: pd.DataFrame, seed: int) -> Rate:
 
 
 def rate_of_runs(passed: np.ndarray, tried: np.ndarray, seed: int = 0) -> Rate:
-    """A rate over all tries of some runs.
+    """Pass rate over all tries of some runs.
 
     Args:
-        passed: Tries of each run that passed, shape (R,).
-        tried: Tries of each run, shape (R,).
-        seed: Of the resampling.
+        passed: Number of tries that passed, by run, shape (R,).
+        tried: Number of tries, by run, shape (R,).
+        seed: Seed of the resampling.
     """
     successes, trials = int(passed.sum()), int(tried.sum())
     if trials and (tried == 1).all():
@@ -145,8 +143,8 @@ def rate_of_runs(passed: np.ndarray, tried: np.ndarray, seed: int = 0) -> Rate:
 def _resampled(
     passed: np.ndarray, tried: np.ndarray, seed: int
 ) -> tuple[float, float, str]:
-    """Percentile interval of a ratio of sums over runs."""
-    # Of runs that are alike every resample is the same: that is no certainty.
+    """Percentile interval of a ratio of sums over runs, and its method."""
+    # Resamples of identical runs are identical: the interval would have no width.
     if len(passed) < 2 or len({*zip(passed.tolist(), tried.tolist(), strict=True)}) < 2:
         return math.nan, math.nan, "none"
 

@@ -1,4 +1,4 @@
-"""Results that are only known by their first successes, as a paper prints them."""
+"""Loads results known only by their first successes, as a paper prints them."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ _WORD = re.compile(r"(\d+)(\+?)")
 
 
 def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
-    """Frames of a table with a row per kind of runs, as in `results/paper`.
+    """Loads a table with one row per kind of run, such as `results/paper/results.csv`.
 
-    Its column `tau` holds the iterations of the first successes, `1 2 5`; `2+` is a run
-    that was ended after two iterations without success, by money, time or a fault.
-    `invalid` counts iterations that gave no controller. Columns that are in
-    `RUN_COLUMNS`, too, are taken over; `environment`, `2d` or `3d`, becomes part of the
-    runs' names, so that those of both may be joined. Others only serve to choose rows.
+    The column `tau` lists the iterations of the first successes, such as `1 2 5`; `2+`
+    is a run that budget, time or a fault ended after two iterations without success.
+    `invalid` is the number of iterations without a controller. Columns named in
+    `RUN_COLUMNS` are copied; `environment` (`2d` or `3d`) becomes part of the run
+    names, so that runs of both can be joined. Other columns only serve to select rows.
 
     Args:
         path: A CSV file.
-        most: K.
-        only: Values of columns, of the rows that are wanted: `environment="2d"`.
+        most: K, the maximum number of iterations.
+        only: Column values of the rows to load, such as `environment="2d"`.
 
     Raises:
-        RunError: It cannot be read, or has no such column or row.
+        RunError: The file cannot be read, or a column or row is missing.
     """
     try:
         table = pd.read_csv(path, dtype=str, keep_default_na=False)

@@ -1,4 +1,4 @@
-"""One row per kind of run: the metrics that belong into a paper."""
+"""Table of metrics with one row per kind of run."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ KIND = ("learner", "optimizer", "task", "prompt", "setting")
 
 
 def summarise(frames: Frames, by: Sequence[str] = KIND) -> pd.DataFrame:
-    """The metrics of each kind of run.
+    """Computes the metrics of each kind of run.
 
     Args:
         frames: The runs.
-        by: Columns of `runs` that tell kinds apart.
+        by: Columns of `runs` that define a kind.
 
     Returns:
-        A row per kind: the columns of `by`; R, verified, censored (runs); sr, sr_low,
-        sr_high (runs resampled); sr_unbiased; first_pass with _low and _high (exact);
-        cs_K, the fraction solved, with _low and _high (exact, censored runs left out);
-        candidate_rate; tau_mean (of the verified); tokens_per_verified and
-        cost_per_verified (of all runs of the kind, over the verified ones);
-        seconds_mean.
+        A row per kind: the columns of `by`; R, verified, censored (numbers of runs);
+        sr, sr_low, sr_high (runs resampled); sr_unbiased; first_pass with _low and
+        _high (exact); cs_K, the fraction of the uncensored runs that were solved, with
+        _low and _high (exact); candidate_rate; tau_mean (of verified runs);
+        tokens_per_verified and cost_per_verified (total of all runs of the kind,
+        divided by the number of verified ones); seconds_mean.
     """
     columns = list(by)
     rows = []
@@ -62,26 +62,26 @@ def _metrics(frames: Frames) -> dict[str, object]:
         "R": len(runs),
         "verified": verified,
         "censored": int(runs["censored"].sum()),
-        **_told("sr", success_rate(frames)),
+        **_with_interval("sr", success_rate(frames)),
         "sr_unbiased": unbiased_success_rate(frames),
-        **_told("first_pass", first_pass(frames)),
+        **_with_interval("first_pass", first_pass(frames)),
         "cs_K": done / len(whole) if len(whole) else float("nan"),
         "cs_K_low": low,
         "cs_K_high": high,
         "candidate_rate": candidate_rate(frames).value,
         "tau_mean": float(runs["tau"].mean()) if verified else float("nan"),
-        "tokens_per_verified": _each(runs["tokens"], verified),
-        "cost_per_verified": _each(runs["cost"], verified),
+        "tokens_per_verified": _per_verified(runs["tokens"], verified),
+        "cost_per_verified": _per_verified(runs["cost"], verified),
         "seconds_mean": float(runs["seconds"].mean()),
     }
 
 
-def _told(name: str, rate: Rate) -> dict[str, float]:
+def _with_interval(name: str, rate: Rate) -> dict[str, float]:
     return {name: rate.value, f"{name}_low": rate.low, f"{name}_high": rate.high}
 
 
-def _each(spent: pd.Series, verified: int) -> float:
-    """Spent by all, for each that was verified; NaN where not all is known."""
+def _per_verified(spent: pd.Series, verified: int) -> float:
+    """Total spent per verified run; NaN if none is verified or some is unknown."""
     if not verified or spent.isna().any():
         return float("nan")
     return float(spent.sum()) / verified
