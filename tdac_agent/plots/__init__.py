@@ -1,4 +1,4 @@
-"""Figures of runs and metrics, with matplotlib: vector, legible, colour-blind safe."""
+"""Matplotlib figures of runs and metrics, safe for colour-blind readers."""
 
 from tdac_agent.plots.baselines import (
     plot_generalisation,

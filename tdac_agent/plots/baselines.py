@@ -1,4 +1,4 @@
-"""Figures of baselines: how they learn, how they do, and how they do elsewhere."""
+"""Figures of baselines: learning curves, success rates and generalisation."""
 
 from __future__ import annotations
 
@@ -26,51 +26,51 @@ _COLUMNS = 3
 
 
 def plot_learning_curves(curves: pd.DataFrame) -> Figure:
-    """Success over steps, a panel per task, mean and range of the seeds.
+    """Plots success over training steps, a panel per task.
 
     Args:
-        curves: A row for each evaluation, with `task`, `algo`, `seed`, `steps` and
-            `success_rate`.
+        curves: A row per evaluation, with the columns `task`, `algo`, `seed`, `steps`
+            and `success_rate`.
     """
     tasks = list(curves["task"].drop_duplicates())
     algos = list(curves["algo"].drop_duplicates())
     figure, panels = _panels(len(tasks), 2.5, 2.1)
     for axes, task in zip(panels, tasks, strict=False):
         for number, algo in enumerate(algos):
-            of = curves[(curves["task"] == task) & (curves["algo"] == algo)]
-            if not of.empty:
-                _curve(axes, of, algo.upper(), number)
+            rows = curves[(curves["task"] == task) & (curves["algo"] == algo)]
+            if not rows.empty:
+                _curve(axes, rows, algo.upper(), number)
         count = curves[curves["task"] == task].groupby("algo")["seed"].nunique()
         seeds = ", ".join(
             f"{str(algo).upper()}: {n} seed{'s' * (n > 1)}" for algo, n in count.items()
         )
-        _name(axes, task.replace(" ", ", "), seeds)
+        _title(axes, task.replace(" ", ", "), seeds)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.set_ylim(-0.03, 1.05)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:.0f}k"))
     _legend(figure, panels)
     figure.supxlabel(
-        "steps of training, all robots together; each seed thin, their mean and range",
+        "training steps of all robots; thin: each seed, bold: mean, shaded: range",
         fontsize=9,
         color=TEXT,
     )
-    figure.supylabel("evaluation episodes reached", fontsize=9, color=TEXT)
+    figure.supylabel("evaluation episodes with goal reached", fontsize=9, color=TEXT)
     return figure
 
 
 def _curve(axes: Axes, rows: pd.DataFrame, label: str, number: int) -> None:
-    """Each seed as a thin line; of several, their mean and range where all are."""
-    each = [of.sort_values("steps") for _, of in rows.groupby("seed")]
+    """Draws each seed, and mean and range over the steps that all seeds cover."""
+    seeds = [seed.sort_values("steps") for _, seed in rows.groupby("seed")]
     colour, line = COLOURS[number], LINES[number]
-    for of in each:
-        axes.plot(of["steps"], of["success_rate"], color=colour, lw=0.6, alpha=0.6)
-    first = max(of["steps"].min() for of in each)
-    last = min(of["steps"].max() for of in each)
+    for seed in seeds:
+        axes.plot(seed["steps"], seed["success_rate"], color=colour, lw=0.6, alpha=0.6)
+    first = max(seed["steps"].min() for seed in seeds)
+    last = min(seed["steps"].max() for seed in seeds)
     steps = np.unique(rows["steps"])
     steps = steps[(first <= steps) & (steps <= last)]
     values = np.array(
-        [np.interp(steps, of["steps"], of["success_rate"]) for of in each]
+        [np.interp(steps, seed["steps"], seed["success_rate"]) for seed in seeds]
     )
     low, high = values.min(axis=0), values.max(axis=0)
     axes.fill_between(steps, low, high, color=colour, alpha=0.18, lw=0)
@@ -78,11 +78,11 @@ def _curve(axes: Axes, rows: pd.DataFrame, label: str, number: int) -> None:
 
 
 def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
-    """Success by policy, a panel per task, with exact intervals; seeds side by side.
+    """Plots success by policy with exact intervals: a panel per task, a dot per seed.
 
     Args:
-        evaluation: A row for each policy on each task, with `task`, `policy`,
-            `training`, `knows`, `episodes` and `reached`; the last two are empty where
+        evaluation: A row per policy and task, with the columns `task`, `policy`,
+            `training`, `knows`, `episodes` and `reached`; the last two are empty if
             there is no such policy.
     """
     tasks = list(evaluation["task"].drop_duplicates())
@@ -93,12 +93,12 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
     figure, panels = _panels(len(tasks), width, height, shared=True)
     missing = False
     for axes, task in zip(panels, tasks, strict=False):
-        of = evaluation[evaluation["task"] == task]
+        rows = evaluation[evaluation["task"] == task]
         for place, policy in enumerate(policies):
-            known = of[of["policy"] == policy].dropna(subset=["episodes"])
+            known = rows[rows["policy"] == policy].dropna(subset=["episodes"])
             _dots(axes, known, len(policies) - place, colours)
             missing |= known.empty
-        _name(axes, task)
+        _title(axes, task)
         axes.set_yticks(range(len(policies), 0, -1), policies)
         axes.set_ylim(0.4, len(policies) + 0.6)
         axes.set_xlim(-0.05, 1.05)
@@ -106,12 +106,12 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
         axes.xaxis.set_major_formatter(PercentFormatter(1.0))
         axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
     _legend(figure, panels)
-    told = "episodes reached without a contact, exact 95 % intervals"
+    label = "episodes with goal reached without contact, exact 95 % intervals"
     if evaluation["training"].notna().any():
-        told += "; a dot for each seed of a training"
+        label += "; one dot per training seed"
     if missing:
-        told += "; –: there is none"
-    figure.supxlabel(told, fontsize=9, color=TEXT)
+        label += "; –: no such policy"
+    figure.supxlabel(label, fontsize=9, color=TEXT)
     return figure
 
 
@@ -141,11 +141,12 @@ def _dots(
 
 
 def plot_generalisation(found: pd.DataFrame) -> Figure:
-    """Success where a policy was trained and elsewhere, mean of the seeds, in %.
+    """Plots success on the training task and on other tasks, over all seeds, in %.
 
     Args:
-        found: A row for each policy on each place, with `trained_on`, `evaluated_on`,
-            `seen`, `episodes` and `reached`; `algo`, where there are several.
+        found: A row per policy and task, with the columns `trained_on`,
+            `evaluated_on`, `seen`, `episodes` and `reached`, and `algo` if there are
+            several.
     """
     trained = found["trained_on"].str.replace(" ", ", ")
     if "algo" in found:
@@ -167,7 +168,7 @@ def plot_generalisation(found: pd.DataFrame) -> Figure:
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
     axes.tick_params(length=0, colors=TEXT)
     axes.spines[:].set_visible(False)
-    axes.set_xlabel("evaluated on (framed: trained on it)", fontsize=9, color=TEXT)
+    axes.set_xlabel("evaluated on (framed: training task)", fontsize=9, color=TEXT)
     axes.set_ylabel("trained on", fontsize=9, color=TEXT)
     return figure
 
@@ -191,7 +192,7 @@ def _frame(x: int, y: int) -> Rectangle:
 def _panels(
     count: int, width: float, height: float, *, shared: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with so many panels in rows, sizes of one in inches."""
+    """A figure with `count` panels in rows; width and height of a panel in inches."""
     columns = min(_COLUMNS, count)
     rows = math.ceil(count / columns)
     left = 1.6 if shared else 0.3
@@ -203,7 +204,7 @@ def _panels(
     return figure, panels
 
 
-def _name(axes: Axes, text: str, below: str = "") -> None:
+def _title(axes: Axes, text: str, below: str = "") -> None:
     axes.set_title(text, loc="left", fontsize=9.5, color=TEXT, pad=14 if below else 4)
     axes.annotate(
         below,

@@ -35,13 +35,13 @@ def plot_success_rates(
     heading: str = "Success rate SR",
     provenance: str = "",
 ) -> Figure:
-    """A bar per learner and group, with the interval of resampled runs.
+    """Plots SR with its interval, as a bar per learner and group.
 
     Args:
-        groups: Runs by the name of where they are from; shown side by side.
-        by: Column of the runs that makes a bar.
+        groups: Runs by the name of their group; groups are shown side by side.
+        by: Column of the runs that defines a bar.
         heading: Title.
-        provenance: A line below it: whose runs, how many.
+        provenance: Line below the title: source and number of the runs.
     """
     names = _order(groups, by)
     figure, axes = new_figure(max(5.0, 1.1 + 0.95 * len(names)), 3.6)
@@ -70,7 +70,7 @@ def plot_success_rates(
 
 
 def _bar(axes: Axes, place: float, rate: Rate, width: float, colour: str) -> None:
-    """A rate with its interval, where it has one, and its figure above."""
+    """Draws a rate with its interval, if it has one, and its value above."""
     axes.bar(place, rate.value, width, color=colour)
     top = rate.value
     if not math.isnan(rate.low):
@@ -97,17 +97,17 @@ def plot_cumulative_success(
     provenance: str = "",
     bands: bool = True,
 ) -> Figure:
-    """CS(k) of each learner, with its pointwise interval.
+    """Plots CS(k) of each learner with its pointwise interval.
 
-    Bands of more than three curves would hide each other: those are in
-    `plot_cumulative_panels`.
+    Bands of more than three curves would hide each other and are left out; use
+    `plot_cumulative_panels` instead.
 
     Args:
         frames: The runs.
-        by: Column of the runs that makes a curve.
-        most: Largest k; where the last curve has reached its end, by default.
+        by: Column of the runs that defines a curve.
+        most: Largest k; by default one more than the longest run has, at most K.
         heading: Title.
-        provenance: A line below it.
+        provenance: Line below the title.
         bands: Whether to shade the 95 % intervals.
     """
     figure, axes = new_figure(6.4, 4.0)
@@ -132,14 +132,14 @@ def plot_cumulative_panels(
     heading: str = "Cumulative success CS(k)",
     provenance: str = "",
 ) -> Figure:
-    """A panel for each learner: its CS(k) with its band, the others in grey behind it.
+    """Plots a panel per learner: its CS(k) with its band, the others in grey.
 
     Args:
         frames: The runs.
-        by: Column of the runs that makes a panel.
-        most: Largest k; where the last curve has reached its end, by default.
-        heading: Title of the first panel.
-        provenance: A line below it.
+        by: Column of the runs that defines a panel.
+        most: Largest k; by default one more than the longest run has, at most K.
+        heading: Title of the figure.
+        provenance: Line below the title.
     """
     curves = _curves(frames, by, most)
     columns = min(3, max(1, len(curves)))
@@ -148,7 +148,7 @@ def plot_cumulative_panels(
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for number, axes in enumerate(grid.flat[len(curves) :], len(curves)):
         axes.set_axis_off()
-        # The panel above it is the lowest one of its column.
+        # The panel above is now the lowest of its column.
         if number >= columns:
             grid.flat[number - columns].tick_params(labelbottom=True)
     for number, (name, curve) in enumerate(curves.items()):
@@ -167,8 +167,8 @@ def plot_cumulative_panels(
 
 
 def _curves(frames: Frames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
-    """CS(k) of each kind, from k = 0, where nothing has succeeded."""
-    last = most if most is not None else _shown(frames.runs)
+    """CS(k) of each kind, starting with CS(0) = 0."""
+    last = most if most is not None else _last_shown_k(frames.runs)
     begin = pd.DataFrame({"k": [0], "cs": [0.0], "low": [0.0], "high": [0.0]})
     return {
         name: pd.concat([begin, cumulative_success(runs, last)], ignore_index=True)
@@ -183,7 +183,7 @@ def _counted(frames: Frames, by: str, name: str) -> str:
 def _step(
     axes: Axes, curve: pd.DataFrame, number: int, colour: str, label: str = ""
 ) -> None:
-    """A curve with a mark at each of its steps."""
+    """Draws a curve with a marker at each of its steps."""
     value = curve["cs"].to_numpy(float)
     axes.step(
         curve["k"],
@@ -217,8 +217,8 @@ def _frame(axes: Axes, curves: dict[str, pd.DataFrame]) -> None:
     axes.set_ylim(0, 1.03)
 
 
-def _shown(runs: pd.DataFrame) -> int:
-    """Iterations worth showing: one more than the longest run had."""
+def _last_shown_k(runs: pd.DataFrame) -> int:
+    """Last iteration to show: one more than the longest run has, at most K."""
     return min(int(runs["K"].max()), int(runs["done"].max()) + 1)
 
 

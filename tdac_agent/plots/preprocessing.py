@@ -1,4 +1,4 @@
-"""The stages of preprocessing: from a picture to what the robot may drive on."""
+"""Figure of the preprocessing stages: from an image to free space for the robot."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _SHADES = {"dark": "dark is occupied", "light": "light is occupied"}
 
 
 def plot_preprocessing(image: Source, grid: OccupancyGrid, params: MapParams) -> Figure:
-    """Four stages: the picture, its threshold, the grid, and room for the robot.
+    """Plots the image, its threshold, the occupancy grid, and space for the robot.
 
     Args:
-        image: What `tdac_envs.preprocess` got.
-        grid: What it gave.
-        params: What it chose.
+        image: Image given to `tdac_envs.preprocess`.
+        grid: Occupancy grid that it returned.
+        params: Parameters that it chose.
     """
     source = as_image(image)
     shape = grid.height / grid.width
     figure = new_plot(2 * SIDE + 0.4, 2 * SIDE * min(1.4, shape) + 1.2)
     first, second, third, last = figure.subplots(2, 2).flat
     first.imshow(source.colour, interpolation="antialiased")
-    _name(first, "1  the picture", f"{source.name}, {grid.width} × {grid.height} px")
+    _title(first, "1  the image", f"{source.name}, {grid.width} × {grid.height} px")
     _plot_threshold(dress(second), luminance(source.colour), params)
     _plot_grid(third, grid.cells, luminance(source.colour), params)
     _plot_room(last, grid, params)
@@ -45,7 +45,7 @@ def plot_preprocessing(image: Source, grid: OccupancyGrid, params: MapParams) ->
 
 
 def _plot_threshold(axes: Axes, grey: np.ndarray, params: MapParams) -> None:
-    """How many pixels have each luminance, and where they are cut."""
+    """Draws the histogram of the luminance, with the threshold."""
     counts = np.bincount(grey.ravel(), minlength=256)
     axes.bar(np.arange(256), np.maximum(counts, 0.5), width=1.0, color="#7A8494")
     axes.set_yscale("log")
@@ -57,13 +57,13 @@ def _plot_threshold(axes: Axes, grey: np.ndarray, params: MapParams) -> None:
         axes.axvline(params.threshold, color=FAILED, linewidth=1.5)
     shade = _SHADES.get(params.polarity, params.method)
     cut = "" if params.threshold is None else f"cut at {params.threshold:g}; "
-    _name(axes, "2  the threshold", f"{cut}{shade}")
+    _title(axes, "2  the threshold", f"{cut}{shade}")
 
 
 def _plot_grid(
     axes: Axes, cells: BoolGrid, grey: np.ndarray, params: MapParams
 ) -> None:
-    """What is occupied; in colour where the threshold alone says something else."""
+    """Draws the grid; cells that differ from the plain threshold are coloured."""
     shown, about = cells.astype(int), params.method
     if params.threshold is not None:
         light = grey > params.threshold
@@ -74,22 +74,22 @@ def _plot_grid(
             about = f"{freed:,} px freed (orange), {filled:,} closed (blue)"
     colours = ListedColormap([FREE, WALL, COLOURS[4], CLOSED])
     axes.imshow(shown, cmap=colours, vmin=0, vmax=3, interpolation="nearest")
-    _name(axes, "3  the occupancy grid", about)
+    _title(axes, "3  the occupancy grid", about)
 
 
 def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
-    """Where the body's centre may be, how far from walls that is, and the way."""
+    """Draws where the body's centre may be, its clearance, and the shortest path."""
     clear = clearance(grid.cells)
     room = body_free(clear, params.robot.radius + params.inflation)
     axes.imshow(grid.cells, cmap=ListedColormap([FREE, WALL]), interpolation="nearest")
     axes.imshow(
         np.ma.masked_array(clear, ~room),
         cmap="YlGnBu",
-        vmin=-0.3 * float(clear.max()),  # no place of it is as pale as the rest
+        vmin=-0.3 * float(clear.max()),  # stands out from the pale background
         interpolation="nearest",
     )
-    way = shortest_path(grid, params)
-    axes.plot(way[:, 0], way[:, 1], color=COLOURS[1], linewidth=1.8)
+    path = shortest_path(grid, params)
+    axes.plot(path[:, 0], path[:, 1], color=COLOURS[1], linewidth=1.8)
     for place, mark in ((params.start, "o"), (params.goal, "*")):
         if place is not None:
             axes.plot(*place, mark, color=PASSED, markeredgecolor="w", markersize=11)
@@ -97,10 +97,10 @@ def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
     about = f"for a disc of {params.robot.radius:g} px{margin}"
     if params.score_terms is not None:
         about += f"; path {params.score_terms.path_length:.0f} px"
-    _name(axes, "4  room for the robot", about)
+    _title(axes, "4  space for the robot", about)
 
 
-def _name(axes: Axes, text: str, about: str) -> None:
+def _title(axes: Axes, text: str, about: str) -> None:
     axes.set_title(f"{text}\n", loc="left", fontsize=10.5, color=TEXT)
     axes.annotate(
         about,

@@ -1,4 +1,4 @@
-"""Figures of one run: what failed when, where time and tokens went."""
+"""Figures of one run: failed tests by candidate, and use of time and tokens."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from tdac_agent.storage.journal import JournalRecord, read_records
 
 MOST_TESTS = 40
 CELL, NARROW = 0.36, 0.21
-"""Width of a candidate, inches; where there are many."""
+"""Width of a candidate's column, inches: with few and with many candidates."""
 MOST_LEVEL = 20
-"""Candidates whose names fit in side by side."""
+"""Most candidates with horizontal labels."""
 STEPS = {"generate": "writing", "edit": "editing", "summarise": "rules"}
 
 
 def plot_failures(run: Run) -> Figure:
-    """A row per test that ever failed, a column per candidate (k, j)."""
+    """Plots a row per test that ever failed, and a column per candidate (k, j)."""
     failed = _ever_failed(run.attempts)
     shown, left_out = failed[:MOST_TESTS], failed[MOST_TESTS:]
     cells = np.array(
@@ -52,24 +52,24 @@ def plot_failures(run: Run) -> Figure:
     if cells.size:
         colours = ListedColormap([PALE, FAILED, NOTHING])
         axes.pcolormesh(cells, cmap=colours, vmin=0, vmax=2, edgecolor="w", linewidth=1)
-        # Not by colour alone.
+        # A second cue besides colour.
         for y, x in np.argwhere(cells == 1):
             axes.text(x + 0.5, y + 0.5, "×", ha="center", va="center", color="w")
-    for place in _begins(run.attempts)[1:]:
+    for place in _iteration_starts(run.attempts)[1:]:
         axes.axvline(place, color="w", linewidth=5)
         axes.axvline(place, color="#999999", linewidth=0.8)
     axes.set_xlim(0, max(6, len(run.attempts)))
     axes.invert_yaxis()
     _label_tests(axes, shown)
     _label_candidates(axes, run.attempts)
-    more = f"; {len(left_out)} further tests left out" if left_out else ""
+    more = f"; {len(left_out)} of them not shown" if left_out else ""
     count = (
         f"{len(failed)} test{'' if len(failed) == 1 else 's'}" if failed else "no test"
     )
     learner = learner_named(run.learner)
     title(
         axes,
-        f"What failed in {run.folder.name}",
+        f"Failed tests of {run.folder.name}",
         f"{learner}; {count} ever failed{more}",
     )
     names = {PALE: "passed", FAILED: "× failed", NOTHING: "no code"}
@@ -85,7 +85,7 @@ def plot_failures(run: Run) -> Figure:
 
 
 def plot_breakdown(run: Run) -> Figure:
-    """Seconds and tokens of each candidate, by what they were used for."""
+    """Plots seconds and tokens of each candidate, by their use."""
     spent = _spent(journal_of(run))
     figure = new_plot(7.2 if run.tokens else 4.6, 3.2)
     panels = [
@@ -93,19 +93,19 @@ def plot_breakdown(run: Run) -> Figure:
         for axes in figure.subplots(1, 2 if run.tokens else 1, squeeze=False).flat
     ]
     _stack(panels[0], spent, ("writing", "editing", "rules", "testing"), "seconds")
-    counted = "" if run.tokens else "; no tokens were counted"
+    counted = "" if run.tokens else "; tokens were not counted"
     about = learner_named(run.learner) + counted
-    title(panels[0], f"Time in {run.folder.name}", about)
+    title(panels[0], f"Time of {run.folder.name}", about)
     if run.tokens:
         _stack(panels[1], spent, ("tokens in", "tokens out"), "tokens")
         panels[1].yaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         cost = "" if run.cost is None else f"; {run.cost:.3f} USD"
-        title(panels[1], "Tokens", f"{run.tokens:,} in all{cost}")
+        title(panels[1], "Tokens", f"{run.tokens:,} in total{cost}")
     return figure
 
 
-def _begins(attempts: list[Attempt]) -> list[int]:
-    """Numbers of the first candidates of all iterations."""
+def _iteration_starts(attempts: list[Attempt]) -> list[int]:
+    """Indices of the first candidate of each iteration."""
     return [n for n, a in enumerate(attempts) if n == 0 or attempts[n - 1].k != a.k]
 
 
@@ -115,7 +115,7 @@ def _label_tests(axes: Axes, shown: list[str]) -> None:
 
 
 def _label_candidates(axes: Axes, attempts: list[Attempt]) -> None:
-    """Below each column (k, j), and how many tests failed."""
+    """Labels each column with k.j and the number of failed tests."""
     many = len(attempts) > MOST_LEVEL
     between = "   " if many else "\n"
     counts = [str(len(a.failed_tests)) if a.valid else "–" for a in attempts]
@@ -126,13 +126,13 @@ def _label_candidates(axes: Axes, attempts: list[Attempt]) -> None:
     places = np.arange(len(attempts)) + 0.5
     axes.set_xticks(places, labels, rotation=90 if many else 0, fontsize=8)
     axes.tick_params(axis="x", length=0)
-    axes.set_xlabel("candidate k.j, and how many tests it failed", color=TEXT, size=9)
+    axes.set_xlabel("candidate k.j and its number of failed tests", color=TEXT, size=9)
 
 
 def _stack(
     axes: Axes, spent: dict[str, dict[str, float]], parts: tuple[str, ...], unit: str
 ) -> None:
-    """A bar per candidate, in parts; one that nobody could see is left out."""
+    """Draws a stacked bar per candidate; parts too small to see are left out."""
     names = list(spent)
     values = {
         part: np.array([uses.get(part, 0.0) for uses in spent.values()])
@@ -147,7 +147,7 @@ def _stack(
     axes.set_xlabel("candidate k.j", color=TEXT)
     axes.set_ylabel(unit, color=TEXT)
     if len(names) > MOST_LEVEL:
-        # The first one of each iteration stands for all of it.
+        # Only the first candidate of an iteration is labelled.
         firsts = [n for n, name in enumerate(names) if name.endswith(".0")]
         kept = firsts[:: 1 + len(firsts) // 10]
         axes.set_xticks(kept, [names[n].removesuffix(".0") for n in kept])
@@ -157,14 +157,14 @@ def _stack(
 
 
 def journal_of(run: Run) -> list[JournalRecord]:
-    """The whole records of a run's journal.
+    """The complete records of a run's journal.
 
     Raises:
-        RunError: There is none.
+        RunError: The run has no journal.
     """
     path = run.folder / JOURNAL
     if not path.is_file():
-        raise RunError(f"cannot read {path}: there is no such file")
+        raise RunError(f"cannot read {path}: no such file")
     return read_records(path)
 
 
@@ -198,5 +198,5 @@ def _ever_failed(attempts: list[Attempt]) -> list[str]:
 
 
 def short_name(test: str) -> str:
-    """A test without its file and `test_`."""
+    """A test's name without its file and `test_`."""
     return test.rpartition("::")[2].removeprefix("test_")

@@ -1,4 +1,4 @@
-"""What all figures have in common."""
+"""The common style of all figures."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from matplotlib.figure import Figure
 
 from tdac_agent.storage.files import write_atomic
 
-# Okabe and Ito (2008): told apart with any colour vision, and in this order in grey.
+# Okabe and Ito (2008): distinct with any colour vision and, in this order, in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LINES = ("-", "--", "-.", ":")
 PASSED, FAILED, NOTHING = "#009E73", "#D55E00", "#D9D9D9"
-PALE = "#D8EEE6"  # of what passed, where what failed is looked for
+PALE = "#D8EEE6"  # passed tests, where failed ones must stand out
 TEXT = "#333333"
 
 
 class Plot(Figure):
-    """A figure that notebooks show as it is.
+    """A figure that notebooks show as SVG.
 
-    It belongs to no window and no global list, so that nobody has to close it.
+    It is not registered with pyplot and need not be closed.
     """
 
     def _repr_svg_(self) -> str:
@@ -43,7 +43,7 @@ def new_plot(width: float, height: float) -> Plot:
 
 
 def dress(axes: Axes) -> Axes:
-    """Axes without the lines that say nothing."""
+    """Applies the common style to axes, and returns them."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color("#999999")
     axes.tick_params(colors=TEXT, labelsize=9)
@@ -53,7 +53,7 @@ def dress(axes: Axes) -> Axes:
 
 
 def title(axes: Axes, text: str, provenance: str = "") -> None:
-    """A title at the left, with where the figures come from below it."""
+    """Sets a title at the left, with the source of the data below it."""
     axes.set_title(text, loc="left", fontsize=11, color=TEXT, pad=20)
     if provenance:
         axes.annotate(
@@ -68,13 +68,13 @@ def title(axes: Axes, text: str, provenance: str = "") -> None:
 
 
 def colours_of(names: Iterable[str]) -> dict[str, str]:
-    """A colour for each name, in the order they come."""
+    """A colour for each name, in the order of the names."""
     unique = dict.fromkeys(names)
     return {name: COLOURS[n % len(COLOURS)] for n, name in enumerate(unique)}
 
 
 def legend(axes: Axes, count: int) -> None:
-    """A legend below the axes, where it covers nothing."""
+    """Adds a legend below the axes, where it covers no data."""
     rows = -(-count // 4)
     axes.legend(
         loc="upper center",
@@ -86,21 +86,21 @@ def legend(axes: Axes, count: int) -> None:
 
 
 def save_figure(figure: Figure, *paths: Path) -> None:
-    """Writes a figure, in the format of each name (svg, pdf, png); same bytes again."""
+    """Writes a figure to each path, in the format of its suffix (svg, pdf, png)."""
     for path in paths:
         write_atomic(path, figure_bytes(figure, path.suffix.lstrip(".") or "svg"))
 
 
 def figure_bytes(figure: Figure, kind: str = "svg") -> bytes:
-    """A figure as a file of some kind; the same bytes each time."""
+    """Encodes a figure as svg, pdf or png; equal figures give equal bytes."""
     stream = io.BytesIO()
     stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with rc_context({"svg.hashsalt": "tdac"}):  # names of its parts
+    with rc_context({"svg.hashsalt": "tdac"}):  # for the ids of elements
         figure.savefig(stream, format=kind, dpi=150, metadata=stamp)
     return stream.getvalue()
 
 
 def spread(count: int, width: float = 0.8) -> Sequence[float]:
-    """Offsets of bars that stand side by side around a place."""
+    """Offsets of bars that are centred side by side on a position."""
     each = width / max(1, count)
     return [each * (n - (count - 1) / 2) for n in range(count)]

@@ -1,4 +1,4 @@
-"""The timeline of one run: what was found, and what it learnt from that."""
+"""Timeline of one run: verdicts, root causes and changes of the rules."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from tdac_agent.storage.journal import JournalRecord
 
 COLUMNS, MOST_LINES, MOST_CAUSES = 106, 3, 4
 LINE, GAP = 0.165, 0.6
-"""Height of a line, inches; space between entries, lines."""
+"""Height of a line, in inches; space between entries, in lines."""
 NAMED = 3
 RULE, TROUBLE = COLOURS[0], COLOURS[4]
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Something that happened.
+    """One entry of the timeline.
 
     Attributes:
-        k: In which iteration; None where that has no meaning.
-        head: What it was, in some words.
-        lines: More of it.
-        colour: Of its mark.
-        mark: As matplotlib names it.
+        k: Iteration; None for an entry of the whole run.
+        head: Short title.
+        lines: Text beside the title.
+        colour: Colour of marker and title.
+        mark: Marker, as named by matplotlib.
     """
 
     k: int | None
@@ -45,18 +45,17 @@ class Entry:
 
     @property
     def rows(self) -> float:
-        """Lines that it takes."""
+        """Height with the gap below, in lines."""
         return max(1, len(self.lines)) + GAP
 
 
 def plot_timeline(run: Run) -> Figure:
-    """The run from above to below: what failed and why, and the rules that came of it.
+    """Plots a run from top to bottom: failures with their causes, and new rules.
 
     Raises:
-        RunError: It has no journal.
+        RunError: The run has no journal.
     """
-    told = gather_run(run)
-    entries = list(_entries(told, journal_of(run)))
+    entries = list(_entries(gather_run(run), journal_of(run)))
     rows = sum(entry.rows for entry in entries)
     figure, axes = new_figure(8.6, 0.75 + LINE * rows)
     axes.set_axis_off()
@@ -78,7 +77,7 @@ def plot_timeline(run: Run) -> Figure:
 
 def _draw(axes: Axes, entry: Entry, row: float, *, begins: bool) -> None:
     style: dict[str, Any] = {"va": "center", "fontsize": 8.5, "color": TEXT}
-    style["parse_math"] = False  # what a model wrote is no formula
+    style["parse_math"] = False  # text of a model may contain $
     if begins and entry.k is not None:
         axes.text(5.4, row, f"k = {entry.k}", ha="right", **style)
         if row:
@@ -92,7 +91,7 @@ def _draw(axes: Axes, entry: Entry, row: float, *, begins: bool) -> None:
 
 
 def _entries(told: Told, records: list[JournalRecord]) -> Iterator[Entry]:
-    """What a reader wants to know, in the order in which it happened."""
+    """Entries in chronological order."""
     tried = {(one.k, one.j): one for one in told.tried}
     for record in records:
         event, k = record["event"], record.get("k")
@@ -117,12 +116,12 @@ def _verdict(record: JournalRecord, tried: Tried | None) -> Entry:
         return Entry(k, f"{at}  no code", _wrapped(notes), TROUBLE)
     head = f"{at}  {len(record['failed_tests'])} failed"
     if record.get("unchanged"):
-        return Entry(k, head, _wrapped(["the same code again", *notes]), FAILED)
+        return Entry(k, head, _wrapped(["code unchanged", *notes]), FAILED)
     return Entry(k, head, (*_causes(record, tried), *_wrapped(notes)), FAILED)
 
 
 def _causes(record: JournalRecord, tried: Tried | None) -> tuple[str, ...]:
-    """What failed by root cause, or by name where no report tells more."""
+    """Root causes of the failures, or test names if there is no report."""
     if tried is None or tried.report is None:
         names = map(short_name, record["failed_tests"])
         return _wrapped([", ".join(names)])
@@ -136,18 +135,18 @@ def _causes(record: JournalRecord, tried: Tried | None) -> tuple[str, ...]:
 
 
 def _cause(group: Group) -> str:
-    """A root cause: which tests, and the first sentence of what happened."""
+    """Text of a root cause: its tests, and the first sentence of what happened."""
     names = [short_name(failure.test) for failure in group.members]
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     first = group.members[0]
-    what = first.message if first.diagnosis is None else first.diagnosis.text
-    # A sentence ends before a space, a figure does not.
-    sentence = what.partition(". ")[0].partition("\n")[0].rstrip(".")
+    text = first.message if first.diagnosis is None else first.diagnosis.text
+    # Unlike a decimal point, the end of a sentence is followed by a space.
+    sentence = text.partition(". ")[0].partition("\n")[0].rstrip(".")
     return f"{', '.join(names[:NAMED])}{more}: {sentence}"
 
 
 def _wrapped(texts: Sequence[str], most: int = MOST_LINES) -> tuple[str, ...]:
-    """Texts in lines, as many for each."""
+    """Wraps each text to at most `most` lines."""
     lines: list[str] = []
     for text in texts:
         rows = textwrap.wrap(text, COLUMNS, max_lines=most, placeholder=" …")

@@ -1,4 +1,4 @@
-"""Episodes over the map or the world."""
+"""Trajectories drawn over a map or world."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tdac_agent.tasks.task import Task
 from tdac_envs.drawing.backdrop import Chart
 
 WIDTH = 7.0
-"""Of the map, inches; less where it is higher than wide."""
+"""Width of the map, inches; less if its height is over 0.8 of its width."""
 
 
 def plot_trajectories(
@@ -38,18 +38,18 @@ def plot_trajectories(
     heading: str | None = None,
     provenance: str = "",
 ) -> Figure:
-    """Ways driven over the map or the world, with start, goal and shortest path.
+    """Draws trajectories over a map or world with start, goal and shortest path.
 
     Args:
-        task: Whose map or world.
-        ways: By what the legend calls them: trajectories as a judge recorded them,
-            or poses of shape (T + 1, 3), or places of shape (T + 1, 2), px or m.
-        outcomes: How each ended, as in a report: `reached`, `collision` ….
+        task: Task whose map or world is drawn.
+        ways: By name in the legend: trajectories as recorded by the judge, or poses of
+            shape (T + 1, 3), or positions of shape (T + 1, 2), in px or m.
+        outcomes: Outcome of each trajectory, as in a report: `reached`, `collision` ….
         heading: Title; the task's name by default.
-        provenance: A line below it.
+        provenance: Line below the title.
 
     Raises:
-        RunError: What is to be drawn are no poses.
+        RunError: An array has another shape.
     """
     chart = pictures_of(task.setting).backdrop().whole()
     picture = chart.canvas.image[: chart.canvas.strip_top]
@@ -78,7 +78,7 @@ def plot_trajectories(
 
 
 def _extent(chart: Chart) -> tuple[float, float, float, float]:
-    """Left, right, low and high edge of the picture, in the environment's unit."""
+    """Left, right, bottom and top edge of the picture, in the environment's unit."""
     (x0, y0), (x1, y1) = chart.canvas.to_frame(chart.at(np.array([[0, 0], [1, 1]])))
     columns, rows = chart.canvas.image.shape[1], chart.canvas.strip_top
     left, right = ((edge - x0) / (x1 - x0) for edge in (-0.5, columns - 0.5))
@@ -101,7 +101,7 @@ def _draw(
     label: str,
     outcome: str,
 ) -> None:
-    """A line with light edges, and a mark where it ended."""
+    """Draws a line with light edges, and a marker at its end."""
     x, y = places.T
     axes.plot(x, y, color="w", linewidth=3.6, alpha=0.5, zorder=2)
     axes.plot(x, y, line, color=colour, linewidth=1.8, alpha=0.8, label=label, zorder=3)

@@ -61,8 +61,8 @@ def test_dots_are_rates_with_exact_intervals():
     rows.append({"task": "maze", "policy": "recorded model", "knows": "+ map"})
     figure = plot_success_by_policy(pd.DataFrame(rows))
     (axes,) = figure.axes
-    assert "a dot for each seed" in figure.get_supxlabel()
-    assert "–: there is none" in figure.get_supxlabel()
+    assert "one dot per training seed" in figure.get_supxlabel()
+    assert "–: no such policy" in figure.get_supxlabel()
     found = [bar.lines[0].get_xdata()[0] for bar in axes.containers]
     assert found == [0.9, 1.0]
     ends = axes.containers[0].lines[2][0].get_segments()[0][:, 0]
