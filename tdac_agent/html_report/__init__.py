@@ -1,4 +1,4 @@
-"""Runs as one HTML file that needs nothing else: `tdac report`."""
+"""`tdac report`: runs as one self-contained HTML file."""
 
 from tdac_agent.html_report.page import Page, make_page
 

@@ -1,4 +1,4 @@
-"""Episodes as few whole numbers: what the player in the page draws."""
+"""Episodes as short lists of integers, for the player in the page."""
 
 from __future__ import annotations
 
@@ -19,43 +19,44 @@ from tdac_agent.verification.diagnosis.report import Episode
 Rows = NDArray[np.float64]
 
 FINENESS = 4.0
-"""Whole numbers in a px of the picture."""
+"""Integer units per px of the picture."""
 TURNS = 100.0
-"""Whole numbers in a rad."""
+"""Integer units per rad."""
 TOLERANCE = 0.5
-"""How far from where it was the body may be drawn at any time, px."""
+"""Largest distance between the drawn and the true pose at any time, px."""
 RAD = 20.0
-"""px that an error of one rad of the heading counts as."""
+"""Distance that a heading error of one rad counts as, px."""
 MOST_POINTS = 400
+"""Limit for one episode."""
 ALL_POINTS = 60_000
-"""In all episodes of a run."""
+"""Limit for all episodes of a run."""
 
 
 def animations(told: Told, task: Task, scene: Scene) -> list[dict[str, Any]]:
-    """The episodes of a run, of those candidates that have any.
+    """Encodes the recorded episodes of all candidates of a run.
 
     Returns:
         A dict per episode for the player: candidate, name, outcome, dt, steps, points
-        (differences of step, x, y and heading, one after the other) and contact.
+        (differences of step, x, y and heading, flattened) and contact.
     """
     found = [(one, *pair) for one in told.tried for pair in _episodes(one)]
     most = max(20, min(MOST_POINTS, ALL_POINTS // max(1, len(found))))
-    return [_told(task, scene, most, *each) for each in found]
+    return [_encoded(task, scene, most, *each) for each in found]
 
 
 def _episodes(one: Tried) -> Iterator[tuple[Episode, Trajectory]]:
-    """Episodes whose trajectory is there."""
+    """The episodes of a candidate that have a stored trajectory."""
     if one.report is None:
         return
     kept = dict(one.trajectories())
     for episode in one.report.episodes:
         trajectory = kept.get(episode.name)
-        # A file may hold another run of that start, one driven by `run_episode`.
+        # The file may be of `run_episode`, which drives from the same start.
         if trajectory is not None and trajectory.steps == episode.steps > 0:
             yield episode, trajectory
 
 
-def _told(
+def _encoded(
     task: Task,
     scene: Scene,
     most: int,
@@ -81,19 +82,19 @@ def _told(
 
 
 def thinned(poses: Rows, most: int, tolerance: float = TOLERANCE) -> NDArray[np.intp]:
-    """Steps between which poses are nearly linear in time.
+    """Selects steps so that the poses between them are nearly linear in time.
 
-    Splits where the line is farthest off, the worst part first (after Ramer, Douglas
-    and Peucker, with time for the way).
+    Splits the worst segment first, at its largest deviation (Ramer-Douglas-Peucker,
+    with deviations taken at equal times).
 
     Args:
-        poses: Shape (n, 3): px, px, rad, headings without jumps.
-        most: Steps to keep at most, 2 or more.
-        tolerance: Greatest distance of a pose from the line, px; a rad is `RAD` px.
-            It may be more where that needs more steps than `most`.
+        poses: Shape (n, 3): x and y, px, and unwrapped heading, rad.
+        most: Maximum number of steps to keep, at least 2.
+        tolerance: Largest deviation of a pose from its segment, px; a rad counts as
+            `RAD` px. Exceeded if it would need more than `most` steps.
 
     Returns:
-        Their indices in order, the first and the last included.
+        Indices of the kept steps in order, including the first and the last.
     """
     scaled = poses * (1.0, 1.0, RAD)
     kept = {0, len(poses) - 1}
@@ -107,7 +108,7 @@ def thinned(poses: Rows, most: int, tolerance: float = TOLERANCE) -> NDArray[np.
 
 
 def _worst(rows: Rows, first: int, last: int) -> tuple[float, int, int, int]:
-    """The pose farthest off the line of a part: (minus its distance, it, the part)."""
+    """Heap entry of a segment: (minus largest deviation, its step, first, last)."""
     share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
     line = rows[first] + share * (rows[last] - rows[first])
     off = np.abs(rows[first : last + 1] - line).max(axis=1)

@@ -1,4 +1,4 @@
-"""Source code and differences as HTML; nothing in them is taken for markup."""
+"""Source code and diffs as HTML; markup in them is escaped."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _KINDS = {"+": "ins", "-": "del", "@": "b"}
 
 
 def highlighted(source: str) -> Markup:
-    """Python source with a `<span>` per line and per token; CSS numbers the lines."""
+    """Highlights Python source: a `<span>` per line and token; CSS numbers lines."""
     shown = source[:MOST_SOURCE]
     lexer = PythonLexer(stripnl=False, ensurenl=False)
-    # Tokens never go beyond a line, so that each line is whole by itself.
+    # Pygments closes each `<span>` at the end of its line.
     marked = highlight(shown, lexer, HtmlFormatter(nowrap=True))
     lines = [Markup('<span class="l">{}</span>').format(Markup(line)) for line in
              marked.rstrip("\n").split("\n")]  # fmt: skip
@@ -29,11 +29,11 @@ def highlighted(source: str) -> Markup:
 
 
 def shown_diff(diff: str, most: int) -> Markup:
-    """A unified diff: added lines in `<ins>`, removed ones in `<del>`.
+    """Formats a unified diff: added lines in `<ins>`, removed lines in `<del>`.
 
     Args:
-        diff: As `difflib` writes it; its two lines of file names are left out.
-        most: Lines to show at most.
+        diff: Output of `difflib.unified_diff`; the two file name lines are left out.
+        most: Maximum number of lines to show.
     """
     lines = diff.splitlines()
     lines = lines[2:] if diff.startswith("---") else lines
@@ -48,7 +48,7 @@ def shown_diff(diff: str, most: int) -> Markup:
 
 
 def count_changes(diff: str) -> tuple[int, int]:
-    """How many lines a unified diff adds and removes."""
+    """Numbers of lines that a unified diff adds and removes."""
     marks = [line[:1] for line in diff.splitlines()[2:]]
     return marks.count("+"), marks.count("-")
 

@@ -29,12 +29,12 @@ MOST_CURVES = 8
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """What the runs say together.
+    """Summary of all runs.
 
     Attributes:
-        kinds: A row per kind of run: its names, and each metric in words.
-        assumptions: What the intervals take for granted, a line each.
-        figures: Title and address of each figure; none for a single run.
+        kinds: A row per kind of run: its labels, and its metrics as text.
+        assumptions: A line per kind of interval: what it assumes.
+        figures: Title and data URL of each figure; none for a single run.
     """
 
     kinds: tuple[dict[str, Any], ...]
@@ -43,7 +43,7 @@ class Overview:
 
 
 def overview_of(told: Sequence[Told]) -> Overview:
-    """The overview of some runs of any kinds."""
+    """Summarises runs of one or several kinds."""
     frames = frames_of([one.run for one in told])
     table = summarise(frames).to_dict("records")
     groups = [frames.only(**{name: row[name] for name in KIND}) for row in table]
@@ -57,7 +57,7 @@ def overview_of(told: Sequence[Told]) -> Overview:
 
 def _kind(row: dict[str, Any], working: int) -> dict[str, Any]:
     return row | {
-        "at_work": working,
+        "running": working,
         "cut_short": row["censored"] - working,
         "sr": _rate(row, "sr"),
         "first_pass": _rate(row, "first_pass"),
@@ -79,7 +79,7 @@ def _number(value: float, form: str) -> str:
 
 
 def _assumptions(groups: list[Frames]) -> tuple[str, ...]:
-    """Which metric has which kind of interval, and what that assumes."""
+    """The kind of interval of each metric, and what it assumes."""
     found = [("SR", success_rate(group).method) for group in groups]
     found += [("CS(K), first pass", first_pass(group).method) for group in groups]
     return tuple(
@@ -94,25 +94,25 @@ def _figures(frames: Frames) -> tuple[tuple[str, str], ...]:
     names = frames.runs["learner"].nunique()
     if len(frames.runs) < 2 or names > MOST_CURVES:
         return ()
-    told = f"{len(frames.runs)} runs"
+    source = f"{len(frames.runs)} runs"
     if frames.runs["task"].nunique() > 1:
-        told += ", all tasks together"
+        source += " of all tasks"
     figures = {
-        "Success rate SR": plot_success_rates({told: frames}, provenance=told),
+        "Success rate SR": plot_success_rates({source: frames}, provenance=source),
         "Cumulative success CS(k)": plot_cumulative_success(
-            frames, provenance=f"{told}; pointwise 95 % intervals"
+            frames, provenance=f"{source}; pointwise 95 % intervals"
         ),
     }
     return tuple((name, drawn(figure)) for name, figure in figures.items())
 
 
 def drawn(figure: Figure) -> str:
-    """A figure as an address; within `<img>` nothing in it is ever run."""
+    """A figure as a data URL; browsers never run scripts in the SVG of an `<img>`."""
     return data_address(figure_bytes(figure), "image/svg+xml")
 
 
 def told_seconds(seconds: float) -> str:
-    """A duration in words."""
+    """Formats a duration, such as `2 min 05 s`."""
     if not math.isfinite(seconds):
         return "–"
     minutes, rest = divmod(round(seconds), 60)

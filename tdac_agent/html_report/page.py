@@ -1,4 +1,4 @@
-"""The page as a whole: one file, no network, and no script but its own."""
+"""The whole page: one file that loads nothing and runs only its own script."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from tdac_agent.models.budget import told_usd
 from tdac_agent.runs.history import Told, gather_run, learner_named, run_folders
 
 MOST_BYTES = 24 << 20
-"""Of the details of all runs; those beyond it are only listed."""
+"""Limit for the details of all runs; further runs are only listed."""
 MOST_TEXT = 2_000
-# Characters that hide or turn around the text beside them are shown by their names.
+# Control characters that hide or reorder text are replaced by visible symbols.
 _HIDDEN = {
     code: f"⟨U+{code:04X}⟩"
     for code in (*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x200E, 0x200F, 0x61C)
@@ -35,9 +35,9 @@ class Page:
     """A report.
 
     Attributes:
-        html: The file.
-        runs: How many there are.
-        verified: How many of them.
+        html: Content of the file.
+        runs: Number of runs.
+        verified: Number of verified runs.
         unreadable: A line for each folder that could not be read.
     """
 
@@ -48,10 +48,10 @@ class Page:
 
 
 def make_page(place: Path) -> Page:
-    """The report on a run folder, or on all runs at or below a folder.
+    """Makes the report on a run folder, or on all runs at or below a folder.
 
     Raises:
-        RunError: There is no run that can be read.
+        RunError: No run can be read.
     """
     place = place.resolve()
     runs: list[tuple[str, Told]] = []
@@ -87,7 +87,7 @@ def make_page(place: Path) -> Page:
 
 
 def _details(runs: list[tuple[str, Told]]) -> tuple[list[Markup], dict[str, Scene]]:
-    """The sections of as many runs as there is room for, and the scenes they show."""
+    """Renders the sections of as many runs as fit, and their scenes."""
     template = _environment().get_template("run.html.j2")
     scenes: dict[str, Scene] = {}
     details: list[Markup] = []
@@ -103,7 +103,7 @@ def _details(runs: list[tuple[str, Told]]) -> tuple[list[Markup], dict[str, Scen
 
 
 def _scene(told: Told, scenes: dict[str, Scene]) -> tuple[str, Scene] | None:
-    """The scene of a run's task, which runs of the same task share."""
+    """The scene of a run's task; runs of the same task share it."""
     if told.task is None:
         return None
     key = told.task.sha256()
@@ -145,12 +145,12 @@ def _environment() -> jinja2.Environment:
 
 
 def shortened(text: str) -> str:
-    """A text of bounded length."""
+    """Cuts a text to a bounded length."""
     return text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]} …"
 
 
 def short_test(test: str) -> str:
-    """A test's name without its file."""
+    """A test's name without its file and `test_`, with spaces for underscores."""
     name, bracket, case = test.partition("::")[2].partition("[")
     return name.removeprefix("test_").replace("_", " ") + bracket + case
 
@@ -160,6 +160,6 @@ def _text(name: str) -> str:
 
 
 def _hash(script: str) -> str:
-    """What a content security policy calls a script by."""
+    """The hash by which a content security policy allows a script."""
     digest = hashlib.sha256(script.encode()).digest()
     return f"sha256-{base64.b64encode(digest).decode()}"

@@ -1,4 +1,4 @@
-"""The background of an animation: the map or the world as a small picture."""
+"""The background of an animation: a small picture of the map or world."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ COLOURS = 48
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A picture of a task, and where on it a pose is.
+    """A picture of a task, and the mapping of poses to it.
 
     Attributes:
-        picture: PNG as a data address.
-        width: px.
-        height: px.
-        radius: Of the body, px.
-        chart: Of the drawing that the picture was made from.
-        zoom: Picture px in a px of the drawing.
+        picture: PNG as a data URL.
+        width: Width, px.
+        height: Height, px.
+        radius: Radius of the body, px.
+        chart: Chart of the drawing that the picture was made from.
+        zoom: Picture px per px of the drawing.
     """
 
     picture: str
@@ -40,10 +40,10 @@ class Scene:
     zoom: float
 
     def at(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Poses in px of the picture, headings clockwise and without jumps.
+        """Converts poses to px of the picture, with unwrapped clockwise headings.
 
         Args:
-            poses: Shape (n, 3), or (n, 2) for places.
+            poses: Shape (n, 3), or (n, 2) for positions, in px or m.
         """
         frame = self.chart.canvas.to_frame(self.chart.at(poses[:, :2]))
         places = (frame + 0.5) * self.zoom
@@ -54,7 +54,7 @@ class Scene:
 
 
 def scene_of(task: Task) -> Scene:
-    """The map or the world with start, goal and shortest path."""
+    """Draws the map or world with start, goal and shortest path."""
     backdrop = pictures_of(task.setting).backdrop()
     chart = backdrop.whole()
     drawn = chart.canvas.image[: chart.canvas.strip_top]
@@ -71,13 +71,13 @@ def scene_of(task: Task) -> Scene:
 
 
 def data_address(content: bytes, kind: str) -> str:
-    """A file as an address that holds it."""
+    """Encodes a file as a data URL of some MIME type."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def _png(drawn: Picture, width: int, height: int) -> bytes:
     small = Image.fromarray(drawn).resize((width, height), Image.Resampling.BOX)
     stream = io.BytesIO()
-    # Few colours make it several times smaller, and nobody sees it.
+    # Few colours make the file several times smaller without a visible loss.
     small.quantize(COLOURS).save(stream, "PNG", optimize=True)
     return stream.getvalue()

@@ -1,4 +1,4 @@
-"""What the page says of one run: names and values for its template."""
+"""Values for the template of one run."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 DIFF_LINES = (100, 600)
 ALL_DIFF_LINES = 20_000
 MOST_ROWS = 60
-"""Of tests that ever failed."""
+"""Limit for the table of failed tests."""
 
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """Tests that failed in one way, and why.
+    """Tests that failed with the same message.
 
     Attributes:
-        message: What was expected and what came.
-        tests: Their ids.
-        diagnoses: Of the episodes behind it.
+        message: The message: expected and actual result.
+        tests: Ids of the tests.
+        diagnoses: Diagnoses of their episodes, without those listed before.
     """
 
     message: str
@@ -43,13 +43,13 @@ class Broken:
 def section_of(
     told: Told, number: int, name: str, scene: tuple[str, Scene] | None
 ) -> dict[str, Any]:
-    """Everything that the template of a run asks for.
+    """Collects the values for the template of a run.
 
     Args:
         told: The run.
-        number: Of its section in the page, from 1.
-        name: Of its folder, for people.
-        scene: Of its task, and the scene's name in the page.
+        number: Number of its section in the page, from 1.
+        name: Displayed name of its folder.
+        scene: Key of its task's scene in the page, and the scene.
     """
     least, most = DIFF_LINES
     episodes = []
@@ -77,7 +77,7 @@ def section_of(
 
 
 def _breakdown(told: Told) -> str | None:
-    """Where time and tokens went; None where the journal does not tell."""
+    """Figure of time and tokens as a data URL; None if the journal is unusable."""
     if not told.run.attempts:
         return None
     try:
@@ -87,7 +87,7 @@ def _breakdown(told: Told) -> str | None:
 
 
 def broken(report: Report) -> list[Broken]:
-    """What failed, tests with the same message together."""
+    """Groups the failures of a report by message."""
     found: dict[str, list[Any]] = {}
     for failure in report.failures:
         found.setdefault(failure.message, []).append(failure)
@@ -102,10 +102,10 @@ def broken(report: Report) -> list[Broken]:
 
 
 def spent(told: Told) -> str:
-    """Tokens and cost of a run, in words."""
+    """Tokens and cost of a run, as text."""
     run = told.run
     if not run.tokens:
-        return "none counted"
+        return "not counted"
     cost = "cost unknown" if run.cost is None else told_usd(run.cost)
     if run.cost_lost:
         cost += f", and at most {told_usd(run.cost_lost)} for lost answers"
@@ -118,21 +118,21 @@ def _iterations(told: Told) -> list[tuple[int, list[Tried]]]:
 
 
 def _failures(told: Told) -> Iterator[tuple[str, list[bool]]]:
-    """Each test that ever failed, and which of the candidates failed it."""
+    """Each test that ever failed, and whether each candidate failed it."""
     names = dict.fromkeys(test for one in told.tried for test in one.failed)
     for name in itertools.islice(names, MOST_ROWS):
         yield name, [name in one.failed for one in told.tried]
 
 
 def _origin(told: Told) -> Iterator[tuple[str, str]]:
-    """Where the verdict is from: a line per fact."""
+    """Provenance of the run: name and value of each fact."""
     run = told.run
-    yield "began", run.started
+    yield "started", run.started
     yield "task", f"{run.task}, sha256 {run.task_sha256}"
     yield "Learner", learner_named(run.learner)
     yield "Optimizer", learner_named(run.optimizer)
     if run.models:
-        yield "models, as reported", ", ".join(run.models)
+        yield "models (as reported)", ", ".join(run.models)
     for model, address in run.served_at.items():
         yield f"served at ({model})", address
     yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
@@ -159,7 +159,7 @@ def _verified_with(report: Report) -> Iterator[tuple[str, str]]:
 
 
 def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
-    """Commands, as typed beside the run's folder, and what each does."""
+    """Commands to type in the parent of the run's folder, and what each does."""
     run = told.run
     words = ["tdac", "synth", "--task", name, "--learner", run.learner]
     if run.optimizer != run.learner:
@@ -173,12 +173,13 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
         words += ["--from", f"{name}/{GIVEN_FILE}"]
     words += ["-K", str(run.iterations), "-J", str(run.patience)]
     words += [] if run.seed is None else ["--seed", str(run.seed)]
-    yield shlex.join(words), "asks anew"
-    again = ["tdac", "synth", "--task", name, "--learner", f"replay:{name}"]
-    yield shlex.join(again), "the answers on record again; nobody is asked"
+    yield shlex.join(words), "repeat the run with new answers"
+    replay = ["tdac", "synth", "--task", name, "--learner", f"replay:{name}"]
+    yield shlex.join(replay), "repeat the run with the recorded answers"
     if not run.finished and told.status != "running":
         more = run.enough.split()
-        yield shlex.join(["tdac", "synth", "--resume", name, *more]), "goes on with it"
+        yield shlex.join(["tdac", "synth", "--resume", name, *more]), "resume the run"
     if run.verified:
-        yield shlex.join(["tdac", "verify", name]), "judges the controller again"
-        yield shlex.join(["tdac", "play", name, "--video", "drive.mp4"]), "as a video"
+        yield shlex.join(["tdac", "verify", name]), "verify the controller again"
+        video = ["tdac", "play", name, "--video", "drive.mp4"]
+        yield shlex.join(video), "record a video of the drive"

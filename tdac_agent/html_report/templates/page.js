@@ -18,7 +18,7 @@
   }
   addEventListener("hashchange", reveal);
   for (const cell of document.querySelectorAll("a.cell")) {
-    // Also where the address is the same as before, and nothing changes.
+    // If the address is already that of the cell, there is no "hashchange".
     cell.addEventListener("click", () => unfold(cell.hash));
   }
   reveal();
@@ -51,7 +51,7 @@
     });
   }
 
-  // One row [step, x, y, heading] for each step that was kept.
+  // One row [step, x, y, heading] for each kept step.
   function rows(points) {
     const at = [0, 0, 0, 0], found = [];
     for (let n = 0; n < points.length; n += 4) {
@@ -61,7 +61,7 @@
     return found;
   }
 
-  // The row at a step, and how many of the kept ones are not after it.
+  // The interpolated row at a step, and the number of kept rows up to it.
   function poseAt(path, step) {
     let low = 0, high = path.length - 1;
     while (high - low > 1) {
@@ -185,7 +185,7 @@
     scrub.addEventListener("input", () => { pause(); step = Number(scrub.value); draw(); });
     background.addEventListener("load", draw);
     background.src = scene.picture;
-    // The last candidate is the one that was verified, or came last.
+    // Begin with the last candidate, which is the verified one if there is one.
     show([...first.values()].at(-1), false);
     return { show };
   }

@@ -193,12 +193,12 @@ def test_a_run_that_was_killed(copied):
     (copied / "iterations" / "k01" / "j1" / "report.json").unlink()
     shown = " ".join("".join(Outline(make_page(copied).html.decode()).shown).split())
     assert "killed" in shown[:200]
-    assert "k=1 j=1 not judged to its end" in shown
+    assert "k=1 j=1 verification not finished" in shown
     assert "tdac synth --resume run" in shown
 
 
 def test_a_run_that_is_still_at_work(copied):
-    """Its lock says so; it was not killed or cut short, and nobody is to go on."""
+    """Its lock says so; it was not killed or ended early, and nobody is to go on."""
     run = load_run(copied)
     left = {"status": "running", "tau": None, "attempts": run.attempts[:1]}
     (copied / "run.json").write_text(run.model_copy(update=left).model_dump_json())
@@ -206,9 +206,9 @@ def test_a_run_that_is_still_at_work(copied):
         text = make_page(copied).html.decode()
     shown = " ".join("".join(Outline(text).shown).split())
     assert "running after 2 candidates" in shown
-    assert "A process is at work on it" in shown
-    assert "1 at work" in shown
-    for word in ("killed", "cut short", "--resume"):
+    assert "This run is still in progress" in shown
+    assert "1 running" in shown
+    for word in ("killed", "ended early", "--resume"):
         assert word not in shown
 
 
