@@ -218,7 +218,7 @@ COLLISIONS = (
         "spiral",
         follower(wheels=swapped, pivot=9.0, speed=0.3, gain=1.0),
         "collision",
-        says=("look at the sign of the turn",),
+        says=("check the sign of the turn",),
     ),
     Plant(
         "heading counted upwards",
@@ -351,7 +351,7 @@ STANDING = (
         "warehouse",
         follower(stop=35.0),
         "missed goal",
-        says=("it stands since step",),
+        says=("it stood still from step",),
     ),
     Plant(
         "stops 40 px beside the goal",
@@ -360,7 +360,7 @@ STANDING = (
         "missed goal",
         jitter=1,
         at=(400.0, 440.0, 4.0),
-        says=("it stands since step",),
+        says=("it stood still from step",),
     ),
     Plant(
         "stands behind the wall at the goal",
@@ -368,7 +368,7 @@ STANDING = (
         follower(goal=(192.0, 60.0)),
         "missed goal",
         env={"start": (100, 100, 0.0), "goal": (209, 60), "robot_radius": 6},
-        says=("a wall stands in between",),
+        says=("a wall is in between",),
     ),
 )
 
@@ -401,7 +401,7 @@ DRIVING = (
         "office",
         brake(45.0, back=-0.6),
         "oscillating",
-        says=("reversed its turn or its drive every 1.0 steps", "at its front"),
+        says=("driving direction every 1.0 steps", "at its front"),
     ),
     Plant(
         "a little forward, a little back",
@@ -425,14 +425,14 @@ DRIVING = (
         shuttle((432.0, 595.0), (288.0, 480.0)),
         "oscillating",
         jitter=2,
-        says=("to and fro",),
+        says=("back and forth",),
     ),
     Plant(
         "to and fro between two places",
         "warehouse",
         patrol((700.0, 221.0), (450.0, 221.0)),
         "oscillating",
-        says=("to and fro",),
+        says=("back and forth",),
     ),
     Plant(
         "to and fro, backwards",
@@ -440,7 +440,7 @@ DRIVING = (
         repeat((40, 0.9, 0.9), (40, -0.9, -0.9)),
         "oscillating",
         env={"start": (60, 100, 0.0), "goal": (250, 170), "robot_radius": 8},
-        says=("to and fro",),
+        says=("back and forth",),
     ),
     Plant(
         "wheels swapped, turns in place",
@@ -478,7 +478,7 @@ DRIVING = (
         "rooms",
         always(0.3, 0.6),
         "spinning",
-        says=("to the left on a circle of 45 px",),
+        says=("to the left on a circle of radius 45 px",),
     ),
     Plant(
         "one wheel stands",
@@ -486,7 +486,7 @@ DRIVING = (
         switch(20, follower(), always(0.0, 0.05)),
         "spinning",
         jitter=1,
-        says=("to the left on a circle of 15 px",),
+        says=("to the left on a circle of radius 15 px",),
     ),
     Plant(
         "spins slowly",
@@ -504,7 +504,7 @@ DRIVING = (
         follower(speed=0.5),
         "too slow",
         env={"horizon": 300},
-        says=("px/s or more were needed",),
+        says=("px/s was needed",),
     ),
     Plant(
         "moves in one step of eight",
@@ -512,7 +512,7 @@ DRIVING = (
         seldom(8, follower()),
         "too slow",
         jitter=1,
-        says=("stood in 87 % of the steps",),
+        says=("stood still in 87 % of the steps",),
     ),
     Plant(
         "rounds in the first room",
@@ -520,7 +520,7 @@ DRIVING = (
         patrol((90.0, 330.0), (230.0, 330.0), (230.0, 460.0), (90.0, 460.0)),
         "looping",
         jitter=1,
-        says=("in rounds",),
+        says=("in loops",),
     ),
     Plant(
         "rounds about the block",
@@ -531,7 +531,7 @@ DRIVING = (
             patrol((770.0, 197.0), (770.0, 500.0), (225.0, 500.0), (225.0, 197.0)),
         ),
         "looping",
-        says=("in rounds",),
+        says=("in loops",),
     ),
     Plant(
         "follows the wall on its left",
@@ -539,7 +539,7 @@ DRIVING = (
         hug(24.0, -1.0, speed=0.6),
         "looping",
         jitter=1,
-        says=("in rounds",),
+        says=("in loops",),
     ),
     Plant(
         "follows the walls of a dead end and of what is beyond it",
@@ -547,14 +547,14 @@ DRIVING = (
         hug(24.0, -1.0, speed=0.7),
         "looping",
         env={"horizon": 6000},
-        says=("in rounds",),
+        says=("in loops",),
     ),
     Plant(
         "follows the wall on its right",
         "clutter",
         hug(26.0, 1.0),
         "looping",
-        says=("in rounds",),
+        says=("in loops",),
     ),
 )
 PLANTS = (*COLLISIONS, *STANDING, *DRIVING)

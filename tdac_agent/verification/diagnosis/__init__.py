@@ -1,1 +1,1 @@
-"""What went wrong in an episode, in words and figures."""
+"""Diagnosis of failed episodes, in words and figures."""

@@ -1,4 +1,4 @@
-"""Why an episode without a contact did not arrive: cause, step and figures."""
+"""Why a robot that touched nothing did not reach its goal: cause, step and figures."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from tdac_agent.verification.diagnosis.stall import (
 )
 from tdac_agent.verification.diagnosis.surroundings import Surroundings
 
-# Share of the episode without progress from which a robot is not merely slow.
+# Share of the episode without progress from which a robot is not merely too slow.
 _STALLED = 0.2
 
 
 def why_no_arrival(rollout: Rollout, around: Surroundings) -> Finding:
-    """What kept a robot from its goal that touched nothing."""
+    """Finds why a robot that touched nothing did not reach its goal."""
     trajectory, units = rollout.trajectory, around.units
     gone = np.hypot(*(trajectory.poses[:, :2] - trajectory.poses[0, :2]).T).max()
     if gone < PROGRESS and np.abs(turns(trajectory)).sum() < 1.0:
-        text = f"in {trajectory.steps} steps it went {gone:.1f} {units.length} from its"
-        return Finding("no motion", f"{text} start and hardly turned.", 0)
+        text = f"in {trajectory.steps} steps it moved at most {gone:.1f} {units.length}"
+        return Finding("no motion", f"{text} from its start and hardly turned.", 0)
     since = last_progress(rollout)
     if rollout.reached or trajectory.steps - since < _STALLED * trajectory.steps:
         return _unfinished(trajectory, around)
@@ -48,7 +48,7 @@ def why_no_arrival(rollout: Rollout, around: Surroundings) -> Finding:
 
 
 def near_goal(rollout: Rollout) -> float:
-    """Path left from which a robot has come to its goal without reaching it."""
+    """Path left below which a robot counts as having come near its goal."""
     d0 = float(rollout.trajectory.path_distances[0])
     near = 3.0 * max(rollout.tolerance, rollout.radius)
     return min(near, max(0.25 * d0, 1.5 * rollout.tolerance))
@@ -58,36 +58,37 @@ def last_progress(rollout: Rollout) -> int:
     """Step after which a robot hardly came nearer to its goal."""
     distances = rollout.trajectory.path_distances
     progress = float(distances[0] - distances.min())
-    # What creeps, or trembles, does not get on.
+    # Creeping and jittering are no progress.
     slack = max(PROGRESS, min(0.05 * progress, 0.5 * rollout.radius))
     return int(np.argmax(distances <= float(distances.min()) + slack))
 
 
 def _unfinished(trajectory: Trajectory, around: Surroundings) -> Finding:
-    """Still under way at the end of its time."""
+    """The robot was still making progress when its time was over."""
     distances, steps = trajectory.path_distances, trajectory.steps
     limit, unit = around.full_speed, around.units.length
     driven, seconds = float(lengths(trajectory).sum()), steps * trajectory.dt
     speed = float(np.abs(forward(trajectory)).mean())
     facts = (
-        f"{percent(1 - distances[-1] / max(distances[0], 1e-9))} of the way in {steps} "
-        f"steps, at {limit * speed:.1f} {unit}/s on average ({percent(speed)} of the "
-        f"wheel limit), {distances[0] / seconds:.1f} {unit}/s or more were needed; "
-        f"{driven:.0f} {unit} driven for {distances[0] - distances[-1]:.0f} {unit} of "
-        f"progress; both wheels stood in "
-        f"{percent(1 - wheels_turn(trajectory).mean())} of the steps."
+        f"covered {percent(1 - distances[-1] / max(distances[0], 1e-9))} of the path "
+        f"in {steps} steps, at a mean speed of {limit * speed:.1f} {unit}/s "
+        f"({percent(speed)} of the wheel limit); at least "
+        f"{distances[0] / seconds:.1f} {unit}/s was needed; it drove {driven:.0f} "
+        f"{unit} for {distances[0] - distances[-1]:.0f} {unit} of progress; both "
+        f"wheels stood still in {percent(1 - wheels_turn(trajectory).mean())} of the "
+        f"steps."
     )
     reversed_share = flips(trajectory, 0)
     spin = float(np.abs(np.diff(trajectory.actions, axis=1)).mean()) / 2.0
     if reversed_share >= 5 * FLIPS and spin >= 0.3:
-        text = "it reversed its turn or its drive in "
-        text += f"{percent(reversed_share)} of the steps and made {facts}"
+        text = "it reversed its turning or driving direction in "
+        text += f"{percent(reversed_share)} of the steps and {facts}"
         return Finding("oscillating", text, steps)
-    return Finding("too slow", facts, steps)
+    return Finding("too slow", f"it {facts}", steps)
 
 
 def _missed_goal(rollout: Rollout, since: int, units: Units) -> Finding | None:
-    """It came near to its goal, and did not get there."""
+    """The robot came near its goal but did not reach it."""
     trajectory, straight = rollout.trajectory, rollout.distances("euclidean")
     distances, unit = trajectory.path_distances, units.length
     within = straight <= rollout.tolerance
@@ -95,8 +96,8 @@ def _missed_goal(rollout: Rollout, since: int, units: Units) -> Finding | None:
         step = int(np.argmax(within))
         text = (
             f"in step {step} it was {straight[step]:.1f} {unit} from the goal, within "
-            f"the tolerance of {rollout.tolerance:.1f} {unit}, but a wall stands in "
-            f"between: the way there is {distances[step]:.1f} {unit}."
+            f"the tolerance of {rollout.tolerance:.1f} {unit}, but a wall is in "
+            f"between: the path to it is {distances[step]:.1f} {unit} long."
         )
         return Finding("missed goal", text, step)
     if distances[since] > near_goal(rollout):
@@ -107,8 +108,8 @@ def _missed_goal(rollout: Rollout, since: int, units: Units) -> Finding | None:
         return None
     step, what = after
     text = (
-        f"in step {best} it was {straight[best]:.1f} {unit} from the goal, tolerance "
-        f"{rollout.tolerance:.1f} {unit}; {what}."
+        f"in step {best} it was {straight[best]:.1f} {unit} from the goal (tolerance "
+        f"{rollout.tolerance:.1f} {unit}); {what}."
     )
     return Finding("missed goal", text, step)
 
@@ -116,10 +117,10 @@ def _missed_goal(rollout: Rollout, since: int, units: Units) -> Finding | None:
 def _after_the_goal(
     rollout: Rollout, since: int, best: int, units: Units
 ) -> tuple[int, str] | None:
-    """What a robot did after it had been nearest to its goal, if that is clear.
+    """What a robot did after it was nearest to its goal, if that is clear.
 
     Returns:
-        The step to look at, and the words.
+        The step to look at, and the text.
     """
     trajectory, straight = rollout.trajectory, rollout.distances("euclidean")[since:]
     rounds, unit = rounds_about(trajectory, since, rollout.goal), units.length
@@ -127,21 +128,23 @@ def _after_the_goal(
     if abs(rounds) >= 2.0 and straight.max() < 4.0 * near_goal(rollout):
         way = "clockwise" if rounds > 0 else "counter-clockwise"
         return best, (
-            f"since step {since} it circled the goal {abs(rounds):.1f} times, {way} on "
-            f"the picture, {straight.min():.1f} to {straight.max():.1f} {unit} from it"
+            f"after step {since} it circled the goal {abs(rounds):.1f} times, {way} "
+            f"seen from above, {straight.min():.1f} to {straight.max():.1f} {unit} "
+            f"from it"
         )
     rest = standing_since(trajectory)
     if straight[-1] <= near_goal(rollout) and rest < trajectory.steps:
         place = units.point(*trajectory.poses[-1, :2])
-        text = f"it stands since step {rest} at {place}, {straight[-1]:.1f} {unit}"
-        return rest, f"{text} from the goal"
+        text = f"it stood still from step {rest} to the end at {place}, "
+        return rest, f"{text}{straight[-1]:.1f} {unit} from the goal"
     if away > 2.0 * rollout.radius:
-        return best, f"it then passed by and went {away:.1f} {unit} away"
+        text = "it then passed by and moved away: its path left grew by"
+        return best, f"{text} {away:.1f} {unit}"
     return None
 
 
 def _wrong_goal(rollout: Rollout, around: Surroundings) -> Finding | None:
-    """It ended where the goal is for one who mixes up the coordinates."""
+    """The robot ended where the goal would be if its coordinates were mixed up."""
     trajectory, units = rollout.trajectory, around.units
     final = trajectory.poses[-math.ceil(_STALLED * trajectory.steps) :, :2]
     start = trajectory.poses[0, :2]

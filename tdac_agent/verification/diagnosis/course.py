@@ -1,4 +1,4 @@
-"""Where the shortest path lies, as seen from the robot while it drove."""
+"""Direction of the shortest path and the goal, as seen from the robot."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from tdac_envs.grid.plan import Path
 _PATH_AHEAD = 400
 _LAST_POSES = 20
 _SAMPLES = 40
-# Wheels that differ by less than this do not mean to turn.
+# Wheel speeds that differ by less than this are no turn.
 _TURNING = 0.04
-# Nearer to the path's direction than this there is nothing to turn to, rad.
+# A heading error below this needs no turn, rad.
 _ALIGNED = 0.2
-# Within this of the opposite direction either way will do, rad.
+# Within this angle of the opposite direction, a turn to either side is right, rad.
 _OPPOSITE = 0.5
-# How far ahead on the path its direction is taken, radii of the body.
+# Distance ahead on the path at which its direction is taken, body radii.
 _RADII = 3.0
 
 
 def heading_error(
     around: Surroundings, trajectory: Trajectory, step: int
 ) -> float | None:
-    """Direction of the shortest path seen from the heading, rad, right positive."""
-    for way in _ways(around, trajectory, step):
-        # A shortest path on a grid has many forms; a pulled one has a direction.
-        (x, y), (to_x, to_y), *_ = around.pull(way[:_PATH_AHEAD])
+    """Angle from the heading to the shortest path, rad, right positive."""
+    for path in _paths_until(around, trajectory, step):
+        # Grid paths of equal length differ in direction; a straightened path has one.
+        (x, y), (to_x, to_y), *_ = around.pull(path[:_PATH_AHEAD])
         bearing = math.atan2(to_y - y, to_x - x)
         heading = float(trajectory.poses[step, 2])
         return math.remainder(bearing - heading, 2.0 * math.pi)
@@ -39,14 +39,16 @@ def heading_error(
 
 
 def way_from(around: Surroundings, trajectory: Trajectory, step: int) -> Path | None:
-    """Begin of the straightened shortest path from a pose, or from one just before."""
-    for way in _ways(around, trajectory, step):
-        return np.array(around.pull(way[: _PATH_AHEAD // 2]))
+    """Start of the straightened shortest path from a pose, or from one just before."""
+    for path in _paths_until(around, trajectory, step):
+        return np.array(around.pull(path[: _PATH_AHEAD // 2]))
     return None
 
 
-def _ways(around: Surroundings, trajectory: Trajectory, step: int) -> Iterator[Path]:
-    """Shortest paths from a pose and from those before it; at a wall there are none."""
+def _paths_until(
+    around: Surroundings, trajectory: Trajectory, step: int
+) -> Iterator[Path]:
+    """Shortest paths from a pose and those before it; a pose at a wall has none."""
     first = max(step - _LAST_POSES + 1, 0)
     for x, y, heading in trajectory.poses[first : step + 1][::-1].tolist():
         path = around.path_from(Pose(x, y, heading))
@@ -57,7 +59,7 @@ def _ways(around: Surroundings, trajectory: Trajectory, step: int) -> Iterator[P
 def goal_bearing(
     trajectory: Trajectory, goal: tuple[float, float], step: int = -1
 ) -> float:
-    """Direction of the goal seen from the heading, rad, right positive."""
+    """Angle from the heading to the goal, rad, right positive."""
     x, y, heading = trajectory.poses[step].tolist()
     bearing = math.atan2(goal[1] - y, goal[0] - x)
     return math.remainder(bearing - heading, 2.0 * math.pi)
@@ -66,11 +68,11 @@ def goal_bearing(
 def turned_away(
     around: Surroundings, trajectory: Trajectory, goal: tuple[float, float]
 ) -> tuple[float, int]:
-    """Share of steps that turned away from the shortest path and from the goal itself.
+    """Share of turning steps that turned away from both the shortest path and the goal.
 
     Returns:
-        The share, and the number of steps that it was taken from: the first ones with
-        a turn, up to where the robot faces away from the path.
+        The share, and the number of steps it is taken over: the first steps with a turn
+        and a heading error, until the robot faces away from the path.
     """
     difference = trajectory.actions[:, 0] - trajectory.actions[:, 1]
     turning = np.flatnonzero(np.abs(difference) > _TURNING)
@@ -94,7 +96,7 @@ def turned_away(
 def _path_bearings(
     around: Surroundings, trajectory: Trajectory, steps: Sequence[int]
 ) -> Iterator[float | None]:
-    """Like `heading_error` for many steps, from the nearest part of the path."""
+    """Like `heading_error` for many steps, by a point a few radii ahead on the path."""
     poses = trajectory.poses[list(steps)]
     ahead = around.places_ahead(poses[:, :2], _RADII * around.radius)
     for (x, y, heading), place in zip(poses.tolist(), ahead, strict=True):

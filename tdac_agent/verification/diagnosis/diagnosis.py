@@ -1,4 +1,4 @@
-"""What happened in a judged episode, from its trajectory alone."""
+"""Diagnoses a judged episode from its trajectory alone."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tdac_agent.verification.diagnosis.touch import side_of, where_on_the_wall
 from tdac_envs.drive.task import Pose
 
 LAST_POSES = 4
-# Share of turns away from the path, and their number, from which it is no accident.
+# Least share and number of turns away from the path that are reported.
 _AWAY, _AWAY_STEPS = 0.8, 8
 _RETURNED = "run_episode returned"
 _OUT_OF_CPU = re.compile(r"CPU time")
@@ -38,19 +38,19 @@ _CONTRACT = re.compile(
 
 
 def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
-    """Cause and circumstances of a failed (or late) episode.
+    """Finds the cause and circumstances of a failed (or late) episode.
 
     Args:
         rollout: The episode.
         task: Map or world of the episode.
 
     Returns:
-        For an episode that is held out: the cause `held out`, and no figures.
+        The diagnosis; for a held-out episode only the cause `held out`, no figures.
     """
     if rollout.outcome == "not run":
         return Diagnosis(cause="error", text=f"{rollout.name}: {rollout.error}.")
     if rollout.held_out:
-        text = "A start that is held out failed; nothing more is told of it."
+        text = "A held-out start failed; its details are not disclosed."
         return Diagnosis(cause="held out", text=text)
     around = surroundings_of(task)
     return _on_screen(rollout_on_screen(rollout, around.units), around)
@@ -60,7 +60,7 @@ def _on_screen(rollout: Rollout, around: Surroundings) -> Diagnosis:
     if rollout.error is not None:
         return _error(rollout, around.units)
     if rollout.trajectory.steps == 0:
-        text = "no motion: no step was made."
+        text = "no motion: no step was taken."
         return _diagnosis(rollout, around.units, "no motion", text, 0)
     if rollout.outcome == "collision":
         return _collision(rollout, around)
@@ -75,7 +75,7 @@ def _error(rollout: Rollout, units: Units) -> Diagnosis:
     elif _CONTRACT.search(message):
         cause = "contract"
     when = f"after {steps} steps" if steps else "before its first step"
-    # A loop of its own that has returned says by itself how far it came.
+    # The message of a `run_episode` that returned already names the step.
     failed = "" if _RETURNED in message else f"the controller failed {when}: "
     text = f"{cause}: {failed}{message}"
     return _diagnosis(rollout, units, cause, text, steps)
@@ -93,8 +93,8 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
     text = (
         f"collision in step {trajectory.steps} "
         f"({trajectory.steps * trajectory.dt:.1f} s) at {units.point(pose.x, pose.y)}, "
-        f"heading {units.heading_of(pose.heading):z.2f} rad, at "
-        f"{speed * around.full_speed:.0f} {units.length}/s, the {side} of the body "
+        f"heading {units.heading_of(pose.heading):z.2f} rad, speed "
+        f"{speed * around.full_speed:.0f} {units.length}/s: the {side} of the body "
         f"touched the {touch.thing} at "
         f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
         f"{around.seen(touch, trajectory)} {_limits(share)}"
@@ -116,8 +116,8 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
 
 
 def _limits(share: float) -> str:
-    told = f"A wheel was at its limit in {percent(share)} of the steps. "
-    return told if share else ""
+    text = f"A wheel was at its limit in {percent(share)} of the steps. "
+    return text if share else ""
 
 
 def _passed_goal(rollout: Rollout, units: Units) -> str:
@@ -127,8 +127,8 @@ def _passed_goal(rollout: Rollout, units: Units) -> str:
         return ""
     if distances[-1] - distances[best] < PROGRESS:
         return ""
-    off = f"{distances[best]:.1f} {units.length} off"
-    return f"It had passed the goal in step {best}, {off}. "
+    left = f"{distances[best]:.1f} {units.length} of path left"
+    return f"It had passed the goal in step {best} with {left}. "
 
 
 def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
@@ -147,32 +147,33 @@ def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
 
 
 def _course(rollout: Rollout, around: Surroundings) -> tuple[float | None, str]:
-    """Where the shortest path lay at the end, and whether the robot turned to it."""
+    """Heading error at the end, and text on it and on turns away from the path."""
     trajectory = rollout.trajectory
     error = heading_error(around, trajectory, trajectory.steps)
     if error is None:
         return None, ""
     straight = goal_bearing(trajectory, rollout.goal)
     text = (
-        f"Heading error {_turn(error)} to the shortest path, {_turn(straight)} to the "
-        f"goal itself. "
+        f"Heading error: the shortest path is {_turn(error)}, the goal itself "
+        f"{_turn(straight)}. "
     )
     share, steps = turned_away(around, trajectory, rollout.goal)
     if steps >= _AWAY_STEPS and share >= _AWAY:
-        text += f"In {percent(share)} of its first {steps} steps with a turn it turned "
-        text += "away from both: look at the sign of the turn. "
+        text += f"In {percent(share)} of its first {steps} turning steps it turned "
+        text += "away from both: check the sign of the turn. "
     return round(error, 3), text
 
 
 def _turn(angle: float) -> str:
     """An angle in words: `41° to the right`."""
-    return f"{abs(math.degrees(angle)):.0f}° {'right' if angle > 0 else 'left'}"
+    side = "right" if angle > 0 else "left"
+    return f"{abs(math.degrees(angle)):.0f}° to the {side}"
 
 
 def _diagnosis(
     rollout: Rollout, units: Units, cause: Cause, text: str, step: int, **facts: Any
 ) -> Diagnosis:
-    """Adds the distances and the last poses to what is known."""
+    """Builds a diagnosis, with the distances and the last poses added."""
     trajectory = rollout.trajectory
     text = f"{rollout.name}: {text.strip()}"
     if not len(trajectory.poses):
@@ -197,16 +198,16 @@ def _diagnosis(
 
 
 def _last_poses(trajectory: Trajectory, units: Units) -> str:
-    """The last poses with the wheel speeds that followed, equal ones told once."""
+    """The last poses with the wheel speeds applied there; equal rows are merged."""
     poses, actions = trajectory.poses.tolist(), trajectory.actions.tolist()
     end = units.pose(*poses[-1])
     groups = [(trajectory.steps, trajectory.steps, end)]
     for step in range(trajectory.steps - 1, -1, -1):
         place, (left, right) = units.pose(*poses[step]), actions[step]
         row = f"{place} [{left:z.2f} {right:z.2f}]"
-        _, last, told = groups[-1]
+        _, last, previous = groups[-1]
         # The pose at the end has no wheel speeds of its own.
-        if told == row or told == place == end:
+        if previous == row or previous == place == end:
             groups[-1] = (step, last, row)
         elif len(groups) < LAST_POSES:
             groups.append((step, step, row))

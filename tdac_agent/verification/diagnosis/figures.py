@@ -33,13 +33,13 @@ def draw_trajectories(
     outcomes: dict[str, str],
     path: Path,
 ) -> None:
-    """Writes a PNG of the map or the world with each trajectory.
+    """Writes a PNG of the map or world with all trajectories.
 
     Args:
-        task: Whose map or world.
-        trajectories: By episode name.
-        outcomes: By episode name.
-        path: The file.
+        task: Task whose map or world is drawn.
+        trajectories: Trajectories by episode name.
+        outcomes: Outcomes by episode name.
+        path: The file to write.
     """
     picture = pictures_of(task.setting).trajectories(
         [trajectory.poses for trajectory in trajectories.values()],
@@ -52,18 +52,18 @@ def draw_trajectories(
 def draw_failures(
     task: Task, report: Report, trajectories: dict[str, Trajectory], folder: Path
 ) -> list[Path]:
-    """Writes a PNG for each episode that failed, `NAME.png`; returns the files.
+    """Writes a picture `NAME.png` of each failed episode; returns the files.
 
     Args:
-        task: Whose map or world.
-        report: What failed, and why.
-        trajectories: By episode name; one that is missing gives no picture.
-        folder: Where to; it must exist.
+        task: Task whose map or world is drawn.
+        report: The report with the episodes and their diagnoses.
+        trajectories: Trajectories by episode name; without one there is no picture.
+        folder: Existing folder to write to.
     """
     background, files = None, []
     for episode in report.episodes:
         trajectory = trajectories.get(episode.name)
-        # A file may hold another run of that start, one driven by `run_episode`.
+        # The file may be of `run_episode`, which drives from the same start.
         if trajectory is None or trajectory.steps != episode.steps:
             continue
         if episode.outcome in ("reached", "not run"):
@@ -83,7 +83,7 @@ def _diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
 
 
 def file_stem(name: str) -> str:
-    """What the files of an episode are called: `jitter_1` for `jitter 1`."""
+    """Name of an episode's files without suffix: `jitter_1` for `jitter 1`."""
     return name.replace(" ", "_")
 
 
@@ -93,7 +93,7 @@ def event_of(
     episode: Episode,
     diagnosis: Diagnosis | None,
 ) -> Event:
-    """What a picture of a failed episode shows; its outcome where no cause is known."""
+    """What the picture of a failed episode shows; the outcome if no cause is known."""
     around = surroundings_of(task)
     units, shown = around.units, trajectory_on_screen(trajectory, around.units)
     end = Pose(*shown.poses[-1].tolist())
@@ -119,7 +119,7 @@ def event_of(
 def contact_of(
     task: Nominal, trajectory: Trajectory, outcome: str
 ) -> tuple[float, float] | None:
-    """Where the body touched something at the end of an episode, px or m."""
+    """The point that the body touched at the end of an episode, px or m."""
     if outcome != "collision":
         return None
     around = surroundings_of(task)
@@ -144,7 +144,7 @@ def _facts(diagnosis: Diagnosis) -> list[str]:
 def _where(
     task: Nominal, trajectory: Trajectory, diagnosis: Diagnosis
 ) -> NDArray[np.float64]:
-    """The places to look at, shape (n, 2)."""
+    """The positions to show enlarged, shape (n, 2)."""
     places = trajectory.poses[:, :2]
     if diagnosis.cause in ("stuck", "spinning", "oscillating"):
         return places[diagnosis.step :]
@@ -154,6 +154,6 @@ def _where(
 
 
 def write_png(picture: Image, path: Path) -> None:
-    """Writes an RGB picture."""
+    """Writes an RGB picture as a PNG file."""
     encoded = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1]
     write_atomic(path, encoded.tobytes())

@@ -1,4 +1,4 @@
-"""What is measured of an episode: time, way, clearance, smoothness."""
+"""Measures of an episode: time, path length, clearance, smoothness."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from tdac_agent.verification.diagnosis.surroundings import surroundings_of
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import path_length
 
-# Of the spectral arc length, as its authors have them.
+# Cut-off frequency (Hz), threshold and zero padding of the spectral arc length.
 _HIGHEST, _FAINT, _PADDING = 10.0, 0.05, 4
 _DIGITS = 6
 
 
 class Measured(PrintableRecord):
-    """Figures of one episode of an evaluation; lengths in px, of the e-puck in m.
+    """Measures of one episode of an evaluation; lengths in px, for the e-puck in m.
 
-    Those of the way are of successes only: what ends at a wall has none.
+    The optional ones, of path and smoothness, are set for successful episodes only.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -32,47 +32,47 @@ class Measured(PrintableRecord):
     outcome: Outcome
     steps: int
     collisions: int
-    seconds: float = Field(description="Simulated.")
-    driven: float = Field(description="Length of the way that was driven.")
+    seconds: float = Field(description="Simulated time.")
+    driven: float = Field(description="Length of the driven path.")
     shortest: float | None = Field(
-        None, description="Length of the shortest way, straightened."
+        None, description="Length of the shortest path, straightened."
     )
     path_ratio: float | None = Field(
-        None, description="Way driven, and the rest of it at the end, to the shortest."
+        None, description="Driven path plus the path left, over the shortest path."
     )
     time_ratio: float | None = Field(
-        None, description="Time to that of the shortest way at full speed."
+        None, description="Time over that of the shortest path at full speed."
     )
     smoothness: float | None = Field(
         None, description="Spectral arc length of the speed; 0 would be smoothest."
     )
-    clearance_min: float = Field(description="Least gap beside the body.")
-    clearance_mean: float = Field(description="Mean gap beside the body.")
+    clearance_min: float = Field(description="Least gap between body and obstacles.")
+    clearance_mean: float = Field(description="Mean gap between body and obstacles.")
     error: str | None = None
 
     @property
     def success(self) -> bool:
-        """Whether the goal was reached without a contact."""
+        """Whether the goal was reached without contact."""
         return self.outcome == "reached" and not self.collisions
 
 
 def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
-    """The figures of an episode.
+    """Measures an episode.
 
     Args:
-        rollout: As it was driven.
-        seed: Of its environment.
-        task: With the start and the goal of the episode.
+        rollout: The episode.
+        seed: Seed of its environment.
+        task: Task with the start and the goal of the episode.
     """
     trajectory = rollout.trajectory
     steps = np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T)
     gaps = np.maximum(rollout.rooms - rollout.radius, 0.0)
     seconds, driven = trajectory.steps * trajectory.dt, float(steps.sum())
-    way: dict[str, float] = {}
+    of_success: dict[str, float] = {}
     if rollout.reached and not rollout.collisions:
         shortest = shortest_way(task)
         rest = float(trajectory.path_distances[-1])
-        way = {
+        of_success = {
             "shortest": shortest,
             "path_ratio": (driven + rest) / shortest,
             "time_ratio": seconds * task.full_step / (shortest * task.dt),
@@ -83,7 +83,7 @@ def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
         "driven": driven,
         "clearance_min": float(gaps.min()),
         "clearance_mean": float(gaps.mean()),
-        **way,
+        **of_success,
     }
     return Measured(
         seed=seed,
@@ -96,10 +96,10 @@ def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
 
 
 def shortest_way(task: Nominal) -> float:
-    """Length of the shortest way from a task's start to its goal.
+    """Length of the shortest path from a task's start to its goal, px or m.
 
-    The grid's shortest path in eight directions, after every shortcut that the body
-    can take.
+    It is the shortest 8-connected grid path, after every shortcut that the body can
+    take.
     """
     around, start = surroundings_of(task), task.start
     units = around.units
@@ -115,12 +115,12 @@ def spectral_arc_length(speeds: NDArray[np.float64], dt: float) -> float:
 
     S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet, "On the analysis
     of movement smoothness", J. NeuroEng. Rehabil. 12:112, 2015, with its constants: 10
-    Hz, threshold 0.05, four times zero padding. It depends neither on how large nor on
-    how long a movement is; about -1.4 for a single stroke, the less the more often the
-    robot slows down and goes on.
+    Hz, threshold 0.05, zero padding level 4. It does not depend on the size or the
+    duration of a movement. It is about -1.4 for a single stroke, and lower the more
+    often the robot slows down and speeds up again.
 
     Args:
-        speeds: At equal intervals, not negative.
+        speeds: Speeds at equal intervals, not negative, shape (T,).
         dt: Interval, s.
     """
     if not speeds.size or speeds.max() == 0.0:

@@ -1,6 +1,6 @@
-"""What the motion of an episode was like: turning, reversing, going in rounds.
+"""Features of the motion in an episode: turns, reversals, loops.
 
-Lengths and headings are those of the screen; see `tdac_agent.tasks.units`.
+Lengths and headings are in units of the screen; see `tdac_agent.tasks.units`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tdac_agent.episodes.trajectory import Trajectory
 
-# Wheels, or differences of wheels, below this are taken for zero.
+# Wheel speeds, and differences of wheel speeds, below this count as zero.
 _DEAD_BAND = 0.02
 # A wheel this near its limit counts as saturated.
 _SATURATED = 0.999
@@ -27,7 +27,7 @@ def turns(trajectory: Trajectory) -> NDArray[np.float64]:
 
 
 def lengths(trajectory: Trajectory) -> NDArray[np.float64]:
-    """Way driven in each step."""
+    """Length driven in each step."""
     return np.asarray(np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T))
 
 
@@ -47,13 +47,13 @@ def wheels_turn(trajectory: Trajectory) -> NDArray[np.bool_]:
 
 
 def wheels_differ(trajectory: Trajectory) -> NDArray[np.bool_]:
-    """Whether the robot was to turn, for each step."""
+    """Whether the wheel speeds differ, for each step."""
     actions = trajectory.actions
     return np.asarray(np.abs(actions[:, 0] - actions[:, 1]) >= _DEAD_BAND)
 
 
 def flips(trajectory: Trajectory, since: int) -> float:
-    """Largest share of steps in which the turn, or the drive, was reversed."""
+    """Share of steps that reversed the turn, or the drive if that is more."""
     actions = trajectory.actions[since:]
     shares = [0.0]
     for signal in (actions[:, 0] - actions[:, 1], actions.sum(axis=1)):
@@ -71,7 +71,7 @@ def swing(trajectory: Trajectory, since: int) -> float:
 def rounds_about(
     trajectory: Trajectory, since: int, centre: tuple[float, float]
 ) -> float:
-    """How often the robot went around a point, clockwise on the screen positive."""
+    """Number of rounds about a point, positive if clockwise on the screen."""
     off = trajectory.poses[since:, :2] - np.asarray(centre)
     angles = np.unwrap(np.arctan2(off[:, 1], off[:, 0]))
     return float(angles[-1] - angles[0]) / (2.0 * math.pi)
@@ -79,13 +79,13 @@ def rounds_about(
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """How far a robot drove over its own trail.
+    """How much a robot drove over its own trail.
 
     Attributes:
-        same_way: Share of the places that it passed again in the same direction.
-        other_way: Share of the places that it passed again in the other direction.
-        period: Steps between two passes in the same direction, or between there and
-            back; 0 where there are none.
+        same_way: Share of positions that it passed again in the same direction.
+        other_way: Share of positions that it passed again in the opposite direction.
+        period: Median number of steps between two passes in the same direction; 0 if
+            there are none.
     """
 
     same_way: float
@@ -94,20 +94,20 @@ class Returns:
 
 
 def find_returns(trajectory: Trajectory, since: int, reach: float) -> Returns:
-    """Looks for rounds, and for driving to and fro.
+    """Finds loops, and driving back and forth.
 
     Args:
-        trajectory: Of the episode.
+        trajectory: Trajectory of the episode.
         since: First step to look at.
-        reach: Two poses this near to each other are at one place. For the other
-            direction it may be twice as far: there and back are seldom one line.
+        reach: Largest distance of two poses at the same position. In opposite
+            directions it may be twice as much, since the two lines seldom coincide.
     """
     steps = np.linspace(since, trajectory.steps - 1, _SAMPLES).astype(int)
     steps = np.unique(steps[steps >= since])
     if steps.size < 2:
         return Returns(0.0, 0.0, 0)
     x, y, heading = trajectory.poses[steps].T
-    # Backwards is the other way, whatever the heading says.
+    # In reverse, the direction of motion is opposite to the heading.
     course = heading + np.pi * (forward(trajectory)[steps] < 0.0)
     along = np.concatenate([[0.0], np.cumsum(lengths(trajectory))])[steps]
     apart = np.hypot(x[:, None] - x, y[:, None] - y)

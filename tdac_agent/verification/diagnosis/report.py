@@ -12,9 +12,9 @@ from tdac_agent.tasks.units import Place
 Group = Literal["static", "unit", "end to end", "user", "judge"]
 GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
 SHIPPED, OWN = "shipped", "own"
-"""Folders of the suite that is shipped, and of a user's own."""
+"""Names of the shipped suite and of a user's own suite."""
 MAX_MESSAGE = 4000
-"""Characters of a test's message."""
+"""Largest number of characters of a test's message."""
 Cause = Literal[
     "collision",
     "no motion",
@@ -39,25 +39,26 @@ class _Record(PrintableRecord):
 class Diagnosis(_Record):
     """What happened in an episode, computed from its trajectory.
 
-    Figures are there where they apply; distances and places in px, of the e-puck in m.
+    Figures that do not apply are None. Distances and positions are in px, for the
+    e-puck in m.
     """
 
     cause: Cause
-    text: str = Field(description="One paragraph, deterministic, no paths.")
+    text: str = Field(description="One paragraph; deterministic, without file paths.")
     episode: str | None = Field(
         None, description="`nominal`, `jitter 1` … or `run_episode`."
     )
-    step: int | None = Field(None, description="Of the event.")
-    x: float | None = Field(None, description="Of the robot at that step.")
+    step: int | None = Field(None, description="Step of the event.")
+    x: float | None = Field(None, description="Position of the robot at that step.")
     y: float | None = None
-    side: str | None = Field(None, description="Of the body that was hit.")
-    wall: tuple[float, float] | None = Field(None, description="What was touched.")
-    thing: str | None = Field(None, description="What that is.")
+    side: str | None = Field(None, description="Side of the body that was hit.")
+    wall: tuple[float, float] | None = Field(None, description="Point of contact.")
+    thing: str | None = Field(None, description="Name of the touched object.")
     corner: tuple[float, float] | None = Field(
-        None, description="Corner of the wall within a body radius of that."
+        None, description="Corner of the wall within a body radius of the contact."
     )
     heading_error: float | None = Field(
-        None, description="To the shortest path at the end, rad, right positive."
+        None, description="Angle to the shortest path at the end, rad, right positive."
     )
     saturated: float | None = Field(
         None, description="Share of steps with a wheel at its limit."
@@ -71,14 +72,14 @@ class Failure(_Record):
 
     test: str = Field(description="Test id, as pytest prints it.")
     group: Group
-    message: str = Field(description="What was expected and what came.")
+    message: str = Field(description="Expected and actual result.")
     diagnosis: Diagnosis | None = None
 
 
 class Episode(_Record):
-    """Figures of one judged episode; distances in px, of the e-puck in m."""
+    """Figures of one judged episode; distances in px, for the e-puck in m."""
 
-    # JSON has no word for infinity: a report with one would not read back.
+    # JSON has no infinity: a report with one could not be read back.
     model_config = ConfigDict(allow_inf_nan=False)
 
     name: str
@@ -90,7 +91,7 @@ class Episode(_Record):
     d_min: float
     d0_euclidean: float
     d_min_euclidean: float
-    progress_passed: bool = Field(description="The progress test, geodesic.")
+    progress_passed: bool = Field(description="The progress test by path length.")
     progress_passed_euclidean: bool
     call_ms_mean: float
     call_ms_p99: float
@@ -98,16 +99,16 @@ class Episode(_Record):
 
 
 class Provenance(_Record):
-    """What the verdict is about."""
+    """What was verified, and under which conditions."""
 
     task: str
-    called: str = Field("", description="The task in words, not by its name alone.")
+    called: str = Field("", description="The task in words, beyond its name.")
     task_sha256: str
-    unit: Place = Field("px", description="Of places and lengths.")
+    unit: Place = Field("px", description="Unit of positions and lengths.")
     left_out: tuple[str, ...] = Field(
-        (), description="Nodes of the world that may be solid and were ignored."
+        (), description="Nodes of the world that may be solid but were ignored."
     )
-    map_sha256: str = Field(description="Of the map or the world.")
+    map_sha256: str = Field(description="Hash of the map or world.")
     params_sha256: str
     sensors_sha256: str
     controller_sha256: str
@@ -117,8 +118,10 @@ class Provenance(_Record):
     profile: Literal["policy", "paper"]
     paper: bool = Field(description="Nominal start only.")
     seed: int
-    sandbox: str = Field(description="Tier that held the controller.")
-    limits: dict[str, float] = Field(description="Of the controller's processes.")
+    sandbox: str = Field(description="Tier of the controller's sandbox.")
+    limits: dict[str, float] = Field(
+        description="Limits of the controller's processes."
+    )
     warnings: tuple[str, ...] = ()
     versions: dict[str, str]
 
@@ -146,16 +149,18 @@ class Report(_Record):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        """A verdict that its own tests do not bear out is none."""
+        """Rejects a verdict that does not agree with the tests."""
         passed = sum(outcome == "passed" for outcome in self.tests.values())
         counts = (len(self.tests), passed, len(self.tests) - passed)
         verdict = self.verdict
-        told = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
+        given = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
         failed = {name for name, outcome in self.tests.items() if outcome != "passed"}
-        if told != counts or {failure.test for failure in self.failures} != failed:
-            raise ValueError(f"expected counts {counts} and their failures, got {told}")
+        if given != counts or {failure.test for failure in self.failures} != failed:
+            raise ValueError(
+                f"expected counts {counts} and their failures, got {given}"
+            )
         if verdict.passed != (0 < passed == len(self.tests)):
-            raise ValueError(f"expected not passed={verdict.passed} with {counts}")
+            raise ValueError(f"passed={verdict.passed} contradicts counts {counts}")
         return self
 
     @property
@@ -170,7 +175,7 @@ def id_of(nodeid: str) -> str:
 
 
 def group_of(test: str) -> Group:
-    """Which part of a suite a test belongs to."""
+    """The part of a suite that a test belongs to."""
     files: dict[str, Group] = {
         "test_static.py": "static",
         "test_unit.py": "unit",

@@ -1,4 +1,4 @@
-"""What a robot does that makes no progress: stands, spins, oscillates, loops."""
+"""What a robot without progress does: it stands, spins, oscillates or loops."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from tdac_agent.verification.diagnosis.motion import (
 )
 from tdac_agent.verification.diagnosis.report import Cause
 
-# A step nearer than this, px or mm, is no progress: a turn in place drifts as much.
+# Coming nearer by less, px or mm, is no progress: a turn in place drifts as much.
 PROGRESS = 1.0
-# Share of steps that reverse a turn or a drive: a period of 40 steps (2 s) or less.
+# Least share of reversals for oscillating: a period of at most 40 steps (2 s).
 FLIPS = 0.05
-# Share of the places that a robot passed before, from which it goes over its trail.
+# Least share of positions passed before, for driving over the own trail.
 _AGAIN = 0.6
-# The largest circle that counts as spinning, radii of the body.
+# Radius of the largest circle that counts as spinning, body radii.
 _CIRCLE = 4.0
-# Rounds in the second half of the time without progress that count as spinning.
+# Least number of turns in the second half of the stall, for spinning.
 _ROUNDS = 1.0
-# Mean wheel speed below which a robot does nothing on purpose.
+# Mean wheel speed below which a robot is idle.
 _IDLE = 0.01
-# Steps that a robot may trail off before it stands.
+# Steps between the last progress and the standstill that need no mention.
 _AT_ONCE = 10
 
 
@@ -40,7 +40,7 @@ Habit = tuple[Cause, str]
 
 
 class Finding(NamedTuple):
-    """What happened, with the step of it."""
+    """What happened, and in which step."""
 
     cause: Cause
     text: str
@@ -50,25 +50,24 @@ class Finding(NamedTuple):
 def why_stalled(
     trajectory: Trajectory, since: int, radius: float, units: Units
 ) -> Finding:
-    """No progress since a step: standing, spinning, oscillating, looping or stuck."""
+    """Finds what a robot did that made no progress since a step."""
     rest = standing_since(trajectory)
     if trajectory.steps - rest >= 0.5 * (trajectory.steps - since):
-        text = (
-            f"it stands at {units.point(*trajectory.poses[-1, :2])} since step {rest}"
-        )
+        place = units.point(*trajectory.poses[-1, :2])
+        text = f"it stood still from step {rest} to the end at {place}"
         if rest - since > _AT_ONCE:
-            text += f", and made no progress since step {since}"
+            text += f", and made no progress after step {since}"
         return Finding("stuck", f"{text}.", rest)
-    # The first half may still be on the way to what the robot then did for good.
+    # In the first half, the robot may not yet have settled into its final behaviour.
     late = since + (trajectory.steps - since) // 2
     cause, text = (
         _spinning(trajectory, late, radius, units)
-        or _going_over_its_trail(trajectory, since, late, radius, units)
-        or _trembling(trajectory, late, radius, units)
+        or _retracing(trajectory, since, late, radius, units)
+        or _jittering(trajectory, late, radius, units)
         or _wandering(trajectory, late, units)
     )
     place = units.point(*trajectory.poses[since, :2])
-    return Finding(cause, f"no progress since step {since} at {place}; {text}.", since)
+    return Finding(cause, f"no progress after step {since} at {place}; {text}.", since)
 
 
 def _spinning(
@@ -82,41 +81,41 @@ def _spinning(
         return None
     way = "right" if net > 0 else "left"
     circle = driven / (rounds * math.tau)
-    wide = f"on a circle of {circle:.0f} {units.length}"
+    wide = f"on a circle of radius {circle:.0f} {units.length}"
     where = wide if circle >= PROGRESS else "in place"
     return "spinning", (
-        f"in the last {trajectory.steps - late} steps it turned {rounds:.1f} times to "
-        f"the {way} {where}"
+        f"in the last {trajectory.steps - late} steps it made {rounds:.1f} full turns "
+        f"to the {way} {where}"
     )
 
 
-def _trembling(
+def _jittering(
     trajectory: Trajectory, late: int, radius: float, units: Units
 ) -> Habit | None:
     turned, share = turns(trajectory)[late:], flips(trajectory, late)
     actions = np.abs(trajectory.actions[late:])
     if abs(turned.sum()) >= 0.3 * max(np.abs(turned).sum(), 1.0):
         return None
-    if share < FLIPS and not _looking_about(trajectory, late, radius):
+    if share < FLIPS and not _sweeping(trajectory, late, radius):
         return None
     if actions.mean() < _IDLE:
         return None
     return "oscillating", (
-        f"in the last {trajectory.steps - late} steps it reversed its turn or its "
-        f"drive every {1 / share:.1f} steps, its heading within "
-        f"{math.degrees(swing(trajectory, late)):.0f}°, its place within "
+        f"in the last {trajectory.steps - late} steps it reversed its turning or "
+        f"driving direction every {1 / share:.1f} steps, its heading within "
+        f"{math.degrees(swing(trajectory, late)):.0f}°, its position within "
         f"{_extent(trajectory, late):.1f} {units.length}"
     )
 
 
-def _looking_about(trajectory: Trajectory, late: int, radius: float) -> bool:
-    """Whether a robot turns to and fro on the spot most of the time."""
+def _sweeping(trajectory: Trajectory, late: int, radius: float) -> bool:
+    """Whether a robot mostly turns back and forth on the spot."""
     reversals = flips(trajectory, late) * (trajectory.steps - late)
     turning = wheels_differ(trajectory)[late:].mean()
     return reversals >= 4 and turning >= 0.5 and _extent(trajectory, late) < 3 * radius
 
 
-def _going_over_its_trail(
+def _retracing(
     trajectory: Trajectory, since: int, late: int, radius: float, units: Units
 ) -> Habit | None:
     if _extent(trajectory, late) < 3.0 * radius:
@@ -126,10 +125,10 @@ def _going_over_its_trail(
     if again.same_way < _AGAIN:
         return None
     cause: Cause = "oscillating" if again.other_way >= _AGAIN else "looping"
-    how = "to and fro" if cause == "oscillating" else "in rounds"
+    how = "back and forth" if cause == "oscillating" else "in loops"
     return cause, (
-        f"since then it drove {how} over its own trail, every {again.period} steps the "
-        f"same, within {box}"
+        f"since then it drove {how} over its own trail with a period of "
+        f"{again.period} steps, within {box}"
     )
 
 
@@ -143,21 +142,21 @@ def _wandering(trajectory: Trajectory, late: int, units: Units) -> Habit:
 
 
 def _box(trajectory: Trajectory, since: int) -> tuple[Points, Points]:
-    """The least and the greatest (x, y) since a step."""
+    """The smallest and the largest (x, y) since a step."""
     places = trajectory.poses[since:, :2]
     return places.min(axis=0), places.max(axis=0)
 
 
 def _extent(trajectory: Trajectory, since: int) -> float:
-    """Diagonal of the box around all places since a step."""
+    """Diagonal of the box around all positions since a step."""
     low, high = _box(trajectory, since)
     return float(np.hypot(*(high - low)))
 
 
 def standing_since(trajectory: Trajectory) -> int:
-    """First step of the rest at the end of an episode; T where it moved to the end.
+    """First step of the standstill at the end of an episode; T if there is none.
 
-    Whoever trembles on the spot does not stand.
+    Jittering on the spot is no standstill.
     """
     x, y, heading = trajectory.poses.T
     moved = np.hypot(x - x[-1], y - y[-1]) > 0.5 * PROGRESS
@@ -167,5 +166,5 @@ def standing_since(trajectory: Trajectory) -> int:
 
 
 def percent(share: float) -> str:
-    """A share in words."""
+    """Formats a share, such as `12 %`."""
     return f"{100 * share:.0f} %"

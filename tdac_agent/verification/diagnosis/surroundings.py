@@ -1,4 +1,4 @@
-"""What a diagnosis asks about a map or a world, in units of the screen."""
+"""The interface to a map or world that diagnoses use, in units of the screen."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ Point = tuple[float, float]
 
 
 class Surroundings(Protocol):
-    """A task's map or world; places and lengths as in `units`."""
+    """A task's map or world; positions and lengths as in `units`."""
 
     @property
     def units(self) -> Units:
-        """Of the environment."""
+        """Units of the environment."""
 
     @property
     def radius(self) -> float:
-        """Of the body."""
+        """Radius of the body."""
 
     @property
     def full_speed(self) -> float:
-        """Lengths a second."""
+        """Full speed of the body, lengths per second."""
 
     def touch(self, pose: Pose, reach: float) -> Touch | None:
         """What the body touches, or would touch first, within `reach`."""
 
     def seen(self, touch: Touch, trajectory: Trajectory) -> str:
-        """Whether the distance sensors look at what was touched, in words."""
+        """What the distance sensors saw of what was touched, as text."""
 
     def path_from(self, pose: Pose) -> Path:
         """Shortest path to the goal, shape (n, 2); empty where there is none."""
@@ -45,10 +45,13 @@ class Surroundings(Protocol):
         """Corners of a path after every shortcut that the body can take."""
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
-        """Where the shortest path from each place first is so far away, or ends."""
+        """Where the shortest path from each position is first `far` from it, or ends.
+
+        None for a position without a path.
+        """
 
     def mistaken_goals(self) -> dict[str, Point]:
-        """Where the goal is for one who mixes up coordinates, by the mistake."""
+        """Where the goal would be with mixed-up coordinates, by name of the mistake."""
 
 
 def surroundings_of(task: Nominal) -> Surroundings:
@@ -57,7 +60,7 @@ def surroundings_of(task: Nominal) -> Surroundings:
 
 
 def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:
-    """A trajectory in units of the screen."""
+    """Converts a trajectory to units of the screen."""
     return replace(
         trajectory,
         poses=units.on_screen(trajectory.poses),
@@ -66,7 +69,7 @@ def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:
 
 
 def rollout_on_screen(rollout: Rollout, units: Units) -> Rollout:
-    """An episode in units of the screen."""
+    """Converts an episode to units of the screen."""
     (goal,) = units.on_screen([rollout.goal])
     return replace(
         rollout,

@@ -1,4 +1,4 @@
-"""Which wall is nearest to the body, on which side of it, and how near to a corner."""
+"""The wall nearest to the body: its side of the body and its nearest corner."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _SIDES = (
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The wall that is nearest to the body.
+    """The wall nearest to the body.
 
     Attributes:
         wall: Its nearest point (x, y), px.
-        bearing: Of that point, seen from the heading, rad, right positive.
-        gap: Between body and wall, px.
+        bearing: Angle from the heading to that point, rad, right positive.
+        gap: Gap between body and wall, px.
         border: Whether it is the border of the map.
-        corner: The nearest outer corner of the wall within a radius of that point.
-        thing: What it is.
+        corner: Nearest outer corner of the wall within a body radius of that point.
+        thing: Its name.
     """
 
     wall: Point
@@ -43,20 +43,20 @@ class Touch:
 
 
 def side_of(bearing: float) -> str:
-    """Side of the robot, as a person sees it, at a bearing (rad, right positive)."""
+    """Name of the side of the robot at a bearing (rad, right positive)."""
     return _SIDES[round(bearing / (math.pi / 4.0)) % 8]
 
 
 def where_on_the_wall(touch: Touch, towards: float, units: Units = PIXELS) -> str:
-    """How a touched point lies to the nearest corner.
+    """Describes a touched point by the nearest corner.
 
     Args:
-        touch: What was touched.
+        touch: The touched wall.
         towards: Direction of the motion, rad.
-        units: Of the places.
+        units: Units of its positions.
 
     Returns:
-        `3.1 px past the corner at (319.5, 87.5)`; empty with no corner near.
+        Text such as `3.1 px past the corner at (319.5, 87.5)`; empty without a corner.
     """
     if touch.corner is None:
         return ""

@@ -36,7 +36,7 @@ def test_feedback_tells_what_happened(small_task, warm):
 def test_held_out_starts_are_told_by_name_only(small_task, warm):
     """Figures of a held-out start appear nowhere, whatever its test says."""
     report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
-    told = "A start that is held out failed; nothing more is told of it."
+    told = "A held-out start failed; its details are not disclosed."
     failure = Failure(
         test="own/test_gap.py::test_gap",
         group="user",

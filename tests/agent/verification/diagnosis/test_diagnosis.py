@@ -81,7 +81,7 @@ def test_collision_with_the_border():
     assert found.y == pytest.approx(7.5, abs=0.1)
     assert found.wall == (60.0, -0.5)
     assert "touched the border of the map" in found.text
-    assert re.search(r"Heading error 11\d° right to the shortest path", found.text)
+    assert re.search(r"the shortest path is 11\d° to the right", found.text)
     assert found.heading_error == pytest.approx(math.radians(115), abs=0.1)
     assert "limit in 100 % of the steps" in found.text
 
@@ -271,9 +271,9 @@ def test_nothing_within_reach():
 
 
 def test_turning_away_from_the_path_is_told():
-    """A robot that turns to the wrong side is told to look at the sign of its turn."""
+    """A robot that turns to the wrong side is told to check the sign of its turn."""
     start = (60, 60, 0.6)
     _, wrong = judged(room(start), always(0.25, 0.2))
-    assert "look at the sign of the turn" in wrong.text
+    assert "check the sign of the turn" in wrong.text
     _, right = judged(room(start, horizon=60), always(0.2, 0.25))
     assert "sign of the turn" not in right.text

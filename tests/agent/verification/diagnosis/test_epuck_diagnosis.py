@@ -92,7 +92,7 @@ def test_figures_of_a_collision():
     assert found.d0 == pytest.approx(distances[0], abs=1e-4)
     assert found.d_min == pytest.approx(distances.min(), abs=1e-4)
     assert 0.7 < found.d0 < 0.9
-    assert "at (0.213, 0.000), heading 0.00 rad, at 126 mm/s" in found.text
+    assert "at (0.213, 0.000), heading 0.00 rad, speed 126 mm/s" in found.text
     assert f"Path left: {1e3 * found.d0:.1f} mm at the start" in found.text
     assert re.search(r"ps[07] read \d+, the sensor on that side", found.text)
     assert "A wheel was at its limit in 100 % of the steps" in found.text
@@ -117,8 +117,8 @@ def test_headings_and_turns_are_as_in_the_world():
     env = env_with(Disc(0.3, 0.0, 0.05), goal=(0.3, 0.5))
     _, found = judged(env, always(1.0, 1.0))
     assert found.heading_error < 0.0
-    assert re.search(r"Heading error \d+° left to the shortest path", found.text)
-    assert re.search(r"\d+° left to the goal itself", found.text)
+    assert re.search(r"the shortest path is \d+° to the left", found.text)
+    assert re.search(r"the goal itself \d+° to the left", found.text)
 
 
 def test_turning_away_is_noticed():
