@@ -1,1 +1,1 @@
-"""From a controller, a task and a suite to a report."""
+"""Verification: a suite is run over a controller on a task, and gives a report."""

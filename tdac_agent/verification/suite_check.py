@@ -1,4 +1,4 @@
-"""A suite proves itself: the reference passes it, and bad controllers do not."""
+"""Checks a suite: the reference controller must pass it, bad controllers must fail."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tdac_agent.verification.suite.proof import SuiteCheck, row_of, verdict_on_s
 from tdac_agent.verification.verify import verify
 
 REPEATS = 5
-# A slow controller is cut off for its speed; where steps are long, by this.
+# Ends the slow controller where steps are so long that its speed alone does not.
 SLOW_LIMITS = Limits(cpu_seconds=30)
 FAULT_WIDTH = 300
 
@@ -46,30 +46,30 @@ def check_suite(
     judge: WarmJudge | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> SuiteCheck:
-    """Verifies the reference and bad controllers, repeatedly.
+    """Verifies the reference and the bad controllers, several times each.
 
     Args:
-        task: What the controllers must do.
+        task: Task of the controllers.
         profile: `policy` or `paper`; the task's own by default.
         suite: Folder with further tests; the task's own by default.
-        shipped: Folder of tests in the place of the shipped ones.
-        tier: Sandbox tier, `auto` for the best one here.
-        seed: Of the jittered starts of all controllers; by default it follows from the
-            task and a secret of this installation.
-        repeats: Verifications of each controller, which must agree. Of the slow one
-            the clock decides: it has one, of the nominal episode alone.
+        shipped: Folder of tests to use instead of the shipped ones.
+        tier: Sandbox tier, `auto` for the best one on this machine.
+        seed: Seed of the jittered starts of all controllers; by default derived from
+            the task and a secret of this installation.
+        repeats: Number of verifications of each controller, which must agree. The slow
+            controller has only one, of the nominal episode, as the clock decides it.
         bad: Names of the bad controllers.
-        judge: A warm one; one of its own by default.
-        on_progress: Called with what is being done, in a few words.
+        judge: A warm judge to use; a new one by default.
+        on_progress: Called with a short description of the current step.
 
     Raises:
-        ControllerFileError: The suite's folder holds no tests.
-        Fault: Sandbox or suite broken.
+        ControllerFileError: The suite's folder has no tests.
+        Fault: The sandbox or the suite is broken.
     """
     if repeats < 1:
         raise ValueError(f"expected at least 1 repeat, got {repeats}")
     began = time.monotonic()
-    # The reference knows its starts, so that they cannot follow from its bytes.
+    # The reference's source contains its starts, so they cannot be derived from it.
     seed = seed_of(b"", task) if seed is None else seed
     with contextlib.ExitStack() as stack:
         warm = judge or stack.enter_context(WarmJudge(task=task))
@@ -109,12 +109,12 @@ def prove_suite(
     judge: WarmJudge | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> SuiteCheck:
-    """The short form, for the beginning of a run; arguments as for `check_suite`.
+    """The short check at the start of a run; arguments as for `check_suite`.
 
     The reference must pass once, and a controller that does nothing must fail once.
 
     Raises:
-        Fault: One of them does not, or sandbox or suite are broken.
+        Fault: One of them does not, or the sandbox or the suite is broken.
     """
     check = check_suite(
         task,
@@ -130,6 +130,6 @@ def prove_suite(
     if not check.proven:
         first, *more = check.problems
         others = f" ({len(more)} more: tdac check-suite)" if more else ""
-        told = textwrap.shorten(first, FAULT_WIDTH, placeholder=" …")
-        raise Fault(f"the suite did not prove itself: {told}{others}")
+        reason = textwrap.shorten(first, FAULT_WIDTH, placeholder=" …")
+        raise Fault(f"the suite did not prove itself: {reason}{others}")
     return check

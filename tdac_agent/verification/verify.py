@@ -1,4 +1,4 @@
-"""Verification: a controller, a task and a suite in; a report out."""
+"""Verifies a controller on a task with a suite, and returns a report."""
 
 from __future__ import annotations
 
@@ -48,31 +48,31 @@ def verify(
     judge: WarmJudge | None = None,
     meanwhile: Callable[[], None] | None = None,
 ) -> Report:
-    """Tests a controller in the sandbox against everything the task asks for.
+    """Tests a controller in the sandbox against everything the task requires.
 
     Args:
         controller: Path of the file, or its source (text of several lines, or bytes).
-        task: What it must do.
+        task: Task of the controller.
         profile: `policy` or `paper`; the task's own by default.
-        paper: Nominal start only, as in the paper.
-        suite: Folder with further tests beside the shipped ones; the task's own by
-            default.
-        shipped: Folder of tests in the place of the shipped ones.
-        tier: Sandbox tier, `auto` for the best one here.
-        seed: Of the jittered starts; by default it follows from the controller, the
-            task and a secret of this installation, so that no author can aim at it.
-        limits: Of the controller's processes; `cpu_seconds` is for all of them.
+        paper: Whether to use the nominal start only, as in the paper.
+        suite: Folder with tests to add to the shipped ones; the task's own by default.
+        shipped: Folder of tests to use instead of the shipped ones.
+        tier: Sandbox tier, `auto` for the best one on this machine.
+        seed: Seed of the jittered starts; by default derived from the controller, the
+            task and a secret of this installation, so that no author can predict it.
+        limits: Limits of the controller's processes; `cpu_seconds` is the total.
         out: Folder for `report.json` and `trajectories/`, with a picture of each
-            episode that failed; none by default.
-        judge: A warm one, for several verifications; one of its own by default.
-        meanwhile: Called now and then while the judge is at work.
+            failed episode; by default nothing is kept.
+        judge: A warm judge, to be shared by several verifications; a new one by
+            default.
+        meanwhile: Called repeatedly while the judge works.
 
     Returns:
-        The report; a failing controller is a report, never an exception.
+        The report; a failing controller gives a report, never an exception.
 
     Raises:
         ControllerFileError: The file cannot be read.
-        Fault: Sandbox or suite broken: neither pass nor fail.
+        Fault: The sandbox or the suite is broken; this is neither pass nor fail.
     """
     began = time.monotonic()
     source = read_source(controller)
@@ -114,15 +114,16 @@ def verify(
 def kept_report(
     folder: Path, task: Task, source: str, seed: int | None
 ) -> Report | None:
-    """The report of a verification in a folder, if that is one of this very controller.
+    """Loads the report in a folder if it is of this controller, otherwise None.
 
-    None where it is of other bytes, another task, suite, seed or version of a package;
-    a seed of None is the controller's own, which nobody else can have made up.
+    Controller, task, suite, seed and package versions must be the same. A seed of None
+    is the one derived from the controller and this installation's secret, so that a
+    report from elsewhere never matches.
     """
     raw = source.encode("utf-8", "surrogatepass")
     try:
-        told = read_file(folder / "report.json", RECORD_BYTES)
-        report = Report.model_validate(parse_json(told))
+        content = read_file(folder / "report.json", RECORD_BYTES)
+        report = Report.model_validate(parse_json(content))
     except (OSError, ValueError):
         return None
     about = report.provenance
@@ -140,14 +141,14 @@ def kept_report(
 
 
 def suite_sha256(task: Task) -> str:
-    """Hash of all tests that a task's controllers are held to."""
-    return _hash(_suites(task))
+    """Hash of all tests that controllers of a task must pass."""
+    return _hash_of_suites(_suites(task))
 
 
 def _suites(
     task: Task, suite: Path | None = None, shipped: Path | None = None
 ) -> dict[str, Path]:
-    """The folders of tests: the shipped ones, and further ones where there are any."""
+    """The folders of tests: the shipped suite, and an own one if there is any."""
     suites = {SHIPPED: _suite_folder(shipped or task.environment.suite)}
     extra = suite or task.suite
     if suite is None:
@@ -158,7 +159,7 @@ def _suites(
 
 
 def read_source(controller: str | bytes | Path) -> bytes:
-    """Source of a controller given as a path, as text of several lines or as bytes.
+    """Reads a controller given as a path, as text of several lines or as bytes.
 
     Raises:
         ControllerFileError: The file cannot be read, or is far too large.
@@ -175,10 +176,10 @@ def read_source(controller: str | bytes | Path) -> bytes:
 
 
 def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> None:
-    """Lays out the judge's folder.
+    """Lays out the folder of a job.
 
-    The suites are linked side by side, so that no `conftest.py` or `pytest.ini` from
-    above one of them takes part.
+    The suites are linked into one folder, so that no `conftest.py` or `pytest.ini` of
+    their own parent folders takes effect.
     """
     job.out.mkdir()
     if job.trajectories is not None:
@@ -191,7 +192,7 @@ def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> No
 
 
 def load_trajectories(folder: Path) -> dict[str, Trajectory]:
-    """The trajectories that a verification kept, by episode name."""
+    """Loads the trajectories that a verification kept, by episode name."""
     return {
         path.stem.replace("_", " "): Trajectory.load(path)
         for path in sorted(folder.glob("*.npz"), key=nominal_first)
@@ -209,7 +210,7 @@ def _suite_folder(path: Path) -> Path:
 def _run_judge(
     job: Job, folder: Path, judge: WarmJudge, meanwhile: Callable[[], None] | None
 ) -> str:
-    """Has the job done; returns what was printed meanwhile."""
+    """Runs a job; returns the output of its process."""
     request = folder / "job.json"
     request.write_text(job.model_dump_json(), encoding="utf-8")
     judge.run(request, DEADLINE_SECONDS, meanwhile)
@@ -223,32 +224,32 @@ def _provenance(
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
         called=called(task),
-        own_suite=_own(suites),
+        own_suite=_own_suite_hash(suites),
         suite=" + ".join(folder.name for folder in suites.values()),
-        suite_sha256=_hash(suites),
+        suite_sha256=_hash_of_suites(suites),
         profile=job.profile,
         paper=job.paper,
         seed=job.seed,
     )
 
 
-def _own(suites: dict[str, Path]) -> str:
-    """Short hash of tests that are not shipped; empty without."""
+def _own_suite_hash(suites: dict[str, Path]) -> str:
+    """Short hash of the suite that is not shipped; empty without one."""
     own = suites.get(OWN)
-    return _hash_of(own)[:8] if own else ""
+    return _hash_of_folder(own)[:8] if own else ""
 
 
-def _hash_of(folder: Path) -> str:
-    return sha256_of(json.dumps(_suite_hash(folder), sort_keys=True).encode())
+def _hash_of_folder(folder: Path) -> str:
+    return sha256_of(json.dumps(_file_hashes(folder), sort_keys=True).encode())
 
 
-def _hash(suites: dict[str, Path]) -> str:
-    hashes = {name: _suite_hash(folder) for name, folder in suites.items()}
+def _hash_of_suites(suites: dict[str, Path]) -> str:
+    hashes = {name: _file_hashes(folder) for name, folder in suites.items()}
     hashes[SHIPPED][EVERY_TASK.name] = sha256_of(EVERY_TASK.read_bytes())
     return sha256_of(json.dumps(hashes, sort_keys=True).encode())
 
 
-def _suite_hash(folder: Path) -> dict[str, str]:
+def _file_hashes(folder: Path) -> dict[str, str]:
     return {
         str(path.relative_to(folder)): sha256_of(read_file(path, RECORD_BYTES))
         for path in sorted(folder.rglob("*.py"))
@@ -256,7 +257,7 @@ def _suite_hash(folder: Path) -> dict[str, str]:
 
 
 def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
-    """Keeps report, trajectories and pictures; those of an earlier one are removed."""
+    """Writes report, trajectories and pictures in place of those of an earlier one."""
     folder = out / "trajectories"
     folder.mkdir(parents=True, exist_ok=True)
     for pattern in ("nominal.*", "jitter_*.*"):
@@ -266,10 +267,10 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
         write_atomic(folder / path.name, path.read_bytes(), lasting=False)
     if not report.passed:
         from tdac_agent.verification.diagnosis.figures import (
-            draw_failures,  # loads what draws
+            draw_failures,  # slow to import
         )
 
         draw_failures(task, report, load_trajectories(folder), folder)
-    # Of the candidate that was here before.
+    # It belongs to the controller that was verified here before.
     (out / "robust.json").unlink(missing_ok=True)
     write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")

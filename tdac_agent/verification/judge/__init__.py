@@ -1,1 +1,1 @@
-"""The judge's process: it runs a suite over a controller."""
+"""The judge's processes, which run suites and episodes of controllers."""

@@ -1,4 +1,4 @@
-"""Whose doing an error is: the controller's, which is a verdict, or ours."""
+"""Separates errors of the controller, which are verdicts, from faults of the judge."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from tdac_agent.sandbox.inner.wire import WireError
 
 @contextmanager
 def ours() -> Generator[None]:
-    """Makes a fault of whatever is raised meanwhile and is not the controller's doing.
+    """Turns errors that the controller did not cause into a `Fault`.
 
-    Only what a controller did, and values that a test wants to send to it and that
-    cannot be sent, are let through: a controller may have made them.
+    Errors of the controller pass through. So do those of values that a test cannot send
+    to the controller, since the controller may have made these values.
 
     Raises:
-        Fault: Sandbox or judge failed; says nothing about the controller.
+        Fault: The sandbox or the judge failed; this says nothing about the controller.
     """
     try:
         yield
@@ -29,11 +29,11 @@ def ours() -> Generator[None]:
     except SandboxError as error:
         raise Fault(f"the sandbox failed: {error}") from error
     except Exception as error:
-        raise Fault(f"the judge failed: {_told(error)}") from error
+        raise Fault(f"the judge failed: {_in_one_line(error)}") from error
 
 
-def _told(error: Exception) -> str:
-    """What was raised and where, in one line."""
+def _in_one_line(error: Exception) -> str:
+    """An error and where it was raised, in one line."""
     text = " ".join(traceback.format_exception_only(error)[-1].split())
     frames = traceback.extract_tb(error.__traceback__)
     return f"{text} ({Path(frames[-1].filename).name}:{frames[-1].lineno})"

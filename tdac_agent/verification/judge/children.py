@@ -1,4 +1,4 @@
-"""Sandboxed children that are ready before they are needed."""
+"""The child pool: sandboxed children that are ready before they are needed."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from tdac_agent.sandbox import (
 )
 from tdac_agent.sandbox.counters import shared_counters
 
-# As many children as the verification of a good controller takes.
+# Number of children that the verification of a good controller takes.
 READY = 10
 
 
 class Nursery:
-    """Keeps a zygote ready that forks children, each for one use.
+    """The child pool: keeps a zygote ready that forks children, each for one use.
 
-    Forks of the process that made it may use it, too: what is ready is shared.
+    Forks of the process that made the pool can use it, too, and share its children.
 
     Args:
-        ahead: Whether to start one for the best tier at once, and the next one when
-            that can have no further child.
+        ahead: Whether to start a zygote of the best tier at once, and the next one as
+            soon as that one is full.
     """
 
     def __init__(self, *, ahead: bool = True) -> None:
@@ -41,10 +41,10 @@ class Nursery:
         self._lock = threading.Lock()
         self._best: Tier | None = None
         self._zygotes: list[Zygote] = []
-        # Without room, but perhaps with children, which another process may have.
+        # Without free slots, but maybe with children in use by other processes.
         self._full: list[Zygote] = []
         self._ready: list[Child] = []
-        # How many of those that were ready were taken.
+        # Number of ready children that were taken.
         self._taken = shared_counters(1)
         self._taking = multiprocessing.get_context("fork").Lock()
         self._owner = os.getpid()
@@ -52,15 +52,15 @@ class Nursery:
             self._start_likely()
 
     def take(self, tier: str, limits: Limits) -> Child:
-        """A child that has no controller yet; several threads may ask at once.
+        """Returns a child without a controller; safe to call from several threads.
 
-        It may use the cores that the caller may use.
+        The child may run on the cores that the caller may run on.
 
         Raises:
-            SandboxError: The tier does not work here.
+            SandboxError: The tier does not work on this machine.
         """
         child = self._ready_child(tier, limits) or self._new_child(tier, limits)
-        with contextlib.suppress(OSError):  # it has ended, which its first call finds
+        with contextlib.suppress(OSError):  # has ended; its first call reports that
             os.sched_setaffinity(child.controller_pid, os.sched_getaffinity(0))
         return child
 
@@ -73,10 +73,13 @@ class Nursery:
             return self._first_child(limits)
 
     def prepare(self) -> bool:
-        """Has one more child ready for the usual limits; False where it has enough.
+        """Starts one more ready child, with the default limits.
 
-        The process that has them ready is the one that ends those nobody takes. It
-        does so before it forks.
+        Called before the process forks. The calling process has to end the children
+        that are not taken.
+
+        Returns:
+            False if there are enough ready children, or none could be started.
         """
         self._owner = os.getpid()
         if len(self._ready) >= READY:
@@ -98,7 +101,7 @@ class Nursery:
         return self._ready[number] if number < len(self._ready) else None
 
     def close(self) -> None:
-        """Has no further children; ends the zygotes that have none."""
+        """Ends unused ready children and, with their last child, the zygotes."""
         if os.getpid() == self._owner:
             for child in self._ready[self._taken[0] :]:
                 child.close()
@@ -114,12 +117,12 @@ class Nursery:
         self.kill()
 
     def kill(self) -> None:
-        """Ends all; the processes that used it have ended, whatever they were at."""
+        """Kills all zygotes; the processes that used the pool must have ended."""
         for zygote in self._zygotes + self._full:
             zygote.kill()
 
     def _first_child(self, limits: Limits) -> Child:
-        """One of the best tier that turns out to work."""
+        """A child of the best tier that works."""
         reasons = []
         for tier in CONFINING:
             try:
@@ -145,7 +148,7 @@ class Nursery:
         return child
 
     def _zygote(self, tier: Tier, limits: Limits) -> Zygote:
-        """One with room for a further child."""
+        """A zygote with a free slot."""
         full = [zygote for zygote in self._zygotes if not zygote.slots]
         self._full = [zygote for zygote in self._full + full if not zygote.ended]
         self._zygotes = [zygote for zygote in self._zygotes if zygote.slots]
@@ -161,7 +164,7 @@ class Nursery:
         zygote.close()
 
     def _start_likely(self) -> None:
-        """Starts a zygote of the first tier that lets one start."""
+        """Starts a zygote of the best tier in which one starts."""
         for tier in CONFINING:
             try:
                 self._zygotes.append(start_zygote(tier, Limits()))

@@ -1,4 +1,4 @@
-"""Who may drive in an evaluation: controllers, learned policies, and four of ours."""
+"""Policies of an evaluation: controllers, learned policies and four baselines."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from tdac_envs.learning.wrappers import Frame
 Kind = Literal[
     "controller", "sb3", "reference", "random", "go-to-goal", "follow-guidance"
 ]
-# A random action is kept for so long, s: wheels that tremble lead nowhere.
+# Duration of a random action, s: jittering wheels would not move the robot.
 HOLD = 1.0
-_ARRIVED = 1e-4  # of the body's radius
-# Bearing at which one turns on the spot, rad, and wheel fraction for each rad.
+_ARRIVED = 1e-4  # distance at which a waypoint is reached, body radii
+# Bearing from which to turn on the spot, rad; wheel fraction per rad of bearing.
 _ON_THE_SPOT, _GAIN = 0.7, 1.2
 
 
@@ -33,9 +33,9 @@ class Contender:
     """A policy, as a job names it.
 
     Attributes:
-        kind: What it is.
-        file: Of a controller, or of a policy of stable-baselines3.
-        wrappers: Names of the wrappers that such a policy sees the world through.
+        kind: Kind of policy.
+        file: File of a controller, or of a policy of stable-baselines3.
+        wrappers: Names of the observation wrappers of such a policy.
     """
 
     kind: Kind
@@ -44,7 +44,7 @@ class Contender:
 
     @property
     def knows(self) -> str:
-        """What it may know: `sensors` (with pose and goal), and what beside them."""
+        """What it may know: `sensors` (with pose and goal), and anything beyond."""
         if self.kind == "controller":
             return "+ map"
         if self.kind == "follow-guidance" or "guidance" in self.wrappers:
@@ -55,10 +55,10 @@ class Contender:
 
 
 class Reference:
-    """Drives the oracle's path on the true pose; privileged.
+    """Drives the oracle's path by the true pose; privileged.
 
     Args:
-        env: Of the episode.
+        env: Environment of the episode.
     """
 
     def __init__(self, env: JudgedEnv) -> None:
@@ -67,35 +67,35 @@ class Reference:
         self._path: list[Point] = []
 
     def reset(self, observation: Observation) -> None:  # noqa: ARG002
-        """Plans from where the robot really is."""
+        """Plans from the true pose."""
         x, y, _ = self._env.pose().tolist()
         self._path = self._about.reference_path(self._env.task, x, y)[1:]
 
     def policy(self, observation: Observation) -> tuple[float, float]:  # noqa: ARG002
-        """A turn in place, or a straight drive."""
+        """Wheel speeds of a turn in place, or of a straight drive."""
         x, y, heading = self._env.pose().tolist()
         task = self._env.task
         near = _ARRIVED * task.body_radius
         while len(self._path) > 1 and math.dist((x, y), self._path[0]) < near:
             self._path.pop(0)
         to_x, to_y = self._path[0]
-        # Steering is told with y down.
+        # `steer` expects y to point down.
         sign = -1.0 if self._about.units.up else 1.0
         pose = (x, sign * y, sign * heading)
         return steer(pose, (to_x, sign * to_y), task.full_step, task.axle_length)
 
     def waited(self) -> float:
-        """It waits for nothing."""
+        """Always 0: it runs in this process."""
         return 0.0
 
 
 class Steered:
-    """Drives at a place that it is told in each step, whatever is in between.
+    """Drives straight at a target, whatever is in between.
 
     Args:
-        env: Of the episode.
-        guided: Whether that is the next way-point of the reference route; else it is
-            the goal.
+        env: Environment of the episode.
+        guided: Whether the target is the next way-point of the reference route; else
+            it is the goal.
     """
 
     def __init__(self, env: JudgedEnv, *, guided: bool) -> None:
@@ -105,13 +105,13 @@ class Steered:
         self._route: Route | None = None
 
     def reset(self, observation: Observation) -> None:  # noqa: ARG002
-        """Has the route computed."""
+        """Computes the route, if it is guided."""
         if self._guided:
             plain: Any = self._env.task
             self._route = route_to_goal(plain)
 
     def policy(self, observation: Observation) -> tuple[float, float]:
-        """Turns to the place, and drives the faster the better it is aligned."""
+        """Turns to the target, and drives faster the better it is aligned."""
         pose, goal = observation["pose"], observation["goal"]
         place = goal if self._route is None else self._route.ahead(pose[None])[0]
         ahead, left = self._frame.seen(pose, place).tolist()
@@ -122,7 +122,7 @@ class Steered:
         return (speed - turn) / largest, (speed + turn) / largest
 
     def waited(self) -> float:
-        """It waits for nothing."""
+        """Always 0: it runs in this process."""
         return 0.0
 
 
@@ -130,19 +130,19 @@ class Random:
     """Uniform wheel speeds, drawn anew every second.
 
     Args:
-        env: Of the episode.
-        seed: Of the episode.
+        env: Environment of the episode.
+        seed: Seed of the episode.
     """
 
     def __init__(self, env: JudgedEnv, seed: int) -> None:
-        # Not the numbers that the environment draws its start from.
+        # A stream apart from the one that the environment draws its start from.
         self._dice = np.random.default_rng([seed, 1])
         self._hold = max(1, round(HOLD / env.nominal.dt))
         self._calls = 0
         self._wheels = (0.0, 0.0)
 
     def reset(self, observation: Observation) -> None:
-        """Needs to know nothing."""
+        """Does nothing."""
 
     def policy(self, observation: Observation) -> tuple[float, float]:  # noqa: ARG002
         """The wheel speeds drawn last."""
@@ -153,7 +153,7 @@ class Random:
         return self._wheels
 
     def waited(self) -> float:
-        """It waits for nothing."""
+        """Always 0: it runs in this process."""
         return 0.0
 
 
@@ -174,9 +174,9 @@ _OURS: dict[str, Callable[[Contender, JudgedEnv, int], Driver]] = {
 
 
 def driver_of(contender: Contender, env: JudgedEnv, seed: int) -> Driver:
-    """A driver for one episode of a contender that runs in this process.
+    """Makes the driver of one episode, for a contender that runs in this process.
 
     Raises:
-        ControllerFault: A learned policy cannot be used in this environment.
+        ControllerFault: A learned policy does not fit this environment.
     """
     return _OURS[contender.kind](contender, env, seed)

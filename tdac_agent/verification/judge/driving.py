@@ -1,4 +1,4 @@
-"""One episode by its seed, whoever drives."""
+"""One episode by its seed, driven by any contender."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from tdac_agent.verification.judge.contenders import Contender, driver_of
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 NO_SANDBOX = "none"
-"""In the place of a tier, of policies that need none."""
+"""Reported as the tier of policies that run without a sandbox."""
 FOREVER = 1 << 62
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """All that an episode depends on but its seed.
+    """Everything that an episode depends on, except its seed.
 
     Attributes:
-        task: What is to be done.
-        contender: Who drives.
+        task: The task.
+        contender: The policy that drives.
         workdir: Folder whose files a controller may read.
-        disturbance: Of the environment.
+        disturbance: Disturbance of the environment.
         tier: Sandbox tier, or `auto`.
-        limits: Of each child, and so of each episode.
-        nursery: Where children come from.
-        variation: Of start and goal.
+        limits: Limits of each child, and so of each episode.
+        nursery: The child pool.
+        variation: Variation of start and goal.
     """
 
     task: Task
@@ -48,13 +48,13 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Driven:
-    """An episode as it was driven.
+    """The result of an episode.
 
     Attributes:
-        rollout: What came of it.
-        cpu_seconds: Of its child; 0 where it had none.
-        tier: Sandbox tier of that.
-        task: With the start and the goal of this episode.
+        rollout: The judged episode.
+        cpu_seconds: CPU time of its child; 0 without one.
+        tier: Sandbox tier of its child.
+        task: Task with the start and the goal of this episode.
     """
 
     rollout: Rollout
@@ -64,16 +64,16 @@ class Driven:
 
 
 def record_of(stage: Stage, seed: int) -> Record:
-    """The record of the episode of a seed, which is yet to begin."""
+    """An empty record for the episode of a seed."""
     env = stage.task.disturbed_env(stage.disturbance, stage.variation)
-    # The environment itself ends an episode at its horizon, which goes with the goal.
+    # The environment ends an episode at its horizon, which depends on the goal.
     return Record(env, None, FOREVER, seed=seed)
 
 
 def drive_seed(stage: Stage, seed: int) -> Driven:
-    """The episode of a seed, of a controller in a fresh child.
+    """Drives the episode of a seed; a controller runs in a fresh child.
 
-    Start and noise are what the environment draws after `reset(seed=seed)`.
+    The environment draws start and noise after `reset(seed=seed)`.
     """
     record = record_of(stage, seed)
     if stage.contender.kind != "controller":
@@ -83,7 +83,7 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
     try:
         child.furnish(stage.workdir, source)
         child.load()
-        # Each call has its limit, and slow ones are cut off by their mean.
+        # Each call has a limit, and slow controllers are ended by their mean time.
         rollout = run_policy(child, record, name, held_out=False, deadline=math.inf)
     except ControllerFault as fault:
         rollout = not_driven(record, name, fault)
@@ -93,13 +93,16 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
 
 
 def source_of(contender: Contender) -> bytes:
-    """Source of a controller."""
+    """Reads the source of a controller."""
     assert contender.file is not None
     return read_file(contender.file, RECORD_BYTES)
 
 
 def _driven_here(stage: Stage, record: Record, seed: int) -> Driven:
-    """The episode of one of our policies, or of a network: no code of others runs."""
+    """Drives an episode of a baseline or a learned policy in this process.
+
+    Neither of them runs foreign code.
+    """
     name = f"seed {seed}"
     try:
         driver = driver_of(stage.contender, record.env, seed)

@@ -1,4 +1,4 @@
-"""What a judge found in a suite's episodes, beside pytest's own report log."""
+"""A judge's findings about a suite's episodes, in addition to pytest's report log."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tdac_agent.verification.judge.judge import NOMINAL, Judge, Key, rollout_key
 
 
 def driven(judge: Judge) -> list[Rollout]:
-    """The whole episodes that `policy` drove."""
+    """The full-length episodes that `policy` drove."""
     return [
         rollout
         for (_, steps, drive), rollout in judge.rollouts.items()
@@ -23,7 +23,7 @@ def driven(judge: Judge) -> list[Rollout]:
 
 
 def findings_of(judge: Judge, expected: list[str]) -> Findings:
-    """The findings of a judge that has settled, of tests that had to run."""
+    """The findings of a settled judge; `expected` are the tests that had to run."""
     task = judge.task
     rollouts = judge.rollouts
     diagnoses = {
@@ -45,9 +45,10 @@ def findings_of(judge: Judge, expected: list[str]) -> Findings:
 
 
 def _named(key: Key, rollouts: Mapping[Key, Rollout]) -> Rollout:
-    """The episode under the name of what drove it: two begin at the nominal start.
+    """Renames an episode of the controller's own loop to `run_episode`.
 
-    An error that `policy` meets as well, as where an import fails, is told once.
+    If `policy` fails with the same error, as when the import fails, the name is kept,
+    so that the error is reported once.
     """
     rollout, nominal = rollouts[key], rollouts.get(NOMINAL)
     of_both = nominal is not None and rollout.error == nominal.error is not None

@@ -1,4 +1,4 @@
-"""The fixtures that suites are written with; a public contract, see docs/suites.md."""
+"""The fixtures for tests of suites; a public contract, see docs/suites.md."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from tdac_agent.verification.suite.contract import MAX_SOURCE_BYTES
 from tdac_agent.verification.suite.oracle import Oracle
 
 JUDGE: pytest.StashKey[Judge] = pytest.StashKey()
-"""Where pytest's configuration has the judge."""
+"""Key of the judge in pytest's configuration."""
 
 
 class Controller:
-    """The controller under test; its code runs in the sandbox, never here.
+    """The controller under test; its code runs in the sandbox, never in this process.
 
     Attributes:
         source: The file's text.
@@ -41,7 +41,7 @@ class Controller:
             limit = f"at most {MAX_SOURCE_BYTES} are allowed"
             pytest.fail(f"the source has {size} bytes, {limit}", pytrace=False)
         try:
-            # As Python itself reads a file, which may declare an encoding.
+            # Decoded as Python does, by the encoding that the file declares.
             return ast.parse(decode_source(self._judge.source))
         except SyntaxError as error:
             line = f" (line {error.lineno})" if error.lineno else ""
@@ -93,8 +93,7 @@ def oracle(task: Task) -> Oracle:
 def generator(pytestconfig: pytest.Config) -> Callable[[str], np.random.Generator]:
     """`generator(name)`: random numbers that follow from the run's seed and a name.
 
-    A controller that is right in cases which are always the same may have them by
-    heart.
+    A controller cannot memorise cases that are drawn from it.
     """
     seed = pytestconfig.stash[JUDGE].seed
     return lambda name: np.random.default_rng([seed, *name.encode()])
@@ -106,9 +105,9 @@ def rollout(
 ) -> Callable[..., Rollout]:
     """`rollout(name, steps=None, drive="policy")`: a judged episode, run once.
 
-    Names are `nominal` and `jitter 1` … `jitter 5`; `drive="run_episode"` lets the
-    controller's own loop step an environment that the judge holds;
-    `drive="truncated run_episode"` ends that loop by `truncated`.
+    Names are `nominal` and `jitter 1` … `jitter 5`. With `drive="run_episode"` the
+    controller's own loop steps the judge's environment; with
+    `drive="truncated run_episode"` the environment truncates that loop.
     """
     judge = pytestconfig.stash[JUDGE]
 

@@ -1,4 +1,4 @@
-"""What the judge's process is asked for, and what it answers."""
+"""Jobs for the judge's process, and its findings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SUITE: Final = "suite"
 
 
 class Job(BaseModel):
-    """A suite that the judge's process is to run; all paths are absolute."""
+    """A suite to run over a controller; all paths are absolute."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -31,11 +31,11 @@ class Job(BaseModel):
     seed: int
     limits: Limits
     out: Path
-    trajectories: Path | None = Field(description="Folder for them, if wanted.")
+    trajectories: Path | None = Field(description="Folder for them; None: not kept.")
 
 
 class Findings(PrintableRecord):
-    """What the judge's process found, beside pytest's own report log."""
+    """What the judge's process found, in addition to pytest's report log."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -1,4 +1,4 @@
-"""The judge: runs a controller's episodes and calls, and keeps what they cost."""
+"""The judge: runs a controller's episodes and calls, and adds up their CPU time."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_envs.drive.task import Pose
 
 NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))
-# As many as a suite has: the nominal one, the jittered ones, those of `run_episode`.
+# Number in a suite: the nominal one, the jittered ones and three of `run_episode`.
 EPISODES = 1 + JITTERS + 3
 WALL_SECONDS = 600.0
 
@@ -52,25 +52,25 @@ OWN_LOOPS: tuple[Key, ...] = (
 
 
 class Judge:
-    """Everything a suite may ask about one controller on one task.
+    """Everything that a suite can ask about one controller on one task.
 
     Args:
-        task: What the controller must do.
+        task: Task of the controller.
         source: Bytes of `controller.py`.
         workdir: Folder whose files the controller may read.
         tier: Sandbox tier, or `auto`.
-        seed: Of the jittered starts.
-        limits: Of each child; `cpu_seconds` is for all of them together.
-        nursery: Where children are started ahead; one of its own by default.
-        crew: Processes that drive; of its own by default, forked now.
-        at_a_time: How many episodes may go on side by side.
-        wall_seconds: How long all of it may take.
+        seed: Seed of the jittered starts.
+        limits: Limits of each child; `cpu_seconds` is the total of all of them.
+        nursery: The child pool; a new one by default.
+        crew: The worker pool that drives episodes; a new one by default, forked now.
+        at_a_time: Largest number of episodes that run concurrently.
+        wall_seconds: Time limit of the whole verification, s.
 
     Attributes:
         tier: Name of the tier that was used.
         cpu_seconds: CPU time of all children so far.
-        seed: Of what is drawn for this run.
-        fault: Why the sandbox failed, where it did.
+        seed: Seed of everything that is drawn for this verification.
+        fault: Why the sandbox or the judge failed; None if neither did.
     """
 
     def __init__(
@@ -103,12 +103,12 @@ class Judge:
             self._own.callback(nursery.close)
         self._nursery = nursery
         if crew is None:
-            # Before the first thread.
+            # Forked before the first thread starts.
             crew = Crew(partial(drive, task, nursery), nursery.close, at_a_time)
             self._own.callback(crew.close)
         self._crew = crew
         self._pool = ThreadPoolExecutor(max_workers=at_a_time)
-        # The suite's own calls are made beside the episodes.
+        # One more than episodes, for the suite's own calls.
         self._turns = Turns(at_a_time + 1)
         self._lock = threading.Lock()
         self._episodes: dict[Key, Future[Rollout]] = {}
@@ -119,11 +119,11 @@ class Judge:
     def unit(self) -> Unit:
         """The imported controller, for calls of its own functions.
 
-        A call that ends its process spoils only the test that made it: the next one
+        A call that ends its process fails only the test that made it: the next test
         gets a fresh process.
 
         Raises:
-            ControllerFault: It cannot be imported.
+            ControllerFault: The controller cannot be imported.
         """
         if self._unit is not None and self._unit.fault is not None:
             self._end_unit()
@@ -133,13 +133,13 @@ class Judge:
         return self._unit
 
     def time_limit(self) -> AbstractContextManager[None]:
-        """Ends a test when the verification has taken too long."""
+        """Context that ends a test when the verification has taken too long."""
         return time_limit(self._deadline, self._too_long)
 
     def call_may_pass(self) -> bool:
-        """Whether the latest call took too long, and maybe by the machine's doing.
+        """Whether the latest call timed out, maybe only because the machine is busy.
 
-        Where it did, the episodes under way are waited for: what follows is alone.
+        If so, it waits for the running episodes, so that a retry has the machine alone.
         """
         fault = None if self._unit is None else self._unit.fault
         if fault is None or not fault.may_pass:
@@ -154,10 +154,10 @@ class Judge:
 
         Args:
             name: `nominal`, or `jitter 1` … `jitter 5`.
-            steps: Stop after so many steps; the horizon by default.
+            steps: Maximum number of steps; the horizon by default.
             drive: `policy`; `run_episode` for the controller's own loop;
-                `truncated run_episode`, where the environment ends that loop after
-                `steps`, and has counted collisions before it.
+                `truncated run_episode`, where the environment truncates that loop after
+                `steps`, and has already counted collisions when it begins.
         """
         if name not in NAMES:
             raise ValueError(
@@ -169,9 +169,10 @@ class Judge:
 
     @property
     def rollouts(self) -> dict[Key, Rollout]:
-        """The episodes that were asked for, by (name, steps, drive).
+        """The episodes that tests asked for, by (name, steps, drive).
 
-        Of those only begun, how many have ended by now is a matter of time.
+        Episodes that were only begun are left out: which of them have ended depends on
+        timing.
         """
         return {
             key: future.result()
@@ -182,9 +183,9 @@ class Judge:
         }
 
     def begin(self, *, jitters: bool, own_loop: bool) -> None:
-        """Starts the episodes that every suite asks for, beside its other tests.
+        """Starts the episodes that every suite asks for, to run during other tests.
 
-        The short ones come last, so that all who drive have done at about one time.
+        The short ones come last, so that all pool processes finish at about one time.
         """
         whole, *short = OWN_LOOPS if own_loop else (NOMINAL,)
         jittered = [(name, None, "policy") for name in NAMES[1:]]
@@ -193,10 +194,7 @@ class Judge:
 
     @contextmanager
     def _ours(self) -> Generator[None]:
-        """Remembers what goes wrong meanwhile and is not the controller's doing.
-
-        A test may catch the error, and no other test meets it again.
-        """
+        """Records the first fault in the block, since a test may catch the error."""
         try:
             with ours():
                 yield
@@ -205,12 +203,12 @@ class Judge:
             raise
 
     def settle(self) -> None:
-        """Waits for the episodes under way; after this all costs are known."""
+        """Waits for the running episodes; after this the CPU time is final."""
         self._pool.shutdown(cancel_futures=True)
         self._end_unit()
 
     def close(self) -> None:
-        """Settles, and ends what it has made itself."""
+        """Settles, and closes the pools that it made itself."""
         self.settle()
         self._own.close()
 
@@ -224,10 +222,10 @@ class Judge:
             self.cpu_seconds += cpu_seconds
 
     def _submit(self, key: Key) -> Future[Rollout]:
-        """The episode's future, from the queue.
+        """Queues an episode if it is new, and returns its future.
 
-        The nominal episode comes first: the jittered ones wait for it, and in a
-        queue it could stand behind them.
+        The nominal episode is always queued before the jittered ones, which wait for
+        it.
         """
         if key[0] != "nominal" and NOMINAL not in self._episodes:
             self._submit(NOMINAL)
@@ -246,9 +244,9 @@ class Judge:
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
         with self._ours():
-            return self._in_turn(name, steps, drive)
+            return self._drive_with_retry(name, steps, drive)
 
-    def _in_turn(self, name: str, steps: int | None, drive: str) -> Rollout:
+    def _drive_with_retry(self, name: str, steps: int | None, drive: str) -> Rollout:
         if name != "nominal" and not self._submit(NOMINAL).result().reached:
             reason = "not run, since the nominal episode failed"
             order = self._order(name, steps, drive)
@@ -257,7 +255,7 @@ class Judge:
             rollout = self.drive(name, steps, drive)
         if not rollout.may_pass:
             return rollout
-        # It may be the machine's doing, or that of those beside it.
+        # A busy machine may be the cause, so the retry runs alone.
         with self._turns.alone():
             return self.drive(name, steps, drive, final=True)
 
@@ -272,10 +270,10 @@ class Judge:
         """Runs an episode in a fresh child.
 
         Args:
-            name: As for `rollout`, as are the next two.
-            steps: Most steps.
-            drive: By what.
-            final: It will not be tried once more.
+            name: As for `rollout`.
+            steps: As for `rollout`.
+            drive: As for `rollout`.
+            final: Whether there is no further retry.
         """
         order = self._order(name, steps, drive)
         try:
@@ -287,7 +285,7 @@ class Judge:
         self._account(driven.cpu_seconds)
         if driven.import_fault is not None:
             self._remember(driven.import_fault, final=final)
-        # Children side by side may together use more than each may by itself.
+        # Concurrent children may together use more than the limit of each.
         if self.cpu_seconds > self._limits.cpu_seconds:
             reason = f"the controller {self._overspent()}"
             return skipped(self.task, order, "error", reason)
@@ -297,10 +295,10 @@ class Judge:
         return Order(name, self.start_pose(name), steps, drive)
 
     def _overspent(self) -> str:
-        return f"used {self._limits.cpu_seconds} s of CPU time, all it may"
+        return f"used up its limit of {self._limits.cpu_seconds} s of CPU time"
 
     def _loaded(self) -> Child:
-        """A fresh child with the controller imported; what may pass is tried again."""
+        """A fresh child with the controller imported; a time-out is retried alone."""
         try:
             with self._turns.beside():
                 return self._load()
@@ -314,10 +312,10 @@ class Judge:
         """A fresh child with the controller imported.
 
         Args:
-            final: It will not be tried once more.
+            final: Whether there is no further retry.
 
         Raises:
-            ControllerFault: It cannot be imported; the same at each later request.
+            ControllerFault: The import failed; later requests raise the same fault.
         """
         self._may_start()
         child = self._nursery.take(self._brief.tier, self._limits)
@@ -331,10 +329,10 @@ class Judge:
         return child
 
     def _may_start(self) -> None:
-        """Whether to start a further child.
+        """Checks that a further child may be started.
 
         Raises:
-            ControllerFault: The controller could not be imported, or may use no more.
+            ControllerFault: The import has failed, or CPU or wall time is used up.
         """
         if self._import_fault is not None:
             raise self._import_fault.with_traceback(None)
@@ -344,11 +342,11 @@ class Judge:
             raise ControllerFault(self._too_long, "import")
 
     def _remember(self, fault: ControllerFault, *, final: bool) -> None:
-        """An import that failed is not tried again, unless it may pass."""
+        """Records a failed import, unless it is to be retried."""
         if final or not fault.may_pass:
             self._import_fault = fault
 
 
 def rollout_key(name: str, steps: int | None, drive: str) -> str:
-    """One episode's name in a report log."""
+    """Key of an episode in a report log."""
     return json.dumps([name, steps, drive])

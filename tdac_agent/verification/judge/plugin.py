@@ -1,4 +1,4 @@
-"""How pytest runs a suite: which tests of it, in which order, with which plugins."""
+"""Runs a suite with pytest: selection and order of its tests, and plugins."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tdac_agent.verification.diagnosis.report import (
 from tdac_agent.verification.judge import fixtures as suite_fixtures
 from tdac_agent.verification.judge.judge import Judge
 
-# Some of these cost a verification more than its tests do.
+# Some of these take more time than the tests of a verification.
 UNUSED_PLUGINS = (
     "cacheprovider",
     "unraisableexception",
@@ -30,15 +30,15 @@ UNUSED_PLUGINS = (
     "faulthandler",
     "legacypath",
 )
-# Of a traceback, of which only the end is told.
+# Limit of calls in a traceback, of which only the end is reported.
 MOST_CALLS = 50
 
 
 class JudgePlugin:
-    """Gives a suite its judge and notes what ran.
+    """Gives a suite its judge, and records which tests must run.
 
     Attributes:
-        expected: Test ids of this profile, as collected before any of them ran.
+        expected: Ids of the tests of this profile, collected before any of them runs.
     """
 
     def __init__(self, judge: Judge, *, profile: str, paper: bool) -> None:
@@ -49,7 +49,7 @@ class JudgePlugin:
         self.expected: list[str] = []
 
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Declares the markers that choose tests by profile; adds the fixtures."""
+        """Declares the markers that select tests by profile; adds the fixtures."""
         config.stash[suite_fixtures.JUDGE] = self._judge
         config.pluginmanager.register(suite_fixtures)
         config.addinivalue_line("markers", "paper: only in the profile `paper`")
@@ -57,33 +57,33 @@ class JudgePlugin:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Leaves out the tests of other profiles, and fixes what must run.
+        """Leaves out tests of other profiles, and fixes which tests must run.
 
-        What another hook leaves out afterwards is missing, and so has failed.
+        A test that another hook removes later is missing, and so has failed.
         """
         chosen = [i for i in items if not self._left_out & _marker_names(i)]
-        # What costs little and explains most comes first.
+        # Quick tests that explain much come first.
         items[:] = sorted(chosen, key=lambda i: GROUPS.index(group_of(id_of(i.nodeid))))
         self.expected = [id_of(item.nodeid) for item in items]
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_setup(self) -> Generator[None]:
-        """Ends what a test prepares when the verification has taken too long."""
+        """Ends the setup of a test when the verification has taken too long."""
         with self._judge.time_limit():
             return (yield)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self) -> Generator[None]:
-        """The same for the test itself, and for what it says."""
+        """Does the same for the test itself and its message."""
         with self._judge.time_limit():
             return (yield)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
-        """Cuts what an error says, before a report takes it apart line by line.
+        """Cuts errors to a bounded size, before pytest formats them line by line.
 
-        A message may quote megabytes that a controller returned, and a source that is
-        nested deeply gives a traceback of many calls.
+        A message may quote megabytes that a controller returned, and deeply nested
+        source gives a traceback of many calls.
         """
         error = None if call.excinfo is None else call.excinfo.value
         known: set[int] = set()
@@ -95,7 +95,7 @@ class JudgePlugin:
     def pytest_runtest_protocol(
         self, item: pytest.Item, nextitem: pytest.Item | None
     ) -> bool:
-        """Runs a test; one that failed for want of time is run once more."""
+        """Runs a test, and once more if a call in it may have timed out by accident."""
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
         reports = runtestprotocol(item, log=False, nextitem=nextitem)
         if self._judge.call_may_pass():
@@ -125,7 +125,7 @@ def _marker_names(item: pytest.Item) -> set[str]:
 
 
 def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
-    """Runs pytest over folders that lie side by side, hermetic, with a report log."""
+    """Runs pytest hermetically over sibling folders, with a report log."""
     root = suites[0].parent
     arguments = [
         *(str(folder) for folder in suites),
@@ -140,5 +140,5 @@ def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
         "--strict-markers",
         "-q",
     ]
-    # By its name, pytest would look for it among all packages that are installed.
+    # Given by name, pytest would search all installed packages for the plugin.
     pytest.main(arguments, plugins=[pytest_reportlog.plugin, *plugins])

@@ -1,4 +1,4 @@
-"""A controller's own functions and objects, called in its sandbox."""
+"""Calls of a controller's own functions and objects, in its sandbox."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Remote:
         return self._unit.send((self._handle, method), args, kwargs)
 
     def call_each(self, method: str, calls: list[tuple[Any, ...]]) -> list[Any]:
-        """Results of many calls of a method, which together may take as long as one."""
+        """Calls a method many times; all calls share the time limit of one."""
         target = (self._handle, method)
         return list(
             self._unit._ask(
@@ -50,12 +50,12 @@ class Unit:
     """The top level of a controller that was imported in its sandbox.
 
     Args:
-        child: With the controller imported.
-        deadline: When the last call must be over, by `time.monotonic`.
-        ours: Around each request; sees the errors that are not the controller's.
+        child: Child with the controller imported.
+        deadline: Latest end of the last call, by `time.monotonic`.
+        ours: Context of each request; sees errors that the controller did not cause.
 
     Attributes:
-        fault: Why the process is gone, None while it answers.
+        fault: Why the process can no longer be used; None while it answers.
     """
 
     def __init__(
@@ -76,10 +76,10 @@ class Unit:
     def call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         """Calls a top-level function or class.
 
-        Exact Python types are kept; what is not data comes back as a `Remote`.
+        Exact Python types are kept; a result that is not data becomes a `Remote`.
 
         Raises:
-            ControllerFault: It raised, took too long or ended its process.
+            ControllerFault: The call raised, took too long or ended its process.
         """
         return self.send(name, args, kwargs)
 

@@ -1,4 +1,4 @@
-"""What the judge's process left behind, as an outcome of each expected test."""
+"""Reads the outcome of each expected test from the files of the judge's process."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from tdac_agent.verification.judge.jobs import Findings
 
 PHASES = frozenset({"setup", "call", "teardown"})
 INTERNAL_ERROR = 3
-"""pytest's exit status, and the mark of its lines about it."""
+"""pytest's exit status after an internal error, and the prefix of its lines on it."""
 BREAKDOWN = "INTERNALERROR>"
 NOT_RUN = "the test did not run to its end"
-TORN = "the report log is torn or unfinished, so that nothing in it counts as passed"
+TORN = "the report log is damaged or incomplete, so no test in it counts as passed"
 
 
 class _Crash(PrintableRecord):
@@ -38,7 +38,7 @@ class _Details(PrintableRecord):
 
 
 class _Collected(PrintableRecord):
-    """pytest's word about a file; it has more fields than are read here."""
+    """pytest's record of a file, with the fields that are used."""
 
     nodeid: str
     outcome: Literal["passed", "failed", "skipped"]
@@ -46,7 +46,7 @@ class _Collected(PrintableRecord):
 
 
 class _Tested(_Collected):
-    """pytest's word about one phase of one test."""
+    """pytest's record of one phase of one test."""
 
     when: Literal["setup", "call", "teardown"]
     wasxfail: Any = None
@@ -58,13 +58,13 @@ class _Tested(_Collected):
 
 
 class _Finished(BaseModel):
-    """pytest's last word."""
+    """pytest's last record."""
 
     exitstatus: StrictInt
 
 
 class _Other(BaseModel):
-    """A record of something else, such as a warning."""
+    """Any other record, such as a warning."""
 
     kind: str = Field(alias="$report_type")
 
@@ -77,15 +77,15 @@ _KINDS: dict[str, type[BaseModel]] = {
 
 
 class _Log(NamedTuple):
-    """Records of a report log; None for a line that is not one."""
+    """Records of a report log; None for a damaged line."""
 
     records: list[BaseModel | None]
 
     def is_whole(self, failed: bool) -> bool:
-        """Whether it was written to its end, and knows of as many failures as it tells.
+        """Whether the log is complete, with an exit status that agrees with `failed`.
 
         Args:
-            failed: Whether it tells of any.
+            failed: Whether its records have any failure.
         """
         last = self.records[-1] if self.records else None
         ended = isinstance(last, _Finished) and last.exitstatus in (0, int(failed))
@@ -93,20 +93,20 @@ class _Log(NamedTuple):
 
     @property
     def broke_down(self) -> bool:
-        """Whether pytest ended by an error of a hook and not of a test."""
+        """Whether pytest ended with an internal error, such as that of a hook."""
         last = self.records[-1] if self.records else None
         return isinstance(last, _Finished) and last.exitstatus == INTERNAL_ERROR
 
 
 def read_findings(results: Path, output: str) -> Findings:
-    """The judge's findings.
+    """Reads the judge's findings.
 
     Args:
-        results: Folder the judge wrote to.
-        output: What it printed.
+        results: Folder that the judge wrote to.
+        output: Output of its process.
 
     Raises:
-        Fault: There are none, or they say that the sandbox failed.
+        Fault: There are none, or they report a fault.
     """
     try:
         raw = (results / "findings.json").read_bytes()
@@ -125,23 +125,22 @@ def read_findings(results: Path, output: str) -> Findings:
 def read_outcomes(
     path: Path, findings: Findings, output: str = ""
 ) -> tuple[dict[str, str], list[Failure]]:
-    """Outcome of each expected test; what is missing from the log has failed.
+    """Reads the outcome of each expected test; one that is not in the log has failed.
 
-    A test has passed if each phase of it is on record, each as passed, in a log that
-    is whole.
+    A test has passed if the log is complete and has each of its phases as passed.
 
     Args:
         path: The log.
-        findings: What the judge found.
-        output: What it printed.
+        findings: The judge's findings.
+        output: Output of its process.
 
     Raises:
-        Fault: The suite cannot be collected, ran what was not expected, or has a hook
+        Fault: The suite cannot be collected, ran an unexpected test, or has a hook
             that raised.
     """
     log = _read(path)
     if log.broke_down:
-        raise Fault(f"the suite broke down: {_breakdown(output)}")
+        raise Fault(f"the suite caused an error in pytest: {_breakdown(output)}")
     phases: dict[str, set[str]] = {name: set() for name in findings.expected}
     tests: dict[str, str] = dict.fromkeys(findings.expected, "missing")
     failures: dict[str, Failure] = {}
@@ -170,7 +169,7 @@ def read_outcomes(
 
 
 def verdict_of(tests: dict[str, str]) -> Verdict:
-    """Passed if there are tests and each of them passed."""
+    """The verdict: passed if there are tests and each of them passed."""
     passed = sum(outcome == "passed" for outcome in tests.values())
     return Verdict(
         passed=0 < passed == len(tests),
@@ -181,7 +180,7 @@ def verdict_of(tests: dict[str, str]) -> Verdict:
 
 
 def _read(path: Path) -> _Log:
-    """A report log; one that cannot be read is empty."""
+    """Reads a report log; one that cannot be read is empty."""
     try:
         lines = path.read_bytes().split(b"\n")
     except OSError:
@@ -190,7 +189,7 @@ def _read(path: Path) -> _Log:
 
 
 def _record(line: bytes) -> BaseModel | None:
-    """The record in one line, None where it is damaged."""
+    """The record in one line; None if it is damaged."""
     try:
         value = json.loads(line.decode("utf-8"))
         kind = _Other.model_validate(value).kind
@@ -221,7 +220,7 @@ def _message(record: _Collected) -> str:
         text = details or ""
     for prefix in ("AssertionError: ", "Failed: "):
         text = text.removeprefix(prefix)
-    # Exceptions are shown with their module; the class says enough.
+    # The type of our own exceptions is left out; their message is enough.
     head, separator, tail = text.partition(": ")
     if separator and head.startswith("tdac_agent."):
         text = tail
@@ -229,7 +228,7 @@ def _message(record: _Collected) -> str:
 
 
 def _of_crash(crash: _Crash) -> str:
-    """What an error says; of a bare assertion, where it stands."""
+    """The message of an error; for a bare assertion, its line."""
     if crash.message != "AssertionError" or crash.lineno is None:
         return crash.message
     return f"line {crash.lineno}: an assertion without a message"
@@ -243,7 +242,7 @@ def _collect_error(name: str, record: _Collected) -> str:
 
 
 def _breakdown(output: str) -> str:
-    """The error of a hook: the last line that pytest marks so."""
+    """The internal error: the last line that pytest marks as such."""
     marked = [line for line in output.splitlines() if line.startswith(BREAKDOWN)]
     return marked[-1].removeprefix(BREAKDOWN).strip() if marked else _tail(output)
 

@@ -3,7 +3,7 @@
 # tiers: every
 # limits: cpu_seconds=1 call_seconds=20
 # fails: test_imports, test_reaches_goal
-# error: used more than . s of CPU time|used . s of CPU time, all it may
+# error: used more than . s of CPU time|used up its limit of . s of CPU time
 # why: a second limit kills without a signal that can be caught
 import signal
 

@@ -3,7 +3,7 @@
 # onto: good/astar_pursuit.py
 # limits: cpu_seconds=6
 # fails: test_is_occupied_inside
-# error: CPU time, all it may|used more than . s of CPU time|did not end within
+# error: limit of . s of CPU time|used more than . s of CPU time|did not end within
 # why: CPU time is bounded over all processes of a verification, wall time too
 class OccMap2D(OccMap2D):
     def is_occupied(self, x, y):
