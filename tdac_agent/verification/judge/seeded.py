@@ -1,4 +1,4 @@
-"""Many episodes by seed, in the judge's process; what is kept of each."""
+"""Runs many episodes by seed in the judge's process, and stores their results."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from tdac_agent.verification.judge.workers import SIZE, Crew
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
 POSES_FILE, CALLS_FILE = "poses.npz", "calls.npy"
-# Of an evaluation: after so many time-outs the rest is not waited for.
+# In an evaluation, the remaining episodes are skipped after this many time-outs.
 MOST_LATE = 3
 
 
 class SeededJob(BaseModel):
-    """Episodes that the judge's process is to run; all paths are absolute.
+    """Episodes to run; all paths are absolute.
 
-    `test` stops a robust verification early; `measured` is of an evaluation: figures
-    for a comparison in the place of a diagnosis, and poses and times beside them.
+    `test` stops a robust verification early. `measured` is set for an evaluation, which
+    keeps measures instead of a diagnosis, and poses and call times as well.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -60,7 +60,7 @@ class SeededJob(BaseModel):
 
 
 class SeededEpisode(PrintableRecord):
-    """Figures of one disturbed episode; distances in px, of the e-puck in m.
+    """Figures of one disturbed episode; distances in px, for the e-puck in m.
 
     `cause`, `step`, `x`, `y` and `side` are the diagnosis of a failure.
     """
@@ -83,12 +83,12 @@ class SeededEpisode(PrintableRecord):
 
     @property
     def success(self) -> bool:
-        """Whether the goal was reached without a contact."""
+        """Whether the goal was reached without contact."""
         return self.outcome == "reached" and not self.collisions
 
 
 class Ending(PrintableRecord):
-    """What the judge's process found beside the episodes."""
+    """What the judge's process found in addition to the episodes."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -98,15 +98,15 @@ class Ending(PrintableRecord):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kept:
-    """What the judge's process keeps of an episode.
+    """What is kept of an episode.
 
     Attributes:
         figures: A line of the results.
-        tier: Sandbox tier; empty where nothing was started.
-        late: Whether it took too long.
-        may_pass: Whether that may have been the machine's doing.
-        poses: Shape (T + 1, 3), float32; of an evaluation, as is the next one.
-        calls: Shape (T,), float32, seconds.
+        tier: Sandbox tier; empty if nothing was started.
+        late: Whether the controller timed out.
+        may_pass: Whether the time-out may be due to a busy machine.
+        poses: Poses of an evaluation, shape (T + 1, 3), float32; else empty.
+        calls: Call times of an evaluation, s, shape (T,), float32; else empty.
     """
 
     figures: SeededEpisode | Measured
@@ -118,10 +118,10 @@ class Kept:
 
 
 def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
-    """Runs the episodes as asked, and writes a line for each in the order of seeds.
+    """Runs the episodes of a job, and writes a line for each in the order of seeds.
 
-    A sequential test sees them in this order, too, and so decides the same however
-    they happen to end; those after its decision are dropped.
+    A sequential test gets them in the same order, so that its decision does not depend
+    on timing. Episodes after its decision are dropped.
     """
     job.out.mkdir(exist_ok=True)
     stage = Stage(
@@ -135,7 +135,7 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
         job.variation,
     )
     counts, tier, fault = [0, 0], job.tier, None
-    everything: list[Kept] = []
+    all_kept: list[Kept] = []
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
             with closing(_in_order(stage, job)) as episodes:
@@ -145,28 +145,28 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
                     file.flush()
                     counts[not kept.figures.success] += 1
                     if job.measured:
-                        everything.append(kept)
+                        all_kept.append(kept)
                     if job.test and job.test.decide(*counts) != "undecided":
                         break
         except SandboxError as error:
             fault = f"the sandbox failed: {error}"
     if job.measured:
-        _write_arrays(everything, job.out)
+        _write_arrays(all_kept, job.out)
     ending = Ending(tier=tier, fault=fault)
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 
 
-def _write_arrays(everything: list[Kept], out: Path) -> None:
-    np.savez(out / POSES_FILE, *(kept.poses for kept in everything))
-    calls = [kept.calls for kept in everything]
+def _write_arrays(all_kept: list[Kept], out: Path) -> None:
+    np.savez(out / POSES_FILE, *(kept.poses for kept in all_kept))
+    calls = [kept.calls for kept in all_kept]
     np.save(out / CALLS_FILE, np.concatenate([np.zeros(0, np.float32), *calls]))
 
 
 def _in_order(stage: Stage, job: SeededJob) -> Generator[Kept]:
-    """Episodes, several at a time; closing waits for the last."""
+    """Yields episodes in order, several running at a time; closing waits for them."""
     size = min(SIZE, len(job.seeds))
     turns, late = Turns(size), list[int]()
-    work = partial(_kept, stage, job.measured)
+    work = partial(_run_episode, stage, job.measured)
     with (
         closing(Crew(work, stage.nursery.close, size)) as crew,
         ThreadPoolExecutor(max_workers=size) as pool,
@@ -174,15 +174,15 @@ def _in_order(stage: Stage, job: SeededJob) -> Generator[Kept]:
         try:
             patience = MOST_LATE if job.measured else len(job.seeds)
             yield from pool.map(
-                partial(_in_turn, crew, turns, late, patience), job.seeds
+                partial(_run_with_retry, crew, turns, late, patience), job.seeds
             )
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def _kept(stage: Stage, measured: bool, seed: int, given_up: bool) -> Kept:
-    """What is kept of the episode of a seed, or of one that is not waited for."""
-    driven = _given_up(stage, seed) if given_up else drive_seed(stage, seed)
+def _run_episode(stage: Stage, measured: bool, seed: int, skip: bool) -> Kept:
+    """Drives or skips the episode of a seed, and returns what is kept of it."""
+    driven = _skipped(stage, seed) if skip else drive_seed(stage, seed)
     rollout = driven.rollout
     late = rollout.outcome == "error" and rollout.timed_out
     if not measured:
@@ -198,27 +198,27 @@ def _kept(stage: Stage, measured: bool, seed: int, given_up: bool) -> Kept:
     )
 
 
-def _given_up(stage: Stage, seed: int) -> Driven:
-    reason = f"not driven, since {MOST_LATE} episodes before it timed out"
+def _skipped(stage: Stage, seed: int) -> Driven:
+    reason = f"not driven, because {MOST_LATE} earlier episodes timed out"
     record = record_of(stage, seed)
     rollout = not_driven(record, f"seed {seed}", ControllerFault(reason, "policy"))
     return Driven(rollout, 0.0, "", record.env.task)
 
 
-def _in_turn(
+def _run_with_retry(
     crew: Crew[[int, bool], Kept],
     turns: Turns,
     late: list[int],
     patience: int,
     seed: int,
 ) -> Kept:
-    """An episode.
+    """Runs an episode in the worker pool.
 
-    A time-out that may be the machine's doing is tried once more, alone.
+    After a time-out that may be due to a busy machine, it is run once more, alone.
     """
-    given_up = len(late) >= patience
+    skip = len(late) >= patience
     with turns.beside():
-        kept = crew.do(seed, given_up)
+        kept = crew.do(seed, skip)
     if kept.late and kept.may_pass and len(late) < patience:
         with turns.alone():
             kept = crew.do(seed, False)
@@ -228,7 +228,7 @@ def _in_turn(
 
 
 def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:
-    """What is kept of an episode; its trajectory is not."""
+    """Figures of an episode, with the diagnosis of a failure."""
     rollout, failure = driven.rollout, {}
     distances, digits = rollout.distances(), task.setting.units.digits
     if not rollout.reached or rollout.collisions:

@@ -1,4 +1,4 @@
-"""Wald's sequential test of a success rate, and what it gets wrong how often."""
+"""Wald's sequential test of a success rate, and its exact error probabilities."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ Decision = Literal["accepted", "rejected", "undecided"]
 ALPHA = BETA = 0.05
 MARGIN = 0.05
 MOST_EPISODES = 1_000_000
-"""Of one run; each takes hundreds of bytes, and at the very least milliseconds."""
+"""Limit of one run; each episode takes hundreds of bytes and at least milliseconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Characteristics:
-    """What a test does with a controller of a known rate; probabilities.
+    """How a test decides on a controller of known success rate.
 
     Attributes:
-        rate: The controller's.
-        accepted: It is accepted.
-        rejected: It is rejected.
-        undecided: The episodes are used up first.
-        mean_episodes: Episodes used on average.
+        rate: Success rate of the controller.
+        accepted: Probability that it is accepted.
+        rejected: Probability that it is rejected.
+        undecided: Probability that the episodes are used up first.
+        mean_episodes: Mean number of episodes used.
     """
 
     rate: float
@@ -41,18 +41,18 @@ class Characteristics:
 class SequentialTest:
     """A sequential probability ratio test (Wald 1945), cut off at a length.
 
-    After each episode the likelihoods of what was seen under the two rates are
-    compared. The bounds are Wald's: they keep both errors near or below what is
-    wanted in a test without end. Cut off, it accepts less, and so never errs more
-    towards accepting; `characteristics` has what holds exactly.
+    After each episode it compares the likelihoods of the results under two success
+    rates: `accept_at` and `refuse_at`. Wald's bounds keep both errors near or below
+    alpha and beta in a test without a limit. The cut-off can only lower the probability
+    of accepting; `characteristics` computes the exact probabilities.
 
     Attributes:
-        accept_at: Rate from which a controller is to be accepted.
-        margin: How far below it a rate is that must not be accepted. In between
+        accept_at: Success rate from which a controller should be accepted.
+        limit: Maximum number of episodes.
+        margin: A rate lower than `accept_at` by this must not be accepted. In between,
             either decision is right.
-        limit: Number of episodes at most.
-        alpha: Wanted probability to accept at the rate that must not be accepted.
-        beta: Wanted probability to reject at the rate that is to be accepted.
+        alpha: Wanted probability of accepting at `refuse_at`.
+        beta: Wanted probability of rejecting at `accept_at`.
     """
 
     accept_at: float
@@ -64,27 +64,27 @@ class SequentialTest:
     def __post_init__(self) -> None:
         if not 0.0 < self.margin < self.accept_at < 1.0:
             raise TaskError(
-                f"expected a rate to accept at below 1 and above the margin "
-                f"{self.margin:g}, which is above 0; got {self.accept_at:g}"
+                f"the rate to accept at must be below 1 and above the margin, and the "
+                f"margin above 0; got {self.accept_at:g} and margin {self.margin:g}"
             )
         if not (0.0 < self.alpha < 0.5 and 0.0 < self.beta < 0.5):
-            raise TaskError("expected alpha and beta between 0 and 0.5")
+            raise TaskError("alpha and beta must be between 0 and 0.5")
         whole_number("episodes", self.limit, 1, MOST_EPISODES)
         if self.limit < self.fewest_to_accept:
             raise TaskError(
                 f"to accept at {self.accept_at:g} with a margin of {self.margin:g} "
-                f"takes at least {self.fewest_to_accept} episodes, and seldom so few; "
+                f"takes at least {self.fewest_to_accept} episodes, usually more; "
                 f"got {self.limit}"
             )
 
     @property
     def refuse_at(self) -> float:
-        """Rate that must not be accepted."""
+        """The success rate that must not be accepted."""
         return round(self.accept_at - self.margin, 12)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Logarithms of the likelihood ratio at which to reject and to accept."""
+        """Log likelihood ratios at which to reject and to accept."""
         return (
             math.log(self.beta / (1.0 - self.alpha)),
             math.log((1.0 - self.beta) / self.alpha),
@@ -92,7 +92,7 @@ class SequentialTest:
 
     @property
     def steps(self) -> tuple[float, float]:
-        """What a success and what a failure add to the logarithm of the ratio."""
+        """What a success and a failure add to the log likelihood ratio."""
         return (
             math.log(self.accept_at / self.refuse_at),
             math.log((1.0 - self.accept_at) / (1.0 - self.refuse_at)),
@@ -100,11 +100,11 @@ class SequentialTest:
 
     @property
     def fewest_to_accept(self) -> int:
-        """Number of successes, and nothing else, after which it accepts."""
+        """Number of successes without a failure after which it accepts."""
         return math.ceil(self.bounds[1] / self.steps[0])
 
     def decide(self, successes: int, failures: int) -> Decision:
-        """What is decided after so many; `undecided` also means: go on."""
+        """The decision after some episodes; `undecided` means to go on, if possible."""
         success, failure = self.steps
         ratio = successes * success + failures * failure
         low, high = self.bounds
@@ -113,9 +113,9 @@ class SequentialTest:
         return "rejected" if ratio <= low else "undecided"
 
     def characteristics(self, rate: float) -> Characteristics:
-        """What this test does with a controller of a known rate.
+        """How this test decides on a controller of known success rate.
 
-        Exact, by the probabilities of each number of failures while undecided.
+        Exact: sums the probabilities of each number of failures while undecided.
         """
         (success, failure), (low, high) = self.steps, self.bounds
         open_, failures = np.ones(1), np.zeros(1)

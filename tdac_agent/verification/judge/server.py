@@ -1,8 +1,8 @@
-"""The judge's process: pytest over a suite, away from the caller and hermetic.
+"""The judge's server, which forks a worker for each job.
 
 Run by `tdac_agent.verification.judge.warm` as `python -m
-tdac_agent.verification.judge.server`; the controller's code never runs here, only in
-the sandboxed children that the judge starts.
+tdac_agent.verification.judge.server`. A worker runs pytest over a suite, isolated from
+the caller. Neither runs the controller's code, which only sandboxed children do.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ from tdac_envs.core.code_cache import has_code
 from tdac_envs.drive.env import Observation
 
 FAREWELL_SECONDS = 1.0
-# Exit codes of a worker; a suite may well end it with another one.
+# Exit codes of a worker; a suite may end it with any other code.
 NO_JOB, DID_JOB = 77, 78
 DONE = b"done"
-# What a job loads when it needs it, unless there was time before.
+# Imported by a job when needed, unless there was time before.
 LOADED_LATE = (
     "tdac_agent.verification.judge.findings",
     "tdac_agent.verification.judge.seeded",
@@ -56,66 +56,66 @@ LOADED_LATE = (
 def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
     """Forks one worker after another until there is no further job.
 
-    Says of each worker its process id, and that its job is done. The worker itself
-    says so, and clears up afterwards; one that could not is spoken for.
+    Writes the process id of each worker, and a line when its job is done. The worker
+    writes that line itself before it cleans up; the server does so if it could not.
 
     Args:
-        nursery: Of the first worker, which has a job at once; by default there is
-            time to load all that a job needs.
-        known: Folder of a task that is read ahead, where there is time.
+        nursery: Child pool of the first worker, if that has a job at once. By default
+            there is time to load everything that a job needs.
+        known: Folder of a task to read ahead, if there is time.
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
-    # What a controller returned is told in messages, and may be long.
+    # Messages quote what a controller returned, which may be long.
     np.set_printoptions(threshold=16, edgeitems=1)
     if nursery is None:
         nursery = Nursery()
-        _rehearse()
+        _warm_up()
         if known is not None:
             load_task(known)
         gc.collect()
-    # What is alive now stays shared with the workers.
+    # Keeps the memory of existing objects shared with the workers.
     gc.freeze()
     more = True
     while more:
         worker = os.fork()
         if worker == 0:
             work(nursery)
-        _say(b"worker %d" % worker)
+        _write_line(b"worker %d" % worker)
         code = os.waitstatus_to_exitcode(_status_of(worker))
         nursery.kill()
         more = code != NO_JOB
         if more:
             nursery = Nursery()
         if code != DID_JOB:
-            _say(DONE)
+            _write_line(DONE)
 
 
 def _status_of(worker: int) -> int:
-    """Of a worker that has ended; one whose caller has gone has no more to do."""
+    """Waits until a worker has ended; ends it if the caller has gone."""
     ended, tell = os.pipe()
 
     def wait() -> None:
         os.waitid(os.P_PID, worker, os.WEXITED | os.WNOWAIT)
         os.close(tell)
 
-    # A process descriptor would do, but not every kernel and container gives one.
+    # A pidfd would be simpler, but not every kernel and container provides one.
     waiting, watch = threading.Thread(target=wait, daemon=True), select.poll()
     waiting.start()
     watch.register(ended, 0)
-    watch.register(0, 0)  # tells when nobody can write any more
+    watch.register(0, 0)  # reports when the caller has closed its end
     watch.poll()
     watch.unregister(0)
-    # Without a job it ends by itself.
+    # A worker without a job ends by itself.
     if not watch.poll(1000 * FAREWELL_SECONDS):
         os.killpg(worker, signal.SIGKILL)
-    waiting.join()  # the next fork should find a single thread
+    waiting.join()  # back to a single thread before the next fork
     os.close(ended)
     return os.waitpid(worker, 0)[1]
 
 
-def _say(word: bytes, descriptor: int = 1) -> None:
-    os.write(descriptor, word + b"\n")
+def _write_line(text: bytes, descriptor: int = 1) -> None:
+    os.write(descriptor, text + b"\n")
 
 
 def work(nursery: Nursery) -> NoReturn:
@@ -124,14 +124,14 @@ def work(nursery: Nursery) -> NoReturn:
     end_with_parent()
     answers = os.dup(1)
     os.dup2(2, 1)
-    # Nothing but what is worth while before the job has come.
+    # Prepares only until the job arrives.
     while not _is_readable(0) and nursery.prepare():
         continue
     crew = None
     if not _is_readable(0):
-        # After the children, which its members share.
+        # Forked after the children, which its processes share.
         crew = _ready_crew(nursery)
-        _run_a_test()
+        _run_empty_suite()
     request = _read_line(0)
     code = NO_JOB
     try:
@@ -147,7 +147,7 @@ def work(nursery: Nursery) -> NoReturn:
                 do_job(Path(request), nursery, crew, later)
                 code = DID_JOB
                 _flush()
-                _say(DONE, answers)
+                _write_line(DONE, answers)
     except BaseException:
         traceback.print_exc()
     finally:
@@ -165,7 +165,7 @@ def _is_readable(descriptor: int) -> bool:
 
 
 def _read_line(descriptor: int) -> str:
-    """A line without its end, read without buffering: the next one is not ours."""
+    """Reads a line without buffering, since the next one is for another worker."""
     line = b""
     while not line.endswith(b"\n"):
         read = os.read(descriptor, 1)
@@ -175,25 +175,25 @@ def _read_line(descriptor: int) -> str:
     return line[:-1].decode()
 
 
-def _rehearse() -> None:
-    """Loads what is compiled, and has pytest load what it needs for a suite."""
+def _warm_up() -> None:
+    """Loads compiled code, and everything that pytest needs for a suite."""
     for name in LOADED_LATE:
         importlib.import_module(name)
-    # A job would wait for the compiling of an environment that it has no use for.
+    # Compiles nothing: a job would wait for an environment that it does not use.
     for one in own_environments():
         if has_code(one.kernels):
-            _rehearse_episode(one.small_env())
-    _run_a_test()
+            _warm_up_episode(one.small_env())
+    _run_empty_suite()
 
 
-def _rehearse_episode(env: Any) -> None:
+def _warm_up_episode(env: Any) -> None:
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     env.nominal.path_from(env.nominal.start)
     spread_starts(env.nominal, 0, 1)
 
 
-def _run_a_test() -> None:
+def _run_empty_suite() -> None:
     from tdac_agent.verification.judge.plugin import run_tests
 
     with tempfile.TemporaryDirectory() as name:
@@ -204,19 +204,22 @@ def _run_a_test() -> None:
 
 
 def _ready_crew(nursery: Nursery) -> SuiteCrew:
-    """Processes that have used what an episode uses: forks share it until then."""
+    """A worker pool whose processes have driven a few steps.
+
+    They have touched the memory that an episode needs, and no longer share it.
+    """
     work = partial(drive_known, nursery)
-    return Crew(work, nursery.close, first=_drive_a_little)
+    return Crew(work, nursery.close, first=_drive_some_steps)
 
 
-def _drive_a_little() -> None:
+def _drive_some_steps() -> None:
     record = Record(environment(DEFAULT).small_env(), None, max_steps=20)
     rollout = run_policy(_Still(), record, "nominal", held_out=False, deadline=inf)
     pickle.dumps(rollout)
 
 
 class _Still:
-    """A policy of ours that does not move, and speaks as a child would."""
+    """A policy that stands still, and encodes its values as a child does."""
 
     def reset(self, observation: Observation) -> object:
         return self.policy(observation)
@@ -235,13 +238,13 @@ def do_job(
     crew: SuiteCrew | None,
     later: contextlib.ExitStack,
 ) -> None:
-    """Does a job of either kind, in its folder; `later` is to be closed after it."""
+    """Runs a job of either kind in its folder; the caller closes `later` after it."""
     text = request.read_text(encoding="utf-8")
     os.chdir(request.parent)
     if json.loads(text)["kind"] == SUITE:
         judge_suite(Job.model_validate_json(text), nursery, crew, later)
     else:
-        # It loads policies of all kinds.
+        # Imported late, since it loads policies of all kinds.
         from tdac_agent.verification.judge.seeded import SeededJob, judge_seeds
 
         judge_seeds(SeededJob.model_validate_json(text), nursery)

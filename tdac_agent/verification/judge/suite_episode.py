@@ -1,4 +1,4 @@
-"""An episode of a suite, from a fresh child to its end, in a process of the crew."""
+"""One episode of a suite in a fresh child, driven by a process of the worker pool."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class Brief:
         source: Bytes of `controller.py`.
         workdir: Folder of the task, whose files the controller may read.
         tier: Sandbox tier, or `auto`.
-        limits: Of each child.
-        deadline: When to stop at the latest, by `time.monotonic`.
+        limits: Limits of each child.
+        deadline: Latest end, by `time.monotonic`.
     """
 
     source: bytes
@@ -44,12 +44,12 @@ class Brief:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """An episode as it is asked for.
+    """A request for an episode.
 
     Attributes:
         name: `nominal`, or `jitter 1` and so on.
-        start: Where it begins.
-        steps: Most steps; the horizon by default.
+        start: Start pose.
+        steps: Maximum number of steps; None for the horizon.
         drive: `policy`, `run_episode` or `truncated run_episode`.
     """
 
@@ -60,19 +60,19 @@ class Order:
 
     @property
     def held_out(self) -> bool:
-        """Whether feedback may tell only pass or fail of it."""
+        """Whether feedback may report only pass or fail of it."""
         return self.name != "nominal" and int(self.name.split()[1]) > SHOWN_JITTERS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Driven:
-    """An episode as it was driven.
+    """The result of an episode.
 
     Attributes:
-        rollout: What came of it.
+        rollout: The judged episode.
         cpu_seconds: CPU time of its child.
         tier: Sandbox tier of its child.
-        import_fault: Why the controller could not be imported, where it could not.
+        import_fault: Why the controller could not be imported; None if it could.
     """
 
     rollout: Rollout
@@ -85,7 +85,7 @@ SuiteCrew = Crew[[Brief, Order], Driven]
 
 
 def drive_known(nursery: Nursery, brief: Brief, order: Order) -> Driven:
-    """The same as `drive`, of the task in the brief's folder."""
+    """The same as `drive`, for the task in the brief's folder."""
     return drive(_task_of(brief.workdir), nursery, brief, order)
 
 
@@ -99,7 +99,7 @@ def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
     """Drives an episode in a fresh child.
 
     Raises:
-        Fault: Sandbox or judge failed.
+        Fault: The sandbox or the judge failed.
     """
     limit = order.steps if order.steps is not None else task.nominal.horizon
     record = Record(task.make_env(), order.start, limit)
@@ -132,18 +132,18 @@ def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
 
 
 def load_controller(child: Child, brief: Brief) -> None:
-    """Gives a child its files, and has it import the controller.
+    """Copies its files to a child, and imports the controller there.
 
     Raises:
-        ControllerFault: It cannot be imported.
-        SandboxError: Its files cannot be copied.
+        ControllerFault: The controller cannot be imported.
+        SandboxError: The files cannot be copied.
     """
     child.furnish(brief.workdir, brief.source)
     child.load()
 
 
 def not_driven(task: Task, order: Order, fault: ControllerFault) -> Rollout:
-    """The episode of a controller that cannot be imported, or may use no more."""
+    """The episode of a controller that cannot be imported, or is out of resources."""
     return replace(
         skipped(task, order, "error", str(fault)),
         timed_out=isinstance(fault, ControllerTimeout),
@@ -152,7 +152,7 @@ def not_driven(task: Task, order: Order, fault: ControllerFault) -> Rollout:
 
 
 def skipped(task: Task, order: Order, outcome: Outcome, reason: str) -> Rollout:
-    """An episode that ended where it began."""
+    """An episode without steps."""
     record = Record(task.make_env(), order.start, 1)
     record.reset()
     nominal = task.nominal

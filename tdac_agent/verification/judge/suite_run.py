@@ -1,4 +1,4 @@
-"""A suite of tests over one controller, run by pytest, in the judge's process."""
+"""Runs a suite over one controller with pytest, in the judge's process."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tdac_agent.verification.judge.suite_episode import SuiteCrew
 def judge_suite(
     job: Job, nursery: Nursery, crew: SuiteCrew | None, later: contextlib.ExitStack
 ) -> None:
-    """Runs a suite as asked, and writes the findings."""
+    """Runs the suite of a job, and writes the findings."""
     task = load_task(job.task)
     judge = Judge(
         task,
@@ -35,11 +35,11 @@ def judge_suite(
     from tdac_agent.verification.judge.plugin import JudgePlugin, run_tests
 
     if len(job.suites) > 1:
-        # What lies beside tests of somebody else's is not what they were compiled to.
+        # Bytecode that lies beside a user's tests may not be theirs.
         sys.pycache_prefix = str(job.out / "bytecode")
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
     run_tests(job.suites, job.out / "report.jsonl", plugin)
-    with ThreadPoolExecutor() as pool:  # most of it is compression
+    with ThreadPoolExecutor() as pool:  # saving is mostly compression
         if job.trajectories is not None:
             for rollout in driven(judge):
                 name = f"{rollout.name.replace(' ', '_')}.npz"

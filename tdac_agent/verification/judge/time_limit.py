@@ -1,4 +1,4 @@
-"""An end to what the judge's own process does about a controller."""
+"""A time limit for work on a controller in the judge's own process."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from contextlib import contextmanager
 
 from tdac_agent.sandbox import ControllerFault
 
-# A test may catch the first error.
+# A test may catch the error, which is then raised again.
 AGAIN_SECONDS = 1.0
 
 
 @contextmanager
 def time_limit(deadline: float, reason: str) -> Generator[None]:
-    """Ends what the main thread does at a deadline, be it in the middle of a message.
+    """Interrupts the main thread at a deadline, even while it formats a message.
 
     Values that a controller chose may take long to compare or to print.
 
     Args:
-        deadline: By `time.monotonic`.
-        reason: What the error says.
+        deadline: The deadline, by `time.monotonic`.
+        reason: Message of the error.
 
     Raises:
-        ControllerFault: At the deadline, or at once where that is over.
+        ControllerFault: At the deadline, or at once if it is over.
     """
     left = deadline - time.monotonic()
     if left <= 0.0:
@@ -44,7 +44,7 @@ def time_limit(deadline: float, reason: str) -> Generator[None]:
         finally:
             active = False
     finally:
-        # Once more, since the first time may itself have been interrupted.
+        # Again, since the signal may have interrupted the first assignment.
         active = False
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

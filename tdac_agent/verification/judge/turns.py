@@ -1,4 +1,4 @@
-"""Work side by side, and now and then alone."""
+"""Concurrent work, with exclusive work now and then."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from contextlib import contextmanager
 
 
 class Turns:
-    """Lets some threads work at a time, or one of them while all others wait.
+    """Lets several threads work concurrently, or one while all others wait.
 
     Args:
-        places: How many may work side by side.
+        places: Number of threads that may work concurrently.
     """
 
     def __init__(self, places: int) -> None:
         self._places = places
         self._free = threading.Semaphore(places)
-        # Held while places are taken: who wants all of them is not overtaken.
+        # Held while places are taken, so that exclusive work is not overtaken.
         self._door = threading.Lock()
 
     @contextmanager
     def beside(self) -> Generator[None]:
-        """Work that may go on beside other work."""
+        """Context of work that may run beside other work."""
         with self._door:
             self._free.acquire()
         try:
@@ -32,7 +32,7 @@ class Turns:
 
     @contextmanager
     def alone(self) -> Generator[None]:
-        """Work beside which nothing else goes on."""
+        """Context of work that runs alone."""
         with self._door:
             for _ in range(self._places):
                 self._free.acquire()

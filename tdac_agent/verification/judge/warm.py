@@ -1,9 +1,9 @@
-"""Judges that are warm before there is anything to judge.
+"""Warm judges: processes that are started before their jobs.
 
-Importing what a judge needs takes about a second, and each sandboxed child a tenth. A
-server process does the importing once; for each verification it forks a worker, which
-starts its children and then waits for its job. A worker does one job and ends, so that
-nothing of a verification is left for the next one.
+A judge takes about a second to import, and each sandboxed child takes a tenth. A server
+process imports everything once; for each verification it forks a worker, which starts
+its children and then waits for its job. A worker does one job and ends, so that no
+state of a verification is left for the next one.
 """
 
 from __future__ import annotations
@@ -27,30 +27,29 @@ from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.verification.judge.children import Nursery
 from tdac_agent.verification.judge.workers import end_with_parent
 
-# What of Python's own environment the judge's process keeps: where things are. The
-# rest can change a verdict; PYTHONOPTIMIZE, for one, takes away every assertion.
+# Environment variables of Python that the judge's process keeps. Others can change a
+# verdict; PYTHONOPTIMIZE, for example, removes every assertion.
 KEPT_VARIABLES = frozenset(
     ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
 )
-# One that has died is noticed at once; a starved machine may take minutes.
+# A busy machine may take minutes; a server that has died is noticed at once.
 START_SECONDS = 600.0
 FAREWELL_SECONDS = 5.0
 POLL_SECONDS = 0.2
 
 
 class WarmJudge:
-    """Does jobs, each in a process of its own that was started ahead of it.
+    """Runs jobs, each in a worker process that was started ahead. A context manager.
 
-    Making one returns at once: it warms up while the caller goes on. A context manager.
+    The constructor returns at once; the judge warms up while the caller goes on.
 
     Args:
-        nursery: Where its children come from, started ahead and ended by the caller;
-            the server is then forked from this process, which should have a single
-            thread, and has all that this one has loaded. By default it is an
-            interpreter of its own.
-        task: What most of its jobs will be about, which that one reads ahead.
-        turn: File whose lock is held during a job, so that those who share it do one
-            after the other.
+        nursery: Child pool that the caller has started and will end. The server is then
+            forked from this process, which should have a single thread, and shares its
+            imports. By default the server is a new interpreter.
+        task: Task of most jobs, which a new interpreter reads ahead.
+        turn: File that is locked during a job, so that judges that share it run one job
+            at a time.
     """
 
     def __init__(
@@ -90,12 +89,12 @@ class WarmJudge:
         seconds: float,
         meanwhile: Callable[[], None] | None = None,
     ) -> None:
-        """Does one job; returns when its process has ended, however it ended.
+        """Runs one job; returns when it is done, or when its worker has died.
 
         Args:
-            request: File that holds the job.
-            seconds: Wall time it may take.
-            meanwhile: Called now and then until it has ended.
+            request: File with the job.
+            seconds: Limit of the wall time, s.
+            meanwhile: Called repeatedly until the job is done.
 
         Raises:
             Fault: The judge did not start, or the job took too long.
@@ -112,20 +111,20 @@ class WarmJudge:
             self._line(seconds, meanwhile)
         except BaseException:
             # A worker leads a process group; its children end with it.
-            with suppress(ProcessLookupError):  # just ended by itself
+            with suppress(ProcessLookupError):  # it has just ended by itself
                 os.killpg(worker, signal.SIGKILL)
             self._line(FAREWELL_SECONDS)
             raise
 
     def _worker(self) -> int:
-        """Process id of the one that waits for a job."""
+        """Process id of the worker that waits for a job."""
         line = b""
         while not line.startswith(b"worker "):
             line = self._line(START_SECONDS)
         return int(line.split()[1])
 
     def close(self) -> None:
-        """Ends the server; its worker ends with it, and the children with that."""
+        """Ends the server, its worker and their children."""
         self._server.end()
         self._log.close()
         self._folder.cleanup()
@@ -139,7 +138,7 @@ class WarmJudge:
     def _line(
         self, seconds: float, meanwhile: Callable[[], None] | None = None
     ) -> bytes:
-        """The server's next line, without its end."""
+        """Reads the server's next line, without its end."""
         stream, deadline = self._server.answers, time.monotonic() + seconds
         line = b""
         while not line.endswith(b"\n"):
@@ -152,11 +151,11 @@ class WarmJudge:
                 continue
             read = os.read(stream, 1)
             if not read:
-                raise Fault(f"the judge ended: {self._last_words()}")
+                raise Fault(f"the judge ended: {self._last_output()}")
             line += read
         return line[:-1]
 
-    def _last_words(self) -> str:
+    def _last_output(self) -> str:
         self._log.seek(0)
         text = self._log.read().decode("utf-8", "replace")
         kept = [line.strip() for line in text.splitlines() if line.strip()][-4:]
@@ -168,9 +167,9 @@ class _Server:
     """A server process.
 
     Attributes:
-        requests: Descriptor to write to.
-        answers: Descriptor to read from.
-        end: Kills and reaps it, and closes both.
+        requests: File descriptor to write to.
+        answers: File descriptor to read from.
+        end: Kills and reaps the process, and closes both descriptors.
     """
 
     requests: int
@@ -181,7 +180,7 @@ class _Server:
 def _start_server(
     known: list[Path], environment: dict[str, str], folder: Path, log: int
 ) -> _Server:
-    """A server in an interpreter of its own, which reads a known task ahead."""
+    """Starts a server in a new interpreter, which reads a known task ahead."""
     process = subprocess.Popen(
         [
             sys.executable,
@@ -210,7 +209,7 @@ def _start_server(
 def _fork_server(
     nursery: Nursery, environment: dict[str, str], folder: Path, log: int
 ) -> _Server:
-    """A server that has what this process has imported."""
+    """Forks a server from this process, with everything that it has imported."""
     import cv2
 
     (theirs_in, requests), (answers, theirs_out) = os.pipe(), os.pipe()

@@ -1,6 +1,6 @@
-"""Processes that work side by side, each with a Python of its own.
+"""The worker pool: processes that drive episodes in parallel.
 
-Threads of one process take turns in running Python, and an episode is mostly Python.
+Threads would not run in parallel, since an episode is mostly Python code.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ T = TypeVar("T")
 
 
 class Crew(Generic[P, T]):
-    """Forked from this process, which should have a single thread then.
+    """A worker pool, forked from this process, which should have a single thread then.
 
-    While a member works, it stays on a core that no other one has, and so do the
-    children that it takes: a judge and a controller answer in turns, and to wake a
-    process on another core takes longer than most answers do.
+    While a process of the pool works, it and its children are pinned to one core that
+    no other one uses: judge and controller run in turns, and waking a process on
+    another core takes longer than most of their answers.
 
     Args:
-        work: What a member does when asked. Arguments and results are pickled; all
-            else it refers to is as it was at the fork.
-        end: What a member does last of all.
-        size: Number of members.
-        first: What a member does before it is asked for anything.
+        work: Called in a process for each request. Arguments and results are pickled;
+            everything else that it refers to is as it was at the fork.
+        end: Called last in each process.
+        size: Number of processes.
+        first: Called first in each process, before any request.
     """
 
     def __init__(
@@ -67,18 +67,20 @@ class Crew(Generic[P, T]):
             self._idle.put(ours)
 
     def do(self, *args: P.args, **kwargs: P.kwargs) -> T:
-        """Has an idle member work, and waits for it; several threads may ask at once.
+        """Calls `work` in an idle process, and waits for it.
+
+        Safe to call from several threads.
 
         Raises:
-            Fault: The member has died.
-            Exception: Whatever the work raised.
+            Fault: The process has died.
+            Exception: Whatever `work` raised.
         """
         member = self._idle.get()
         try:
             member.send((args, kwargs))
             result, error = member.recv()
         except (EOFError, OSError):
-            raise Fault("a process of the judge has died") from None
+            raise Fault("a process of the judge's worker pool has died") from None
         finally:
             self._idle.put(member)
         if error is not None:
@@ -87,11 +89,11 @@ class Crew(Generic[P, T]):
 
     @property
     def members(self) -> list[int]:
-        """Process ids."""
+        """Process ids of the pool."""
         return [member.pid or 0 for member in self._members]
 
     def close(self) -> None:
-        """Ends the members; none may be at work."""
+        """Ends the processes; none of them may be working."""
         for end in self._ends:
             end.close()
         for member in self._members:
@@ -99,7 +101,7 @@ class Crew(Generic[P, T]):
 
 
 class Cores:
-    """The cores that this process may use, shared out among its forks."""
+    """The cores that this process may use, distributed among its forks."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("fork")
@@ -109,9 +111,9 @@ class Cores:
 
     @contextlib.contextmanager
     def one(self) -> Generator[None]:
-        """Stays on the core where this process is, or on a free one where it is taken.
+        """Pins this process to its current core, or to a free one if that is taken.
 
-        With no free one, it goes where the system sends it.
+        Without a free core it is not pinned.
         """
         place = self._take()
         if place is None:
@@ -136,7 +138,7 @@ class Cores:
 
 
 def _stay_on(cores: list[int]) -> None:
-    with contextlib.suppress(OSError):  # a system that forbids it decides by itself
+    with contextlib.suppress(OSError):  # some systems forbid pinning
         os.sched_setaffinity(0, cores)
 
 
@@ -147,7 +149,7 @@ def _core() -> int:
 
 
 def end_with_parent() -> None:
-    """Lets the kernel kill this process when the one that forked it ends (Linux)."""
+    """Has the kernel kill this process when its parent ends (on Linux)."""
     if sys.platform == "linux":
         pr_set_pdeathsig = 1
         ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
@@ -162,7 +164,7 @@ def _serve(
     cores: Cores,
 ) -> None:
     end_with_parent()
-    # The others' ends, too: a member ends when the judge has closed its own.
+    # Inherited from the judge: this process ends when the judge has closed its own.
     for other in ends_of_judge:
         other.close()
     with contextlib.suppress(EOFError, KeyboardInterrupt):
