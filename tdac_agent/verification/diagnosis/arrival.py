@@ -126,9 +126,9 @@ def _after_the_goal(
     rounds, unit = rounds_about(trajectory, since, rollout.goal), units.length
     away = float(trajectory.path_distances[-1] - trajectory.path_distances[best])
     if abs(rounds) >= 2.0 and straight.max() < 4.0 * near_goal(rollout):
-        way = "clockwise" if rounds > 0 else "counter-clockwise"
+        sense = "clockwise" if rounds > 0 else "counter-clockwise"
         return best, (
-            f"after step {since} it circled the goal {abs(rounds):.1f} times, {way} "
+            f"after step {since} it circled the goal {abs(rounds):.1f} times, {sense} "
             f"seen from above, {straight.min():.1f} to {straight.max():.1f} {unit} "
             f"from it"
         )

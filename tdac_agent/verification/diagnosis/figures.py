@@ -136,8 +136,8 @@ def _facts(diagnosis: Diagnosis) -> list[str]:
     facts = [sentence.encode("ascii", "replace").decode()[:MAX_FACT]]
     if diagnosis.heading_error is not None:
         error = math.degrees(diagnosis.heading_error)
-        way = "right" if error > 0 else "left"
-        facts.append(f"heading error {abs(error):.0f} deg, path to the {way}")
+        side = "right" if error > 0 else "left"
+        facts.append(f"heading error {abs(error):.0f} deg, path to the {side}")
     return facts
 
 

@@ -79,13 +79,13 @@ def _spinning(
     small = driven <= rounds * math.tau * _CIRCLE * radius
     if rounds < _ROUNDS or abs(net) < 0.7 * total or not small:
         return None
-    way = "right" if net > 0 else "left"
+    side = "right" if net > 0 else "left"
     circle = driven / (rounds * math.tau)
     wide = f"on a circle of radius {circle:.0f} {units.length}"
     where = wide if circle >= PROGRESS else "in place"
     return "spinning", (
         f"in the last {trajectory.steps - late} steps it made {rounds:.1f} full turns "
-        f"to the {way} {where}"
+        f"to the {side} {where}"
     )
 
 

@@ -16,8 +16,8 @@ from tdac_agent.sandbox.inner.wire import WireError
 def ours() -> Generator[None]:
     """Turns errors that the controller did not cause into a `Fault`.
 
-    Errors of the controller pass through. So do those of values that a test cannot send
-    to the controller, since the controller may have made these values.
+    Errors of the controller pass through. So do errors about values that cannot be sent
+    to the controller, since it may have made them.
 
     Raises:
         Fault: The sandbox or the judge failed; this says nothing about the controller.

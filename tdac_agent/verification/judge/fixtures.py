@@ -1,4 +1,4 @@
-"""The fixtures for tests of suites; a public contract, see docs/suites.md."""
+"""The fixtures for suites; a public contract, see docs/suites.md."""
 
 from __future__ import annotations
 

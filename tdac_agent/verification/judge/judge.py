@@ -63,7 +63,7 @@ class Judge:
         limits: Limits of each child; `cpu_seconds` is the total of all of them.
         nursery: The child pool; a new one by default.
         crew: The worker pool that drives episodes; a new one by default, forked now.
-        at_a_time: Largest number of episodes that run concurrently.
+        at_a_time: Maximum number of concurrent episodes.
         wall_seconds: Time limit of the whole verification, s.
 
     Attributes:
@@ -108,7 +108,7 @@ class Judge:
             self._own.callback(crew.close)
         self._crew = crew
         self._pool = ThreadPoolExecutor(max_workers=at_a_time)
-        # One more than episodes, for the suite's own calls.
+        # One place more than episodes, for the suite's own calls.
         self._turns = Turns(at_a_time + 1)
         self._lock = threading.Lock()
         self._episodes: dict[Key, Future[Rollout]] = {}
@@ -117,7 +117,7 @@ class Judge:
         self._import_fault: ControllerFault | None = None
 
     def unit(self) -> Unit:
-        """The imported controller, for calls of its own functions.
+        """The imported controller, whose functions can be called.
 
         A call that ends its process fails only the test that made it: the next test
         gets a fresh process.
@@ -185,7 +185,8 @@ class Judge:
     def begin(self, *, jitters: bool, own_loop: bool) -> None:
         """Starts the episodes that every suite asks for, to run during other tests.
 
-        The short ones come last, so that all pool processes finish at about one time.
+        The short ones come last, so that all pool processes finish at about the same
+        time.
         """
         whole, *short = OWN_LOOPS if own_loop else (NOMINAL,)
         jittered = [(name, None, "policy") for name in NAMES[1:]]

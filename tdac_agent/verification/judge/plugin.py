@@ -74,7 +74,7 @@ class JudgePlugin:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self) -> Generator[None]:
-        """Does the same for the test itself and its message."""
+        """Ends a test, or the making of its message, in the same case."""
         with self._judge.time_limit():
             return (yield)
 
@@ -95,7 +95,7 @@ class JudgePlugin:
     def pytest_runtest_protocol(
         self, item: pytest.Item, nextitem: pytest.Item | None
     ) -> bool:
-        """Runs a test, and once more if a call in it may have timed out by accident."""
+        """Runs a test; repeats it if a call timed out, maybe on a busy machine."""
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
         reports = runtestprotocol(item, log=False, nextitem=nextitem)
         if self._judge.call_may_pass():

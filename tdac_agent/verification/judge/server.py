@@ -2,7 +2,7 @@
 
 Run by `tdac_agent.verification.judge.warm` as `python -m
 tdac_agent.verification.judge.server`. A worker runs pytest over a suite, isolated from
-the caller. Neither runs the controller's code, which only sandboxed children do.
+the caller. The controller's code runs only in sandboxed children.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ FAREWELL_SECONDS = 1.0
 # Exit codes of a worker; a suite may end it with any other code.
 NO_JOB, DID_JOB = 77, 78
 DONE = b"done"
-# Imported by a job when needed, unless there was time before.
+# Imported when a job needs them, or earlier if there is time.
 LOADED_LATE = (
     "tdac_agent.verification.judge.findings",
     "tdac_agent.verification.judge.seeded",
@@ -60,9 +60,9 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
     writes that line itself before it cleans up; the server does so if it could not.
 
     Args:
-        nursery: Child pool of the first worker, if that has a job at once. By default
-            there is time to load everything that a job needs.
-        known: Folder of a task to read ahead, if there is time.
+        nursery: Child pool of the first worker, whose job is due at once. By default
+            the server makes one, and first loads everything that a job needs.
+        known: Folder of a task to read ahead in the latter case.
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
@@ -92,12 +92,12 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
 
 
 def _status_of(worker: int) -> int:
-    """Waits until a worker has ended; ends it if the caller has gone."""
-    ended, tell = os.pipe()
+    """Waits for a worker to end, and returns its status; kills it without a caller."""
+    ended, writer = os.pipe()
 
     def wait() -> None:
         os.waitid(os.P_PID, worker, os.WEXITED | os.WNOWAIT)
-        os.close(tell)
+        os.close(writer)
 
     # A pidfd would be simpler, but not every kernel and container provides one.
     waiting, watch = threading.Thread(target=wait, daemon=True), select.poll()
@@ -119,7 +119,7 @@ def _write_line(text: bytes, descriptor: int = 1) -> None:
 
 
 def work(nursery: Nursery) -> NoReturn:
-    """Prepares children, waits for a job on standard input, does it and ends."""
+    """Prepares children, waits for a job on standard input, runs it and exits."""
     os.setpgid(0, 0)
     end_with_parent()
     answers = os.dup(1)
@@ -179,7 +179,7 @@ def _warm_up() -> None:
     """Loads compiled code, and everything that pytest needs for a suite."""
     for name in LOADED_LATE:
         importlib.import_module(name)
-    # Compiles nothing: a job would wait for an environment that it does not use.
+    # Without compiling: a job would wait for an environment that it may not use.
     for one in own_environments():
         if has_code(one.kernels):
             _warm_up_episode(one.small_env())
@@ -204,9 +204,9 @@ def _run_empty_suite() -> None:
 
 
 def _ready_crew(nursery: Nursery) -> SuiteCrew:
-    """A worker pool whose processes have driven a few steps.
+    """A worker pool whose processes have driven some steps.
 
-    They have touched the memory that an episode needs, and no longer share it.
+    They have their own copies of the memory pages that an episode writes to.
     """
     work = partial(drive_known, nursery)
     return Crew(work, nursery.close, first=_drive_some_steps)

@@ -25,7 +25,7 @@ SHOWN_JITTERS = 2
 
 @dataclass(frozen=True, slots=True)
 class Brief:
-    """What the episodes of a verification have in common.
+    """Settings shared by the episodes of a verification.
 
     Attributes:
         source: Bytes of `controller.py`.

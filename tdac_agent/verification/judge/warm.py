@@ -1,9 +1,9 @@
 """Warm judges: processes that are started before their jobs.
 
-A judge takes about a second to import, and each sandboxed child takes a tenth. A server
-process imports everything once; for each verification it forks a worker, which starts
-its children and then waits for its job. A worker does one job and ends, so that no
-state of a verification is left for the next one.
+Importing a judge takes about a second, and starting a sandboxed child a tenth of that.
+A server process does the importing once; for each verification it forks a worker, which
+starts its children and then waits for its job. A worker does one job and ends, so that
+no state of a verification is left for the next one.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from tdac_agent.verification.judge.workers import end_with_parent
 KEPT_VARIABLES = frozenset(
     ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
 )
-# A busy machine may take minutes; a server that has died is noticed at once.
+# A start on a busy machine may take minutes; a dead server is noticed at once.
 START_SECONDS = 600.0
 FAREWELL_SECONDS = 5.0
 POLL_SECONDS = 0.2

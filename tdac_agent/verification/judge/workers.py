@@ -36,9 +36,9 @@ class Crew(Generic[P, T]):
     Args:
         work: Called in a process for each request. Arguments and results are pickled;
             everything else that it refers to is as it was at the fork.
-        end: Called last in each process.
+        end: Called in each process before it ends.
         size: Number of processes.
-        first: Called first in each process, before any request.
+        first: Called in each process before its first request.
     """
 
     def __init__(
@@ -164,7 +164,7 @@ def _serve(
     cores: Cores,
 ) -> None:
     end_with_parent()
-    # Inherited from the judge: this process ends when the judge has closed its own.
+    # Copies of the judge's ends would hide that the judge has closed its own.
     for other in ends_of_judge:
         other.close()
     with contextlib.suppress(EOFError, KeyboardInterrupt):
