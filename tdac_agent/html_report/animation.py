@@ -27,7 +27,6 @@ TOLERANCE = 0.5
 RAD = 20.0
 """Distance that a heading error of one rad counts as, px."""
 MOST_POINTS = 400
-"""Limit for one episode."""
 ALL_POINTS = 60_000
 """Limit for all episodes of a run."""
 

@@ -29,11 +29,9 @@ def highlighted(source: str) -> Markup:
 
 
 def shown_diff(diff: str, most: int) -> Markup:
-    """Formats a unified diff: added lines in `<ins>`, removed lines in `<del>`.
+    """Formats at most `most` lines of a unified diff, without those of file names.
 
-    Args:
-        diff: Output of `difflib.unified_diff`; the two file name lines are left out.
-        most: Maximum number of lines to show.
+    Added lines are in `<ins>`, removed lines in `<del>`.
     """
     lines = diff.splitlines()
     lines = lines[2:] if diff.startswith("---") else lines

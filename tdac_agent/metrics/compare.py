@@ -23,12 +23,11 @@ class Comparison:
         pairs: Number of pairs.
         first_only: Pairs that only the first kind solved within K iterations.
         second_only: Pairs that only the second kind solved within K iterations.
-        p_solved: Two-sided p-value of the exact McNemar test of `first_only` against
-            `second_only`; 1 if both are 0.
+        p_solved: Exact McNemar test of these two, two-sided p-value; 1 if both are 0.
         sooner: Pairs in which the first kind needed fewer iterations. A run without
             success counts as slower than any success.
         later: Pairs in which the first kind needed more iterations.
-        p_tau: Two-sided p-value of the exact sign test of `sooner` against `later`.
+        p_tau: Exact sign test of these two, two-sided p-value; 1 if both are 0.
     """
 
     pairs: int
@@ -106,9 +105,8 @@ def best_of_n(frames: Frames, loop: Frames, within: int | None = None) -> pd.Dat
 
     Returns:
         A row per `measure` of cost known for both (`cost` in USD, `tokens`): mean cost
-        of one shot (`one_shot`) and of a loop run (`run`), the number `n` of shots that
-        a loop run pays for, pass@n of the shots (`best_of_n`; NaN with fewer than n
-        candidates), and the CS of the loop (`cs`).
+        of a shot (`one_shot`) and of a loop run (`run`), number `n` of shots at the
+        cost of a run, their pass@n (`best_of_n`; NaN with fewer shots), CS (`cs`).
     """
     tried = frames.candidates
     first = tried[(tried["k"] == 1) & (tried["j"] == 0)]

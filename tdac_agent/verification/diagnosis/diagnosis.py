@@ -40,12 +40,7 @@ _CONTRACT = re.compile(
 def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
     """Finds the cause and circumstances of a failed (or late) episode.
 
-    Args:
-        rollout: The episode.
-        task: Map or world of the episode.
-
-    Returns:
-        The diagnosis; for a held-out episode only the cause `held out`, no figures.
+    For a held-out episode the cause is `held out`, and there are no figures.
     """
     if rollout.outcome == "not run":
         return Diagnosis(cause="error", text=f"{rollout.name}: {rollout.error}.")

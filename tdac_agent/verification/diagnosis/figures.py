@@ -33,14 +33,7 @@ def draw_trajectories(
     outcomes: dict[str, str],
     path: Path,
 ) -> None:
-    """Writes a PNG of the map or world with all trajectories.
-
-    Args:
-        task: Task whose map or world is drawn.
-        trajectories: Trajectories by episode name.
-        outcomes: Outcomes by episode name.
-        path: The file to write.
-    """
+    """Writes a PNG of the map or world with trajectories and outcomes by episode."""
     picture = pictures_of(task.setting).trajectories(
         [trajectory.poses for trajectory in trajectories.values()],
         [outcomes.get(name, "") for name in trajectories],

@@ -98,8 +98,7 @@ def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
 def shortest_way(task: Nominal) -> float:
     """Length of the shortest path from a task's start to its goal, px or m.
 
-    It is the shortest 8-connected grid path, after every shortcut that the body can
-    take.
+    The shortest 8-connected grid path, after every shortcut that the body can take.
     """
     around, start = surroundings_of(task), task.start
     units = around.units

@@ -39,8 +39,7 @@ class _Record(PrintableRecord):
 class Diagnosis(_Record):
     """What happened in an episode, computed from its trajectory.
 
-    Figures that do not apply are None. Distances and positions are in px, for the
-    e-puck in m.
+    Distances and positions are in px, for the e-puck in m; None if they do not apply.
     """
 
     cause: Cause

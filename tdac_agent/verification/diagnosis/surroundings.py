@@ -45,10 +45,7 @@ class Surroundings(Protocol):
         """Corners of a path after every shortcut that the body can take."""
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
-        """Where the shortest path from each position is first `far` from it, or ends.
-
-        None for a position without a path.
-        """
+        """Where the shortest path from each position first is `far` away, or ends."""
 
     def mistaken_goals(self) -> dict[str, Point]:
         """Where the goal would be with mixed-up coordinates, by name of the mistake."""

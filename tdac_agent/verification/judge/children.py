@@ -73,13 +73,9 @@ class Nursery:
             return self._first_child(limits)
 
     def prepare(self) -> bool:
-        """Starts one more ready child, with the default limits.
+        """Starts one more ready child with the default limits; False if it starts none.
 
-        Called before the process forks. The calling process has to end the children
-        that are not taken.
-
-        Returns:
-            False if there are enough ready children, or none could be started.
+        Call it before forking: only the calling process ends unused children.
         """
         self._owner = os.getpid()
         if len(self._ready) >= READY:

@@ -55,11 +55,7 @@ class Contender:
 
 
 class Reference:
-    """Drives the oracle's path by the true pose; privileged.
-
-    Args:
-        env: Environment of the episode.
-    """
+    """Drives the oracle's path by the true pose; privileged."""
 
     def __init__(self, env: JudgedEnv) -> None:
         self._env = env
@@ -92,10 +88,7 @@ class Reference:
 class Steered:
     """Drives straight at a target, whatever is in between.
 
-    Args:
-        env: Environment of the episode.
-        guided: Whether the target is the next way-point of the reference route; else
-            it is the goal.
+    The target is the goal, or the next way-point of the reference route if `guided`.
     """
 
     def __init__(self, env: JudgedEnv, *, guided: bool) -> None:
@@ -127,12 +120,7 @@ class Steered:
 
 
 class Random:
-    """Uniform wheel speeds, drawn anew every second.
-
-    Args:
-        env: Environment of the episode.
-        seed: Seed of the episode.
-    """
+    """Uniform wheel speeds, drawn anew every second."""
 
     def __init__(self, env: JudgedEnv, seed: int) -> None:
         # A stream apart from the one that the environment draws its start from.

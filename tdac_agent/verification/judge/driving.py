@@ -99,10 +99,7 @@ def source_of(contender: Contender) -> bytes:
 
 
 def _driven_here(stage: Stage, record: Record, seed: int) -> Driven:
-    """Drives an episode of a baseline or a learned policy in this process.
-
-    Neither of them runs foreign code.
-    """
+    """Drives an episode of a baseline or learned policy, which run no foreign code."""
     name = f"seed {seed}"
     try:
         driver = driver_of(stage.contender, record.env, seed)

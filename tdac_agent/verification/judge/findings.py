@@ -47,8 +47,7 @@ def findings_of(judge: Judge, expected: list[str]) -> Findings:
 def _named(key: Key, rollouts: Mapping[Key, Rollout]) -> Rollout:
     """Renames an episode of the controller's own loop to `run_episode`.
 
-    If `policy` fails with the same error, as when the import fails, the name is kept,
-    so that the error is reported once.
+    Not if `policy` failed with the same error, which is then reported once.
     """
     rollout, nominal = rollouts[key], rollouts.get(NOMINAL)
     of_both = nominal is not None and rollout.error == nominal.error is not None

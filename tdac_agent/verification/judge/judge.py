@@ -171,8 +171,7 @@ class Judge:
     def rollouts(self) -> dict[Key, Rollout]:
         """The episodes that tests asked for, by (name, steps, drive).
 
-        Episodes that were only begun are left out: which of them have ended depends on
-        timing.
+        Without those that were only begun: which of them have ended depends on timing.
         """
         return {
             key: future.result()
@@ -185,8 +184,7 @@ class Judge:
     def begin(self, *, jitters: bool, own_loop: bool) -> None:
         """Starts the episodes that every suite asks for, to run during other tests.
 
-        The short ones come last, so that all pool processes finish at about the same
-        time.
+        The short ones come last, so that all processes finish at about the same time.
         """
         whole, *short = OWN_LOOPS if own_loop else (NOMINAL,)
         jittered = [(name, None, "policy") for name in NAMES[1:]]
@@ -225,8 +223,7 @@ class Judge:
     def _submit(self, key: Key) -> Future[Rollout]:
         """Queues an episode if it is new, and returns its future.
 
-        The nominal episode is always queued before the jittered ones, which wait for
-        it.
+        The nominal episode is queued before the jittered ones, which wait for it.
         """
         if key[0] != "nominal" and NOMINAL not in self._episodes:
             self._submit(NOMINAL)
@@ -268,13 +265,9 @@ class Judge:
         *,
         final: bool = False,
     ) -> Rollout:
-        """Runs an episode in a fresh child.
+        """Runs an episode in a fresh child; `final` if there is no further retry.
 
-        Args:
-            name: As for `rollout`.
-            steps: As for `rollout`.
-            drive: As for `rollout`.
-            final: Whether there is no further retry.
+        The other arguments are as for `rollout`.
         """
         order = self._order(name, steps, drive)
         try:
@@ -310,10 +303,7 @@ class Judge:
             return self._load(final=True)
 
     def _load(self, *, final: bool = False) -> Child:
-        """A fresh child with the controller imported.
-
-        Args:
-            final: Whether there is no further retry.
+        """A fresh child with the controller imported; `final`: without a retry.
 
         Raises:
             ControllerFault: The import failed; later requests raise the same fault.

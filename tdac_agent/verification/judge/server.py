@@ -204,10 +204,7 @@ def _run_empty_suite() -> None:
 
 
 def _ready_crew(nursery: Nursery) -> SuiteCrew:
-    """A worker pool whose processes have driven some steps.
-
-    They have their own copies of the memory pages that an episode writes to.
-    """
+    """A worker pool whose processes have already touched what an episode needs."""
     work = partial(drive_known, nursery)
     return Crew(work, nursery.close, first=_drive_some_steps)
 

@@ -67,9 +67,7 @@ class Crew(Generic[P, T]):
             self._idle.put(ours)
 
     def do(self, *args: P.args, **kwargs: P.kwargs) -> T:
-        """Calls `work` in an idle process, and waits for it.
-
-        Safe to call from several threads.
+        """Calls `work` in an idle process, and waits for it; thread-safe.
 
         Raises:
             Fault: The process has died.
