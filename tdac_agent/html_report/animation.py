@@ -50,7 +50,7 @@ def _episodes(one: Tried) -> Iterator[tuple[Episode, Trajectory]]:
     kept = dict(one.trajectories())
     for episode in one.report.episodes:
         trajectory = kept.get(episode.name)
-        # The file may be of `run_episode`, which drives from the same start.
+        # The file may hold an episode of `run_episode` from the same start.
         if trajectory is not None and trajectory.steps == episode.steps > 0:
             yield episode, trajectory
 

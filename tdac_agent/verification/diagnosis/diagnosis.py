@@ -70,7 +70,7 @@ def _error(rollout: Rollout, units: Units) -> Diagnosis:
     elif _CONTRACT.search(message):
         cause = "contract"
     when = f"after {steps} steps" if steps else "before its first step"
-    # The message of a `run_episode` that returned already names the step.
+    # The message of a `run_episode` that returned already gives the number of steps.
     failed = "" if _RETURNED in message else f"the controller failed {when}: "
     text = f"{cause}: {failed}{message}"
     return _diagnosis(rollout, units, cause, text, steps)

@@ -56,7 +56,7 @@ def draw_failures(
     background, files = None, []
     for episode in report.episodes:
         trajectory = trajectories.get(episode.name)
-        # The file may be of `run_episode`, which drives from the same start.
+        # The file may hold an episode of `run_episode` from the same start.
         if trajectory is None or trajectory.steps != episode.steps:
             continue
         if episode.outcome in ("reached", "not run"):

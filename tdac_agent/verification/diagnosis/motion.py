@@ -53,7 +53,7 @@ def wheels_differ(trajectory: Trajectory) -> NDArray[np.bool_]:
 
 
 def flips(trajectory: Trajectory, since: int) -> float:
-    """Share of steps that reversed the turn, or the drive if that is more."""
+    """The larger share of steps: that reversed the turn, or that reversed the drive."""
     actions = trajectory.actions[since:]
     shares = [0.0]
     for signal in (actions[:, 0] - actions[:, 1], actions.sum(axis=1)):
