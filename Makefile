@@ -1,22 +1,22 @@
-# What each part promises, on two cores, installation aside:
-#   make test         Every feature works, on this machine as it is; at most 5 minutes.
-#                     Nothing in it needs a quiet machine.
-#   make slow         What needs patience or quiet: each controller of the zoo on every
-#                     sandbox tier, each bundled map, long sweeps of seeds, killed runs.
-#   make slow-sample  120 of these tests, drawn by SAMPLE; CI draws by the commit's hash.
-#   make test-all     Both, and lint: what must pass before a release.
-#   make portability  Other people's machines: no bubblewrap, each tier, lowest and newest
-#                     versions, other Pythons, another user, other processors, a busy
-#                     machine. A table says what could not be tried, and why. Some rows:
+# What each target checks; times are for two cores, without the installation:
+#   make test         Every feature on this machine as it is; at most 5 minutes.
+#                     No test needs a quiet machine.
+#   make slow         Tests that take long or need a quiet machine: each controller of the
+#                     zoo on every sandbox tier, each bundled map, many seeds, killed runs.
+#   make slow-sample  120 of these tests, drawn by the seed SAMPLE; CI uses the commit hash.
+#   make test-all     test, slow and lint: required before a release.
+#   make portability  Other machines: no bubblewrap, each tier, lowest and newest versions,
+#                     other Pythons, another user, other processors, a busy machine. The
+#                     table also lists what could not run, and why. Selected rows:
 #                     make portability ROWS="lowest wheel-user"
-#   make lint         Style, types, and who may import whom.
+#   make lint         Style, types and import rules.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-# Chooses which slow tests are run by slow-sample.
+# Seed of the tests that slow-sample draws.
 SAMPLE ?= 1
-# A file's tests share what they need, so they are run by one process; in their order
-# the files with short tests come last, and both processes end together.
+# Tests of one file share fixtures, so one process runs them all. The given order puts
+# files with short tests last, so that both processes end at about the same time.
 PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder
 
 .PHONY: synth test test-all slow slow-sample lint bench portability clean
