@@ -2,10 +2,10 @@
 
     python -m benchmarks [NAME …] [--rounds N] [--maps DIR] [--json] [--profile]
 
-Without names, all of them. Every bench times its floor and what it is compared with
-in the same run, in turns; only the ratios carry over to another machine. `--quick`
-shows that all of it works, on sizes that say nothing. `--profile` prints instead
-where the CPU time of each bench goes, that of its threads, too.
+Without names it runs all of them. Every bench times its floor and its reference in the
+same run, in turns; only the ratios carry over to other machines. `--quick` only checks
+that the benches work, on toy sizes. `--profile` prints where the CPU time of each bench
+goes, including that of its threads, instead.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from benchmarks.timing import Bench, Effort, Row, duration, show, whole_from_one
 
 NAMES = ("env_step", "epuck_step", "peers", "preprocessing", "planning", "start_up")
 PROFILED = 25
-"""Lines of a profile."""
+"""Number of lines in a profile."""
 
 
 def main() -> int:
-    """Returns the exit code: 1 where something takes longer than it should."""
+    """Returns the exit code: 1 if a case exceeds its time limit."""
     options = _options()
     chosen = {name: _bench(name, options) for name in options.names or NAMES}
     if options.profile:
@@ -56,8 +56,8 @@ def main() -> int:
         print(json.dumps({"machine": _machine(), **every}, indent=1))
     late = [row for benches in found.values() for b in benches for row in _late(b)]
     for row in late:
-        told = f"{duration(row.fastest)}, limit {duration(row.limit or 0.0)}"
-        print(f"too slow: {row.case}: {told}", file=sys.stderr)
+        times = f"{duration(row.fastest)}, limit {duration(row.limit or 0.0)}"
+        print(f"too slow: {row.case}: {times}", file=sys.stderr)
     return 1 if late else 0
 
 
@@ -72,7 +72,7 @@ def _bench(name: str, options: argparse.Namespace) -> Callable[[], Sequence[Benc
 def _profile(name: str, run: Callable[[], object]) -> None:
     import yappi
 
-    # The standard library's profiler sees one thread alone.
+    # The standard library's profiler covers only one thread.
     yappi.set_clock_type("cpu")
     with yappi.run(builtins=True):
         run()
@@ -88,13 +88,13 @@ def _profile(name: str, run: Callable[[], object]) -> None:
 
 
 def _place(call: Any) -> str:
-    """Where a function is; one that is not Python's has no line."""
+    """File, line and name of a function; functions outside Python have no line."""
     file = Path(call.module).name
     return escape(f"{file}:{call.lineno} {call.name}" if call.lineno else call.name)
 
 
 def _late(bench: Bench) -> list[Row]:
-    """The rows that take longer than they should even at best."""
+    """The rows whose fastest time exceeds their limit."""
     return [row for row in bench.rows if row.limit and row.fastest > row.limit]
 
 
@@ -110,15 +110,13 @@ def _options() -> argparse.Namespace:
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=about)
     parser.add_argument(
-        "names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}"
+        "names", nargs="*", metavar="NAME", help=f"one of {', '.join(NAMES)}"
     )
-    parser.add_argument("--maps", type=Path, help="folder of MovingAI maps and .scen")
-    parser.add_argument(
-        "--rounds", type=whole_from_one, help="turns that the cases take"
-    )
+    parser.add_argument("--maps", type=Path, help="folder of MovingAI maps with .scen")
+    parser.add_argument("--rounds", type=whole_from_one, help="rounds for every case")
     parser.add_argument("--quick", action="store_true", help="toy sizes, one round")
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument("--profile", action="store_true", help="print profiles")
+    parser.add_argument("--profile", action="store_true", help="profile the benches")
     options = parser.parse_args()
     wrong = sorted(set(options.names) - set(NAMES))
     if wrong:

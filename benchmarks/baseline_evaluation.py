@@ -1,4 +1,4 @@
-"""All policies on the same episodes of each task, by `tdac evaluate`'s judge."""
+"""Runs all policies on the same episodes of each task with `tdac evaluate`'s judge."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class Entry:
 
     Attributes:
         task: Name of a bundled task.
-        name: Of its folder.
-        label: For people.
-        policy: As `tdac evaluate` takes it.
-        training: Of a learned one.
-        seed: Of its training.
+        name: Name of its folder.
+        label: Displayed name.
+        policy: Argument for `tdac evaluate`.
+        training: Name of its training, if it was learned.
+        seed: Seed of its training.
     """
 
     task: str
@@ -52,7 +52,7 @@ class Entry:
 
 
 def evaluate_all(names: list[str], runs: Path) -> None:
-    """Has every policy drive on every task, where that is not on record."""
+    """Runs every policy on every task unless the result is already recorded."""
     with WarmJudge() as judge:
         for entry in entries(runs):
             learned = entry.training is not None
@@ -66,14 +66,14 @@ def evaluate_all(names: list[str], runs: Path) -> None:
 
 
 def entries(runs: Path) -> Iterator[Entry]:
-    """All that are to drive, in the order of the table."""
+    """All entries in the order of the table."""
     files = trained(runs)
     for task in TASKS:
         for training, file in files.items():
-            asked = TRAININGS[training]
-            if asked.tasks == (task,):
-                label = asked.algo.upper()
-                yield Entry(task, training, label, str(file), training, asked.seed)
+            planned = TRAININGS[training]
+            if planned.tasks == (task,):
+                label = planned.algo.upper()
+                yield Entry(task, training, label, str(file), training, planned.seed)
         controller = RECORDED / task / "controller.py"
         if controller.is_file():
             yield Entry(task, "recorded", MODEL, str(controller))
@@ -82,7 +82,7 @@ def entries(runs: Path) -> Iterator[Entry]:
 
 
 def table(runs: Path) -> pd.DataFrame:
-    """A row for each policy on each task; an empty one where no model is on record."""
+    """A row for each policy on each task; an empty one if no model is recorded."""
     rows = []
     for task in TASKS:
         done = [e for e in entries(runs) if e.task == task and _done(e, runs)]
@@ -96,10 +96,10 @@ def table(runs: Path) -> pd.DataFrame:
 
 
 def _note(row: dict[str, Any]) -> str | None:
-    """What is to be known of a row: errors, time-outs among them, are not hidden."""
-    told = [row["note"]] if row["note"] else []
-    told += [f"{count} × {reason}" for reason, count in row["reasons"].items()]
-    return "; ".join(told) or None
+    """The note on a row, including its errors and time-outs."""
+    notes = [row["note"]] if row["note"] else []
+    notes += [f"{count} × {reason}" for reason, count in row["reasons"].items()]
+    return "; ".join(notes) or None
 
 
 def _folder(entry: Entry, runs: Path) -> Path:
@@ -107,7 +107,7 @@ def _folder(entry: Entry, runs: Path) -> Path:
 
 
 def _done(entry: Entry, runs: Path) -> bool:
-    """Whether the record is of this very policy."""
+    """Whether exactly this policy is recorded."""
     file = _folder(entry, runs) / "evaluation.json"
     if not file.is_file():
         return False

@@ -1,4 +1,4 @@
-"""Learned policies on maps and worlds that they have and have not been trained on."""
+"""Runs learned policies on maps and worlds seen and not seen in training."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ SEED = 0
 
 
 def drive_all(names: list[str], runs: Path) -> None:
-    """Has policies drive wherever their robot can, where that is not on record."""
+    """Runs policies on all tasks of their robot that are not recorded yet."""
     wanted = [
         (training, task)
         for training in trained(runs)
         if training in names
         for task in _places(TRAININGS[training].tasks)
     ]
-    # First where they were trained.
+    # The tasks they were trained on come first.
     for training, task in sorted(wanted, key=lambda pair: not _seen(*pair)):
         known = _read(training, runs)
         if task not in known:
@@ -41,7 +41,7 @@ def _seen(training: str, task: str) -> bool:
 
 
 def _drive(training: str, task: str, runs: Path) -> dict[str, int]:
-    """Episodes in which the goal was reached, and with a contact."""
+    """Counts the episodes that reached the goal, and those with a contact."""
     from stable_baselines3.common.vec_env import VecMonitor
 
     from tdac_agent.training.learning import ALGOS, evaluate_batch
@@ -75,13 +75,13 @@ def _order(found: tuple[str, dict[str, int]]) -> int:
 
 
 def _row(training: str, task: str, counts: dict[str, int]) -> dict[str, Any]:
-    asked = TRAININGS[training]
+    planned = TRAININGS[training]
     low, high = exact_interval(counts["reached"], EPISODES)
     return {
         "training": training,
-        "algo": asked.algo,
-        "trained_on": " ".join(asked.tasks),
-        "seed": asked.seed,
+        "algo": planned.algo,
+        "trained_on": " ".join(planned.tasks),
+        "seed": planned.seed,
         "evaluated_on": task,
         "seen": _seen(training, task),
         "episodes": EPISODES,
@@ -93,7 +93,7 @@ def _row(training: str, task: str, counts: dict[str, int]) -> dict[str, Any]:
 
 
 def _places(tasks: tuple[str, ...]) -> list[str]:
-    """The bundled tasks of the same environment."""
+    """The bundled tasks in the same environment."""
     env = load_task(tasks[0]).spec.env
     return [name for name in bundled_tasks() if load_task(name).spec.env == env]
 
@@ -103,7 +103,7 @@ def _file(training: str, runs: Path) -> Path:
 
 
 def _read(training: str, runs: Path) -> dict[str, dict[str, int]]:
-    """What is on record of this very policy, by task."""
+    """Recorded counts of exactly this policy, by task."""
     file = _file(training, runs)
     if not file.is_file():
         return {}

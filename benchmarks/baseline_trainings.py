@@ -1,4 +1,4 @@
-"""The trainings of the baselines, and the tables that tell how they went."""
+"""The trainings of the baselines, and tables of their results."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ PPO_TASKS = ("maze", "epuck", "office", "cave", "rooms", "epuck-maze")
 SAC_TASKS = ("rooms", "epuck")
 FOUR_MAPS = ("maze", "office", "cave", "rooms")
 OTHERWISE = {"four-maps": 800_000}
-"""Steps of PPO, where they are not those of the hyperparameters' file."""
+"""Training steps that differ from those in the hyperparameter file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """What is trained: an algorithm on some tasks, from a seed."""
+    """A training: an algorithm, its tasks and its seed."""
 
     algo: Algo
     tasks: tuple[str, ...]
@@ -46,16 +46,16 @@ TRAININGS = {
 
 
 def train_all(names: list[str], runs: Path) -> None:
-    """Trains, or goes on with what was interrupted."""
+    """Runs the trainings, and resumes interrupted ones."""
     for name in names:
-        asked = TRAININGS[name]
+        item = TRAININGS[name]
         print(name, flush=True)
-        plan = make_plan(asked.tasks, asked.algo, seed=asked.seed, steps=asked.steps)
+        plan = make_plan(item.tasks, item.algo, seed=item.seed, steps=item.steps)
         train(plan, runs / name)
 
 
 def trained(runs: Path) -> dict[str, Path]:
-    """The policies of the trainings in a folder that are finished."""
+    """The policy files of the finished trainings in a folder."""
     return {name: runs / name / POLICY for name in TRAININGS if _done(runs / name)}
 
 
@@ -65,12 +65,12 @@ def _done(folder: Path) -> bool:
 
 
 def _begun(runs: Path) -> list[str]:
-    """The trainings in a folder that have been evaluated once at least."""
+    """The trainings in a folder that have been evaluated at least once."""
     return [name for name in TRAININGS if (runs / name / FACTS).is_file()]
 
 
 def curve_table(runs: Path) -> pd.DataFrame:
-    """All learning curves: a row for each evaluation."""
+    """All learning curves, with a row for each evaluation."""
     curves = []
     for name in _begun(runs):
         curve = pd.read_csv(runs / name / CURVE_FILE)
@@ -80,7 +80,7 @@ def curve_table(runs: Path) -> pd.DataFrame:
 
 
 def training_table(runs: Path) -> pd.DataFrame:
-    """A row for each training, whether or not it is finished."""
+    """A row for each training, finished or not."""
     return pd.DataFrame([_row(name, runs / name) for name in _begun(runs)])
 
 

@@ -1,11 +1,11 @@
-"""Trains the baselines, lets them drive, and collects it all in results/baselines.
+"""Trains and evaluates the baselines, and collects results in results/baselines.
 
     python -m benchmarks.baselines [STAGE …] [--only ppo-maze-0 …] [--runs DIR]
 
-Stages: `train`; `evaluate`, all policies on the same episodes; `generalise`, learned
-ones on other maps and worlds; `collect`, tables and figures of what is there. Without
-names, all. Each piece of work has a place of its own in --runs: started again, the
-command goes on with what was interrupted and leaves what is finished.
+Stages: `train`; `evaluate`: all policies on the same episodes; `generalise`: learned
+policies on other maps and worlds; `collect`: tables and figures of the results. By
+default all. Each item has a separate folder in --runs: the command resumes interrupted
+items and skips finished ones.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def main() -> int:
 
 
 def collect(runs: Path) -> None:
-    """Writes tables and figures of what is in a folder of trainings."""
+    """Writes tables and figures of the results in a folder of trainings."""
     tables = {
         "trainings": trainings.training_table(runs),
         "curves": trainings.curve_table(runs),
@@ -59,7 +59,7 @@ def collect(runs: Path) -> None:
 
 
 def draw(results: Path) -> None:
-    """Draws the figures from the tables alone."""
+    """Draws the figures from the tables."""
     found = {file.stem: pd.read_csv(file) for file in sorted(results.glob("*.csv"))}
     if {"curves", "trainings"} <= found.keys():
         curves = found["curves"].merge(
@@ -87,7 +87,7 @@ def _options() -> argparse.Namespace:
     options = parser.parse_args()
     wrong = [stage for stage in options.stages if stage not in STAGES]
     if wrong:
-        parser.error(f"no stage {wrong[0]!r}; expected some of {', '.join(STAGES)}")
+        parser.error(f"no stage {wrong[0]!r}; the stages are {', '.join(STAGES)}")
     return options
 
 

@@ -1,17 +1,17 @@
-"""What the campaign layer costs, and how runs scale with workers.
+"""Measures the overhead of the campaign layer, and how runs scale with workers.
 
     python -m benchmarks.campaign [--runs N] [--many N] [--json]
 
-The same short runs (`builtin` on a small map, verified at once) are made by one worker
-and by two, in turns. Their speed-up is printed beside that of two bare loops, pinned as
-the workers are, at the same moment: what the machine gives. Overhead is the time of one
-worker that is in no run: starting, planning, handing out, the tables, of `--runs` runs.
+One worker and then two workers make the same short runs (`builtin` on a small map,
+verified at once). Their speed-up is printed beside that of two bare loops, pinned like
+the workers, which shows what the machine allows at that moment. The overhead is the
+time of one worker outside its `--runs` runs: starting, planning, dispatching, tables.
 
-With `--many`, that many scripted runs of one iteration are made with `keep: records`.
-They are as short as runs can be: about one in ten has an answer that is tested in the
-sandbox, and drives or imports what it may not; those of the others are no Python, and
-are asked for three times. Memory of the driver on the way, its CPU time and the files
-are printed, and what the same command takes when nothing is left to do.
+With `--many N`, N scripted runs of one iteration are made with `keep: records`. They
+are as short as possible: about one in ten has an answer that is tested in the sandbox,
+and drives or makes a forbidden import; the answers of the others are no Python, and are
+requested three times. The bench prints the driver's memory over time, its CPU time and
+the number of files, and the same for a second call of the command, with nothing to do.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from tdac_agent.metrics import find_runs
 LOOP = 20_000_000
 LOOK_SECONDS = 0.2
 PARTS = (0.1, 0.5, 0.9)
-"""Of a campaign's time, when the driver's memory is told."""
+"""Fractions of a campaign's time at which the driver's memory is reported."""
 BROKEN = """def policy(obs)
     return 0.5, 0.5
 """
@@ -51,16 +51,16 @@ def policy(obs):
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """A campaign that was carried out.
+    """Measurements of a finished campaign.
 
     Attributes:
-        runs: That were made.
-        wall: Of the driver's process, s.
-        in_runs: Sum over the runs, s.
+        runs: Number of finished runs.
+        wall: Wall time of the driver's process, s.
+        in_runs: Sum of the wall times of the runs, s.
         driver_cpu: CPU time of the driver's process, s.
-        driver_mb: Its memory when parts of the time were over; in the end, the most.
-        files: In its folder.
-        megabytes: Of these.
+        driver_mb: Memory of the driver by fraction of the time, and the maximum, MB.
+        files: Number of files in its folder.
+        megabytes: Size of these files, MB.
     """
 
     runs: int
@@ -88,11 +88,11 @@ def main() -> None:
         print(json.dumps(found, indent=1))
         return
     for name, figures in found.items():
-        told = ", ".join(f"{key} {_told(value)}" for key, value in figures.items())
-        print(f"{name}: {told}")
+        text = ", ".join(f"{key} {_formatted(value)}" for key, value in figures.items())
+        print(f"{name}: {text}")
 
 
-def _told(value: object) -> str:
+def _formatted(value: object) -> str:
     if isinstance(value, dict):
         return "/".join(f"{part:.0f}" for part in value.values())
     return f"{value:.4g}" if isinstance(value, float) else str(value)
@@ -116,7 +116,7 @@ def _scaling(folder: Path, runs: int) -> dict[str, dict[str, object]]:
 
 
 def _make(folder: Path, workers: int, out: str) -> Made:
-    """Carries out the campaign; its driver is looked at meanwhile."""
+    """Runs the campaign and samples memory and CPU time of its driver."""
     words = ["campaign", "bench.yaml", "--workers", str(workers), "--out", out]
     began, memory, cpu = time.perf_counter(), [0.0], 0.0
     with subprocess.Popen(
@@ -157,7 +157,7 @@ def _cpu_seconds(pid: int) -> float:
 
 
 def _loops(count: int) -> float:
-    """Wall time of some bare loops at a time, each on a core of its own, s."""
+    """Wall time of concurrent bare loops, each on a separate core, s."""
     context = multiprocessing.get_context("fork")
     cores = sorted(os.sched_getaffinity(0))
     loops = [
@@ -179,7 +179,7 @@ def _loop(core: int) -> None:
 
 
 def _write_many(folder: Path, runs: int) -> None:
-    """A campaign of the shortest runs that are verified."""
+    """Writes a campaign of runs that are as short as possible."""
     (folder / "forbidden.py").write_text(FORBIDDEN)
     (folder / "broken.py").write_text(BROKEN)
     drawn = [
@@ -194,7 +194,7 @@ def _write_many(folder: Path, runs: int) -> None:
 
 
 def _write(folder: Path, runs: int, learners: list[str], **more: object) -> None:
-    """A campaign on a room of 160 × 120 px with a wall in it."""
+    """Writes a campaign on a room of 160 × 120 px with a wall in it."""
     cells = np.zeros((120, 160), np.bool_)
     cells[0] = cells[-1] = cells[:, 0] = cells[:, -1] = True
     cells[:80, 70:76] = True
@@ -231,8 +231,10 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.campaign", description=about
     )
-    parser.add_argument("--runs", type=int, default=200, help="of each campaign")
-    parser.add_argument("--many", type=int, default=0, help="scripted runs instead")
+    parser.add_argument("--runs", type=int, default=200, help="runs per campaign")
+    parser.add_argument(
+        "--many", type=int, default=0, help="make scripted runs instead"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     return parser.parse_args()
 

@@ -1,8 +1,8 @@
-"""How often each interval of `tdac_agent.metrics` holds the true value.
+"""Measures the coverage of each interval of `tdac_agent.metrics`.
 
-Run `python -m benchmarks.coverage`. Runs are simulated: each iteration passes with one
-probability, the first success ends a run. Where runs do not tell an interval, it is
-everything from 0 to 1. It takes minutes.
+Run `python -m benchmarks.coverage`; it takes minutes. Runs are simulated: each
+iteration passes with the same probability, and the first success ends a run. If no
+interval can be computed from the runs, it is taken to be [0, 1].
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PROBABILITIES = (0.2, 0.5, 0.8, 0.95)
 
 
 def exact_coverage(probability: float, runs: int) -> float:
-    """Of the exact interval, summed over all numbers of successes."""
+    """Coverage of the exact interval, summed over all numbers of successes."""
     held = 0.0
     for successes in range(runs + 1):
         low, high = exact_interval(successes, runs)
@@ -39,7 +39,7 @@ def exact_coverage(probability: float, runs: int) -> float:
 def rate_coverage(
     probability: float, runs: int, *, trials: int = 1000, seed: int = 0
 ) -> float:
-    """Of SR's interval by resampling runs; simulated."""
+    """Simulated coverage of SR's interval by resampling runs."""
     random = np.random.default_rng(seed)
     held = 0
     for _ in range(trials):
@@ -51,10 +51,9 @@ def rate_coverage(
 
 @cache
 def _rate_interval(first: tuple[int, ...]) -> tuple[float, float]:
-    """Of runs whose first successes these are; few runs are often alike."""
+    """SR's interval for first successes; cached, because few runs are often alike."""
     tau = np.array(first)
     rate = rate_of_runs((tau <= MOST).astype(int), tau.clip(max=MOST))
-    # Without an interval everything is possible.
     return (rate.low, rate.high) if rate.method != "none" else (0.0, 1.0)
 
 
@@ -67,7 +66,10 @@ def kaplan_meier_coverage(
     trials: int = 1000,
     seed: int = 0,
 ) -> float:
-    """Of CS(at) where each iteration is the last one affordable with `stopped`."""
+    """Simulated coverage of the interval of CS(at) with censoring.
+
+    Each iteration is the last affordable one with probability `stopped`.
+    """
     random = np.random.default_rng(seed)
     true = 1 - (1 - probability) ** at
     held = 0
@@ -82,7 +84,7 @@ def kaplan_meier_coverage(
 
 @cache
 def _curve_interval(ends: tuple[tuple[int, int], ...], at: int) -> tuple[float, float]:
-    """Of CS(at), given the first success and the last affordable iteration of each."""
+    """Interval of CS(at) for (first success, last affordable iteration) of each run."""
     first, last = np.array(ends).T
     seen = first <= last
     frame = pd.DataFrame(

@@ -1,7 +1,7 @@
-"""Mistakes that people and models make in controllers, as changes of a syntax tree.
+"""Typical mistakes in controllers, by people and models, as syntax tree mutations.
 
-Each rule looks at one node and yields (node, new text) for every change it can make;
-it finds its places by what the code says, so one rule fits controllers of any style.
+Each rule examines one node and yields (node, new text) for every possible change. It
+matches names and expressions, so it applies to controllers of any style.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Worlds that are drawn and written here, and what is solid at a point of them."""
+"""Random worlds, and the distance from a point to their obstacles."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Drawn:
     """A world drawn at random.
 
     Attributes:
-        text: Of its file.
-        start: x, y, yaw.
-        goal: x, y.
-        floor: Outline of the arena.
-        solids: Outline of each piece that is solid.
+        text: Text of its file.
+        start: x, y in m and yaw in rad.
+        goal: x, y in m.
+        floor: Outline of the arena, shape (n, 2), m.
+        solids: Outline of each solid piece, shape (n, 2), m.
     """
 
     text: str
@@ -34,7 +34,7 @@ class Drawn:
 
     @classmethod
     def at_random(cls, draw: random.Random) -> Drawn:
-        """A turned arena with a few things in it."""
+        """A turned arena with a few obstacles."""
         x, y, yaw = draw.uniform(-2, 2), draw.uniform(-2, 2), draw.uniform(-3, 3)
         a, b = draw.uniform(1.2, 1.8), draw.uniform(0.9, 1.3)
         if draw.random() < 0.5:
@@ -141,7 +141,7 @@ def _prism(flat: Array) -> str:
 
 
 def points_in(drawn: Drawn, draw: random.Random) -> Iterator[Point]:
-    """All over the floor and around it, and in each thing."""
+    """Points on the floor and around it, and the centre of each solid piece."""
     low, high = drawn.floor.min(axis=0) - 0.1, drawn.floor.max(axis=0) + 0.1
     for _ in range(250):
         yield draw.uniform(low[0], high[0]), draw.uniform(low[1], high[1])
@@ -151,7 +151,7 @@ def points_in(drawn: Drawn, draw: random.Random) -> Iterator[Point]:
 
 
 def room_at(drawn: Drawn, x: float, y: float) -> float:
-    """Distance to what is solid, negative in it or beyond the floor, m."""
+    """Distance to the nearest solid, negative inside it or beyond the floor, m."""
     least = _depth(drawn.floor, x, y)
     for outline in drawn.solids:
         least = min(least, -_depth(outline, x, y))
@@ -159,7 +159,7 @@ def room_at(drawn: Drawn, x: float, y: float) -> float:
 
 
 def _depth(outline: Array, x: float, y: float) -> float:
-    """How deep a point is within an outline; negative outside of it."""
+    """Distance from a point to an outline, positive inside and negative outside, m."""
     ends = np.roll(outline, -1, axis=0)
     share = np.linspace(0.0, 1.0, 600 if len(outline) < 50 else 4)[:, None, None]
     dense = (outline + share * (ends - outline)).reshape(-1, 2)

@@ -1,13 +1,12 @@
-"""Steps of TDAC-Map2D-v0 next to CartPole-v1: alone, in batches, and as they grow.
+"""Times steps of TDAC-Map2D-v0 beside CartPole-v1: single, in batches, and scaling.
 
     python -m benchmarks env_step
 
-A step of a single environment through `gym.make` in several situations, of a robot of
-a batch on one thread, on two, and in two processes that share nothing, which is what
-two cores are worth at that moment; then how the time grows with the area of the map and
-with the number of rays, and what the map's arrays take for each pixel. All take turns
-in short bursts. Floor: an environment that does nothing, so that Gymnasium's wrappers
-are all that it costs.
+Cases: a single environment through `gym.make` in several situations; a batch on one
+thread, on two, and in two independent processes, which show what two cores are worth at
+that moment; and the growth with the area of the map and with the number of rays, with
+the memory of the map's arrays per pixel. The cases run in turns, in short bursts. The
+floor is an environment that does nothing: the cost of Gymnasium's wrappers.
 """
 
 from __future__ import annotations
@@ -31,21 +30,21 @@ from benchmarks.timing import Bench, Effort, compared, in_turn, quartiles
 Actions = list[Any]
 Env = gym.Env[Any, Any]
 Burst = Callable[[], int]
-"""Makes some steps and returns how many."""
+"""Makes some steps and returns their number."""
 
 FLOOR, REFERENCE = "nothing", "CartPole-v1"
 NAME = "TDAC-Map2D-v0"
 ROUNDS = 60
 STEPS = 300
 BATCH_STEPS = 8192
-"""Of all robots of a batch in a burst."""
+"""Steps in a burst, summed over the robots of a batch."""
 ROBOTS = 512
 AREAS = (0.1, 0.5, 2.0, 4.0, 16.0)
 RAYS = (1, 18, 72, 288)
 
 
 class DoNothing(gym.Env[int, Any]):
-    """What Gymnasium's own wrappers cost: the floor."""
+    """The floor: the cost of Gymnasium's wrappers."""
 
     observation_space = gym.spaces.Discrete(2)
     action_space = gym.spaces.Discrete(2)
@@ -82,7 +81,7 @@ def path_driving(env: Env, count: int) -> Actions:
 
 
 def steer(pose: NDArray[np.float64], path: NDArray[np.float64]) -> Any:
-    """Wheels towards the path point 12 px ahead of the nearest one."""
+    """Action towards the path point 12 points after the nearest one."""
     x, y, heading = pose
     nearest = int(np.argmin(np.hypot(path[:, 0] - x, path[:, 1] - y)))
     to_x, to_y = path[min(nearest + 12, len(path) - 1)]
@@ -93,7 +92,7 @@ def steer(pose: NDArray[np.float64], path: NDArray[np.float64]) -> Any:
 
 
 def wall_driving(_: Env, count: int) -> Actions:
-    """Full speed into whatever is there."""
+    """Full speed ahead, whatever is in the way."""
     return [np.ones(2, np.float32)] * count
 
 
@@ -106,7 +105,7 @@ SINGLE: dict[str, tuple[dict[str, Any], Drive]] = {
 
 
 def single_burst(env: Env, drive: Drive) -> Burst:
-    """Some steps of one environment, with resets where an episode ends."""
+    """Steps of one environment, with a reset at the end of an episode."""
     env.reset(seed=0)
     script = cycle(drive(env, 10 * STEPS))
     env.reset(seed=0)
@@ -136,7 +135,7 @@ def raced(
     rounds: int,
     notes: Mapping[str, str] | None = None,
 ) -> Bench:
-    """A bench of steps, beside the yardsticks."""
+    """Times bursts beside the yardsticks."""
     times = in_turn({**yardsticks(), **bursts}, rounds)
     return compared(title, times, FLOOR, REFERENCE, notes=notes)
 
@@ -145,7 +144,7 @@ ALONE, TOGETHER, APART = "1 thread", "2 threads", "2 processes"
 
 
 def scaled(title: str, bursts: dict[str, Burst], rounds: int) -> Bench:
-    """The same of cases on one thread and on more, with what these are worth."""
+    """Like `raced`, with the speed-up of cases over the same on one thread."""
     times = in_turn({**yardsticks(), **bursts}, rounds)
     notes = {}
     for name, own in times.items():
@@ -159,7 +158,7 @@ def scaled(title: str, bursts: dict[str, Burst], rounds: int) -> Bench:
 
 
 def batch_burst(envs: Any) -> Burst:
-    """Some steps of a batch, which has been reset."""
+    """Steps of a batch that has been reset."""
     steps = max(BATCH_STEPS // envs.num_envs, 1)
     envs.action_space.seed(0)
     script = cycle([envs.action_space.sample() for _ in range(8)])
@@ -173,14 +172,14 @@ def batch_burst(envs: Any) -> Burst:
 
 
 def batch_envs(count: int, threads: int) -> Any:
-    """A batch on the maze, reset."""
+    """A batch on the maze, after a reset."""
     envs = gym.make_vec(NAME, count, "vector_entry_point", threads=threads)
     envs.reset(seed=0)
     return envs
 
 
 def burst_apart(count: int, processes: int = 2) -> Burst:
-    """The same in processes that share nothing: as much as the cores are worth."""
+    """Steps of batches in independent processes: the upper bound of the cores."""
     context = multiprocessing.get_context("spawn")
     ends = []
     for _ in range(processes):
@@ -216,7 +215,7 @@ def single(rounds: int) -> Bench:
 
 def batches(rounds: int) -> Bench:
     """Batches, on one thread and on more."""
-    # So few are stepped by one thread.
+    # Batches of this size use one thread.
     bursts = {f"64 robots, {ALONE}": batch_burst(batch_envs(64, 1))}
     for count in (1024, 4096):
         bursts[f"{count} robots, {ALONE}"] = batch_burst(batch_envs(count, 1))
@@ -237,14 +236,14 @@ def more_rays(rounds: int) -> Bench:
 
 
 def pillars(pixels: float) -> NDArray[np.bool_]:
-    """A square map of so many million pixels: pillars of 16 px, 96 px apart."""
+    """A square map of `pixels` million pixels: pillars of 16 px, 96 px apart."""
     side = round(math.sqrt(1e6 * pixels))
     at = np.arange(side) % 96 < 16
     return at[:, None] & at[None, :]
 
 
 def larger_maps(rounds: int, areas: Sequence[float] = AREAS) -> Bench:
-    """Robots all over a map, and one that stays in its corner, as the map grows."""
+    """Robots all over a growing map, and one robot that stays in its corner."""
     bursts, notes = {}, {}
     for area in areas:
         cells = pillars(area)
@@ -278,14 +277,14 @@ def scatter(envs: Any, side: int) -> None:
 
 
 def bytes_of(task: Any) -> float:
-    """Memory of a task's arrays for each pixel of its map."""
+    """Memory of a task's arrays per pixel of its map, bytes."""
     world = task.terrain
     arrays = (world.grid.cells, world.padded_clear, world.leaps, task.field)
     return float(sum(array.nbytes for array in arrays) / world.grid.cells.size)
 
 
 def benches(effort: Effort) -> list[Bench]:
-    """One bench a table."""
+    """One bench per table."""
     rounds = effort.rounds_of(ROUNDS)
     maps = partial(larger_maps, areas=AREAS[: 2 if effort.quick else None])
     return [table(rounds) for table in (single, batches, more_rays, maps)]
