@@ -1,4 +1,4 @@
-"""Mistakes in controllers for the e-puck, and those of `DOMAIN` that they share."""
+"""Mistakes in controllers for the e-puck, including those shared with `DOMAIN`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FLOOR = re.compile(r"size|half|length|width|side", re.IGNORECASE)
 
 
 def sides_not_halved(node: ast.AST, _source: Source) -> Iterator[Change]:
-    """Half of a side is the whole of it."""
+    """Uses a whole side instead of half of it."""
     if not isinstance(node, ast.BinOp) or not FLOOR.search(text_of(node)):
         return
     left, right = text_of(node.left), text_of(node.right)
@@ -27,7 +27,7 @@ def sides_not_halved(node: ast.AST, _source: Source) -> Iterator[Change]:
 
 
 def angles_not_added(node: ast.AST, _source: Source) -> Iterator[Change]:
-    """The turn of what is inside, or of what is around it, is left out."""
+    """Leaves out the rotation of a node or of its parent."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         left, right = text_of(node.left), text_of(node.right)
         if re.search(r"yaw|turn|heading|angle", left) and re.search("yaw|turn", right):
@@ -36,7 +36,7 @@ def angles_not_added(node: ast.AST, _source: Source) -> Iterator[Change]:
 
 
 def other_bound(node: ast.AST, _source: Source) -> Iterator[Change]:
-    """The least for the greatest, and the other way round."""
+    """Swaps minimum and maximum."""
     for name, other in (("min", "max"), ("max", "min")):
         if isinstance(node, ast.Call) and text_of(node.func) == name:
             arguments = text_of(node)[len(name) :]
@@ -48,7 +48,7 @@ def other_bound(node: ast.AST, _source: Source) -> Iterator[Change]:
 
 
 def opposite_sensors(node: ast.AST, _source: Source) -> Iterator[Change]:
-    """Each sensor for the one on the other side; front for back."""
+    """Swaps sensors of the left and right side, or of front and back."""
     if not isinstance(node, ast.Subscript) or not NEAR.search(text_of(node.value)):
         return
     if isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, int):
@@ -58,7 +58,7 @@ def opposite_sensors(node: ast.AST, _source: Source) -> Iterator[Change]:
 
 
 def blocked_when_free(node: ast.AST, _source: Source) -> Iterator[Change]:
-    """What is near is taken for free, and the other way round."""
+    """Takes near obstacles for free space and vice versa, or ignores them."""
     if isinstance(node, ast.Compare) and len(node.ops) == 1:
         if not NEAR.search(text_of(node.left)) or isinstance(node.ops[0], ast.Is):
             return
@@ -70,7 +70,7 @@ def blocked_when_free(node: ast.AST, _source: Source) -> Iterator[Change]:
 
 
 def no_half_cell(node: ast.AST, _source: Source) -> Iterator[Change]:
-    """Corners of cells for their middles."""
+    """Uses corners of cells instead of their centres."""
     added = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add)
     if added and text_of(node.right) == "0.5":
         yield node, f"({text_of(node.left)})"
@@ -78,7 +78,7 @@ def no_half_cell(node: ast.AST, _source: Source) -> Iterator[Change]:
 
 
 def wrong_path(node: ast.AST, source: Source) -> Iterator[Change]:
-    """What `astar` returns, in part or for another case."""
+    """Truncates or changes the path that `astar` returns."""
     if source.function_of(node) != "astar" or not isinstance(node, ast.Return):
         return
     if isinstance(node.value, ast.List) and not node.value.elts:
@@ -91,7 +91,7 @@ def wrong_path(node: ast.AST, source: Source) -> Iterator[Change]:
 
 
 def wrong_grid(node: ast.AST, source: Source) -> Iterator[Change]:
-    """What `build_grid` returns, turned, moved, or of another type."""
+    """Turns, moves or converts the grid that `build_grid` returns."""
     if source.function_of(node) != "build_grid" or not isinstance(node, ast.Return):
         return
     if isinstance(node.value, ast.Tuple) and len(node.value.elts) == 2:
@@ -107,7 +107,7 @@ def wrong_grid(node: ast.AST, source: Source) -> Iterator[Change]:
 
 
 def wrong_world(node: ast.AST, source: Source) -> Iterator[Change]:
-    """What `parse_world` returns with an entry of another."""
+    """Changes one entry of the dict that `parse_world` returns."""
     if source.function_of(node) != "parse_world" or not isinstance(node, ast.Return):
         return
     if node.value is not None and not isinstance(node.value, ast.Constant):
@@ -125,7 +125,7 @@ def wrong_world(node: ast.AST, source: Source) -> Iterator[Change]:
 
 
 def start_of_the_file(node: ast.AST, source: Source) -> Iterator[Change]:
-    """The place in params.json for the one in the first observation."""
+    """Uses the start in params.json instead of the one in the first observation."""
     planning = source.function_of(node) in {"reset", "__init__", "plan"}
     usable = source.imports("numpy as np") and source.imports("sensors")
     if planning and usable and text_of(node) == "obs['pose']":

@@ -1,7 +1,7 @@
-"""What the functions of an e-puck's controller must answer, computed without ours.
+"""Independent checks of the functions of an e-puck's controller.
 
-Worlds are drawn, points are tested against outlines that are sampled, and the wheels
-turn a robot that is integrated in small steps.
+Worlds are random, points are tested against sampled outlines, and the motion of the
+robot is integrated in small steps.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WHEEL, AXLE = 0.02, 0.052
 
 
 def contract_violations(child: Child, task: Task, text: str) -> Iterator[str]:
-    """What the file and its functions do against the contract of profile `paper`."""
+    """Violations of the contract of profile `paper` by a file and its functions."""
     yield from guard_faults(ast.parse(text))
     yield from _constants(child, task)
     draw = random.Random(SEED)
@@ -56,7 +56,7 @@ def _constants(child: Child, task: Task) -> Iterator[str]:
 
 
 def _world(child: Child, drawn: Drawn, draw: random.Random) -> Iterator[str]:
-    """`parse_world` and `build_grid` on a world that was drawn."""
+    """Checks `parse_world` and `build_grid` on a random world."""
     world = child.call("parse_world", (drawn.text,))
     try:
         start, goal = (
@@ -125,7 +125,7 @@ def _is_cell(value: Any) -> bool:
 
 
 def _steering(child: Child, task: Task, draw: random.Random) -> Iterator[str]:
-    """What `compute_wheel_speeds` promises, at random places."""
+    """Checks the contract of `compute_wheel_speeds` at random poses."""
     for _ in range(12):
         pose = draw.uniform(-2, 2), draw.uniform(-2, 2), draw.uniform(-3.1, 3.1)
         left, right = _wheels(child, pose, 0.3, 0.0, None)
@@ -159,7 +159,7 @@ def _wheels(
     angle: float,
     prox: list[float] | None,
 ) -> tuple[float, float]:
-    """Wheel speeds towards a point so far away at an angle; NaN where they are not."""
+    """Wheel speeds towards a point at distance `far`; NaN if they are invalid."""
     x, y, yaw = pose
     target = x + far * math.cos(yaw + angle), y + far * math.sin(yaw + angle)
     found = child.call("compute_wheel_speeds", ((x, y), yaw, target, prox))
@@ -173,7 +173,7 @@ def _wheels(
 def _drive(
     child: Child, pose: tuple[float, float, float], angle: float, dt: float
 ) -> float:
-    """How near it gets to a waypoint 0.3 m away in 20 s, m."""
+    """Nearest distance to a waypoint, which is 0.3 m away, within 20 s, m."""
     x, y, yaw = pose
     target = x + 0.3 * math.cos(yaw + angle), y + 0.3 * math.sin(yaw + angle)
     nearest = 0.3

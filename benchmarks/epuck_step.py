@@ -1,10 +1,10 @@
-"""Steps of TDAC-EPuck-v0 next to CartPole-v1: alone, in batches, in larger worlds.
+"""Times steps of TDAC-EPuck-v0 beside CartPole-v1: single, batches, larger worlds.
 
     python -m benchmarks epuck_step
 
-A step of a single environment through `gym.make` in several situations, of a robot of
-a batch on one thread and on two, and as the number of solid parts of a world grows. All
-take turns in short bursts.
+Cases: a single environment through `gym.make` in several situations; a batch on one
+thread and on two; and worlds with more and more solid parts. The cases run in turns, in
+short bursts.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ THREADS = (1, 2)
 
 
 def path_driving(env: Env, count: int) -> list[Any]:
-    """Actions along the shortest path, again and again from the start."""
+    """Actions along the shortest path, repeatedly from the start."""
     inner: Any = env.unwrapped
     path = inner.nominal.path_from(inner.nominal.start)
     env.reset(seed=0)
@@ -55,7 +55,7 @@ def path_driving(env: Env, count: int) -> list[Any]:
 
 
 def wall_driving(_: Env, count: int) -> list[Any]:
-    """Full speed into whatever is there."""
+    """Full speed ahead, whatever is in the way."""
     return [np.ones(2, np.float32)] * count
 
 
@@ -92,7 +92,7 @@ def batches(rounds: int) -> Bench:
 
 
 def more_things(rounds: int) -> Bench:
-    """A batch on one thread, among more and more posts, 20 cm apart."""
+    """A batch on one thread among a growing number of posts, 20 cm apart."""
     bursts = {
         f"{count} posts": batch(1024, world=posts(count), threads=1) for count in PARTS
     }
@@ -108,7 +108,7 @@ def batch(count: int, **options: Any) -> Burst:
 
 
 def posts(count: int) -> World:
-    """A plain with so many square posts of 3 cm, in rows and columns."""
+    """A plain with `count` square posts of 3 cm, in rows and columns."""
     side = round(count**0.5)
     obstacles = []
     for k in range(count):
@@ -121,6 +121,6 @@ def posts(count: int) -> World:
 
 
 def benches(effort: Effort) -> list[Bench]:
-    """One bench a table."""
+    """One bench per table."""
     rounds = effort.rounds_of(ROUNDS)
     return [table(rounds) for table in (single, batches, more_things)]

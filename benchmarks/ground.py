@@ -1,4 +1,4 @@
-"""What a mutation score is measured on: one ground for each kind of task."""
+"""The setups of the mutation score: one for each kind of task."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from tdac_agent.tasks.task import Task
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A task, its good controllers, and how much is asked of them.
+    """A task, its good controllers, and the extent of the tests.
 
     Attributes:
-        results: Name of the files of results.
+        results: Name of the result files.
         task: Makes the task.
-        originals: Good controllers for it.
-        violations: What a file does against the contract of profile `paper`.
-        domain: Number of mutants from the domain's own mistakes.
+        originals: Returns good controllers for it.
+        violations: Yields a file's violations of the contract of profile `paper`.
+        domain: Number of mutants from domain-specific mistakes.
         syntactic: Number of mutants from cosmic-ray.
-        seeds: Number of jittered starts that the independent judge tries.
+        seeds: Number of jittered starts that the independent judge uses.
     """
 
     results: str
@@ -42,7 +42,7 @@ class Ground:
 
     @property
     def failures_allowed(self) -> int:
-        """One more, and less than 90 % of the starts succeed."""
+        """Failures at which at least 90 % of the starts still succeed."""
         return self.seeds // 10
 
 
@@ -66,4 +66,4 @@ GROUNDS = {
         seeds=20,
     ),
 }
-"""By the kind of task."""
+"""Setups by kind of task."""

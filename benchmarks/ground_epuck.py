@@ -15,9 +15,9 @@ ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "epuck"
 
 
 def small_world() -> Task:
-    """Two walls to drive around, in an arena that is turned and off the origin.
+    """A turned and shifted arena with two walls that the robot must drive around.
 
-    Headings around pi are the robot's way, and it looks away from its goal at first.
+    The route has headings around pi, and the robot first faces away from its goal.
     """
     world = str(ZOO / "world.wbt")
     return load_task(
@@ -26,7 +26,7 @@ def small_world() -> Task:
 
 
 def good_drivers(task: Task) -> list[Original]:
-    """The template in two tunings, and the good ones of the zoo."""
+    """The template with two sets of parameters, and the zoo's good controllers."""
     assert isinstance(task.nominal, EPuckTask)
     tuned = EPuckParameters(inflation_margin=0.01, slow_dist=0.03, unstick_after=120.0)
     texts = {

@@ -1,4 +1,4 @@
-"""The map and the good controllers that the mutation score is measured with."""
+"""The map and the good controllers of the 2D mutation score."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "map2d" / "good
 
 
 def cells() -> BoolGrid:
-    """Three rooms in a row, 240 x 166 px: passages of 2.9 radii below and above."""
+    """Three rooms in a row, 240 x 166 px; passages of 2.9 radii below and above."""
     occupied = np.zeros((166, 240), np.bool_)
     occupied[:7] = occupied[-4:] = occupied[:, :4] = occupied[:, -4:] = True
     occupied[:127, 70:77] = occupied[42:, 154:161] = True
-    # A pillar that can be passed on one side only.
+    # A pillar that the robot can pass on one side only.
     occupied[76:84, 114:120] = True
     return occupied[:, ::-1]
 
 
 def small_task() -> Task:
-    """A way of twice the straight distance for a body of 12 px.
+    """A task for a body of 12 px with a route of twice the straight distance.
 
-    The robot looks away from its goal at first, and headings around pi are its way.
+    The route has headings around pi, and the robot first faces away from its goal.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -48,7 +48,7 @@ def small_task() -> Task:
 
 
 def good_controllers(task: Task) -> list[Original]:
-    """The template in two tunings, and the good ones of the zoo."""
+    """The template with two sets of parameters, and the zoo's good controllers."""
     robot, dt = task.params.robot, task.nominal.dt
     tuned = Parameters(inflation_margin=3.0, lookahead=60.0, unstick_after=80.0)
     originals = [

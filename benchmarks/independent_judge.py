@@ -1,4 +1,4 @@
-"""Whether a mutant is harmful: judged apart from `verify`, by other code and starts."""
+"""Judges whether a mutant is harmful, independently of `verify`'s code and starts."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ Loop = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What the independent judge found.
+    """The independent judge's result.
 
     Attributes:
-        reason: Why the controller is harmful, empty where it is not.
-        tried: Jittered starts.
-        failed: How many of them failed.
+        reason: Why the controller is harmful; empty if it is not.
+        tried: Number of jittered starts.
+        failed: Number of starts that failed.
     """
 
     reason: str
@@ -43,9 +43,9 @@ class IndependentJudge:
     """Judges controllers on one ground.
 
     Args:
-        ground: What is asked of them.
-        task: What they must do.
-        limits: Of each child.
+        ground: The setup.
+        task: The task of the controllers.
+        limits: Limits of each child.
     """
 
     def __init__(self, ground: Ground, task: Task, limits: Limits) -> None:
@@ -54,12 +54,12 @@ class IndependentJudge:
         self.limits = limits
 
     def judge(self, text: str, profile: str, *, all_seeds: bool = False) -> Judgement:
-        """Finds out whether a controller is harmful.
+        """Judges whether a controller is harmful.
 
         Args:
-            text: The controller.
+            text: Source of the controller.
             profile: `policy` or `paper`.
-            all_seeds: Go on after the answer is certain.
+            all_seeds: Whether to continue after the result is certain.
         """
         with tempfile.TemporaryDirectory() as name:
             write_workdir(Path(name), self.task)
@@ -104,7 +104,7 @@ class IndependentJudge:
             yield f"{type(fault).__name__}: {fault}"
 
     def _loops(self) -> Iterator[Loop]:
-        """Episodes for `run_episode`: each ends for another reason."""
+        """Episodes for `run_episode`, each with a different cause of its end."""
         make = self.task.make_env
         yield {"env": make(), "most": 5000}
         yield {"env": make(variation="jitter"), "most": 17}
@@ -121,7 +121,7 @@ class IndependentJudge:
         yield from witness.contradictions(result)
 
     def _episode(self, begin: Any, env: JudgedEnv, seed: int) -> str:
-        """Why an episode of `policy` failed, empty where it did not."""
+        """Why an episode of `policy` failed; empty if it succeeded."""
         observation, _ = env.reset(seed=seed)
         seconds, steps = 0.0, 0
         try:
@@ -146,14 +146,18 @@ class IndependentJudge:
 
 @functools.cache
 def _nursery() -> Nursery:
-    """One for each process of the pool; it ends with the process."""
+    """The child pool of this process; it ends with the process."""
     nursery = Nursery()
     Finalize(None, nursery.close, exitpriority=1)
     return nursery
 
 
 def _wheels(child: Child, observation: Any) -> Any:
-    """The answer of `policy` where it is two finite numbers."""
+    """The answer of `policy`, clipped to [-1, 1].
+
+    Raises:
+        ControllerFault: It is not two finite numbers.
+    """
     answer = child.policy(observation)
     try:
         values = [float(value) for value in answer]

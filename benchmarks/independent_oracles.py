@@ -1,4 +1,4 @@
-"""What the functions of a controller must answer, computed without our oracles."""
+"""Independent checks of the functions of a 2D controller, without our oracles."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SEED = 20_240_717
 
 
 def contract_violations(child: Child, task: Task, text: str) -> Iterator[str]:
-    """What the file and its functions do against the contract of profile `paper`."""
+    """Violations of the contract of profile `paper` by a file and its functions."""
     yield from guard_faults(ast.parse(text))
     yield from _constants(child, task)
     draw = random.Random(SEED)
@@ -40,7 +40,7 @@ def contract_violations(child: Child, task: Task, text: str) -> Iterator[str]:
 
 
 def guard_faults(tree: ast.Module) -> Iterator[str]:
-    """What is missing of `main()` and its guard."""
+    """Missing parts of `main()` and its guard."""
     last = ast.unparse(tree.body[-1])
     if not (last.startswith("if __name__") and "main()" in last):
         yield "no guard"
@@ -130,7 +130,7 @@ def _planning(
     width, height = len(cells[0]), len(cells)
     for _ in range(3):
         start = draw.randrange(width), draw.randrange(height)
-        # With larger cells the goal must lie on the lattice of the start.
+        # With larger cells the goal must be on the lattice of the start.
         goal = (
             draw.randrange(start[0] % cell, width, cell),
             draw.randrange(start[1] % cell, height, cell),
@@ -147,7 +147,7 @@ def _planning(
 def path_fault(
     cells: Cells, path: Any, start: Point, goal: Point, cell: int, best: float
 ) -> str | None:
-    """What is wrong with what a planner returned, or None."""
+    """The error in a planner's return value, or None."""
     if type(path) is not list or not all(map(_is_point, path)):
         return f"no list of (int, int): {path!r:.60}"
     return step_fault(cells, path, start, goal, best, cell)
@@ -161,7 +161,7 @@ def step_fault(
     best: float,
     cell: int = 1,
 ) -> str | None:
-    """What is wrong with a list of points as a path, or None."""
+    """The error in a list of points as a path, or None."""
     if math.isinf(best):
         return "a path where there is none" if path and cell == 1 else None
     if not path or path[0] != start or path[-1] != goal:
@@ -175,7 +175,7 @@ def step_fault(
 
 
 def _steps(cells: Cells, point: Point, cell: int) -> Iterator[tuple[Point, float]]:
-    """Neighbours that every single pixel step on the way to them allows."""
+    """Neighbours `cell` px away to which every single pixel step is allowed."""
     for dx, dy in itertools.product((-1, 0, 1), repeat=2):
         x, y = point
         for _ in range(cell):
@@ -188,7 +188,7 @@ def _steps(cells: Cells, point: Point, cell: int) -> Iterator[tuple[Point, float
 
 
 def octile_length(cells: Cells, start: Point, goal: Point, cell: int = 1) -> float:
-    """Dijkstra; inf where there is no path."""
+    """Length of the shortest path by Dijkstra's algorithm; inf without a path."""
     if _solid(cells, *start) or _solid(cells, *goal):
         return math.inf
     best, queue = {start: 0.0}, [(0.0, start)]
@@ -204,7 +204,7 @@ def octile_length(cells: Cells, start: Point, goal: Point, cell: int = 1) -> flo
 
 
 def _joined(cells: Cells, start: Point, goal: Point) -> bool:
-    """No corner is cut, so that what is joined is joined by straight steps."""
+    """Whether a path exists; without cut corners, straight steps suffice."""
     parts = label(~np.array(cells), connectivity=1)
     first, last = parts[start[1], start[0]], parts[goal[1], goal[0]]
     return bool(first and first == last)

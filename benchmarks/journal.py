@@ -1,4 +1,4 @@
-"""Answers of a long run, kept so that it can be taken up again."""
+"""A journal of a long run's results, from which the run can be resumed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any
 
 
 class Journal:
-    """Answers by the text they are about; those of an earlier run are kept.
+    """Results by the text of their item, including those of an earlier run.
 
     Args:
-        path: One line an answer; none is written without.
-        about: What else the answers depend on, as text.
+        path: File with one line per result, or None to keep none.
+        about: Text of everything else that the results depend on.
     """
 
     def __init__(self, path: Path | None, about: str) -> None:
@@ -28,7 +28,7 @@ class Journal:
     def answers(
         self, pool: ProcessPoolExecutor, ask: Callable[[Any], Any], items: Sequence[Any]
     ) -> Iterator[Any]:
-        """The answer for each item, in order; each is kept as soon as it is there."""
+        """The result for each item, in order; each is recorded as soon as possible."""
         keys = [self._key(item) for item in items]
         asked: dict[str, Future[Any]] = {}
         for key, item in zip(keys, items, strict=True):

@@ -1,4 +1,4 @@
-"""Mutations of `run_episode`: what it does and reports is not what happened."""
+"""Mutations of `run_episode`: wrong loops, and reports of what did not happen."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ FORMS = {
 
 
 def _entry(name: str) -> Callable[[ast.AST, Source], Iterator[Change]]:
-    """One entry of the returned dict in other forms, or without it."""
+    """A rule that changes or renames one entry of the returned dict."""
 
     def rule(node: ast.AST, source: Source) -> Iterator[Change]:
         if source.function_of(node) != "run_episode":

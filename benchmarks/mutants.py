@@ -1,4 +1,4 @@
-"""Mutants of good controllers: by the domain's own mistakes, and by cosmic-ray's."""
+"""Mutants of good controllers: domain-specific mistakes, and those of cosmic-ray."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from benchmarks.source import Source
 from tdac_agent.tasks.task_file import Profile
 
 RULES: dict[str, dict[str, Rule]] = {"map2d": DOMAIN, "epuck": DOMAIN_EPUCK}
-"""The domain's mistakes, by kind of task."""
+"""Rules for domain-specific mistakes, by kind of task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Mutant:
 
     Attributes:
         mutation: Name of the change.
-        original: What was changed.
+        original: The unchanged controller.
         text: The changed source.
     """
 
@@ -60,7 +60,7 @@ class Mutant:
     text: str
 
     def change(self) -> tuple[int, str]:
-        """First changed line, its number in the original and what it became."""
+        """Number of the first changed line in the original, and its new text."""
         before = self.original.text.splitlines()
         after = self.text.splitlines()
         matcher = difflib.SequenceMatcher(None, before, after, autojunk=False)
@@ -72,7 +72,7 @@ class Mutant:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A mutant that may be made."""
+    """A possible mutant, made on demand."""
 
     mutation: str
     original: Original
@@ -82,16 +82,16 @@ class Candidate:
 def choose(
     originals: Sequence[Original], domain: int, syntactic: int, seed: int
 ) -> list[Mutant]:
-    """A seeded sample that gives every mutation and every controller its turn.
+    """A seeded sample that is balanced over mutations and controllers.
 
-    Mutants that equal their original or another one, or that do not parse, are not
-    taken.
+    Mutants that equal their original or another mutant, or that do not parse, are
+    excluded.
 
     Args:
         originals: Good controllers.
-        domain: Number of mutants from the domain's own mistakes.
-        syntactic: Number of mutants from cosmic-ray, which is needed above 0 only.
-        seed: Of the sample.
+        domain: Number of mutants from domain-specific mistakes.
+        syntactic: Number of mutants from cosmic-ray, which only a number above 0 needs.
+        seed: Seed of the sample.
     """
     draw = random.Random(seed)
     seen = {normal(item.text) for item in originals} | {None}
@@ -104,7 +104,7 @@ def choose(
 
 
 def domain_mutants(original: Original) -> Iterator[Candidate]:
-    """Every mutant of a controller that the rules of its kind of task know."""
+    """Every mutant of a controller by the rules for its kind of task."""
     source = Source(original.text)
     for name, rule in RULES[original.kind].items():
         for node in ast.walk(source.tree):
@@ -121,12 +121,12 @@ def library_mutants(original: Original) -> Iterator[Candidate]:
 
     nodes = list(ast_nodes(get_ast(original.text)))
     for name in sorted(operator_names()):
-        # These two want the names of variables as arguments.
+        # These two need names of variables as arguments.
         if name.endswith(("VariableReplacer", "VariableInserter")):
             continue
         operator = get_operator(name)()
         places = sum(len(list(operator.mutation_positions(node))) for node in nodes)
-        # "core/ReplaceBinaryOperator_Add_Sub": one family for all pairs.
+        # All pairs as in "core/ReplaceBinaryOperator_Add_Sub" are one family.
         family = name.rpartition("/")[2].partition("_")[0]
         for place in range(places):
             make = functools.partial(mutate_code, original.text, operator, place)
@@ -134,7 +134,7 @@ def library_mutants(original: Original) -> Iterator[Candidate]:
 
 
 def normal(text: str) -> str | None:
-    """The syntax tree without docstrings as text; None where it does not parse."""
+    """The syntax tree without docstrings, as text; None if it does not parse."""
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError):
@@ -157,7 +157,7 @@ def _is_text(node: ast.AST) -> bool:
 def _by_turns(
     pool: list[Candidate], count: int, draw: random.Random, seen: set[str | None]
 ) -> list[Mutant]:
-    """Takes one mutant of each mutation, then again, each from another controller."""
+    """Takes one mutant of each mutation in turn, varying the controllers."""
     queues: dict[str, list[Candidate]] = {}
     for item in draw.sample(pool, len(pool)):
         queues.setdefault(item.mutation, []).append(item)
@@ -175,7 +175,7 @@ def _by_turns(
 def _next(
     queue: list[Candidate], taken: Counter[str], seen: set[str | None]
 ) -> Mutant | None:
-    """The next new mutant, of the controller that had the fewest turns."""
+    """The next new mutant, from the controller with the fewest mutants so far."""
     queue.sort(key=lambda item: taken[item.original.name], reverse=True)
     while queue:
         item = queue.pop()

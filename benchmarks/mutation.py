@@ -1,18 +1,17 @@
-"""Mutation score of the shipped suite: of the harmful mutants, how many it kills.
+"""Mutation score of the shipped suite: the share of harmful mutants that it kills.
 
     python -m benchmarks.mutation [--kind map2d|epuck] [--sample N] [--seed S] [--json]
                                   [--resume FILE]
 
-Mutants of good controllers get one change each: a mistake of the domain
+A mutant is a good controller with one change: a domain-specific mistake
 (`domain_mutations`, `lies`) or an operator of cosmic-ray (`pip install ".[bench]"`).
 *Killed*: `tdac_agent.verify` does not pass it. *Harmful*: an independent judge, with
-oracles and starts of its own, finds that it violates the contract, or that it succeeds
-on less than 90 % of 50 jittered starts (e-puck: 20), where the original succeeds on all
-of them.
+separate oracles and starts, finds that it violates the contract, or that it succeeds on
+less than 90 % of 50 jittered starts (e-puck: 20), all of which the original passes.
 
-Both kinds of task have their turn, unless one is named. The whole run writes
-`results/mutation.csv` and `.md`, and `results/mutation_epuck.csv` and `.md`; a sample
-only prints. Exit 1 where a harmful mutant survives.
+By default both kinds of task are measured. The whole run writes `results/mutation.csv`
+and `.md`, and `results/mutation_epuck.csv` and `.md`; a sample only prints. Exit 1 if a
+harmful mutant survives.
 """
 
 from __future__ import annotations
@@ -45,18 +44,18 @@ RESULTS = Path(__file__).parent.parent / "results"
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What became of one mutant.
+    """The result for one mutant.
 
     Attributes:
         mutation: Name of the change.
-        controller: What was changed.
+        controller: Name of the original.
         profile: `policy` or `paper`.
         line: Number of the changed line.
-        change: What the line became.
+        change: New text of the line.
         killed: Whether the suite failed it.
         killed_by: The first test that failed.
-        harmful: Whether the independent judge objects.
-        reason: Why it does.
+        harmful: Whether the independent judge finds it harmful.
+        reason: Why it is harmful.
     """
 
     mutation: str
@@ -84,7 +83,7 @@ def _task(kind: str) -> Task:
 
 @cache
 def _warm_judge() -> WarmJudge:
-    """One for each process of the pool; it ends with the process."""
+    """The judge of this process; it ends with the process."""
     judge = WarmJudge()
     Finalize(None, judge.close, exitpriority=1)
     return judge
@@ -107,7 +106,7 @@ def _independent(kind: str) -> IndependentJudge:
 
 
 def examine(mutant: Mutant) -> dict[str, Any]:
-    """Asks the suite and the independent judge about a mutant; a `Row` as a dict."""
+    """Judges a mutant by the suite and the independent judge; a `Row` as a dict."""
     text, original = mutant.text, mutant.original
     report = _report(original, text)
     found = _independent(original.kind).judge(text, original.profile)
@@ -127,7 +126,7 @@ def examine(mutant: Mutant) -> dict[str, Any]:
 
 
 def fault_of(original: Original) -> str:
-    """Why a controller is not good on its task; empty where it passes everything."""
+    """Why a controller is not good on its task; empty if it passes everything."""
     report = _report(original, original.text)
     if not report.passed:
         failure = report.failures[0]
@@ -148,7 +147,11 @@ def main() -> int:
 
 
 def measure(kind: str, options: argparse.Namespace, pool: ProcessPoolExecutor) -> int:
-    """Examines mutants for a kind of task and tells; how many harmful ones survive."""
+    """Examines and prints the mutants for a kind of task.
+
+    Returns:
+        Number of harmful mutants that survive.
+    """
     ground, task, began = GROUNDS[kind], _task(kind), time.monotonic()
     journal = Journal(options.resume, task.sha256())
     candidates = ground.originals(task)
@@ -185,7 +188,7 @@ def measure(kind: str, options: argparse.Namespace, pool: ProcessPoolExecutor) -
 
 
 def _shares(ground: Ground, sample: int | None) -> tuple[int, int]:
-    """Numbers of the domain's and of cosmic-ray's mutants."""
+    """Numbers of domain-specific mutants and of cosmic-ray's."""
     whole = ground.domain + ground.syntactic
     count = whole if sample is None else sample
     syntactic = count * ground.syntactic // whole
@@ -196,12 +199,12 @@ def _options() -> argparse.Namespace:
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="benchmarks.mutation", description=about)
     parser.add_argument("--kind", choices=GROUNDS, help="only this kind of task")
-    parser.add_argument("--sample", type=int, help="only so many mutants")
-    parser.add_argument("--seed", type=int, default=1, help="of the choice of mutants")
+    parser.add_argument("--sample", type=int, help="number of mutants")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the sample")
     parser.add_argument("--json", action="store_true", help="print rows as JSON")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument(
-        "--resume", type=Path, help="journal; what it answers is not asked again"
+        "--resume", type=Path, help="journal; recorded results are not computed again"
     )
     return parser.parse_args()
 

@@ -1,6 +1,6 @@
-"""Kinds of mutation rules: each makes a rule from how something shall read instead.
+"""Factories of mutation rules; each takes the form of the replacement text.
 
-A rule looks at one node and yields (node, new text) for every change it can make.
+A rule examines one node and yields (node, new text) for every possible change.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def _wheel_pairs(node: ast.AST) -> Iterator[tuple[ast.Tuple, str, str]]:
 
 
 def wheels(form: str) -> Rule:
-    """Returned wheel speeds in another form."""
+    """Changes returned wheel speeds `{a}, {b}`."""
 
     def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
         for value, a, b in _wheel_pairs(node):
@@ -34,7 +34,7 @@ def wheels(form: str) -> Rule:
 
 
 def call(name: str, form: str, count: int = 2) -> Rule:
-    """Calls of a function (by its last name) in another form."""
+    """Changes calls of a function, given by its last name, with `count` arguments."""
 
     def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
         if is_call(node, name, count):
@@ -46,7 +46,7 @@ def call(name: str, form: str, count: int = 2) -> Rule:
 
 
 def item(key: str, form: str) -> Rule:
-    """Reads of `obs[key]` in another form."""
+    """Changes reads of `obs[key]`."""
 
     def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
         if constant_key(node) == key and isinstance(node.ctx, ast.Load):
@@ -56,7 +56,7 @@ def item(key: str, form: str) -> Rule:
 
 
 def in_policy(*lines: str) -> Rule:
-    """Lines at the beginning of `policy`; `obs` is its argument."""
+    """Inserts lines at the beginning of `policy`; `obs` stands for its argument."""
 
     def rule(node: ast.AST, source: Source) -> Iterator[Change]:
         if not (isinstance(node, ast.FunctionDef) and node.name == "policy"):
@@ -71,7 +71,7 @@ def in_policy(*lines: str) -> Rule:
 
 
 def margin(form: str, names: re.Pattern[str] = BODY) -> Rule:
-    """Uses of the body's size and of margins in another form."""
+    """Changes uses of the body's size and of margins."""
 
     def rule(node: ast.AST, source: Source) -> Iterator[Change]:
         name = node.id if isinstance(node, ast.Name) else constant_key(node)
@@ -85,7 +85,7 @@ def margin(form: str, names: re.Pattern[str] = BODY) -> Rule:
 
 
 def never(pattern: re.Pattern[str], *, returns: bool = False) -> Rule:
-    """Conditions that speak of something are never met."""
+    """Makes conditions that match a pattern always false."""
 
     def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
         if isinstance(node, ast.If):
@@ -99,7 +99,7 @@ def never(pattern: re.Pattern[str], *, returns: bool = False) -> Rule:
 
 
 def constant(form: str) -> Rule:
-    """Constants of the module in another form."""
+    """Changes the module's constants."""
 
     def rule(node: ast.AST, source: Source) -> Iterator[Change]:
         if node not in source.tree.body or not isinstance(node, ast.Assign):
@@ -114,7 +114,7 @@ def constant(form: str) -> Rule:
 
 
 def heuristic(form: str) -> Rule:
-    """What a search adds to the cost so far, in another form."""
+    """Changes the heuristic that a search adds to the cost so far."""
 
     def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
         if is_call(node, "heappush", 2) and isinstance(node.args[1], ast.Tuple):
@@ -126,7 +126,7 @@ def heuristic(form: str) -> Rule:
 
 
 def words(old: str, new: str) -> Rule:
-    """Texts that name something, with another name in its place."""
+    """Replaces a word in string constants other than docstrings."""
 
     def rule(node: ast.AST, source: Source) -> Iterator[Change]:
         if not isinstance(node, ast.Constant) or not isinstance(node.value, str):

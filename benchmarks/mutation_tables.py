@@ -1,4 +1,4 @@
-"""`results/mutation.csv` and `.md`: every mutant, and what they come to."""
+"""Writes `results/mutation.csv` and `.md`: every mutant, and the totals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 def write_csv(path: Path, rows: Sequence[Any]) -> None:
-    """One line a mutant."""
+    """Writes one line per mutant."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(asdict(rows[0])), lineterminator="\n")
         writer.writeheader()
@@ -26,7 +26,7 @@ def write_markdown(
     left_out: Mapping[str, str],
     seeds: int,
 ) -> None:
-    """Sums, a table by mutation, and the survivors by name."""
+    """Writes the totals, a table by mutation, and the survivors by name."""
     harmful = [row for row in rows if row.harmful]
     survivors = [row for row in harmful if not row.killed]
     harmless = [row for row in rows if not row.harmful]

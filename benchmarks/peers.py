@@ -1,10 +1,10 @@
-"""Other simulators of the same kind, stepped where they are installed.
+"""Times steps of similar simulators that are installed.
 
     python -m benchmarks peers
 
 ir-sim: one differential-drive robot with a lidar of 18 beams among three shapes. VMAS:
-its scenario "navigation" with one agent and 18 rays, as a batch. Beside them, ours with
-18 rays, alone and in a batch of as many.
+a batch of its scenario "navigation" with one agent and 18 rays. Ours is timed beside
+them with 18 rays, single and in a batch of the same size.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def benches(effort: Effort) -> list[Bench]:
 
 
 def steppers() -> Iterator[tuple[str, Burst]]:
-    """Name, and a call that makes some steps and returns how many."""
+    """Name and burst of each installed simulator."""
     if find_spec("irsim") is not None:
         yield "ir-sim, 18 beams", _irsim()
     if find_spec("vmas") is not None:

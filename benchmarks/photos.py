@@ -1,15 +1,15 @@
-"""Photographs of plans made from drawings whose truth is known.
+"""Measures preprocessing on simulated photographs of plans with known truth.
 
     python benchmarks/photos.py [DIR] [--photos N] [--seed S] [--no-task]
 
-Each drawing is printed in ink on paper, dark on light or light on dark, and taken by a
-poor camera: a gradient of light, a vignette, a soft shadow, blur, a small turn, noise
-and JPEG. The drawings are made here; those of DIR (with an `index.json` as
-`real_maps.py` has it) come from its truth masks.
+Each drawing is rendered as ink on paper, dark on light or light on dark, and then as a
+poor photograph of it: a gradient of light, a vignette, a soft shadow, blur, a small
+rotation, noise and JPEG. The drawings are generated, or made from the truth masks of
+DIR, which has an `index.json` as for `real_maps.py`.
 
-Columns: right: accepted with the right polarity, and the path keeps off the true walls;
-wrong: the other polarity; crossed: a path through a true wall; close: refused, for both
-polarities are likely; refused: for another reason.
+Columns: right: accepted with the right polarity, and the path avoids the true walls;
+wrong: the other polarity; crossed: a path through a true wall; close: refused because
+both polarities are likely; refused: for another reason.
 """
 
 from __future__ import annotations
@@ -43,19 +43,19 @@ Field = NDArray[np.float64]
 SIDE = 700
 """Longest side of a drawing, px."""
 PAGE = 30
-"""Empty page around a drawing, px."""
+"""Width of the empty margin around a drawing, px."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """What is photographed.
+    """A plan to photograph.
 
     Attributes:
-        name: For people.
+        name: Displayed name.
         truth: Shape (height, width), bool, True = wall.
         start: (x, y), px.
         goal: (x, y), px.
-        radius: Of the body, px.
+        radius: Radius of the body, px.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photo:
-    """A photograph of a drawing; its task and truth lie as the picture does."""
+    """A photograph, and its drawing, rotated like the picture."""
 
     drawing: Drawing
     picture: ColourImage
@@ -79,7 +79,7 @@ class Photo:
 
 
 def drawings() -> list[Drawing]:
-    """Plans of several kinds, made of lines and of areas."""
+    """Several kinds of plans, made of lines and of areas."""
     made = [
         _rooms(0, wall=6),
         _rooms(1, wall=3),
@@ -94,14 +94,14 @@ def drawings() -> list[Drawing]:
 
 
 def _rooms(seed: int, wall: int) -> Drawing:
-    """Rooms in rows, a door between each two that are joined by a tree."""
+    """Rooms in rows, with doors along a tree that joins all rooms."""
     rng = np.random.default_rng(seed)
     truth = _lattice(rng, 4, 5, 110, wall, door=50)
     return Drawing(f"rooms {wall} px", truth, (55, 55), (495, 385), 11.0)
 
 
 def _maze(seed: int, wall: int) -> Drawing:
-    """A maze: cells that are open to each other as wide as they are."""
+    """A maze: openings are as wide as the cells."""
     rng = np.random.default_rng(seed)
     truth = _lattice(rng, 7, 9, 66, wall, door=66)
     return Drawing(f"maze {wall} px", truth, (33, 33), (8 * 66 + 33, 33), 11.0)
@@ -127,7 +127,7 @@ def _lattice(
 def _tree(
     rng: np.random.Generator, rows: int, columns: int
 ) -> Iterator[tuple[Point, Point]]:
-    """Pairs of neighbouring cells whose doors join all of them, and some more."""
+    """Pairs of neighbouring cells for doors: a spanning tree, and some more."""
     group = {cell: cell for cell in product(range(rows), range(columns))}
 
     def root(cell: Point) -> Point:
@@ -148,7 +148,7 @@ def _tree(
 
 
 def _cave(seed: int) -> Drawing:
-    """Halls in solid rock, with rock around them as well."""
+    """Halls in solid rock that fills the whole page."""
     rng = np.random.default_rng(seed)
     rock = np.full((480, 640), 255, np.uint8)
     halls = np.array(
@@ -185,7 +185,7 @@ def _corridors(seed: int) -> Drawing:
 
 
 def _with_page(drawing: Drawing) -> Drawing:
-    """The drawing with empty page around it."""
+    """The drawing with an empty margin around it."""
     (sx, sy), (gx, gy) = drawing.start, drawing.goal
     return replace(
         drawing,
@@ -196,7 +196,7 @@ def _with_page(drawing: Drawing) -> Drawing:
 
 
 def real_drawings(folder: Path) -> list[Drawing]:
-    """The truth masks of a folder of maps, as large as the drawings made here."""
+    """Drawings from a folder's truth masks, as large as the generated ones."""
     entries = json.loads((folder / "index.json").read_text())
     found = [_real(folder, entry) for entry in entries if _is_printed(entry)]
     return [drawing for drawing in found if drawing is not None]
@@ -233,7 +233,7 @@ def _real(folder: Path, entry: dict) -> Drawing | None:
 
 
 def gradient(shape: tuple[int, ...], angle: float) -> Field:
-    """From 1 to 0 across the picture, in a direction."""
+    """A ramp from 1 to 0 across the picture, in a direction."""
     rows, columns = np.indices(shape) / np.array(shape).reshape(2, 1, 1)
     ramp = columns * np.cos(angle) + rows * np.sin(angle)
     return np.asarray((ramp.max() - ramp) / np.ptp(ramp))
@@ -246,14 +246,14 @@ def vignette(shape: tuple[int, ...]) -> Field:
 
 
 def shadow(shape: tuple[int, ...], rng: np.random.Generator) -> Field:
-    """1 in the light, 0 in the shade of something with a straight edge."""
+    """1 in the light, 0 in a shadow with a straight edge."""
     ramp = gradient(shape, rng.uniform(0, 2 * np.pi))
     edge, soft = rng.uniform(0.35, 0.65), rng.uniform(0.01, 0.05)
     return np.asarray(1 / (1 + np.exp(-(ramp - edge) / soft)))
 
 
 def lit(picture: Field, light: Field) -> Field:
-    """The picture in some light; 1 changes nothing."""
+    """The picture multiplied by the light; 1 changes nothing."""
     return picture * light[..., None]
 
 
@@ -266,7 +266,7 @@ def printed(truth: BoolGrid, polarity: str, paper: Field, ink: Field) -> Field:
 def developed(
     picture: Field, rng: np.random.Generator, blur: float, noise: float, quality: int
 ) -> ColourImage:
-    """What is in the file: blurred, noisy, compressed."""
+    """The picture as stored: blurred, noisy, compressed."""
     if blur:
         picture = cv2.GaussianBlur(picture, (0, 0), blur)
     if noise:
@@ -282,7 +282,7 @@ def developed(
 
 
 def turned(drawing: Drawing, degrees: float) -> tuple[Drawing, NDArray[np.float64]]:
-    """The drawing turned about its centre, and how to turn its picture."""
+    """The drawing turned about its centre, and the matrix that turns its picture."""
     height, width = drawing.truth.shape
     turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), degrees, 1.0)
     cells = cv2.warpAffine(
@@ -296,7 +296,7 @@ def turned(drawing: Drawing, degrees: float) -> tuple[Drawing, NDArray[np.float6
 
 
 def photograph(drawing: Drawing, polarity: str, rng: np.random.Generator) -> Photo:
-    """A photograph under light that the generator chooses."""
+    """A photograph under random light."""
     paper = np.array(
         [rng.uniform(215, 252), rng.uniform(205, 250), rng.uniform(170, 245)]
     )
@@ -318,7 +318,7 @@ def photograph(drawing: Drawing, polarity: str, rng: np.random.Generator) -> Pho
 
 
 def _light(shape: tuple[int, ...], rng: np.random.Generator) -> tuple[Field, str]:
-    """How bright each pixel is lit, 0..1, and what that is."""
+    """The light at each pixel, 0..1, and its description."""
     light, names = np.ones(shape), []
     kinds = rng.random(3) < (0.7, 0.5, 0.4)
     if kinds[0] or not kinds.any():
@@ -339,10 +339,10 @@ def _light(shape: tuple[int, ...], rng: np.random.Generator) -> tuple[Field, str
 
 
 def seven(drawing: Drawing) -> Iterator[Photo]:
-    """A light page with darker walls, 80 and more grey levels darker somewhere.
+    """Seven photographs of a light page that is locally 80 or more grey levels darker.
 
-    Gradients in four directions, two vignettes and a gradient that is taken off instead
-    of multiplied; some with noise, none blurred or compressed.
+    Four gradients, two vignettes, and a gradient that is subtracted instead of
+    multiplied; some have noise, none is blurred or compressed.
     """
     shape, page = drawing.truth.shape, np.array([240.0, 238.0, 232.0])
     ink = np.array([130.0, 128.0, 133.0])  # so pale that the light outweighs it
@@ -367,7 +367,7 @@ def seven(drawing: Drawing) -> Iterator[Photo]:
 
 
 def photos(made: list[Drawing], count: int, seed: int) -> Iterator[Photo]:
-    """Photographs of the drawings in turn, both polarities of each."""
+    """Photographs of the drawings in turn, in both polarities."""
     rng = np.random.default_rng(seed)
     pairs = [(d, p) for d in made for p in ("dark", "light")]
     order = [pairs[k] for k in rng.permutation(len(pairs))]
@@ -375,11 +375,11 @@ def photos(made: list[Drawing], count: int, seed: int) -> Iterator[Photo]:
         yield photograph(*order[k % len(order)], np.random.default_rng([seed, k]))
 
 
-# ---------------------------------------------------------------- what came out
+# ---------------------------------------------------------------- results
 
 
 def outcome(photo: Photo, with_task: bool = True) -> tuple[str, str]:
-    """What preprocessing made of a photograph, in a word, and how."""
+    """The column that a photograph counts in, and the method or the error."""
     drawing = photo.drawing
     ends = (drawing.start, drawing.goal) if with_task else (None, None)
     try:

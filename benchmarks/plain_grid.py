@@ -1,4 +1,4 @@
-"""Algorithm 1 as one would write it with OpenCV and scikit-image; to compare with."""
+"""A straightforward Algorithm 1 with OpenCV and scikit-image, for comparison."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Point = tuple[int, int]
 
 
 def best_score(picture: Any, start: Point, goal: Point, radius: float) -> float:
-    """Score of the best of the 40 candidates; -inf without one."""
+    """Score of the best of the 40 candidates; -inf if none is feasible."""
     grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
     best = -np.inf
     for kind in (cv2.THRESH_BINARY_INV, cv2.THRESH_BINARY):

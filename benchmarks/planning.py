@@ -1,14 +1,14 @@
-"""A* on grids beside `skimage.graph.MCP_Geometric`, and against published lengths.
+"""Times A* beside `skimage.graph.MCP_Geometric`, and checks published lengths.
 
     python -m benchmarks planning [--maps DIR]
 
-DIR holds MovingAI maps with their `.scen` files; without it, floor plans are drawn and
-the lengths are checked against a whole distance field. Maps with water or swamp have
-rules of their own and are left out. scikit-image passes diagonally between obstacles
-and gives every scenario its own search object, as ours does its own arrays.
+DIR contains MovingAI maps with their `.scen` files. Without it, floor plans are drawn,
+and the lengths are checked against a whole distance field. Maps with water or swamp
+have special rules and are left out. scikit-image allows diagonal steps between
+obstacles; for every scenario it allocates a search object, and ours its arrays.
 
-Floor: one pass over the map that finds the pixels joined to the start, which every
-search without a heuristic makes.
+The floor is one pass over the map that finds the pixels connected to the start, which
+every search without a heuristic makes.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ FLOOR, OURS, THEIRS = "connected pixels", "A*", "MCP_Geometric"
 
 @dataclass(frozen=True, slots=True)
 class Trip:
-    """Pixels (x, y) and the length of the shortest path, px."""
+    """Start and goal pixels (x, y), and the length of the shortest path, px."""
 
     start: Point
     goal: Point
@@ -46,7 +46,7 @@ class Trip:
 
 
 def benches(effort: Effort, maps: Path | None = None) -> list[Bench]:
-    """One bench a map."""
+    """One bench per map."""
     rounds = effort.rounds_of(3)
     return [
         _on_map(name, free, trips, rounds)
@@ -70,7 +70,7 @@ def _maps(
 
 
 def scenarios(file: Path, count: int = SCENARIOS) -> Iterator[Trip]:
-    """Up to `count` of a file's scenarios, spread over all of them."""
+    """Up to `count` of a file's scenarios, evenly spread."""
     rows = [line.split() for line in file.read_text().splitlines()[1:] if line.strip()]
     count = min(count, len(rows))
     for row in (rows[k * len(rows) // count] for k in range(count)):

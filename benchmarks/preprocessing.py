@@ -1,11 +1,11 @@
-"""What preprocessing costs, beside a straightforward version of the same algorithm.
+"""Times preprocessing beside a straightforward version of the same algorithm.
 
     python -m benchmarks preprocessing
 
-A drawn floor plan of 64 rooms with specks, holes and letters-sized blots, so that no
-two strengths of cleanup have the same result. Floor: one exact distance transform of
-OpenCV, of which Algorithm 1 needs one a cleaned grid. The growth is over the range of
-map sizes; n log n is what it is compared with.
+The input is a drawn floor plan of 64 rooms with specks, holes and letter-sized blots,
+so that no two strengths of cleanup have the same result. The floor is one exact
+distance transform of OpenCV; Algorithm 1 needs one per cleaned grid. The growth over
+the map size is compared with n log n.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Drawn = tuple[Picture, Point, Point]
 RADIUS = 4.0
 ROOMS = 8
 SIZES = {0.5: 0.15, 4.0: 1.2}
-"""Megapixels, and the most seconds that `preset="paper"` should take."""
+"""Time limit of `preset="paper"` in seconds, by megapixels."""
 GROWTH = (0.1, 0.25, 1.0, 4.0, 16.0)
 FLOOR, PLAIN = "one distance transform", "OpenCV + scikit-image, 40 candidates"
 PAPER, DEFAULT = 'preset="paper"', "default preset"
@@ -45,7 +45,7 @@ def benches(effort: Effort) -> list[Bench]:
 
 
 def floor_plan(megapixels: float, seed: int = 0) -> Drawn:
-    """A picture of rooms in a tree, with a start and a goal in opposite corners."""
+    """A picture of connected rooms, with start and goal in opposite corners."""
     rng = np.random.default_rng(seed)
     side = round(math.sqrt(1e6 * megapixels))
     room, wall = side // ROOMS, max(side // 250, 3)
@@ -67,7 +67,7 @@ def floor_plan(megapixels: float, seed: int = 0) -> Drawn:
 def _door(
     grey: Picture, rng: np.random.Generator, i: int, j: int, room: int, wall: int
 ) -> None:
-    """Opens the room to the right or below, so that all are joined."""
+    """Opens a door to the right or below, so that all rooms are connected."""
     if i == j == ROOMS - 1:
         return
     right = j == ROOMS - 1 or (i < ROOMS - 1 and rng.random() < 0.5)
@@ -89,7 +89,7 @@ def _dirt(grey: Picture, rng: np.random.Generator) -> None:
 
 
 def cases(drawn: Drawn) -> dict[str, Call]:
-    """What is timed on one picture."""
+    """The calls that are timed on one picture."""
     from benchmarks.plain_grid import best_score
 
     picture, start, goal = drawn
@@ -113,7 +113,7 @@ def _at_size(megapixels: float, limit: float | None, rounds: int) -> Bench:
 
 
 def _growth(sizes: tuple[float, ...], rounds: int) -> Bench:
-    """The paper's grid over map sizes; each row's note is against n log n."""
+    """Times `preset="paper"` over map sizes; the notes are relative to n log n."""
     times: dict[str, list[float]] = {}
     notes: dict[str, str] = {}
     first = f"{sizes[0]:g} MPix"

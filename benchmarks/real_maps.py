@@ -1,17 +1,17 @@
-"""Preprocessing measured on maps by other people, against their truth masks.
+"""Measures preprocessing on third-party maps against their truth masks.
 
     python benchmarks/real_maps.py DIR [--radius 12|fit] [--negate] [--no-verify]
 
-DIR holds an `index.json`: a list of tasks with file, polarity, start, goal,
+DIR contains an `index.json`: a list of tasks with file, polarity, start, goal,
 `max_robot_radius_px`, a reference length and a `truth/` mask (black = obstacle).
-Only the picture is used, never a yaml beside it.
+Only the image is used, never a yaml beside it.
 
-Columns: polarity with the task and without start and goal; solvable; route: the
+Columns: polarity with the task, and without start and goal; solvable; route: the
 shortest path on the chosen grid keeps half the radius from every truth obstacle and is
 within 10 % of the reference length; iou90: the free space connected to the start has
-an IoU of at least 0.9 with the truth's; verified: by the builtin learner; refused: of
-the tasks that the index calls infeasible and of copies closed by a wall in the
-obstacle's colour.
+an IoU of at least 0.9 with the truth's; verified: the builtin learner's controller is
+verified; refused: out of the tasks that the index calls infeasible and of copies that
+are closed by a wall in the obstacles' colour.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ Entry = dict[str, Any]
 WALL = 5
 """Thickness of the wall that closes a copy, px."""
 MAX_WALLS = 12
-"""Walls after which a map counts as too open to be closed."""
+"""Number of walls after which a map counts as too open to be closed."""
 
 
 @dataclass
 class Row:
-    """What happened to one task; None where a column does not apply."""
+    """The results for one task; None if a column does not apply."""
 
     name: str
     radius: int
@@ -66,7 +66,7 @@ class Row:
     reason: str = ""
 
     def note(self, text: str) -> None:
-        """Adds a reason to the others."""
+        """Appends a reason."""
         self.reason = f"{self.reason}; {text}" if self.reason else text
 
 
@@ -86,7 +86,7 @@ def verify_builtin(image: ColourImage, start: Point, goal: Point, radius: int) -
 
 
 def select(entries: list[Entry], radius: str) -> list[tuple[Entry, int]]:
-    """The tasks that are measured, each with its robot radius, px."""
+    """The tasks to measure, each with its robot radius, px."""
     chosen = []
     for entry in entries:
         largest = entry["max_robot_radius_px"]
@@ -99,7 +99,7 @@ def select(entries: list[Entry], radius: str) -> list[tuple[Entry, int]]:
 
 
 def picture(folder: Path, entry: Entry, negate: bool) -> ColourImage:
-    """The task's picture, alpha on white; inverted on request."""
+    """The task's image, with alpha on white; optionally inverted."""
     name = entry["file"]
     if name.endswith(".map"):
         name = entry["png"]
@@ -108,7 +108,7 @@ def picture(folder: Path, entry: Entry, negate: bool) -> ColourImage:
 
 
 def measure(folder: Path, negate: bool, verify: bool, task: tuple[Entry, int]) -> Row:
-    """All columns of one task."""
+    """Computes all columns of one task."""
     entry, radius = task
     row = Row(entry["name"], radius, entry["polarity"] == "mixed")
     image = picture(folder, entry, negate)
@@ -179,7 +179,7 @@ def _grid_columns(row: Row, entry: Entry, image: ColourImage, truth: BoolGrid) -
 
 
 def reference_length(entry: Entry, truth: BoolGrid, radius: int) -> float:
-    """The index's length of the shortest path, px; planned on the truth without one."""
+    """Length of the shortest path in px, from the index or planned on the truth."""
     if entry.get("ref_len_px"):
         return float(entry["ref_len_px"])
     free = body_free(clearance(truth), radius)
@@ -206,10 +206,10 @@ def closed_copy(
     polarity: str,
     negate: bool,
 ) -> ColourImage | None:
-    """The picture with walls drawn until the truth is disconnected, or None.
+    """The image with walls added until the truth is disconnected, or None.
 
-    Each wall crosses the present shortest path at its narrowest place, away from
-    start and goal, and runs from obstacle to obstacle.
+    Each wall crosses the current shortest path at its narrowest place, away from
+    start and goal, from obstacle to obstacle.
     """
     copy, cells = image.copy(), truth.copy()
     ink = obstacle_ink(image, truth, polarity, negate)
@@ -233,7 +233,7 @@ def closed_copy(
 def obstacle_ink(
     image: ColourImage, truth: BoolGrid, polarity: str, negate: bool
 ) -> BoolGrid:
-    """Truth obstacles that are drawn as such (the paper around a plan is not)."""
+    """Truth obstacles that are drawn in the image, unlike the paper around a plan."""
     if polarity == "mixed":
         return truth
     grey = luminance(image)
@@ -248,7 +248,7 @@ def crossing(
     path: NDArray[np.float64],
     near_ends: BoolGrid,
 ) -> tuple[Point, Point] | None:
-    """The shortest straight wall across the path, obstacle to obstacle."""
+    """The shortest straight wall across the path, from obstacle to obstacle."""
     height, width = cells.shape
     steps = path.astype(int)
     allowed = [i for i, (x, y) in enumerate(steps) if not near_ends[y, x]]
@@ -279,7 +279,7 @@ def disc_hit(near_ends: BoolGrid, one: Any, other: Any) -> bool:
 
 
 def _hit(cells: BoolGrid, origin: Any, step: Any) -> Any:
-    """The first obstacle from `origin` along `step`, a little way into it."""
+    """A point one step inside the first obstacle from `origin` along `step`."""
     height, width = cells.shape
     point = origin.astype(float)
     while True:
@@ -311,7 +311,7 @@ COLUMNS = (
 
 
 def count(rows: list[Row]) -> dict[str, int]:
-    """Number of tasks, and how many are right in each column."""
+    """Number of tasks, and of correct results in each column."""
     feasible = [row for row in rows if row.solvable is not None]
     sums = {name: sum(bool(getattr(row, name)) for row in rows) for name in COLUMNS}
     return {"tasks": len(feasible), **sums}
@@ -342,7 +342,7 @@ def main() -> int:
 
 
 def print_table(plain: list[Row], mixed: list[Row], verified: bool) -> None:
-    """One line a failure, then the counts."""
+    """Prints one line per failure, then the counts."""
     for row in [*plain, *mixed]:
         if row.reason:
             print(f"{row.name} (radius {row.radius}): {row.reason} [{row.method}]")

@@ -1,17 +1,16 @@
-"""The world reader measured on Webots worlds by other people.
+"""Measures the world reader on third-party Webots worlds.
 
     python benchmarks/real_worlds.py DIR [--json]
 
-DIR holds `.wbt` files and an `expected.json`, an independent reading of them: robot
+DIR contains `.wbt` files and an `expected.json`, an independent reading of them: robot
 poses, arenas, footprints of obstacles (polygons or discs, one for each primitive),
 `nonphysical` Solids, and `skipped`, the types that it does not model. Its lengths are
 rounded to 0.1 mm.
 
-A world falls short where it does not load; a robot is off by more than 1 mm or
-0.01 rad; an arena differs; a footprint has an IoU below 0.98 (and an outline that is
-off by more than 0.15 mm); a Rock does not lie in its bounding disc with the area of
-the true hull; something of theirs is not accounted for in our reading; or something
-solid of ours is not in theirs.
+A world fails if it does not load; a robot is off by more than 1 mm or 0.01 rad; an
+arena differs; a footprint has an IoU below 0.98 (and an outline that is off by more
+than 0.15 mm); a Rock is not in its bounding disc with the area of the true hull; one of
+their items is not accounted for in our reading; or one of our solids is not in theirs.
 """
 
 from __future__ import annotations
@@ -43,15 +42,15 @@ Record = dict[str, Any]
 
 IOU = 0.98
 ROUNDING = 1.5e-4
-"""What rounding to 0.1 mm can move, m."""
+"""Tolerance for lengths that are rounded to 0.1 mm, m."""
 ROCKS = {"regular": 0.505, "flat": 0.470}
-"""Area of a rock's hull by that of its bounding disc."""
+"""Area of a rock's hull divided by the area of its bounding disc."""
 PIXELS = 1500
 
 
 @dataclass
 class Row:
-    """One world."""
+    """The results for one world."""
 
     name: str
     version: str = ""
@@ -67,7 +66,7 @@ class Row:
 
 
 def measure(path: Path, truth: Record | None) -> Row:
-    """Reads one world and compares."""
+    """Reads one world and compares it with the expected reading."""
     row = Row(path.name)
     begin = time.perf_counter()
     try:
@@ -90,7 +89,7 @@ def measure(path: Path, truth: Record | None) -> Row:
 
 
 def compare_robots(row: Row, ours: tuple[EPuck, ...], theirs: list[Record]) -> None:
-    """Each of theirs is one of ours, and the other way round."""
+    """Checks that their robots and ours correspond one to one."""
     left = list(ours)
     for robot in theirs:
         near = [mine for mine in left if _same_pose(mine, robot)]
@@ -99,7 +98,7 @@ def compare_robots(row: Row, ours: tuple[EPuck, ...], theirs: list[Record]) -> N
             row.robots += 1
         else:
             row.problems.append(f"no robot at {robot['x']}, {robot['y']}")
-    row.problems += [f"a robot too many at {mine.pose}" for mine in left]
+    row.problems += [f"unexpected robot at {mine.pose}" for mine in left]
 
 
 def _same_pose(mine: EPuck, theirs: Record) -> bool:
@@ -109,7 +108,7 @@ def _same_pose(mine: EPuck, theirs: Record) -> bool:
 
 
 def compare_arenas(row: Row, ours: tuple[Arena, ...], theirs: list[Record]) -> None:
-    """Each of theirs is one of ours, and the other way round."""
+    """Checks that their arenas and ours correspond one to one."""
     left = list(ours)
     for arena in theirs:
         same = [mine for mine in left if _same_arena(mine, arena)]
@@ -118,7 +117,7 @@ def compare_arenas(row: Row, ours: tuple[Arena, ...], theirs: list[Record]) -> N
             row.arenas += 1
         else:
             row.problems.append(f"no such arena: {arena}")
-    row.problems += [f"an arena too many: {mine}" for mine in left]
+    row.problems += [f"unexpected arena: {mine}" for mine in left]
 
 
 def _same_arena(mine: Arena, theirs: Record) -> bool:
@@ -149,7 +148,7 @@ def _same_arena(mine: Arena, theirs: Record) -> bool:
 
 @dataclass
 class Candidate:
-    """Something of ours that one of their records may be: a piece, or several."""
+    """One or several of our pieces that may correspond to one of their records."""
 
     obstacle: Obstacle
     pieces: frozenset[int]
@@ -163,7 +162,7 @@ class Candidate:
 
 
 def candidates(world: World) -> Iterator[Candidate]:
-    """Each piece alone, and each obstacle as a whole."""
+    """Each single piece, and each obstacle as a whole."""
     count = 0
     for thing in world.obstacles:
         shapes = [part.shape for part in thing.solid]
@@ -179,7 +178,7 @@ def compare_footprints(row: Row, world: World, theirs: list[Record]) -> list[Obs
     """Pairs their footprints with ours, the best pairs first.
 
     Returns:
-        Obstacles of ours that none of theirs is.
+        Our obstacles without a counterpart.
     """
     offers = list(candidates(world))
     pairs = [
@@ -214,14 +213,14 @@ def compare_footprints(row: Row, world: World, theirs: list[Record]) -> list[Obs
 def likeness(record: Record, offer: Candidate) -> float:
     """Intersection over union, at least `IOU` for an outline within rounding.
 
-    Of a rock it is 1 if it is the right one.
+    For a rock it is 1 if the rocks match, otherwise 0.
     """
     if record["kind"] == "Rock":
         return float(offer.obstacle.kind == "Rock" and _is_rock(record, offer))
     outlines = [_outline(shape) for shape in offer.shapes]
     theirs, hole = _record_outline(record), _hole(record)
     if hole is None and len(outlines) > 1 and "radius" in record:
-        # Their disc stands for whatever is round, with or without a hole.
+        # Their disc stands for any round shape, with or without a hole.
         outlines = [_hull(np.vstack(outlines))]
     if hole is not None or len(outlines) > 1 or not _is_convex(theirs):
         return _raster_iou(theirs, hole, outlines)
@@ -298,7 +297,7 @@ def _area(points: Points) -> float:
 
 
 def _apart(one: Points, other: Points) -> float:
-    """Largest distance of a corner of either to the corners or edges of the other."""
+    """Largest distance from a corner of one outline to the other outline."""
     return max(_off(one, other), _off(other, one))
 
 
@@ -352,7 +351,7 @@ def _raster_iou(one: Points, hole: Points | None, others: list[Points]) -> float
 
 
 def compare_markers(row: Row, world: World, theirs: list[Record]) -> None:
-    """Their Solids without a boundingObject are ours, and not solid."""
+    """Checks that we have their Solids without a boundingObject, as not solid."""
     ours = [thing for thing in world.obstacles if not thing.solid]
     for mark in theirs:
         near = [
@@ -369,7 +368,7 @@ def compare_markers(row: Row, world: World, theirs: list[Record]) -> None:
 def account(
     row: Row, world: World, skipped: dict[str, int], extras: list[Obstacle]
 ) -> None:
-    """What they skip we model or list, and what is only ours they skip."""
+    """Checks that we model or list what they skip, and they skip our extras."""
     listed = Counter(node.kind for node in world.unmodelled)
     listed += Counter(
         word for node in world.unmodelled for word in set(node.why.split())
@@ -378,17 +377,17 @@ def account(
     for name, count in skipped.items():
         kind = name.split()[0].split(":")[-1]
         missing = count - listed[kind]
-        for ours in (kind, "Solid"):  # they may skip a geometry of a Solid
+        for ours in (kind, "Solid"):  # they may skip the geometry of a Solid
             explained = max(min(own[ours], missing), 0)
             own[ours] -= explained
             missing -= explained
         if missing > 0:
-            row.problems.append(f"{name}: {count} skipped there, not listed here")
-    row.problems += [f"{count} {kind} only here" for kind, count in (+own).items()]
+            row.problems.append(f"{name}: {count} skipped by them, not listed by us")
+    row.problems += [f"{count} {kind} only in ours" for kind, count in (+own).items()]
 
 
 def show(rows: list[Row]) -> None:
-    """The table, problems below it."""
+    """Prints the table with the problems below it."""
     table = Table()
     for name in ("world", "version", "ms", "robots", "arenas", "footprints"):
         table.add_column(name, justify="left" if name == "world" else "right")
@@ -416,7 +415,7 @@ def show(rows: list[Row]) -> None:
 
 
 def summary(rows: list[Row]) -> str:
-    """One line about all."""
+    """A one-line summary."""
     good = sum(not row.problems for row in rows)
     matched, footprints = sum(r.matched for r in rows), sum(r.footprints for r in rows)
     return (
@@ -426,7 +425,7 @@ def summary(rows: list[Row]) -> str:
 
 
 def main() -> int:
-    """Prints the table, or JSON; 1 where a world falls short."""
+    """Prints the table, or JSON; returns 1 if a world fails."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--json", action="store_true")

@@ -1,4 +1,4 @@
-"""A controller's source with its syntax tree, and small questions about nodes."""
+"""A controller's source with its syntax tree, and predicates on nodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Source:
     """Text and tree of a controller.
 
     Args:
-        text: Must parse.
+        text: Source that parses.
 
     Attributes:
         functions: Functions and methods by name.
@@ -31,7 +31,7 @@ class Source:
         for node in ast.walk(self.tree):
             if isinstance(node, ast.FunctionDef):
                 self.functions.setdefault(node.name, node)
-                # Outer functions come first, so that inner ones overwrite them.
+                # Outer functions come first, so inner ones overwrite their nodes.
                 self._owner.update((child, node.name) for child in ast.walk(node))
             if isinstance(node, ast.Call):
                 self._called.add(node.func)
@@ -39,17 +39,17 @@ class Source:
                 self._docstrings.add(node.value)
 
     def replaced(self, node: ast.AST, text: str) -> str:
-        """The source with another text in the place of a node."""
+        """The source with a node replaced by a text."""
         begin, end = self._span(node)
         return (self._raw[:begin] + text.encode() + self._raw[end:]).decode()
 
     def segment(self, node: ast.AST) -> str:
-        """Text of a node."""
+        """Source text of a node."""
         begin, end = self._span(node)
         return self._raw[begin:end].decode()
 
     def function_of(self, node: ast.AST) -> str:
-        """Name of the innermost function around a node, empty at the top."""
+        """Name of the innermost function around a node; empty at the top level."""
         return self._owner.get(node, "")
 
     def is_called(self, node: ast.AST) -> bool:
@@ -57,11 +57,11 @@ class Source:
         return node in self._called
 
     def is_docstring(self, node: ast.AST) -> bool:
-        """Whether a text stands by itself."""
+        """Whether a constant is a statement by itself."""
         return node in self._docstrings
 
     def defines(self, name: str) -> bool:
-        """Whether a function of this name is in the file."""
+        """Whether the file defines a function of this name."""
         return name in self.functions
 
     def imports(self, name: str) -> bool:
@@ -80,17 +80,17 @@ class Source:
 
 
 def text_of(node: ast.AST) -> str:
-    """Source of a node, on one line for an expression."""
+    """Normalised source of a node; one line for an expression."""
     return ast.unparse(node)
 
 
 def called(node: ast.Call) -> str:
-    """Last name of what is called."""
+    """Last part of the name of the called function."""
     return text_of(node.func).rpartition(".")[2]
 
 
 def is_call(node: ast.AST | None, name: str, count: int | None = None) -> Any:
-    """Whether a node calls a function of this last name with so many arguments."""
+    """Whether a node calls a function of this last name with `count` arguments."""
     if not isinstance(node, ast.Call) or called(node) != name:
         return False
     return count is None or len(node.args) == count
@@ -102,7 +102,7 @@ def is_pair(node: ast.AST | None) -> Any:
 
 
 def constant_key(node: ast.AST) -> Any:
-    """The key of `something["key"]`, None of any other node."""
+    """The key of `something["key"]`; None for any other node."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         return node.slice.value if isinstance(node.slice.value, str) else None
     return None

@@ -1,10 +1,10 @@
-"""What it takes to start: the command line's help, an import, a first environment.
+"""Times the start-up: the command line's help, imports, a first environment.
 
     python -m benchmarks start_up
 
-Each is a process of its own. Floor: the bare interpreter; reference: one that imports
-numpy, which every tool of this kind has to. Compiled code lies ready on disk, as after
-the first use on a machine.
+Each case is a separate process. The floor is the bare interpreter, the reference one
+that imports numpy, as every tool of this kind must. Compiled code is already cached on
+disk, as after the first use on a machine.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Times that are taken in turn, and the table that shows them.
+"""Timing in turns, and the table of results.
 
-What is compared takes turns within one run, so that other work on the machine
-disturbs all of it alike: ratios hold where seconds do not.
+Compared cases take turns within one run, so that other load on the machine affects all
+of them equally: ratios carry over where seconds do not.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from rich.console import Console
 from rich.table import Table
 
 Call = Callable[[], int | object]
-"""What is timed once; or so many times as it returns."""
+"""A timed call; if it returns an int, that is the number of steps it made."""
 Times = Mapping[str, Sequence[float]]
-"""Of each case, s, one for each round."""
+"""Seconds per step of each case, one value per round."""
 
 WIDTH = 140
-"""Columns of a table that is not cut."""
+"""Minimum console width, so that tables are not cut."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,15 +30,15 @@ class Effort:
     """How thoroughly a bench measures.
 
     Attributes:
-        quick: Toy sizes, one round: shows that all of it works.
-        rounds: In each, all cases take their turn; by default what the bench needs.
+        quick: Whether to use toy sizes and one round, only to check that it works.
+        rounds: Number of rounds over all cases; by default the bench's own.
     """
 
     quick: bool = False
     rounds: int | None = None
 
     def rounds_of(self, usual: int) -> int:
-        """The number of rounds, where a bench usually makes `usual`."""
+        """The number of rounds for a bench with `usual` rounds by default."""
         return self.rounds or (1 if self.quick else usual)
 
 
@@ -49,15 +49,14 @@ class Row:
     Attributes:
         case: What was timed.
         seconds: Median time, s.
-        fastest: Least time, s.
-        slowest: Greatest time, s.
-        per_floor: Times the least that the machine can do, as the bench says.
-        speed: How many times as fast as what the bench compares with: median over the
-            rounds, each compared with the other of the same round.
-        low: First quartile of these.
-        high: Third quartile of these.
-        limit: Most seconds that it should take, or None.
-        note: More figures, in words.
+        fastest: Minimum time, s.
+        slowest: Maximum time, s.
+        per_floor: Time divided by that of the floor.
+        speed: Speed relative to the reference: median of the ratios within rounds.
+        low: First quartile of these ratios.
+        high: Third quartile of these ratios.
+        limit: Time limit in s, or None.
+        note: Additional figures as text.
     """
 
     case: str
@@ -74,13 +73,13 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """The rows of one bench, and what their ratios are to.
+    """The rows of one bench, and the cases that their ratios refer to.
 
     Attributes:
         title: What was measured.
-        floor: Case that is the floor.
-        reference: Case that the others are compared with.
-        rows: One a case.
+        floor: Name of the case that is the floor.
+        reference: Name of the case that is the reference.
+        rows: One per case.
     """
 
     title: str
@@ -90,7 +89,7 @@ class Bench:
 
 
 def in_turn(cases: Mapping[str, Call], rounds: int) -> dict[str, list[float]]:
-    """Times each case `rounds` times, one after the other, after one call unseen."""
+    """Times each case `rounds` times in turn, after one untimed warm-up call each."""
     taken: dict[str, list[float]] = {name: [] for name in cases}
     for number in range(rounds + 1):
         for name, call in cases.items():
@@ -110,7 +109,7 @@ def compared(
     limits: Mapping[str, float] | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> Bench:
-    """A bench of these times, with the ratios to two of its cases."""
+    """A bench of these times, with ratios to the floor and to the reference."""
     rows = []
     for case, own in times.items():
         low, speed, high = quartiles(_ratios(times[reference], own))
@@ -133,14 +132,14 @@ def compared(
 
 
 def _ratios(over: Sequence[float], under: Sequence[float]) -> list[float]:
-    """Of each round; of the medians where the cases had different rounds."""
+    """Ratios per round; of the medians if the numbers of rounds differ."""
     if len(over) != len(under):
         over, under = [statistics.median(over)], [statistics.median(under)]
     return [a / b for a, b in zip(over, under, strict=True)]
 
 
 def quartiles(ratios: Sequence[float]) -> tuple[float, float, float]:
-    """First quartile, median and third quartile; of a single one, that one."""
+    """First quartile, median and third quartile; a single value three times."""
     if len(ratios) == 1:
         return ratios[0], ratios[0], ratios[0]
     low, middle, high = statistics.quantiles(ratios, method="inclusive")
@@ -172,7 +171,7 @@ def show(bench: Bench) -> None:
 
 
 def duration(seconds: float) -> str:
-    """A time with three digits and its unit."""
+    """A time with three significant digits and its unit."""
     for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
         if seconds * factor >= 1.0:
             return f"{seconds * factor:.3g} {unit}"
@@ -193,7 +192,7 @@ def _verdict(row: Row) -> str:
 
 
 def whole_from_one(text: str) -> int:
-    """A number of an option; a type of argparse."""
+    """A positive integer from the command line; a type for argparse."""
     if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text}")
+        raise argparse.ArgumentTypeError(f"expected a positive integer, got {text}")
     return int(text)

@@ -1,11 +1,11 @@
-"""Steps per second of PPO, end to end, on our environments and on CartPole-v1.
+"""Measures steps/s of PPO, end to end, on our environments and on CartPole-v1.
 
     python -m benchmarks.training_speed [--steps N] [--rounds N]
 
-With the hyperparameters that `tdac train` has for maps, and with those that
-stable-baselines3 has by itself (ten epochs in batches of 64). The cases take turns, and
-the best round of each counts. The environments' share is the time within `step` and
-`reset` of the batch, as PPO calls them.
+It uses the hyperparameters of `tdac train` for maps, and the defaults of
+stable-baselines3 (ten epochs in batches of 64). The cases run in turns, and the best
+round of each counts. The environments' share is the time within the batch's `step` and
+`reset`, as called by PPO.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ DICT = ("goal-relative", "guidance")
 
 @dataclass(frozen=True, slots=True, order=True)
 class Speed:
-    """Of one training.
+    """Speed of one training.
 
     Attributes:
-        steps_per_second: End to end.
-        share: Of the wall time, what the environments take.
+        steps_per_second: Steps per second, end to end.
+        share: Fraction of the wall time spent in the environments.
     """
 
     steps_per_second: float
@@ -65,12 +65,12 @@ class Timed(VecEnvWrapper):
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is timed.
+    """A training to time.
 
     Attributes:
-        env: Its name.
+        env: Name of the environment.
         make: Makes a batch.
-        policy: Of stable-baselines3.
+        policy: Policy class of stable-baselines3.
         ours: Whether the hyperparameters are those of `tdac train`.
     """
 
@@ -81,7 +81,7 @@ class Case:
 
 
 def speed(case: Case, steps: int) -> Speed:
-    """Speed of a training that has begun already."""
+    """Measures a training after one warm-up rollout."""
     envs = case.make()
     timed = Timed(envs)
     ours = model_arguments(make_plan(("maze",)).hyperparameters)
@@ -96,7 +96,7 @@ def speed(case: Case, steps: int) -> Speed:
 
 
 def of_task(name: str, wrappers: tuple[str, ...] | None = None) -> Callable[[], Any]:
-    """The batch on which `tdac train` trains."""
+    """A factory of the batch on which `tdac train` trains."""
     plan = make_plan((name,), wrappers=wrappers)
     return lambda: make_batch(plan, plan.n_envs, training=True)
 

@@ -1,22 +1,21 @@
-"""What a verification costs, and how much of that is not the controller's.
+"""Measures the cost of a verification, and the share that is not the controller's.
 
     python -m benchmarks.verify [--task maze] [--runs N] [--json]
 
 Three controllers are verified from the command line and, as in the loop, by a warm
-judge: `builtin` as `tdac synth` leaves it; the privileged reference, which computes
-next to nothing, so that what its verification costs is our share; one that stands
-still until the time is up. For `builtin` our share is the wall time that is left when
-the time in which its processes computed is spread over the cores and taken away.
+judge: `builtin` as written by `tdac synth`; the privileged reference, which computes
+next to nothing, so that its whole cost counts as our share; and one that stands still
+until the time is up. For `builtin`, our share is the wall time minus the CPU time of
+its processes, divided by the number of cores.
 
-Prints the median and the range of the wall times, s. The judge is given time to get
-ready before each run of the loop, as a learner gives it. Two figures say how fast the
-machine was meanwhile: a step of CartPole-v1 through `gym.make`, and a bare interpreter
-that imports numpy, which is as little as a judge and its sandbox can start with. Where
-the limits were set these take 4.6 us and 58 ms. Our share is also given as it would be
-there, by that of the two figures by which it is more, and held against the limits. They
-are for a controller that passes, `builtin`, and for one that is stuck; of the
-reference's processes the whole CPU time is called ours. Byte code is on disk, as
-wherever the package has been used before.
+The bench prints the median and the range of the wall times, s. Before each run of the
+loop the judge has time to prepare, as while a learner writes. Two figures measure the
+speed of the machine: a step of CartPole-v1 through `gym.make`, and a bare interpreter
+that imports numpy, the minimum start of a judge and its sandbox. On the machine for
+which the limits were set these take 4.6 us and 58 ms. Our share is also scaled to that
+machine, by the smaller of the two slowdowns, and compared with the limits. There are
+limits for a controller that passes, `builtin`, and for one that is stuck, and none for
+the reference. Byte code is on disk, as after the first use of the package.
 """
 
 from __future__ import annotations
@@ -63,15 +62,15 @@ class Row:
     """Cost of one controller's verification.
 
     Attributes:
-        controller: Whose.
+        controller: Name of the controller.
         way: `command line` or `loop`.
         passed: Whether it was verified.
         wall: Median of the wall times, s.
-        fastest: Least of them, s.
-        slowest: Greatest of them, s.
+        fastest: Minimum wall time, s.
+        slowest: Maximum wall time, s.
         computing: CPU time of the controller's processes, s.
         share: Wall time that is not the controller's, s.
-        limit: What the share should not exceed, s; there is none for the reference.
+        limit: Limit of the share, s; None for the reference.
     """
 
     controller: str
@@ -86,7 +85,7 @@ class Row:
 
 
 def main() -> int:
-    """Returns the exit code: 1 where a share or a wall time exceeds its limit."""
+    """Returns the exit code: 1 if a share or a wall time exceeds its limit."""
     options = _options()
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     try:
@@ -114,8 +113,8 @@ def main() -> int:
     slower = _slower(machines)
     late = [row for row in rows if _too_slow(row, slower)]
     for row in late:
-        told = f"wall {row.wall:.2f} s, our share {row.share:.2f} s"
-        print(f"too slow: {row.controller}, {row.way}: {told}", file=sys.stderr)
+        times = f"wall {row.wall:.2f} s, our share {row.share:.2f} s"
+        print(f"too slow: {row.controller}, {row.way}: {times}", file=sys.stderr)
     return 1 if late else 0
 
 
@@ -138,7 +137,7 @@ def _run_folder(folder: Path, task: Task, source: str) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """How fast the machine is.
+    """Speed of a machine.
 
     Attributes:
         step: Median time of a step of CartPole-v1, s.
@@ -150,7 +149,7 @@ class Machine:
 
 
 OF_LIMITS = Machine(step=4.6e-6, start=58e-3)
-"""Where the limits were set."""
+"""The machine for which the limits were set."""
 
 
 def _machine() -> Machine:
@@ -176,7 +175,7 @@ Measure = Callable[[], tuple[float, float, bool]]
 
 
 def _from_cli(run: Path) -> Measure:
-    """Wall time, CPU time of the controller's processes, verdict; from outside."""
+    """Measures the command: wall time, the controller's CPU time, verdict."""
     command = [sys.executable, "-m", "tdac_agent", "verify", str(run), "--json"]
 
     def measure() -> tuple[float, float, bool]:
@@ -223,14 +222,14 @@ def _row(controller: str, way: str, measure: Measure, runs: int) -> Row:
 
 
 def _slower(machines: list[Machine]) -> float:
-    """How many times slower the machine was than that of the limits, at least."""
+    """The smaller slowdown of the machine relative to that of the limits."""
     step = statistics.mean(m.step for m in machines) / OF_LIMITS.step
     start = statistics.mean(m.start for m in machines) / OF_LIMITS.start
     return min(step, start)
 
 
 def _too_slow(row: Row, slower: float) -> bool:
-    """Whether a limit would be exceeded on the machine of the limits."""
+    """Whether a row exceeds a limit, after scaling for the machine's speed."""
     long = row.controller == "builtin" and row.wall > LIMITS[row.way][0] * slower
     return long or (row.limit is not None and row.share > row.limit * slower)
 
@@ -241,8 +240,8 @@ def _show(rows: list[Row], task: str, machines: list[Machine]) -> None:
     table = Table(title=f"Verification on {task}, s ({load})", title_justify="left")
     for name in ("controller", "from", "verdict"):
         table.add_column(name)
-    there = "at the limits' speed"
-    for name in ("wall", "range", "controller's CPU", "our share", there, "limit"):
+    scaled = "our share, scaled"
+    for name in ("wall", "range", "controller's CPU", "our share", scaled, "limit"):
         table.add_column(name, justify="right")
     for row in rows:
         colour = "red" if _too_slow(row, slower) else "green"
@@ -262,13 +261,12 @@ def _show(rows: list[Row], task: str, machines: list[Machine]) -> None:
     console.print(table)
     for when, machine in zip(("before", "after"), machines, strict=True):
         console.print(
-            f"machine {when}: CartPole-v1 {duration(machine.step)} a step, "
-            f"import numpy {duration(machine.start)} a start"
+            f"machine {when}: CartPole-v1 {duration(machine.step)} per step, "
+            f"import numpy {duration(machine.start)} per start"
         )
     console.print(
-        f"speed of the limits: {duration(OF_LIMITS.step)} and "
-        f"{duration(OF_LIMITS.start)}; this machine is taken to be "
-        f"{slower:.1f} times slower"
+        f"the limits are for {duration(OF_LIMITS.step)} and "
+        f"{duration(OF_LIMITS.start)}; this machine counts as {slower:.1f} times slower"
     )
 
 
@@ -276,7 +274,9 @@ def _options() -> argparse.Namespace:
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="benchmarks.verify", description=about)
     parser.add_argument("--task", default="maze", help="bundled name or task.yaml")
-    parser.add_argument("--runs", type=whole_from_one, default=5, help="of each kind")
+    parser.add_argument(
+        "--runs", type=whole_from_one, default=5, help="runs of each kind"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     return parser.parse_args()
 

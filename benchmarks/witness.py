@@ -1,4 +1,4 @@
-"""The environment that `run_episode` of a mutant is given by the independent judge."""
+"""The environment that the independent judge passes to `run_episode` of a mutant."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ SEED = 7_000_001
 
 
 class Witness:
-    """An environment for `run_episode` that remembers what happened.
+    """An environment for `run_episode` that records the episode.
 
     Args:
-        env: Steps.
-        most: The `max_steps` that the controller was given.
-        bumps: Collisions that the environment has counted before.
-        units: Of its lengths.
+        env: The environment to step.
+        most: The controller's `max_steps`.
+        bumps: Initial value of the collision counter.
+        units: Units of its lengths.
     """
 
     def __init__(self, env: JudgedEnv, most: int, bumps: int, units: Units) -> None:
@@ -62,13 +62,13 @@ class Witness:
             raise EnvRefusalError("an action that is not two finite numbers")
         return np.clip(wheels, -1.0, 1.0)
 
-    def contradictions(self, told: Any) -> Iterator[str]:
-        """What of a returned dict is not what happened."""
+    def contradictions(self, claims: Any) -> Iterator[str]:
+        """Differences between the dict that `run_episode` returned and the record."""
         if not self.over and len(self.speeds) < self.most:
             yield f"run_episode ended after {len(self.speeds)} steps"
         task = self.env.nominal
-        if type(told) is not dict:
-            yield f"run_episode returned a {type(told).__name__}"
+        if type(claims) is not dict:
+            yield f"run_episode returned a {type(claims).__name__}"
             return
         wanted = {
             "positions": (self.positions, self.slack),
@@ -79,12 +79,12 @@ class Witness:
         }
         for key, (value, slack) in wanted.items():
             try:
-                found = np.asarray(told[key], float)
+                found = np.asarray(claims[key], float)
             except (KeyError, TypeError, ValueError):
                 yield f"run_episode: {key} is missing or no numbers"
                 continue
             true = np.asarray(value, float)
             if found.shape != true.shape or np.abs(found - true).max() > slack:
                 yield f"run_episode: {key} is not what happened"
-        if type(told.get("collisions")) is not int:
+        if type(claims.get("collisions")) is not int:
             yield "run_episode: collisions is not an int"
