@@ -66,10 +66,7 @@ def kaplan_meier_coverage(
     trials: int = 1000,
     seed: int = 0,
 ) -> float:
-    """Simulated coverage of the interval of CS(at) with censoring.
-
-    Each iteration is the last affordable one with probability `stopped`.
-    """
+    """Simulated coverage of CS(at)'s interval; `stopped`: P(no next iteration)."""
     random = np.random.default_rng(seed)
     true = 1 - (1 - probability) ** at
     held = 0

@@ -153,11 +153,7 @@ def _nursery() -> Nursery:
 
 
 def _wheels(child: Child, observation: Any) -> Any:
-    """The answer of `policy`, clipped to [-1, 1].
-
-    Raises:
-        ControllerFault: It is not two finite numbers.
-    """
+    """The answer of `policy`, clipped; a fault unless it is two finite numbers."""
     answer = child.policy(observation)
     try:
         values = [float(value) for value in answer]

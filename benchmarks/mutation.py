@@ -147,11 +147,7 @@ def main() -> int:
 
 
 def measure(kind: str, options: argparse.Namespace, pool: ProcessPoolExecutor) -> int:
-    """Examines and prints the mutants for a kind of task.
-
-    Returns:
-        Number of harmful mutants that survive.
-    """
+    """Examines a kind of task's mutants; returns how many harmful ones survive."""
     ground, task, began = GROUNDS[kind], _task(kind), time.monotonic()
     journal = Journal(options.resume, task.sha256())
     candidates = ground.originals(task)

@@ -1,6 +1,6 @@
 """Draws the bundled maps and the robot: `python -m tools.draw_maps.draw DIR`.
 
-The same files come out of every run.
+Every run produces the same files.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Bundled maps of wild and worked ground, from above: a cave and a warehouse."""
+"""Bundled maps of a cave and a warehouse, from above."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ _CARTONS: tuple[Colour, ...] = (
 def _rack(
     page: Image, rng: np.random.Generator, left: float, right: float, y: float
 ) -> None:
-    """A row of pallet racking, 28 px deep, with cartons in its bays."""
+    """Draws a row of pallet racking, 28 px deep, with cartons in its bays."""
     box(page, (left, y, right, y + 28), _STEEL)
     x = left + 4
     while x + 18 < right:
@@ -89,7 +89,7 @@ def _rack(
 
 
 def _pallet(page: Image, x: float, y: float, width: float, height: float) -> None:
-    """A loaded pallet with its top left corner at (x, y)."""
+    """Draws a loaded pallet with its top left corner at (x, y)."""
     box(page, (x, y, x + width, y + height), (120, 82, 44))
     box(page, (x + 3, y + 3, x + width - 3, y + height - 3), (150, 106, 62))
     line(page, [(x, y), (x + width, y + height)], 1.2, (92, 62, 34))

@@ -1,7 +1,7 @@
-"""What the bundled maps are drawn with: shapes and pens on a fine sheet.
+"""Drawing primitives of the bundled maps: shapes and pens on a fine sheet.
 
-A sheet is an RGB image `FINE` times finer than the map; `scan` averages it down, so
-that edges are as soft as those of a scanned page. Points are (x, y) in map pixels.
+A sheet is an RGB image `FINE` times finer than the map; `scan` downsamples it by
+averaging, so edges are as soft as those of a scanned page. Points are (x, y), map px.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def write(page: Image, text: str, middle: Point, size: float, colour: Colour) ->
 def smooth_noise(
     rng: np.random.Generator, width: int, height: int, scale: float
 ) -> Noise:
-    """Noise of mean 0 and deviation about 1 whose blots are `scale` px wide."""
+    """Noise of mean 0 and deviation about 1, smooth on a scale of `scale` px."""
     rows, columns = int(height / scale) + 3, int(width / scale) + 3
     coarse = rng.standard_normal((rows, columns)).astype(np.float32)
     size = (int(columns * scale), int(rows * scale))
@@ -152,10 +152,10 @@ def pen(
 
 
 def scan(page: Image, rng: np.random.Generator, stains: float) -> Image:
-    """The sheet at map size, with stains `stains` grey levels deep and dust."""
+    """The sheet at map size, with dust, and stains of `stains` grey levels."""
     height, width = page.shape[0] // FINE, page.shape[1] // FINE
     small = cv2.resize(page, (width, height), interpolation=cv2.INTER_AREA)
-    # Fewer shades along the edges make the largest files a quarter smaller.
+    # Quantising the shades along edges makes the largest files a quarter smaller.
     image = np.round(small.astype(np.float32) / 6) * 6
     image += np.round(stains * smooth_noise(rng, width, height, 90))[..., None]
     for _ in range(width * height // 1500):

@@ -58,7 +58,7 @@ def draw_maze(rng: np.random.Generator) -> Image:
     strokes = [
         [(left + pitch * x, top + pitch * y) for x, y in run] for run in _runs(_MAZE)
     ]
-    # Narrows the only way to the goal to less than three body radii.
+    # Narrows the only passage to the goal to less than three body radii.
     strokes.append([(left + 3 * pitch, top + 5 * pitch), (262.0, top + 5 * pitch)])
     for stroke in strokes:
         colour = _RED if rng.random() < 0.5 else _BLUE

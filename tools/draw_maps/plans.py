@@ -1,4 +1,4 @@
-"""Bundled maps that are plans: an office, a gallery in thin lines, a ship's deck."""
+"""Bundled maps drawn as plans: an office, a thin-walled gallery, a ship's deck."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _DIM: Colour = (66, 98, 156)
 
 
 def _desk(page: Image, x: float, y: float, chair: float) -> None:
-    """A desk with a screen, and its chair `chair` px below (above if negative)."""
+    """Draws a desk with a screen, and a chair `chair` px below (above if negative)."""
     box(page, (x - 24, y - 12, x + 24, y + 12), _WALL)
     box(page, (x - 22, y - 10, x + 22, y + 10), _DESK)
     box(page, (x - 10, y - 3, x + 10, y + 1), _WALL)
@@ -41,13 +41,13 @@ def _desk(page: Image, x: float, y: float, chair: float) -> None:
 
 
 def _swing(page: Image, hinge: Point, width: float, first: float) -> None:
-    """The faint quarter circle that a door leaf sweeps."""
+    """Draws the faint quarter circle that a door leaf sweeps."""
     points = arc(hinge, width, first, first + 90)
     line(page, [hinge, *points], 1.2, _FAINT)
 
 
 def _outer_rooms(page: Image) -> None:
-    """The rooms along the outer walls, one door each."""
+    """Draws the rooms along the outer walls, one door each."""
     wall(page, ((34, 164), (780, 164)), 6, _WALL, _OFFICE_DOORS)
     for x in (220, 406, 594, 780):
         wall(page, ((x, 34), (x, 164)), 6, _WALL)
@@ -101,7 +101,7 @@ def draw_office(rng: np.random.Generator) -> Image:
 
 
 def _octagon(page: Image, radius: float, width: float, door: tuple[int, float]) -> None:
-    """One ring of the gallery: circumradius, thickness, (side, width) of its door."""
+    """Draws a ring of the gallery; `door` is (side, width)."""
     angles = [math.radians(11 + 45 * k) for k in range(9)]
     corners = [(350 + radius * math.cos(a), 350 + radius * math.sin(a)) for a in angles]
     middle = radius * math.sin(math.radians(22.5))
@@ -112,14 +112,14 @@ def _octagon(page: Image, radius: float, width: float, door: tuple[int, float]) 
 
 
 def _spoke(page: Image, angle: float, inner: float, outer: float) -> None:
-    """A thin wall between two rings of the gallery; degrees and px."""
+    """Draws a thin wall between two rings of the gallery; degrees and px."""
     x, y = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     ends = (350 + inner * x, 350 + inner * y), (350 + outer * x, 350 + outer * y)
     wall(page, ends, 1.5, _WALL)
 
 
 def draw_thin_walls(rng: np.random.Generator) -> Image:
-    """A gallery of nested octagons, its walls one or two pixels thin."""
+    """A gallery of nested octagons with walls one or two pixels thick."""
     page = sheet(700, 700, (252, 252, 252))
     for radius, width, door in (
         (335, 2.0, (0, 0)), (262, 1.5, (7, 60)),

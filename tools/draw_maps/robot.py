@@ -28,7 +28,7 @@ _METAL: Colour = (176, 184, 192)
 
 
 def draw_robot() -> Image:
-    """The robot from above, RGBA: nose towards +x, the body as wide as the image."""
+    """The robot from above, RGBA: nose towards +x, body as wide as the image."""
     page, mask = sheet(_SIZE, _SIZE, _RIM), sheet(_SIZE, _SIZE, (0, 0, 0))
     disc(mask, _MIDDLE, 63, (255, 255, 255))
     disc(page, _MIDDLE, 58, _SHELL)
@@ -49,7 +49,7 @@ def draw_robot() -> Image:
 
 
 def _wheel(page: Image, y: float) -> None:
-    """A tyre with its tread, seen from above."""
+    """Draws a tyre with its tread, from above."""
     corners = [(44, y - 8), (83, y - 8), (83, y + 8), (44, y + 8)]
     line(page, corners, 4, _TYRE, closed=True)
     polygon(page, corners, _TYRE)
@@ -58,7 +58,7 @@ def _wheel(page: Image, y: float) -> None:
 
 
 def _sensor(page: Image, degrees: float) -> None:
-    """The two round eyes of an ultrasonic sensor on the nose."""
+    """Draws the two transducers of an ultrasonic sensor on the nose."""
     for offset in (-6.5, 6.5):
         angle = math.radians(degrees + offset)
         eye = (63.5 + 50 * math.cos(angle), 63.5 + 50 * math.sin(angle))

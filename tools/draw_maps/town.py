@@ -1,4 +1,4 @@
-"""Bundled maps of places people live in, from above: a street, rooms, a playroom."""
+"""Bundled maps of a street, furnished rooms and a playroom, from above."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _plot(page: Image, area: Area, colour: Colour) -> None:
 
 
 def _house(page: Image, rng: np.random.Generator, area: Area) -> None:
-    """A house: a ridged roof with one side in the light."""
+    """Draws a house: a ridged roof with one side in the light."""
     left, top, right, bottom = area
     colour = _ROOFS[int(rng.integers(len(_ROOFS)))]
     _plot(page, area, colour)
@@ -60,7 +60,7 @@ def _house(page: Image, rng: np.random.Generator, area: Area) -> None:
 
 
 def _block(page: Image, rng: np.random.Generator, area: Area, depth: float) -> None:
-    """A closed block of houses `depth` px deep around a green court."""
+    """Draws a closed block of houses, `depth` px deep, around a green court."""
     left, top, right, bottom = area
     _plot(page, (left - 5, top - 5, right + 5, bottom + 5), _PAVING)
     _plot(page, area, _LAWN)
@@ -77,7 +77,7 @@ def _block(page: Image, rng: np.random.Generator, area: Area, depth: float) -> N
 
 
 def _tree(page: Image, rng: np.random.Generator, at: Point, radius: float) -> None:
-    """A tree: a bumpy crown."""
+    """Draws a tree with a bumpy crown."""
     (x, y) = _turned([at])[0]
     disc(page, (x, y), radius, _TREES[int(rng.integers(len(_TREES)))])
     for _ in range(5):
@@ -100,7 +100,7 @@ def draw_street(rng: np.random.Generator) -> Image:
     _plot(page, (641, 641, 791, 791), _LAWN)
     for tree in ((668, 668), (738, 676), (680, 744), (760, 750)):
         _tree(page, rng, tree, 15)
-    # The gateway, narrower than three body radii.
+    # A gateway narrower than three body radii.
     _plot(page, (536, 434, 584, 467), _PAVING)
     for tree in ((386, 388), (514, 510), (386, 514)):
         _tree(page, rng, tree, 9)
@@ -127,7 +127,7 @@ _FLOORS: tuple[Colour, ...] = (
 
 
 def _furnish(page: Image) -> None:
-    """Sofas, beds, tables and plants."""
+    """Draws sofas, beds, tables and plants."""
     for left, top, right, bottom, colour in (
         (50, 60, 90, 170, (62, 84, 120)), (150, 40, 230, 72, (120, 78, 48)),
         (330, 46, 420, 82, (96, 104, 72)), (498, 195, 519, 262, (120, 78, 48)),
@@ -183,7 +183,7 @@ _PENS: tuple[Points, ...] = (
 
 
 def _toy(page: Image, rng: np.random.Generator, at: Point) -> None:
-    """A ball, a building block or a book."""
+    """Draws a ball, a building block or a book."""
     colour = _TOYS[int(rng.integers(len(_TOYS)))]
     dark = (colour[0] * 3 // 4, colour[1] * 3 // 4, colour[2] * 3 // 4)
     if rng.random() < 0.35:

@@ -1,8 +1,8 @@
-"""Tries what other people's machines are like, and prints a table of what came of it.
+"""Runs the checks on simulated other machines, and prints a table of the results.
 
 python3 tools/portability [ROW ...] [--work DIR] [--command COMMAND]
 
-Without rows all of them. Exit 0 if every row that could run passed.
+Without rows it runs all of them. Exit 0 if every row that could run passed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DRAWN = "drawn"
 
 
 def main() -> int:
-    """Runs the rows that were named; 1 if one of them failed."""
+    """Runs the selected rows; returns 1 if one of them failed."""
     options = _options()
     names = _names(options.rows)
     folder = options.work or Path(tempfile.mkdtemp(prefix="tdac-portability-"))
@@ -51,14 +51,14 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--work",
         type=Path,
-        help="folder to work in, which is kept; what it has is used",
+        help="working folder, which is kept; its contents are reused",
     )
-    parser.add_argument("--command", default="make test", help="of temporary and busy")
+    parser.add_argument("--command", default="make test", help="for temporary and busy")
     return parser.parse_args()
 
 
 def _names(wanted: list[str]) -> list[str]:
-    """The rows to run, each of them known."""
+    """The rows to run; exits if one is unknown."""
     names = [_drawn() if name == DRAWN else name for name in wanted or ROWS]
     if unknown := [name for name in names if name not in ROWS]:
         sys.exit(f"no row {unknown[0]!r}; there are {', '.join(ROWS)}")
@@ -66,7 +66,7 @@ def _names(wanted: list[str]) -> list[str]:
 
 
 def _drawn() -> str:
-    """The row that the hash of the last commit chooses."""
+    """The row drawn by the hash of the last commit."""
     command = ["git", "rev-parse", "HEAD"]
     commit = subprocess.check_output(command, cwd=ROOT, text=True).strip()
     name = drawn(commit)

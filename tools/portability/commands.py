@@ -1,4 +1,4 @@
-"""Runs a command so that its output is seen at once and its end is known."""
+"""Runs commands with live output, and describes how they ended."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ def run(
     user: int | None = None,
     expect: int = 0,
 ) -> str:
-    """Runs a command, shows what it prints and returns the last of it.
+    """Runs a command, prints its output and returns the end of it.
 
     Args:
         words: The command.
-        cwd: Where.
-        env: Its environment; this process's own by default.
+        cwd: Working folder.
+        env: Environment; by default that of this process.
         user: User and group id to run it as, without further groups.
-        expect: The exit code that it must have.
+        expect: Expected exit code.
 
     Raises:
-        RowFailed: It ended in another way.
+        RowFailed: The exit code is another one.
     """
     command = [str(word) for word in words]
     print(f"$ {' '.join(command)}", flush=True)
@@ -72,7 +72,7 @@ def run(
 
 
 def ending(code: int) -> str:
-    """An exit code in words; shells tell a signal as 128 and its number."""
+    """An exit code in words; shells report a signal as 128 plus its number."""
     number = -code if code < 0 else code - 128 if code > 128 else 0
     if number in set(signal.Signals):
         return f"ended by {signal.Signals(number).name}"
@@ -80,7 +80,7 @@ def ending(code: int) -> str:
 
 
 def last(text: str) -> str:
-    """What is told behind an exit code: pytest's counts, or the last line."""
+    """The text after an exit code: pytest's counts, or the last line of output."""
     if counts := counted(text):
         return f", {counts}"
     lines = [line.strip() for line in text.splitlines() if line.strip()]
@@ -88,7 +88,7 @@ def last(text: str) -> str:
 
 
 def counted(text: str) -> str:
-    """The counts that pytest closed its last run with, or an empty text."""
+    """The counts in pytest's last summary line, or an empty text."""
     for line in reversed(text.splitlines()):
         if found := CLOSING.match(line.strip(" =")):
             return found[1]
@@ -101,5 +101,5 @@ def without(environment: Mapping[str, str], *names: str) -> dict[str, str]:
 
 
 def own_environment(**more: str) -> dict[str, str]:
-    """This process's environment and more."""
+    """This process's environment with more variables."""
     return {**os.environ, **more}

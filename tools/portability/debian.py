@@ -1,4 +1,4 @@
-"""Packages of Debian, unpacked into a folder; they are not installed."""
+"""Unpacks Debian packages into a folder without installing them."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from table import CannotRun, RowFailed
 def unpacked(
     place: Place, packages: list[str], architecture: str = "", *, alone: bool = False
 ) -> Path:
-    """A folder that holds the packages' files, as in `/`.
+    """A folder with the packages' files, laid out as in `/`.
 
     Args:
         place: The working folder.
-        packages: Their names.
-        architecture: As Debian names it; the machine's own by default.
-        alone: Without what they depend on, which the machine has.
+        packages: Names of the packages.
+        architecture: Debian's name of the architecture; by default the machine's own.
+        alone: Whether to leave out dependencies, because the machine has them.
 
     Raises:
-        CannotRun: This is no Debian, or it does not give them.
+        CannotRun: This is not Debian, or the packages are not available.
     """
     for tool in ("apt-get", "dpkg"):
         if shutil.which(tool) is None:
-            raise CannotRun(f"no {tool} here to fetch {', '.join(packages)} with")
+            raise CannotRun(f"fetching {', '.join(packages)} needs {tool}")
     folder = place.folder / "-".join(["debian", *packages])
     if (folder / "root").exists():
         return folder / "root"
@@ -43,7 +43,7 @@ def unpacked(
 def _download(
     folder: Path, packages: list[str], architecture: str, alone: bool
 ) -> None:
-    """Fetches with lists and a status of its own: of no package installed."""
+    """Downloads with separate apt lists, and a status without installed packages."""
     for part in ("state/lists/partial", "cache/archives/partial"):
         (folder / part).mkdir(parents=True)
     (folder / "status").touch()
@@ -61,5 +61,5 @@ def _download(
         }
     apt = ["apt-get", "-qq", *(f"-o{name}={text}" for name, text in options.items())]
     run([*apt, "update"], cwd=folder)
-    way = ["download"] if alone else ["install", "--download-only", "--yes"]
-    run([*apt, *way, *packages], cwd=folder)
+    verb = ["download"] if alone else ["install", "--download-only", "--yes"]
+    run([*apt, *verb, *packages], cwd=folder)

@@ -1,4 +1,4 @@
-"""Rows that drive the environments on other processors, as QEMU emulates them."""
+"""Rows that run the environments on other processors, emulated by QEMU."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def aarch64(place: Place) -> str:
 
 def _x86(place: Place, processor: str) -> str:
     if platform.machine() != "x86_64":
-        raise CannotRun("emulated with the packages of this machine: only on x86-64")
+        raise CannotRun("it uses the packages of this machine, so it needs x86-64")
     program = _qemu(place, "x86_64")
     command = [program, "-cpu", processor, place.python, SCRIPT]
     return _compared(
@@ -49,7 +49,7 @@ def _x86(place: Place, processor: str) -> str:
 
 
 def _qemu(place: Place, machine: str) -> str:
-    """The emulator of a kind of machine, from PATH or Debian's package."""
+    """The emulator of an architecture, from PATH or Debian's package."""
     names = (f"qemu-{machine}", f"qemu-{machine}-static")
     for name in names:
         if found := shutil.which(name):
@@ -62,10 +62,10 @@ def _qemu(place: Place, machine: str) -> str:
 
 
 def _wheels(place: Place, version: str) -> Path:
-    """What tdac needs, as wheels for aarch64, in a folder.
+    """A folder with tdac's dependencies from wheels for aarch64.
 
     Raises:
-        CannotRun: There is no such wheel of something.
+        CannotRun: A dependency has no such wheel.
     """
     folder = place.folder / "aarch64"
     platform_ = (
@@ -86,7 +86,7 @@ def _wheels(place: Place, version: str) -> Path:
         place.run_uv("pip", "install", *platform_, *into)
     except RowFailed as error:
         raise CannotRun(
-            f"not all that tdac needs has a wheel for aarch64: {error}"
+            f"not all dependencies have a wheel for aarch64: {error}"
         ) from None
     return folder
 
@@ -94,10 +94,10 @@ def _wheels(place: Place, version: str) -> Path:
 def _compared(
     place: Place, name: str, command: list[object], env: dict[str, str]
 ) -> str:
-    """Runs the rollout on this processor and on the other, and compares.
+    """Runs the rollout on this processor and on the other, and compares the numbers.
 
     Raises:
-        RowFailed: They differ by more than a processor's rounding.
+        RowFailed: They differ by more than rounding.
     """
     here, there = place.folder / "here.json", place.folder / f"{name}.json"
     if not here.exists():
@@ -107,16 +107,16 @@ def _compared(
     expected, got = (json.loads(file.read_text()) for file in (here, there))
     if expected == got:
         digest = hashlib.sha256(here.read_bytes()).hexdigest()[:12]
-        return f"the same to the last bit as here: {digest}"
+        return f"bit-identical to this machine: {digest}"
     wrong = [key for key in expected if not _near(expected[key], got[key])]
     if wrong:
-        raise RowFailed(f"other numbers than here: {', '.join(wrong)}")
+        raise RowFailed(f"different numbers than on this machine: {', '.join(wrong)}")
     apart = max(
         abs(a - b)
         for key in expected
         for a, b in zip(expected[key], got[key], strict=True)
     )
-    return f"the same as here but for rounding, at most {apart:.1g}"
+    return f"as on this machine except for rounding, at most {apart:.1g}"
 
 
 def _near(expected: list[float], got: list[float]) -> bool:

@@ -1,4 +1,4 @@
-"""Rows that use tdac as another user than the one who installed its wheel."""
+"""Rows that use tdac as a different user from the one who installed its wheel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from place import Place
 from table import CannotRun
 
 NOBODY = 65534
-# A user id as containers have it: without a line in /etc/passwd.
+# A user id as in containers, without an entry in /etc/passwd.
 NAMELESS = 54321
 PUBLIC = "/opt"
 RECENT = "import ssl, sys; sys.exit(sys.version_info < (3, 11))"
@@ -21,23 +21,23 @@ PERSONAL = ("HOME", "USER", "LOGNAME", "PYTHONPATH", "VIRTUAL_ENV")
 
 
 def wheel_user(place: Place) -> str:
-    """A wheel that root has installed, used by a user with a home."""
+    """A wheel installed by root and used by a user with a home."""
     return _first_commands(place, NOBODY, has_home=True)
 
 
 def wheel_nohome(place: Place) -> str:
-    """The same as a user id without a passwd entry and without HOME."""
+    """The same with a user id without a passwd entry and without HOME."""
     return _first_commands(place, NAMELESS, has_home=False)
 
 
 def _first_commands(place: Place, user: int, has_home: bool) -> str:
-    """What a new user tries first, in an empty folder of the user's.
+    """Runs the first commands of a new user in an empty folder owned by that user.
 
     Raises:
-        CannotRun: This is not root, who alone can act as somebody else.
+        CannotRun: This user is not root and cannot act as another user.
     """
     if os.geteuid() != 0:
-        raise CannotRun("only root can install for others and act as one of them")
+        raise CannotRun("only root can install for other users and act as one")
     python = _public_interpreter()
     here = Path(tempfile.mkdtemp(dir=place.folder, prefix="user-"))
     os.chown(here, user, user)
@@ -53,13 +53,13 @@ def _first_commands(place: Place, user: int, has_home: bool) -> str:
 
 
 def _installed(place: Place, folder: Path, python: str) -> Path:
-    """The command `tdac` of a wheel in a folder that only root can write."""
+    """The command `tdac` from a wheel, in a folder that only root can write to."""
     folder.chmod(0o755)
     wheels, venv = place.folder / "wheels", folder / "venv"
     place.run_uv("build", "--quiet", "--wheel", "--out-dir", wheels, place.tree)
     (wheel,) = wheels.glob("*.whl")
     place.run_uv("venv", "--quiet", "--python", python, venv)
-    # As pip does: otherwise every command of another user compiles all that it imports.
+    # As pip does: otherwise every command of another user compiles all its imports.
     compiled = ("--quiet", "--compile-bytecode")
     place.run_uv("pip", "install", *compiled, "--python", venv / "bin/python", wheel)
     return venv / "bin/tdac"

@@ -1,4 +1,4 @@
-"""The folder that the rows work in, with a clone and its virtual environment."""
+"""The working folder of the rows, with a clone and its virtual environment."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class Place:
-    """A working folder below the temporary folder; what a row needs is made once.
+    """The working folder; everything that rows need is created once, on demand.
 
     Attributes:
         folder: The folder.
-        command: What `temporary` and `busy` run in the clone.
+        command: Command that `temporary` and `busy` run in the clone.
     """
 
     def __init__(self, folder: Path, command: list[str]) -> None:
-        # What runs as another user must get here.
+        # Commands that run as another user need access.
         folder.chmod(0o755)
         self.folder = folder
         self.command = command
 
     @functools.cached_property
     def tree(self) -> Path:
-        """A fresh clone of the last commit, or the one that is there already."""
+        """A fresh clone of the last commit, or the existing one."""
         tree = self.folder / "tree"
         if tree.exists():
             return tree
@@ -41,10 +41,10 @@ class Place:
             stdout=subprocess.PIPE,
             check=True,
         ).stdout:
-            print("changes that are not committed are not in the clone", flush=True)
+            print("uncommitted changes are not in the clone", flush=True)
         shared = ROOT.parent / "shared"
         if shared.is_dir():
-            # Where the tests look for maps and worlds of other people.
+            # The tests look here for third-party maps and worlds.
             (self.folder / "shared").symlink_to(shared)
         return tree
 
@@ -58,28 +58,28 @@ class Place:
 
     @functools.cached_property
     def uv(self) -> Path:
-        """uv, in an environment of its own."""
+        """uv, in a separate environment."""
         home = self.folder / "uv"
         run([sys.executable, "-m", "venv", home], cwd=self.folder)
         run([home / "bin/pip", "install", "--quiet", "uv"], cwd=self.folder)
         return home / "bin/uv"
 
     def run_uv(self, *words: str | Path) -> str:
-        """Runs uv with the interpreters that are here."""
+        """Runs uv with the interpreters on this machine."""
         env = {**os.environ, "UV_PYTHON_DOWNLOADS": "never"}
         if links := os.environ.get("PIP_FIND_LINKS"):
             env.setdefault("UV_FIND_LINKS", links)
         return run([self.uv, *words], cwd=self.folder, env=env)
 
     def environment(self, name: str, python: str) -> Path:
-        """The interpreter of a new virtual environment with nothing in it."""
+        """The interpreter of a new, empty virtual environment."""
         venv = self.folder / name
         self.run_uv("venv", "--quiet", "--python", python, venv)
         return venv / "bin/python"
 
 
 def interpreter(version: str) -> str:
-    """An interpreter of a version such as "3.12", of those on PATH and of pyenv's.
+    """An interpreter of a version such as "3.12", from PATH or pyenv.
 
     Raises:
         CannotRun: There is none.
@@ -90,13 +90,13 @@ def interpreter(version: str) -> str:
     for path in (folder / name for folder in folders):
         if path.exists() and _is(path, version):
             return str(path)
-    raise CannotRun(f"there is no {name} on PATH nor among pyenv's versions")
+    raise CannotRun(f"{name} is neither on PATH nor among pyenv's versions")
 
 
 def _is(path: Path, version: str) -> bool:
     """Whether it runs and is that version; a shim may do neither."""
     code = "import sys; print('%d.%d' % sys.version_info[:2])"
-    told = subprocess.run(
+    done = subprocess.run(
         [path, "-c", code], capture_output=True, text=True, check=False
     )
-    return told.stdout.strip() == version
+    return done.stdout.strip() == version

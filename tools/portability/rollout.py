@@ -1,4 +1,4 @@
-"""Drives each environment a little and writes down all that was observed.
+"""Steps each environment and writes all observations and rewards to a file.
 
 python rollout.py FILE
 """
@@ -24,17 +24,17 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
 
 
 def main(file: Path) -> None:
-    """Writes name -> numbers, one name for each environment, alone and as a batch."""
-    told = {}
+    """Writes the numbers by name, for each environment, single and as a batch."""
+    numbers = {}
     for name, arguments in ENVIRONMENTS.items():
-        told[name] = alone(gym.make(name, **arguments))
+        numbers[name] = alone(gym.make(name, **arguments))
         batch = gym.make_vec(name, num_envs=ROBOTS, **arguments)
-        told[f"{ROBOTS} x {name}"] = together(batch)
-    file.write_text(json.dumps(told))
+        numbers[f"{ROBOTS} x {name}"] = together(batch)
+    file.write_text(json.dumps(numbers))
 
 
 def alone(env: gym.Env[Any, Any]) -> list[float]:
-    """All observations and rewards of some episodes."""
+    """All observations and rewards of several episodes."""
     env.action_space.seed(1)
     observation, _ = env.reset(seed=0)
     seen = flat(observation)
@@ -50,7 +50,7 @@ def alone(env: gym.Env[Any, Any]) -> list[float]:
 
 
 def together(envs: gym.vector.VectorEnv[Any, Any, Any]) -> list[float]:
-    """The same of a batch, which begins the next episodes by itself."""
+    """All observations and rewards of a batch with autoreset."""
     envs.action_space.seed(1)
     observations, _ = envs.reset(seed=0)
     seen = flat(observations)
@@ -61,7 +61,7 @@ def together(envs: gym.vector.VectorEnv[Any, Any, Any]) -> list[float]:
 
 
 def flat(observation: dict[str, Any]) -> list[float]:
-    """The numbers of an observation, in the order of its names."""
+    """The numbers of an observation, in the order of its keys."""
     values = (np.ravel(observation[name]) for name in sorted(observation))
     return [float(value) for value in np.concatenate(list(values))]
 

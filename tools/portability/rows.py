@@ -16,13 +16,13 @@ from place import Place
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One thing that must work on other people's machines.
+    """A check that must pass on other people's machines.
 
     Attributes:
-        run: Does it and returns what came of it.
-        what: It runs.
-        drawn: Whether CI may draw it: not what takes a quarter of an hour, nor what CI
-            runs anyway.
+        run: Runs the check and returns a summary.
+        what: What it runs, in words.
+        drawn: Whether CI may draw it: not if it takes a quarter of an hour, or if CI
+            runs it anyway.
     """
 
     run: Callable[[Place], str]
@@ -42,8 +42,10 @@ ROWS = {
     "newest": Row(versions.newest, "tests with the newest versions"),
     "python3.12": Row(versions.python312, "tests on CPython 3.12"),
     "python3.13": Row(versions.python313, "tests on CPython 3.13"),
-    "wheel-user": Row(packaged.wheel_user, "wheel of root's, used by nobody", False),
-    "wheel-nohome": Row(packaged.wheel_nohome, "wheel, user id without name and HOME"),
+    "wheel-user": Row(
+        packaged.wheel_user, "wheel installed by root, used by nobody", False
+    ),
+    "wheel-nohome": Row(packaged.wheel_nohome, "wheel, user id without name or HOME"),
     "qemu-nehalem": Row(emulated.nehalem, "rollout on an emulated Nehalem"),
     "qemu-haswell": Row(emulated.haswell, "rollout on an emulated Haswell"),
     "qemu-aarch64": Row(emulated.aarch64, "rollout on an emulated aarch64"),
@@ -53,9 +55,9 @@ ROWS = {
 
 
 def drawn(seed: str) -> str:
-    """The row that CI runs beside those that it always runs.
+    """The row that CI runs in addition to the fixed ones.
 
     Args:
-        seed: The commit's hash: each row has its turn, and a run can be repeated.
+        seed: The commit's hash, so that rows vary and a run can be repeated.
     """
     return random.Random(seed).choice([name for name in ROWS if ROWS[name].drawn])

@@ -12,7 +12,7 @@ from place import Place
 from walls import hidden
 
 BUSY_LOOPS = 4
-# Of each kind of compiled function a few tests, for without compilation all are slow.
+# Only some tests of each kind of compiled function, because plain Python is slow.
 KERNELS = "tests/envs/map2d/test_kernels.py"
 
 
@@ -23,15 +23,15 @@ def temporary(place: Place) -> str:
 
 
 def busy(place: Place) -> str:
-    """The same while other programs want the processors, too."""
-    _ = place.python  # the installation is not what is tried
+    """The same while other programs load the processors."""
+    _ = place.python  # install before the load starts
     with busy_loops(BUSY_LOOPS):
         return temporary(place)
 
 
 @contextmanager
 def busy_loops(number: int) -> Iterator[None]:
-    """Processes that compute all the time."""
+    """Runs processes that compute all the time."""
     command = [sys.executable, "-c", "while True: pass"]
     loops = [subprocess.Popen(command) for _ in range(number)]
     try:

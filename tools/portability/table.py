@@ -1,4 +1,4 @@
-"""What can come of a row of the table."""
+"""The rows of the table and their outcomes."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ PASSED, FAILED, NOT_RUN = "passed", "failed", "not run"
 
 
 class RowFailed(Exception):
-    """Something was run and did not do what it must."""
+    """A check ran and failed."""
 
 
 class CannotRun(Exception):
-    """This machine lacks something; the text says what."""
+    """The check needs something that this machine lacks; the text names it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,11 @@ class Outcome:
     """One line of the table.
 
     Attributes:
-        row: Its name.
+        row: Name of the row.
         what: What was run.
         result: `PASSED`, `FAILED` or `NOT_RUN`.
-        seconds: How long it took.
-        detail: What came of it, or the reason.
+        seconds: Duration, s.
+        detail: Summary or reason.
     """
 
     row: str
@@ -37,8 +37,8 @@ class Outcome:
 
 
 def told(outcomes: list[Outcome]) -> str:
-    """The table as text, one line a row."""
-    head = ("row", "result", "seconds", "what was run", "what came of it")
+    """The table as text, one line per row."""
+    head = ("row", "result", "seconds", "what was run", "details")
     lines = [head]
     lines += [(o.row, o.result, f"{o.seconds:.0f}", o.what, o.detail) for o in outcomes]
     columns = range(len(head) - 1)
@@ -50,12 +50,12 @@ def told(outcomes: list[Outcome]) -> str:
 
 
 def attempt(name: str, what: str, run: Callable[[], str]) -> Outcome:
-    """The outcome of a row, which this runs.
+    """Runs a row and returns its outcome.
 
     Args:
-        name: Of the row.
-        what: It runs.
-        run: Does it and returns what came of it.
+        name: Name of the row.
+        what: What it runs, in words.
+        run: Runs it and returns a summary.
     """
     began = time.monotonic()
     try:

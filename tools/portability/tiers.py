@@ -1,4 +1,4 @@
-"""Rows that try each tier of the sandbox by its name."""
+"""Rows that test each tier of the sandbox by name."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ for status in available_tiers():
 """
 STANDS_STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 NOT_VERIFIED = 1
-# What goes wrong in one call of a few shall be seen, too.
+# Repeated, to catch failures that occur only now and then.
 TRIES = 3
 
 
@@ -29,26 +29,26 @@ def verdicts(place: Place) -> str:
 
 
 def tiers(place: Place) -> str:
-    """The tests of the sandbox, the zoo's core and the verdicts, likewise."""
+    """The tests of the sandbox, the zoo's core and the verdicts, in the same way."""
     return _without_and_with(place, _tests_and_verdicts)
 
 
 def _without_and_with(place: Place, check: Check) -> str:
-    """Runs a check for the tiers that work; says of each whether it was tried.
+    """Runs a check for the working tiers without bubblewrap, and if possible with it.
 
-    Raises:
-        CannotRun: bubblewrap cannot be had; what was run without it has passed.
+    Returns:
+        A summary that also gives the reason if bubblewrap could not be used.
     """
     env = hidden(place)
-    said = f"bubblewrap hidden: {check(place, env, _working(place, env))}"
+    summary = f"without bubblewrap: {check(place, env, _working(place, env))}"
     try:
         env = shown(place)
     except CannotRun as reason:
-        return f"{said}; not with it: {reason}"
+        return f"{summary}; not with it: {reason}"
     names = _working(place, env)
     if "bubblewrap" not in names:
-        return f"{said}; it does not work here"
-    return f"{said}; shown: {check(place, env, names)}"
+        return f"{summary}; it does not work on this machine"
+    return f"{summary}; with it: {check(place, env, names)}"
 
 
 def _working(place: Place, env: Environment) -> list[str]:
@@ -56,18 +56,18 @@ def _working(place: Place, env: Environment) -> list[str]:
     text = run([place.python, "-c", WORKING], cwd=place.tree, env=env)
     lines = [line.split() for line in text.splitlines() if line.startswith("tier ")]
     if not lines:
-        raise RowFailed("no tier was told")
+        raise RowFailed("no tier was printed")
     return [words[1] for words in lines if words[2] == "works"]
 
 
 def _tests_and_verdicts(place: Place, env: Environment, names: list[str]) -> str:
     python, tree = place.python, place.tree
     tests = ["-m", "pytest", "-q", "-m", "not slow", "tests/agent/sandbox"]
-    said = counted(run([python, *tests], cwd=tree, env=env))
+    counts = counted(run([python, *tests], cwd=tree, env=env))
     for name in names:
         zoo = ["tests/agent/zoo/run.py", "--core", "--tier", name]
         run([python, *zoo], cwd=tree, env=env)
-    return f"{said}, the zoo's core, {_verdicts(place, env, names)}"
+    return f"{counts}, the zoo's core, {_verdicts(place, env, names)}"
 
 
 def _verdicts(place: Place, env: Environment, names: list[str]) -> str:
@@ -76,13 +76,13 @@ def _verdicts(place: Place, env: Environment, names: list[str]) -> str:
     for name in names:
         for _ in range(TRIES):
             run([*verify, good, "--tier", name], cwd=place.folder, env=env)
-        told = [*verify, bad, "--profile", "policy", "--tier", name]
-        run(told, cwd=place.folder, env=env, expect=NOT_VERIFIED)
+        command = [*verify, bad, "--profile", "policy", "--tier", name]
+        run(command, cwd=place.folder, env=env, expect=NOT_VERIFIED)
     return f"verdicts on {' '.join(names)}"
 
 
 def _controllers(place: Place, env: Environment) -> tuple[Path, Path]:
-    """A run folder that is verified, and a controller that does not move."""
+    """A verified run folder, and a controller that does not move."""
     good, bad = place.folder / "good", place.folder / "bad.py"
     if not good.exists():
         synth = [place.python, "-m", "tdac_agent", "synth", "--out", good]

@@ -1,4 +1,4 @@
-"""Rows that run the tests with other versions of what tdac needs, and of Python."""
+"""Rows that run the tests with other versions of Python and of the dependencies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tomllib
 from commands import counted, run
 from place import Place, interpreter
 
-# Comes with gigabytes for graphics cards where no smaller build is offered.
+# These pull in gigabytes for GPUs if no smaller build is available.
 HEAVY = ("torch", "stable-baselines3")
 
 
@@ -41,9 +41,9 @@ def _tests(place: Place, name: str, version: str, *options: str) -> str:
     install = ("pip", "install", "--python", python)
     left_out = ""
     if "nvidia" in place.run_uv(*install, "--dry-run", *heavy):
-        left_out = f"; without {', '.join(HEAVY)}: here they come with some gigabytes"
+        left_out = f"; without {', '.join(HEAVY)}: they would pull in gigabytes"
     else:
-        # What is installed stays, and so the lowest of these is not asked for.
+        # Installed first, so that their lowest versions are not required below.
         place.run_uv(*install, *heavy)
     place.run_uv(*install, *options, "--editable", place.tree, *light)
     tests = ["-m", "pytest", "-q", "-n", "2", "--dist", "loadfile", "-m", "not slow"]
@@ -51,7 +51,7 @@ def _tests(place: Place, name: str, version: str, *options: str) -> str:
 
 
 def test_extra(place: Place) -> list[str]:
-    """What the tests need beside tdac."""
+    """The requirements of the test extra."""
     project = tomllib.loads((place.tree / "pyproject.toml").read_text())["project"]
     needed: list[str] = project["optional-dependencies"]["test"]
     return needed

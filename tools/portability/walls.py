@@ -1,4 +1,4 @@
-"""PATH without bubblewrap, and PATH with it."""
+"""Environments with and without bubblewrap on PATH."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ PROGRAM = "bwrap"
 
 
 def hidden(place: Place) -> dict[str, str]:
-    """This environment, with a PATH on which there is no bubblewrap.
+    """This environment, with a PATH without bubblewrap.
 
-    A folder of PATH that has it is replaced by one with links to all else in it.
+    A folder of PATH that contains it is replaced by one with links to everything else.
     """
     folders = []
     for number, folder in enumerate(os.get_exec_path()):
@@ -39,10 +39,10 @@ def _links_to_all_else(place: Place, number: int, folder: str) -> str:
 
 
 def shown(place: Place) -> dict[str, str]:
-    """This environment, with a PATH on which there is bubblewrap.
+    """This environment, with a PATH with bubblewrap.
 
     Raises:
-        CannotRun: There is none and it cannot be fetched.
+        CannotRun: It is not installed and cannot be fetched.
     """
     if shutil.which(PROGRAM) is not None:
         return own_environment()
