@@ -1,4 +1,4 @@
-"""Robot controllers that are written, tested and repaired until they are verified."""
+"""Write, test and repair robot controllers until they are verified."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = [
     "verify_robust",
 ]
 
-_HOME = {
+_MODULE_OF = {
     "Disturbance": "tasks.disturbance",
     "Evaluation": "evaluation.evaluation_report",
     "Policy": "evaluation.policy",
@@ -56,12 +56,12 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    """Imports a part on first use."""
-    if name not in _HOME:
+    """Imports a public name on first use."""
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'tdac_agent' has no attribute {name!r}")
-    return getattr(import_module(f"tdac_agent.{_HOME[name]}"), name)
+    return getattr(import_module(f"tdac_agent.{_MODULE_OF[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    """What there is, imported yet or not."""
+    """All public names, imported yet or not."""
     return sorted({*globals(), *__all__})

@@ -1,13 +1,13 @@
-"""Entry point of the `tdac` script, and of `python -m tdac_agent`."""
+"""Entry point of the `tdac` script and of `python -m tdac_agent`."""
 
 import gc
 import sys
 
 
 def main() -> None:
-    """The command line; Ctrl-C while that is still being loaded is a line as well."""
+    """Runs the command line; Ctrl-C during its imports prints one line, too."""
     try:
-        # What is loaded stays: nothing of it is worth collecting.
+        # Imported objects live until exit: collecting them is a waste of time.
         gc.disable()
         from tdac_agent.cli.main import main as command_line
 

@@ -1,6 +1,6 @@
-"""What may be spent: the worst case of a call is reserved before the call is made.
+"""Spending limits: the worst case of a call is reserved before the call is made.
 
-The public face of `tdac_agent.models.budget`.
+The public names of `tdac_agent.models.budget`.
 """
 
 from tdac_agent.models.budget import (

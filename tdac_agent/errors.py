@@ -10,12 +10,12 @@ class RunError(TdacError):
 
 
 class ControllerFileError(TdacError):
-    """A controller file cannot be read."""
+    """A controller, policy or output file cannot be read or written."""
 
 
 class ProviderError(TdacError):
-    """A model cannot be chosen as it was: unknown, incomplete, no key, no package."""
+    """A model cannot be used: unknown or incomplete name, missing key or package."""
 
 
 class Fault(Exception):
-    """Neither pass nor fail: the sandbox, the suite or a provider is broken."""
+    """No verdict is possible: the sandbox, the suite or a provider is broken."""

@@ -1,6 +1,6 @@
-"""The contract with whatever writes controllers: a language model or `builtin`.
+"""The interface of a controller writer: a language model or `builtin`.
 
-The public face of `tdac_agent.models.provider`.
+The public names of `tdac_agent.models.provider`.
 """
 
 from tdac_agent.models.provider import (

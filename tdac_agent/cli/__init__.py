@@ -1,1 +1,1 @@
-"""The command line: one module per command, another for its flags."""
+"""The command line: one module per command, and one for its flags."""

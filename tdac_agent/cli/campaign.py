@@ -1,4 +1,4 @@
-"""`tdac campaign`: a live table, then the metrics, and what did not come to its end."""
+"""`tdac campaign`: a live table, then the metrics and the unfinished runs."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ FOLDER = Path("campaigns")
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the command was asked for.
+    """The settings of a `tdac campaign` command.
 
     Attributes:
-        given: The campaign's file, or the name of a shipped one.
-        limits: `max_cost` and `max_tokens`, where they are not the file's.
+        given: Campaign file, or name of a bundled campaign.
+        limits: `max_cost` and `max_tokens` that override those of the file.
         executor: `local` or `ray`.
-        workers: Runs at a time.
-        shard: Part of all runs, `i/n`.
-        out: The campaign's folder.
-        trust: Whether the file may run, and reach, what it names.
-        key_over_http: Whether a key may go to another machine unencrypted.
+        workers: Number of concurrent runs; None for one per CPU core.
+        shard: Share of the runs, `i/n`.
+        out: Campaign folder; None for `campaigns/NAME`.
+        trust: Whether the file may run and contact everything it names.
+        key_over_http: Whether an API key may be sent unencrypted to another machine.
     """
 
     given: str
@@ -57,11 +57,11 @@ class Wanted:
     key_over_http: bool = False
 
     def folder(self, config: CampaignConfig) -> Path:
-        """The campaign's folder, by default one of its name."""
+        """The campaign folder."""
         return self.out or FOLDER / config.name
 
     def command(self) -> str:
-        """The words that go on with it."""
+        """The command line that continues the campaign."""
         words = ["tdac", "campaign", self.given]
         flags = {"--workers": self.workers, "--out": self.out}
         flags |= {f"--{name.replace('_', '-')}": v for name, v in self.limits.items()}
@@ -75,7 +75,7 @@ class Wanted:
 
 
 def run(wanted: Wanted, as_json: bool) -> int:
-    """Carries out a campaign and prints; returns the exit code."""
+    """Runs a campaign and prints its progress and results; returns the exit code."""
     console = make_console(stderr=as_json)
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
     config = with_limits(read_config(file), wanted.limits)
@@ -91,45 +91,45 @@ def run(wanted: Wanted, as_json: bool) -> int:
             keep=config.keep,
             key_over_http=wanted.key_over_http,
         )
-        progress, left = look(plan, shard, terms.runs)
-        check_models(plan, left, config, key_over_http=wanted.key_over_http)
-        _tell_heading(console, config, progress, folder)
-        _tell_remarks(console, plan, terms)
+        progress, remaining = look(plan, shard, terms.runs)
+        check_models(plan, remaining, config, key_over_http=wanted.key_over_http)
+        _print_heading(console, config, progress, folder)
+        _print_notes(console, plan, terms)
         try:
-            if left:
-                _make(progress, left, terms, wanted.executor, console)
+            if remaining:
+                _run_remaining(progress, remaining, terms, wanted.executor, console)
         finally:
-            # With pandas and scipy, which take seconds: a refusal does without.
+            # Imported late: pandas and scipy take seconds to load.
             from tdac_agent.campaign.collect import collect, write_tables
             from tdac_agent.cli.campaign_summary import show_summary
 
             summary = write_tables(collect(plan, terms.runs), folder)
             show_summary(summary, console)
-            _tell_ending(console, progress, folder, wanted)
+            _print_ending(console, progress, folder, wanted)
     if as_json:
         sys.stdout.write(json.dumps(_as_json(progress, folder), indent=2) + "\n")
     return _exit_code(progress)
 
 
 def with_limits(config: CampaignConfig, limits: dict[str, Any]) -> CampaignConfig:
-    """A campaign with the limits of the command line."""
+    """The campaign with the limits given on the command line."""
     return config.model_copy(update=limits)
 
 
 def check_models(
     plan: Plan,
-    left: Iterable[PlannedRun],
+    remaining: Iterable[PlannedRun],
     config: CampaignConfig,
     *,
     key_over_http: bool = False,
 ) -> None:
-    """Makes each model once, so that a missing key is known before the night.
+    """Creates each model once, so that a missing key is reported before the first run.
 
     Raises:
-        ProviderError: With all that is missing.
+        ProviderError: A model cannot be used; the message lists all that is missing.
     """
     models: list[Provider] = []
-    for cell in dict.fromkeys(planned.cell for planned in left):
+    for cell in dict.fromkeys(planned.cell for planned in remaining):
         setting = plan.tasks[cell.task].setting
         models += choose_models(
             cell.learner,
@@ -141,15 +141,15 @@ def check_models(
     bounds_of(models, tariffs_of(models), config.max_cost, config.max_tokens)
 
 
-def _make(
+def _run_remaining(
     progress: Progress,
-    left: list[PlannedRun],
+    remaining: list[PlannedRun],
     terms: Terms,
     executor: str,
     console: Console,
 ) -> None:
     with LiveView(console, progress, terms) as view:
-        carry_out(progress, left, terms, _executor(executor), view.saw)
+        carry_out(progress, remaining, terms, _executor(executor), view.saw)
 
 
 def _executor(name: str) -> Executor:
@@ -162,7 +162,7 @@ def _executor(name: str) -> Executor:
     return run_locally
 
 
-def _tell_heading(
+def _print_heading(
     console: Console, config: CampaignConfig, progress: Progress, folder: Path
 ) -> None:
     kinds = len(progress.tallies)
@@ -172,22 +172,22 @@ def _tell_heading(
         soft_wrap=True,
     )
     if progress.before == progress.planned:
-        console.print("all of them have come to their end before; nothing was done")
+        console.print("all runs have already finished; nothing was done")
     elif progress.before:
-        console.print(f"going on: {progress.before} have come to their end before")
+        console.print(f"continuing: {progress.before} have already finished")
 
 
-def _tell_remarks(console: Console, plan: Plan, terms: Terms) -> None:
+def _print_notes(console: Console, plan: Plan, terms: Terms) -> None:
     for line in model_warnings(models_of(plan.cells)):
         tell(console, f"note: {line}", "yellow")
     others = foreign(plan, terms.runs)
     if others:
-        told = f"{len(others)} other kinds of run are in {terms.runs}: of an earlier "
-        told += "file, task, suite or version; they are left alone"
-        tell(console, f"note: {told}", "yellow")
+        kinds = f"{len(others)} other kind{'' if len(others) == 1 else 's'} of run"
+        note = f"ignoring {kinds} in {terms.runs}: of an earlier file, task, suite or"
+        tell(console, f"note: {note} version", "yellow")
 
 
-def _tell_ending(
+def _print_ending(
     console: Console, progress: Progress, folder: Path, wanted: Wanted
 ) -> None:
     for problem, count in progress.problems.most_common():
@@ -195,12 +195,13 @@ def _tell_ending(
     console.print(told_counts(progress), soft_wrap=True)
     console.print(
         f"  tables: {folder}/runs.csv, candidates.csv, summary.csv\n"
-        f"  look: tdac report {shlex.quote(str(folder))}",
+        f"  HTML report: tdac report {shlex.quote(str(folder))}",
         soft_wrap=True,
     )
     if progress.finished < progress.planned:
-        more = " with a greater --max-cost" if progress.exhausted else ""
-        console.print(f"  go on{more}: {escape(wanted.command())}", soft_wrap=True)
+        more = " with a higher --max-cost" if progress.exhausted else ""
+        command = escape(wanted.command())
+        console.print(f"  to continue{more}: {command}", soft_wrap=True)
 
 
 def _as_json(progress: Progress, folder: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`tdac campaign --dry-run`: the runs, and what they can cost at most."""
+"""`tdac campaign --dry-run`: the runs and their maximum cost."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.outlook import Outlook, foresee
 
 LEGEND = (
-    "K iterations with up to J repairs each; asked: questions of all runs if nothing "
-    "ever passes; USD if each is answered at once, and if each answer has to be asked "
-    "for three times"
+    "K: iterations; J: repairs per iteration; asked: questions of all runs if no "
+    "controller ever passes; USD at most: each question is asked once; asked 3 times: "
+    "each question is asked three times"
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What a kind of run can cost.
+    """The maximum cost of one kind of run.
 
     Attributes:
-        kind: Its folder.
-        runs: How many.
+        kind: Folder name of the kind.
+        runs: Number of runs.
         iterations: K.
         patience: J.
-        questions: Of all runs, if nothing ever passes.
-        cost_once: USD at most, each question being answered at once; None if unknown.
-        cost_most: USD at most, each answer being asked for three times.
+        questions: Number of questions of all runs if no controller ever passes.
+        cost_once: USD at most if each question is asked once; None if unknown.
+        cost_most: USD at most if each question is asked three times; None if unknown.
     """
 
     kind: str
@@ -54,10 +54,10 @@ class Row:
 
 
 def run(wanted: Wanted, as_json: bool) -> int:
-    """Prints the plan; no model is asked, no key is needed, nothing is written.
+    """Prints the plan and returns 0; asks no model, needs no key, writes nothing.
 
     Args:
-        wanted: What the command was asked for.
+        wanted: Settings of the command.
         as_json: Whether to print JSON.
     """
     console = make_console(stderr=as_json)
@@ -79,8 +79,8 @@ def run(wanted: Wanted, as_json: bool) -> int:
     console.print(_table([t.cell for t in progress.tallies.values()], rows))
     tell(console, LEGEND, "dim")
     if progress.before:
-        done = f"{progress.before} of {progress.planned} runs have come to their end"
-        tell(console, f"{done} before, and are counted here, too: {folder}")
+        done = f"{progress.before} of {progress.planned} runs in {folder} have already"
+        tell(console, f"{done} finished; they are counted above, too")
     for line in _lines(rows, config.max_cost, config.max_tokens, prices):
         tell(console, line)
     for line in model_warnings(models_of(plan.cells)):
@@ -138,14 +138,14 @@ def _lines(
     unknown = costs.count(None)
     total = sum(cost for cost in costs if cost is not None)
     if total or unknown:
-        kinds = f", without {unknown} kinds whose price is unknown" if unknown else ""
+        kinds = f", excluding {unknown} kinds of unknown price" if unknown else ""
         lines.append(
-            f"if nothing ever passes: at most {told_usd(total)}{kinds}; a run that is "
-            "verified soon costs a small part of that"
+            f"if no controller ever passes: at most {told_usd(total)}{kinds}; a run "
+            "that is verified early costs a small part of that"
         )
         bounds = [told_usd(max_cost)] if max_cost is not None else []
         bounds += [f"{max_tokens} tokens"] if max_tokens is not None else []
-        lines.append(f"all runs together stop at {' and '.join(bounds) or 'nothing'}")
+        lines.append(f"limit of all runs together: {' and '.join(bounds) or 'none'}")
         lines.append(f"prices of {prices.dated}: {price_file()}")
     return lines
 

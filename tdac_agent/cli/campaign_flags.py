@@ -20,38 +20,38 @@ def campaign(
     config: Annotated[
         str,
         typer.Argument(
-            metavar="CONFIG", help="A YAML file, or the name of a shipped one."
+            metavar="CONFIG", help="Campaign YAML file, or name of a bundled campaign."
         ),
     ],
     executor: Annotated[
         Literal["local", "ray"],
-        typer.Option(help="Processes of this machine, or tasks of a Ray cluster."),
+        typer.Option(help="Processes on this machine, or tasks on a Ray cluster."),
     ] = "local",
     workers: Annotated[
         Optional[int],  # noqa: UP045 - typer reads it at run time
         typer.Option(
             min=1,
             metavar="N",
-            help="Runs at a time; more than cores where they wait for models.  "
-            "[default: one a core]",
+            help="Concurrent runs; more than there are cores if they wait for models.  "
+            "[default: one per core]",
         ),
     ] = None,
     shard: Annotated[
         str,
         typer.Option(
-            metavar="I/N", help="Every N-th run from the I-th: a machine's part."
+            metavar="I/N", help="Make every N-th run from the I-th: one of N machines."
         ),
     ] = "1/1",
     out: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
-            "--out", metavar="DIR", help="Its folder.  [default: campaigns/NAME]"
+            "--out", metavar="DIR", help="Campaign folder.  [default: campaigns/NAME]"
         ),
     ] = None,
     dry_run: Annotated[
         bool,
         typer.Option(
-            "--dry-run", help="Print the runs and what they cost at most; makes none."
+            "--dry-run", help="Print the runs and their maximum cost; make none."
         ),
     ] = False,
     max_cost: Annotated[
@@ -61,7 +61,7 @@ def campaign(
             min=0.0,
             callback=finite_cost,
             metavar="USD",
-            help="Of all runs together.  [default: the file's]",
+            help="Limit of all runs together.  [default: the file's]",
             rich_help_panel=BUDGET,
         ),
     ] = None,
@@ -71,7 +71,8 @@ def campaign(
             "--max-tokens",
             min=0,
             metavar="N",
-            help="Of all runs together.  [default: the file's]",
+            help="Limit of all runs together, input plus output tokens.  "
+            "[default: the file's]",
             rich_help_panel=BUDGET,
         ),
     ] = None,
@@ -79,9 +80,9 @@ def campaign(
     key_over_http: KeyOverHttp = False,
     as_json: Json = False,
 ) -> None:
-    """Make many runs: learners × optimizers × tasks × settings × R, and their tables.
+    """Make R runs of each task × learner × optimizer × prompt × setting.
 
-    The same command goes on where the last one ended; a finished run is never repeated.
+    The same command continues an interrupted campaign; finished runs are not repeated.
     """
     from tdac_agent.cli import campaign as command
 

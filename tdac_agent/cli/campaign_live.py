@@ -1,4 +1,4 @@
-"""A campaign while it goes on: a table on a terminal, lines in a file."""
+"""Live progress of a campaign: a table on a terminal, lines in a file."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import tell
 
 FRAME_LINES = 10
-"""Around the rows of the table."""
+"""Screen lines outside the rows of the table."""
 BAR_WIDTH = 60
 
 
 class LiveView:
-    """What a campaign shows of itself. A context manager.
+    """Context manager that shows the progress of a campaign.
 
     Args:
-        console: Where to.
-        progress: Of the campaign.
-        terms: What its runs share.
+        console: Console to print to.
+        progress: Progress of the campaign.
+        terms: Settings that all runs share.
     """
 
     def __init__(self, console: Console, progress: Progress, terms: Terms) -> None:
@@ -63,11 +63,11 @@ class LiveView:
             self._live.stop()
 
     def saw(self, update: Update) -> None:
-        """Tells what stays on the screen."""
+        """Prints the lines that stay on the screen."""
         match update:
             case Died():
-                told = f"the process of {update.planned.name} died: {update.reason}"
-                tell(self._console, f"{told}; it goes on", "yellow")
+                death = f"the process of {update.planned.name} died: {update.reason}"
+                tell(self._console, f"{death}; a new one continues its run", "yellow")
             case Ended() if not self._console.is_terminal:
                 self._console.print(self._line(update.outcome), soft_wrap=True)
             case Ended() if not update.outcome.finished:
@@ -78,25 +78,25 @@ class LiveView:
         why = f": {outcome.reason}" if outcome.reason else ""
         done = f"[{self._progress.finished}/{self._progress.planned}]"
         colour = COLOURS.get(outcome.status, "yellow")
-        told = f"{outcome.status}{at}, {told_time(outcome.seconds)}{why}"
-        return f"{escape(done)} {escape(outcome.name)} [{colour}]{escape(told)}[/]"
+        status = f"{outcome.status}{at}, {told_time(outcome.seconds)}{why}"
+        return f"{escape(done)} {escape(outcome.name)} [{colour}]{escape(status)}[/]"
 
     def _render(self) -> RenderableType:
         doing = sorted(self._progress.doing.values(), key=lambda one: one.since)
         room = max(3, self._console.height - FRAME_LINES - len(doing))
         tallies = list(self._progress.tallies.values())
-        shown = sorted(tallies, key=self._interest)[:room]
+        shown = sorted(tallies, key=self._sort_key)[:room]
         table = self._table(tally for tally in tallies if tally in shown)
         more = len(tallies) - len(shown)
         others = [f"[dim]and {more} more kinds of run[/]"] if more else []
         counts = told_counts(self._progress, going=True)
-        return Group(table, *others, self._doing(doing), self._bar(), counts)
+        return Group(table, *others, self._current_runs(doing), self._bar(), counts)
 
-    def _interest(self, tally: Tally) -> tuple[bool, bool, bool]:
-        """Kinds under way first, then those with something wrong, then unfinished."""
-        at_work = {one.planned.cell.folder for one in self._progress.doing.values()}
+    def _sort_key(self, tally: Tally) -> tuple[bool, bool, bool]:
+        """Sort key: running kinds first, then those with halted runs, then unfinished."""
+        running = {one.planned.cell.folder for one in self._progress.doing.values()}
         unfinished = tally.finished < tally.planned
-        return tally.cell.folder not in at_work, not tally.halted, not unfinished
+        return tally.cell.folder not in running, not tally.halted, not unfinished
 
     def _table(self, tallies: Iterable[Tally]) -> Table:
         spent = ("tokens", "USD") if self._paid else ()
@@ -109,8 +109,8 @@ class LiveView:
             table.add_row(*map(escape, self._labels.of(tally.cell)), *figures)
         return table
 
-    def _doing(self, doing: Iterable[Doing]) -> Table:
-        """What is under way: which run, for how long, and what it is at."""
+    def _current_runs(self, doing: Iterable[Doing]) -> Table:
+        """The current runs: name, elapsed time and current activity."""
         grid = Table.grid(padding=(0, 2, 0, 0))
         grid.add_column(overflow="fold")
         grid.add_column(justify="right", no_wrap=True)
@@ -124,7 +124,7 @@ class LiveView:
     def _bar(self) -> Padding:
         progress = self._progress
         bar = ProgressBar(progress.planned, progress.finished, BAR_WIDTH)
-        return Padding(bar, (1, 0, 0, 0))  # which ends the bar's line, too
+        return Padding(bar, (1, 0, 0, 0))  # the padding also ends the bar's line
 
 
 def _counts(tally: Tally) -> list[str]:

@@ -14,11 +14,11 @@ from tdac_agent.cli.console import Console
 from tdac_agent.metrics import Rate
 
 WIDE = 110
-"""Columns in which a rate and its interval are beside each other."""
+"""Console width from which a rate and its interval share a line."""
 
 
 def show_summary(summary: pd.DataFrame, console: Console) -> None:
-    """Prints the metrics of each kind of run that there is."""
+    """Prints the metrics of each kind of run."""
     if summary.empty:
         return
     names = [*ALWAYS]
@@ -28,21 +28,20 @@ def show_summary(summary: pd.DataFrame, console: Console) -> None:
     between = " " if console.width >= WIDE else "\n"
     rows = summary.to_dict("records")
     figures = [_figures(row, between) for row in rows]
-    # A column in which nobody has anything is left out.
-    told = [name for name in figures[0] if any(one[name] for one in figures)]
-    table = make_table(names, told)
-    for row, known in zip(rows, figures, strict=True):
+    shown = [name for name in figures[0] if any(one[name] for one in figures)]
+    table = make_table(names, shown)
+    for row, figure in zip(rows, figures, strict=True):
         labels = [Path(str(row[n])).name if n == "prompt" else row[n] for n in names]
-        table.add_row(*(escape(str(n)) for n in labels), *(known[n] for n in told))
+        table.add_row(*(escape(str(n)) for n in labels), *(figure[n] for n in shown))
     console.print(table)
-    remark = "95 % intervals, and τ, the mean iteration of success: docs/metrics.md"
-    if "tokens" in told:
-        remark += "\ntokens and USD: each verified run's share of all"
-    console.print(f"[dim]{remark}[/]", soft_wrap=True)
+    legend = "95 % intervals; τ: mean iteration of success (docs/metrics.md)"
+    if "tokens" in shown:
+        legend += "\ntokens and USD: of all runs, per verified run"
+    console.print(f"[dim]{legend}[/]", soft_wrap=True)
 
 
 def _figures(row: dict[Any, Any], between: str) -> dict[str, str]:
-    """What the table says of a kind, by column; nothing where there is nothing."""
+    """The cells of a kind of run by column; empty where there is no value."""
     done, halted = row["verified"], int(row["censored"])
     cost = row["cost_per_verified"] if row["tokens_per_verified"] > 0 else math.nan
     verified = f"[{'green' if done else 'red'}]{done}[/]/{row['R']}"
@@ -65,5 +64,5 @@ def _number(value: float, form: str) -> str:
 
 def _rate(row: dict[Any, Any], name: str, between: str) -> str:
     low, high = row[f"{name}_low"], row[f"{name}_high"]
-    told = str(Rate(row[name], 0, 0, low, high, "")).replace(" ", between, 1)
-    return escape(told)
+    rate = str(Rate(row[name], 0, 0, low, high, ""))
+    return escape(rate.replace(" ", between, 1))

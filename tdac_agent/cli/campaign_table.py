@@ -1,4 +1,4 @@
-"""Tables of kinds of run, and how far a campaign is in a line."""
+"""Tables of kinds of run, and a one-line summary of a campaign's progress."""
 
 from __future__ import annotations
 
@@ -17,35 +17,35 @@ from tdac_agent.models.budget import told_usd
 COLOURS = {"verified": "green", "not verified": "red"}
 LABEL_WIDTH = 6
 FILE_WIDTH = 130
-"""Of tables that are written into a file."""
+"""Least width of tables that are written to a file."""
 ALWAYS = ("task", "learner")
 SOMETIMES = ("optimizer", "prompt", "setting")
 
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """What tells the kinds of run of a campaign apart.
+    """The labels that distinguish the kinds of run of a campaign.
 
     Attributes:
-        names: Of the columns.
+        names: Names of the label columns.
     """
 
     names: tuple[str, ...]
 
     def of(self, cell: Cell) -> list[str]:
         """The labels of a kind of run."""
-        known = {
+        labels = {
             "task": cell.task_name,
             "learner": cell.learner,
             "optimizer": cell.optimizer,
             "prompt": Path(cell.prompt).name,
             "setting": cell.setting,
         }
-        return [known[name] for name in self.names]
+        return [labels[name] for name in self.names]
 
 
 def labels_of(cells: Sequence[Cell]) -> Labels:
-    """Task and learner, and what else is not the same in all."""
+    """Labels for task, learner and every other setting that varies."""
     rows = [(c.optimizer != c.learner, c.optimizer, c.prompt, c.setting) for c in cells]
     other = any(row[0] for row in rows)
     varied = {"optimizer": other, "prompt": _several(rows, 2)}
@@ -58,7 +58,7 @@ def _several(rows: Sequence[tuple[object, ...]], column: int) -> bool:
 
 
 def make_console(*, stderr: bool) -> Console:
-    """A console; a file has room for wide tables."""
+    """A console; at least `FILE_WIDTH` wide if it writes to a file."""
     console = Console(stderr=stderr, highlight=False)
     if not console.is_terminal:
         console.width = max(console.width, FILE_WIDTH)
@@ -66,7 +66,7 @@ def make_console(*, stderr: bool) -> Console:
 
 
 def make_table(labels: Iterable[str], figures: Iterable[str]) -> Table:
-    """A table of kinds of run; where it is narrow, the labels are folded."""
+    """An empty table of kinds of run; a narrow console folds the labels."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for name in labels:
         table.add_column(name, overflow="fold", min_width=LABEL_WIDTH)
@@ -76,11 +76,11 @@ def make_table(labels: Iterable[str], figures: Iterable[str]) -> Table:
 
 
 def told_counts(progress: Progress, *, going: bool = False) -> str:
-    """How far a campaign is, in a line."""
+    """The progress of a campaign in one line; `going` if it is still running."""
     parts = [f"[bold]{progress.finished} of {progress.planned}[/] runs have ended"]
     if going:
-        parts.append(f"{len(progress.doing)} at work")
-        parts.append(f"{told_time(progress.seconds)} gone")
+        parts.append(f"{len(progress.doing)} running")
+        parts.append(f"{told_time(progress.seconds)} elapsed")
         left = progress.seconds_left
         parts.append("" if left is None else f"about {told_time(left)} left")
     elif progress.now:
@@ -95,7 +95,7 @@ def told_counts(progress: Progress, *, going: bool = False) -> str:
 
 
 def told_time(seconds: float) -> str:
-    """A time for people: `41 s`, `12:05 min`, `7:30 h`."""
+    """A duration in readable form: `41 s`, `12:05 min`, `7:30 h`."""
     whole = round(seconds)
     if whole < 100:
         return f"{seconds:.1f} s" if whole < 10 else f"{whole} s"

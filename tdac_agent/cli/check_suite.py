@@ -1,4 +1,4 @@
-"""`tdac check-suite`."""
+"""`tdac check-suite`: tests a suite with a reference and with bad controllers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def run(
     repeats: int,
     as_json: bool,
 ) -> int:
-    """Checks a suite and prints; returns the exit code."""
+    """Checks a suite and prints the result; returns the exit code."""
     check_tier(tier)
     console = Console(stderr=as_json)
     with WarmJudge() as judge, console.status("preparing the task …") as status:
@@ -68,13 +68,13 @@ def _show(check: SuiteCheck, task: str, console: Console) -> None:
 
 
 def _table(check: SuiteCheck) -> Table:
-    """The controllers, a row each."""
-    table = Table(title="Controllers that put the suite to the proof")
+    """One row per controller."""
+    table = Table(title="The suite on the reference and on bad controllers")
     table.title_justify = "left"
-    for name in ("controller", "must", "did"):
+    for name in ("controller", "expected", "result"):
         table.add_column(name)
     table.add_column("repeats agree", justify="right")
-    table.add_column("fails")
+    table.add_column("failed tests")
     for row in check.rows:
         good = row.controller == REFERENCE
         right = row.passed == (row.repeats if good else 0)
@@ -82,19 +82,19 @@ def _table(check: SuiteCheck) -> Table:
         table.add_row(
             row.controller,
             "pass" if good else "fail",
-            f"[{colour}]{_did(row)}[/]",
+            f"[{colour}]{_result(row)}[/]",
             "[red]no[/]" if row.disagreements else f"{row.repeats}",
-            escape(_shown(row)),
+            escape(_failed_tests(row)),
         )
     return table
 
 
-def _did(row: Row) -> str:
+def _result(row: Row) -> str:
     if 0 < row.passed < row.repeats:
         return f"pass {row.passed} of {row.repeats}"
     return "pass" if row.passed else "fail"
 
 
-def _shown(row: Row) -> str:
+def _failed_tests(row: Row) -> str:
     names = [test.partition("::")[2] for test in row.failures]
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")

@@ -34,11 +34,14 @@ def check_suite(
     tier: Tier = "auto",
     seed: JitterSeed = None,
     repeats: Annotated[
-        int, typer.Option(min=1, help="Verifications of each, which must agree.")
+        int,
+        typer.Option(
+            min=1, metavar="N", help="Verifications per controller; they must agree."
+        ),
     ] = 5,
     as_json: Json = False,
 ) -> None:
-    """Let a suite prove itself: a reference must pass it, bad controllers must not."""
+    """Check a suite: a reference controller must pass it, bad ones must fail it."""
     with begun():
         from tdac_agent.cli import check_suite as command
 

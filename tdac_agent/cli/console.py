@@ -1,4 +1,4 @@
-"""The console of all commands."""
+"""The console that all commands print to."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tdac_agent.storage.plain import printable
 
 
 class Console(rich.console.Console):
-    """A rich console on which no text can steer the terminal; rich itself can.
+    """A rich console that filters all text, so that only rich controls the terminal.
 
     Args:
-        stderr: Whether it writes there and not to stdout.
-        highlight: Whether numbers and paths are coloured.
+        stderr: Whether to write to stderr instead of stdout.
+        highlight: Whether to colour numbers and paths.
     """
 
     def __init__(self, *, stderr: bool = False, highlight: bool = True) -> None:
@@ -28,13 +28,13 @@ class Console(rich.console.Console):
         super().__init__(file=stream, stderr=stderr, highlight=highlight, emoji=False)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Reads markup as rich does; filtered already, a text is laid out as it is."""
+        """Parses markup as rich does; filters the text before rich lays it out."""
         return super().render_str(printable(text), **options)
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Renders as rich does; every text passes the filter on its way."""
+        """Renders as rich does; filters the text of each segment."""
         for segment in super().render(renderable, options):
             if segment.control:
                 yield segment

@@ -1,4 +1,4 @@
-"""`tdac demo`: a recorded run of a language model again, with the tests made live."""
+"""`tdac demo`: replays a recorded run of a language model with live tests."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from tdac_agent.runs.replay import DEMO
 from tdac_agent.tasks.task import load_task
 
 _ABOUT = (
-    "A language model's answers to the [bold]{prompt}[/] prompt for the task "
-    "[bold]{task}[/], recorded {date}: unedited, each from a fresh conversation that "
-    "held the printed prompt alone. The controllers run, and every test is made, here "
-    "and now; where that makes a question other than it was then, a line says so. By "
-    "hand:\n"
+    "Replaying a language model's answers to the [bold]{prompt}[/] prompt for the task "
+    "[bold]{task}[/], recorded {date}. They are unedited; each is from a fresh "
+    "conversation that contained only the printed prompt. The controllers and all "
+    "tests run live on this machine; a line marks each question that therefore differs "
+    "from the recorded one. The same by hand:\n"
     "  tdac synth --task {task} --prompt {prompt} --learner replay:demo\n"
 )
 
 
 def run(out: Path | None, as_json: bool) -> int:
-    """Replays the shipped run; returns the exit code.
+    """Replays the bundled run; returns the exit code.
 
     Args:
         out: Run folder; the next free one by default.
-        as_json: Whether to print the record.
+        as_json: Whether to print the run record as JSON.
     """
     console = Console(stderr=as_json)
     recorded = load_run(DEMO)

@@ -1,4 +1,4 @@
-"""`tdac doctor`: what works on this machine, by trying it."""
+"""`tdac doctor`: tries what works on this machine."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ PACKAGES = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-head
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that was tried.
+    """The result of one check.
 
     Attributes:
-        name: What.
-        works: Whether it works here.
-        detail: How, or why not and what to do.
-        needed: Whether nothing works without it.
+        name: Name of the check.
+        works: Whether it passed.
+        detail: What works, or why it does not and what to do.
+        needed: Whether tdac is unusable without it.
     """
 
     name: str
@@ -55,9 +55,9 @@ class Check:
 
 
 def run(as_json: bool) -> int:
-    """Tries everything and prints it; 3 where something needed does not work."""
+    """Prints the results of all checks; returns 3 if a required one failed, else 0."""
     checks = [*_sandbox(), *_trials(), _window(), *_extras(), *_keys()]
-    # These load what has been tried above, which would end this process, too.
+    # Last: this imports what the trials tried, and a crash would end this process.
     checks += _models() if _usable(checks) else []
     if as_json:
         record = {
@@ -71,7 +71,7 @@ def run(as_json: bool) -> int:
 
 
 def _usable(checks: list[Check]) -> bool:
-    """Whether everything works that is needed."""
+    """Whether all required checks passed."""
     return all(check.works for check in checks if check.needed)
 
 
@@ -86,18 +86,18 @@ def _sandbox() -> list[Check]:
     works = (s.tier.name for s in tiers if s.works and s.tier.promises)
     best = next(works, None)
     detail = best or (
-        "none: controllers run only with --tier rlimits, unconfined; "
+        "none: controllers run only unconfined, with --tier rlimits; "
         "on Debian and Ubuntu: apt install bubblewrap"
     )
     return [*checks, Check("sandbox in use", best is not None, detail, needed=True)]
 
 
 def _trials() -> list[Check]:
-    """What a first hour needs, tried; films are no part of what is needed."""
+    """Results of the trials, each run in its own process."""
     checks = []
-    with Console(stderr=True).status("") as told:
+    with Console(stderr=True).status("") as status:
         for title, name, needed in TRIALS:
-            told.update(f"trying {title}; the first time it is compiled …")
+            status.update(f"trying {title} (compiles on first use) …")
             checks.append(Check(title, *attempt(name), needed))
     return checks
 
@@ -106,7 +106,7 @@ def _window() -> Check:
     if importlib.util.find_spec("pygame") is None:
         return Check("window", False, install_command("human"))
     if not has_display():
-        return Check("window", False, "no display here; videos work without one")
+        return Check("window", False, "no display; videos work without one")
     return Check("window", True, "pygame")
 
 
@@ -120,17 +120,17 @@ def _extras() -> list[Check]:
 
 
 def _keys() -> list[Check]:
-    """Whether there are keys; never what they are, nor whether they are accepted."""
+    """Whether API keys are set; does not print or validate them."""
     checks = []
     for name in KEYS:
-        there = bool(os.environ.get(name, "").strip())
-        detail = "set" if there else f"optional: set {name} to use these models"
-        checks.append(Check(f"key {name}", there, detail))
+        is_set = bool(os.environ.get(name, "").strip())
+        detail = "set" if is_set else f"optional: set {name} to use its models"
+        checks.append(Check(f"key {name}", is_set, detail))
     return checks
 
 
 def _models() -> list[Check]:
-    """Which models of the shipped campaigns are gone, or soon will be."""
+    """Whether models of the bundled campaigns are retired, or soon will be."""
     from tdac_agent.campaign.config import read_config
     from tdac_agent.models.choice import OFFLINE
     from tdac_agent.models.lifecycle import model_warnings, retired
@@ -143,7 +143,7 @@ def _models() -> list[Check]:
         if notes:
             checks.append(Check(f"campaign {name}", not gone, "; ".join(notes)))
         elif any(model.partition(":")[0] not in OFFLINE for model in models):
-            detail = "none of its models is known to end soon"
+            detail = "none of its models is known to be retired soon"
             checks.append(Check(f"campaign {name}", True, detail))
     return checks
 

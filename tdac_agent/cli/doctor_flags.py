@@ -11,9 +11,9 @@ app = typer.Typer()
 
 @app.command(epilog="Example: `tdac doctor`")
 def doctor(as_json: Json = False) -> None:
-    """Try what works on this machine: sandbox, compiled code, judge, video, extras.
+    """Check this machine: sandbox, compiled code, verification, video, extras, keys.
 
-    Exits with 3 where something does not work that everything needs.
+    Exits with 3 if a required part does not work.
     """
     from tdac_agent.cli import doctor as command
 
@@ -22,10 +22,9 @@ def doctor(as_json: Json = False) -> None:
 
 @app.command(epilog="Example: `tdac warm`")
 def warm() -> None:
-    """Compile everything now, so that no command has to wait for it later.
+    """Compile everything now, so that no later command has to wait for it.
 
-    Run by an administrator on an installed package, this is done for all users of the
-    machine.
+    If an administrator runs it on an installed package, it serves all users.
     """
     from tdac_agent.cli import warm as command
 

@@ -1,4 +1,4 @@
-"""`tdac synth --dry-run`: the first prompt, and what the run can cost at most."""
+"""`tdac synth --dry-run`: the first prompt and the maximum cost of the run."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ def run(
     refine: bool,
     as_json: bool,
 ) -> int:
-    """Prints the prompt, and nothing else, to stdout, the rest to stderr.
+    """Prints the prompt alone to stdout, the rest to stderr; returns 0.
 
     Args:
-        flags: That name the task.
+        flags: Flags that name the task.
         models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
             `max_output`, `max_cost` and `max_tokens`, as for `synthesize`.
         k: Iterations.
         j: Edits per iteration.
         refine: Whether failures become rules.
-        as_json: Whether to print the outlook.
+        as_json: Whether to print the outlook as JSON.
     """
     learner = models["learner"]
     optimizer = models["optimizer"] or learner
@@ -67,12 +67,12 @@ def run(
     sys.stdout.flush()
     console = Console(stderr=True, highlight=False)
     unbounded = _unbounded(outlook) if models["base_url"] is None else []
-    for line in [*_lines(outlook), *_needed([*missing, *unbounded])]:
+    for line in [*_estimates(outlook), *_still_needed([*missing, *unbounded])]:
         tell(console, line)
     return 0
 
 
-def _lines(outlook: Outlook) -> list[str]:
+def _estimates(outlook: Outlook) -> list[str]:
     k, j = outlook.iterations, outlook.patience
     lines = [
         f"prompt: about {outlook.prompt_tokens} tokens (an estimate: a third of its "
@@ -80,21 +80,22 @@ def _lines(outlook: Outlook) -> list[str]:
         f"answer: at most {outlook.answer_tokens} tokens",
     ]
     if outlook.cost_most == 0.0:
-        return [*lines, "cost: none, no model is asked"]
+        return [*lines, "cost: none; no model is asked"]
     if outlook.first_cost is not None:
-        told = told_usd(outlook.first_cost)
-        lines.append(f"first question: at most {told}, which are reserved for it")
-    asked = f"whole run: {outlook.questions} questions (K={k}, J={j}) if nothing passes"
+        reserved = told_usd(outlook.first_cost)
+        lines.append(f"first question: at most {reserved}, reserved before it is asked")
+    whole = f"whole run: {outlook.questions} questions (K={k}, J={j})"
+    whole += " if no controller passes"
     if outlook.cost_once is not None and outlook.cost_most is not None:
-        asked += (
+        whole += (
             f": at most {told_usd(outlook.cost_once)}, or "
-            f"{told_usd(outlook.cost_most)} if every answer is asked for three times"
+            f"{told_usd(outlook.cost_most)} if each question is asked three times"
         )
-    return [*lines, asked, *_budget(outlook), *_prices(outlook)]
+    return [*lines, whole, *_budget(outlook), *_prices(outlook)]
 
 
 def _budget(outlook: Outlook) -> list[str]:
-    """What bounds a run, and whether its first question is within that."""
+    """The limits of a run, and whether they cover its first question."""
     limits = []
     if outlook.max_cost is not None:
         default = ", by default" if outlook.max_cost == MAX_COST else ""
@@ -103,39 +104,40 @@ def _budget(outlook: Outlook) -> list[str]:
         limits.append(f"{outlook.max_tokens} tokens (--max-tokens)")
     if not limits:
         return []
-    told = "enough for the first question; it stops before one that does not fit in"
+    verdict = "enough for the first question; the run stops before one it cannot pay"
     if outlook.first_needs:
-        told = f"not enough for the first question: give {outlook.first_needs} or more"
-    return [f"budget: {' and '.join(limits)}: {told}"]
+        needs = outlook.first_needs
+        verdict = f"not enough for the first question: give {needs} or more"
+    return [f"budget: {' and '.join(limits)}: {verdict}"]
 
 
 def _unbounded(outlook: Outlook) -> list[str]:
-    """Of models of vendors without a price; other servers have a limit of tokens."""
+    """Flags needed for vendor models without a price; others have a token limit."""
     if outlook.max_tokens is not None:
         return []
     return [
-        f"--max-tokens N, since no price of {name} is known to bound the run by"
+        f"--max-tokens N, since no price of {name} is known to limit the run's cost"
         for name in outlook.unknown_prices
         if name.partition(":")[0] in BY_VENDOR
     ]
 
 
 def _prices(outlook: Outlook) -> list[str]:
-    """Where the prices are from, and what has none."""
+    """The source of the prices, and the models without one."""
     lines = []
     if outlook.uncounted:
         names = " and ".join(outlook.uncounted)
-        lines.append(f"cost of {names}: not counted, a matter of your own")
+        lines.append(f"cost of {names}: not counted; tdac cannot know it")
     if outlook.unknown_prices:
         names = " and ".join(outlook.unknown_prices)
         lines.append(
-            f"price of {names}: unknown; enter it in a copy of {SHIPPED} at "
-            "~/.config/tdac/prices.yaml (or where $TDAC_PRICES says) to see the cost"
+            f"price of {names}: unknown; to see the cost, add it to a copy of {SHIPPED} "
+            "at ~/.config/tdac/prices.yaml (or at the path in $TDAC_PRICES)"
         )
     if outlook.unknown_prices or outlook.first_cost is not None:
         lines.append(f"prices of {outlook.prices_dated}: {price_file()}")
     return lines
 
 
-def _needed(missing: list[str]) -> list[str]:
+def _still_needed(missing: list[str]) -> list[str]:
     return [f"still needed: {line}" for line in dict.fromkeys(missing)]

@@ -1,4 +1,4 @@
-"""`tdac evaluate`: policies of any kind on the same tasks, from the same seeds."""
+"""`tdac evaluate`: compares policies of any kind on the same tasks and seeds."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def run(
     tier: str,
     as_json: bool,
 ) -> int:
-    """Evaluates and prints; returns the exit code."""
+    """Evaluates the policies and prints the results; returns the exit code."""
     check_tier(tier)
     names = None if wrappers is None else wrapper_names(wrappers)
-    entrants_of(policies, names)  # before anything is started
-    _check_places(csv, out)
+    entrants_of(policies, names)  # fails early on a wrong name
+    _check_outputs(csv, out)
     console = Console(stderr=as_json)
     columns = (
         TextColumn("{task.fields[doing]}"),
@@ -48,7 +48,7 @@ def run(
         MofNCompleteColumn(),
         TextColumn("{task.fields[successes]} reached"),
     )
-    # Drawn where there is something new, and not ten times a second.
+    # Redrawn only on updates: a timer would cost CPU time.
     bar = Progress(
         *columns,
         console=console,
@@ -91,23 +91,23 @@ def run(
 
 
 def wrapper_names(words: list[str]) -> list[str]:
-    """The names that are given; `none` stands for no wrapper.
+    """The names of the wrappers; `none` alone stands for an empty list.
 
     Raises:
-        TaskError: It is given beside others.
+        TaskError: `none` is combined with other names.
     """
     if words == [NO_WRAPPERS]:
         return []
     if NO_WRAPPERS in words:
-        raise TaskError("--wrapper none and another --wrapper contradict each other")
+        raise TaskError("--wrapper none cannot be combined with another --wrapper")
     return words
 
 
-def _check_places(csv: Path | None, out: Path | None) -> None:
-    """Refuses places that cannot be written to before the work is done.
+def _check_outputs(csv: Path | None, out: Path | None) -> None:
+    """Checks before the work begins that the outputs can be written.
 
     Raises:
-        ControllerFileError: There is one.
+        ControllerFileError: One of them cannot be written.
     """
     if csv is not None and not csv.absolute().parent.is_dir():
         raise ControllerFileError(f"cannot write {csv}: no such folder")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.cli.options import Json, Tier
+from tdac_agent.cli.options import TASK, VARIATION, WRAPPER, Json, Tier
 
 app = typer.Typer()
 
@@ -21,56 +21,53 @@ def evaluate(
         list[str],
         typer.Argument(
             metavar="POLICY...",
-            help="controller.py files, run folders, .zip files of stable-baselines3, "
+            help="Controller files, run folders, .zip files of stable-baselines3, "
             "`reference`, `builtin`, `follow-guidance`, `go-to-goal`, `random`.",
         ),
     ],
     tasks: Annotated[
         Optional[list[str]],  # noqa: UP045 - typer reads it at run time
         typer.Option(
-            "--task",
-            help="Bundled name, task.yaml, or run folder; repeatable.  [default: maze]",
+            "--task", metavar="TASK", help=f"{TASK}; repeatable.  [default: maze]"
         ),
     ] = None,
     episodes: Annotated[
-        int, typer.Option(min=1, help="Of each policy on each task.")
+        int, typer.Option(min=1, metavar="N", help="Episodes per policy and task.")
     ] = 100,
     seed: Annotated[
-        int, typer.Option(min=0, help="Of the episodes, the same for all policies.")
+        int,
+        typer.Option(
+            min=0, metavar="N", help="Seed of the episodes, the same for all policies."
+        ),
     ] = 0,
     variation: Annotated[
-        Literal["nominal", "jitter", "mixed", "random"],
-        typer.Option(
-            help="Starts: the task's own, within a body radius of it, mixed with "
-            "any start, or any start and goal."
-        ),
+        Literal["nominal", "jitter", "mixed", "random"], typer.Option(help=VARIATION)
     ] = "jitter",
     wrappers: Annotated[
         Optional[list[str]],  # noqa: UP045
         typer.Option(
             "--wrapper",
             metavar="NAME",
-            help="Of a .zip that does not say it, innermost first; repeatable: "
-            "`goal-relative`, `guidance`, `flatten`, or `none`.",
+            help=f"{WRAPPER}  [default: as the .zip file records]",
         ),
     ] = None,
     csv: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--csv", metavar="FILE", help="Write a row for each episode."),
+        typer.Option("--csv", metavar="FILE", help="Write a CSV row per episode."),
     ] = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
             "--out",
             metavar="DIR",
-            help="Write evaluation.json, episodes.csv, timing.csv and, of each task, a "
-            "picture with the ways of all policies.",
+            help="Folder for evaluation.json, episodes.csv, timing.csv and, per task, "
+            "a picture of all trajectories.",
         ),
     ] = None,
     tier: Tier = "auto",
     as_json: Json = False,
 ) -> None:
-    """Compare policies of any kind: same tasks, same seeds, same judge."""
+    """Compare policies of any kind on the same tasks and seeds."""
     from tdac_agent.cli import evaluate as command
 
     raise typer.Exit(

@@ -1,4 +1,4 @@
-"""An evaluation on the terminal."""
+"""Prints an evaluation on the terminal."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from tdac_agent.evaluation.evaluation_report import (
 from tdac_agent.tasks.units import UNITS
 
 NONE = "–"
-# Of the policies' names, where a table has to fit into 80 columns.
+# Least width of long policy names, so that a table fits into 80 columns.
 WIDEST = 12
 LEGEND = (
     "95 %: exact interval of the rate (Clopper-Pearson). hit: episodes with a contact. "
-    "time, path: in those of the shortest way at full speed; SPARC: smoothness, "
-    "spectral arc length of the speed (0 is smoothest); medians of the successes. gap: "
-    "beside the body, least / mean. ms/step: median / 99th percentile, as the judge "
-    "sees it."
+    "time, path: ratio to the shortest path at full speed; SPARC: smoothness, spectral "
+    "arc length of the speed (0 is smoothest); all three: median of the successes. "
+    "gap: clearance beside the body, least / mean. ms/step: median / 99th percentile "
+    "of a policy call, measured by the judge."
 )
 PAIRED = (
-    ">: reaches more often, ~: no difference shown, by McNemar's exact test, not "
-    "corrected for the number of pairs. only one: episodes in which just one of them "
-    "reaches the goal."
+    ">: reaches the goal more often; ~: no significant difference; by McNemar's exact "
+    "test, not corrected for the number of pairs. only one: episodes in which only one "
+    "of the two reaches the goal."
 )
-# Below this a difference would be rare among equals; not corrected for many tests.
+# Level of each comparison; not corrected for multiple tests.
 SIGNIFICANT = 0.05
 
 
 def show_evaluation(found: Evaluation, console: Console) -> None:
-    """Prints a table for each task, what went wrong, and who beats whom."""
+    """Prints a table per task with its failure reasons, then the comparisons."""
     timings = {(t.task, t.policy): t for t in found.timings}
     for task in found.tasks:
         rows = [row for row in found.rows if row.task == task.name]
         console.print(_table(found, task, rows, timings))
         console.print()
-        for line in _remarks(rows):
+        for line in _notes(rows):
             tell(console, line, indent=2)
     console.print(LEGEND, style="dim", highlight=False)
     if found.comparisons:
@@ -63,8 +63,8 @@ def _table(
     units = UNITS[task.unit]
     places = 0 if task.unit == "m" else 1
     starts = {
-        "jitter": "moved starts",
-        "mixed": "moved starts and any",
+        "jitter": "jittered starts",
+        "mixed": "jittered and random starts",
         "random": "random starts and goals",
     }
     title = (
@@ -108,8 +108,8 @@ def _plain_table(title: str) -> Table:
     )
 
 
-def _remarks(rows: Sequence[Row]) -> list[str]:
-    """What the policies did wrong, and what is to be known about them."""
+def _notes(rows: Sequence[Row]) -> list[str]:
+    """Notes on the policies, and the reasons of their failures with counts."""
     lines = []
     for row in rows:
         if row.note is not None:
@@ -120,11 +120,11 @@ def _remarks(rows: Sequence[Row]) -> list[str]:
 
 
 def comparison_table(pairs: Sequence[Comparison], *, several: bool) -> Table:
-    """Who beats whom on the same seeds; at equal information first.
+    """One row per pair of policies.
 
     Args:
         pairs: The comparisons.
-        several: Whether they are of several tasks.
+        several: Whether they cover several tasks.
     """
     table = _plain_table("The same episodes, paired")
     for name in (*(("task",) if several else ()), "policies"):
@@ -144,13 +144,13 @@ def comparison_table(pairs: Sequence[Comparison], *, several: bool) -> Table:
 
 
 def _pair(pair: Comparison) -> str:
-    """Who reaches the goal more often, if that can be said."""
+    """The two names, joined by `>` if the difference is significant, else by `~`."""
     better, worse = _ordered(pair)
     return f"{better} {'>' if pair.p < SIGNIFICANT else '~'} {worse}"
 
 
 def _ordered(pair: Comparison) -> tuple[str, str]:
-    """The names, first the one that reaches the goal more often."""
+    """The two names; the one that reaches the goal more often comes first."""
     if pair.only_other > pair.only_one:
         return pair.other, pair.one
     return pair.one, pair.other

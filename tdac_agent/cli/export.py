@@ -1,4 +1,4 @@
-"""`tdac export webots`."""
+"""`tdac export webots`: a verified e-puck controller as a Webots project."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tdac_envs.webots.stage import open_stage
 
 
 def run(run_folder: Path, out: Path, tier: str, as_json: bool) -> int:
-    """Writes the project and drives it once, here; 0 if it reaches the goal."""
+    """Writes the project and runs it once without Webots; returns 0 if it passes."""
     check_tier(tier)
     project = export_webots(run_folder, out)
     stage = open_stage(project.world)
@@ -48,11 +48,11 @@ def _show(project: Project, report: WebotsReport, console: Console) -> None:
     for path in (project.world, project.controller):
         console.print(f"wrote {escape(str(path))}", soft_wrap=True)
     if report.passed:
-        words = f"[bold green]reached[/] the goal after {report.steps} steps"
+        result = f"[bold green]reached[/] the goal after {report.steps} steps"
     else:
-        words = f"[bold red]not passed[/]: {escape(report.why_not)}"
+        result = f"[bold red]not passed[/]: {escape(report.why_not)}"
     before = project.verified_steps
-    verified = "" if before is None else f" (verified: {before})"
-    told = f"driven here, as a Webots controller: {words}{verified}"
-    console.print(told, soft_wrap=True)
+    verified = "" if before is None else f" (when verified: {before})"
+    line = f"run by tdac, as a Webots controller: {result}{verified}"
+    console.print(line, soft_wrap=True)
     console.print("[yellow]not run in Webots itself[/]")

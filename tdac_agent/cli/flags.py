@@ -1,11 +1,11 @@
-"""A task from the command line's flags."""
+"""Builds a task from the command line's flags."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,11 +22,11 @@ from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 from tdac_envs.mapping.image import load_image
 
 Point = tuple[float, float]
-SAID_BY_A_TASK = (
+FIXED_BY_TASK = (
     *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
     *("polarity", "threshold"),
 )
-MEANT_FOR_MAPS = (
+ONLY_FOR_MAPS = (
     *("map_image", "robot_radius", "robot_image", "snap", "metres"),
     *("polarity", "threshold"),
 )
@@ -56,7 +56,7 @@ class TaskFlags:
         return self != TaskFlags()
 
     def words(self) -> list[str]:
-        """The part of a command line that gives the same flags again."""
+        """The command line words that repeat these flags."""
         words = []
         for name in (f.name for f in fields(self)):
             value = getattr(self, name)
@@ -68,37 +68,38 @@ class TaskFlags:
         return words + [word for name in self.ignore for word in ("--ignore", name)]
 
     def load(self, default: str = "maze") -> Task:
-        """The task that the flags ask for.
+        """The task that the flags describe.
 
         Raises:
-            TaskError: They contradict each other, or the task cannot be used.
+            TaskError: The flags contradict each other, or the task cannot be used.
             MapError: There is no such map.
         """
         heading = None if self.heading is None else (self.heading,)
         check_finite(start=self.start, goal=self.goal, heading=heading)
+        check_radius(self.robot_radius)
         if self.task is not None:
-            self._refuse("--task already says it all", SAID_BY_A_TASK)
+            self._refuse("--task already defines the task", FIXED_BY_TASK)
             return load_task(self.task)
         if self.world is not None:
-            self._refuse("--world is for an e-puck", MEANT_FOR_MAPS)
+            self._refuse("--world defines an e-puck task", ONLY_FOR_MAPS)
             return load_task(self._world_spec(self.world), base=Path())
-        self._refuse("only a --world has nodes to ignore", ("ignore",))
+        self._refuse("--ignore needs --world", ("ignore",))
         source = self.map_image or default
         own = source not in bundled_maps()
         if own:
             check_exists(Path(source))
         if own and (self.start is None or self.goal is None):
             raise TaskError(
-                f"give --start X Y and --goal X Y for {source!r} "
-                "(`tdac map IMAGE` draws rulers to read them off)"
+                f"the map {source!r} needs --start X Y and --goal X Y "
+                "(read them off the rulers that `tdac map IMAGE` draws)"
             )
         return load_task(self._spec(source), base=Path())
 
     def _refuse(self, why: str, names: tuple[str, ...]) -> None:
-        """Refuses flags that mean nothing here.
+        """Refuses flags that would have no effect.
 
         Raises:
-            TaskError: One of them is given.
+            TaskError: One of these flags is given.
         """
         given = [name for name in names if getattr(self, name) not in (None, (), False)]
         if given:
@@ -119,13 +120,13 @@ class TaskFlags:
             "goal": self.goal,
             "instructions": _text(self.instructions),
         }
-        return checked(given, "the flags")
+        return _checked(given)
 
     def _spec(self, source: str) -> TaskFile:
         start: tuple[float, ...] | None = self.start
         goal, radius = self.goal, self.robot_radius
         if self.metres and source in bundled_maps():
-            raise TaskError("--metres needs --map with a map.yaml that has a scale")
+            raise TaskError("--metres needs a --map with a resolution, as in map.yaml")
         if self.metres:
             start, goal, radius = in_pixels(Path(source), self.start, goal, radius)
         if source in bundled_maps() and start is None:
@@ -142,24 +143,38 @@ class TaskFlags:
             "robot": {"radius": radius, "image": self.robot_image},
             "instructions": _text(self.instructions),
         }
-        return checked(given, "the flags")
+        return _checked(given)
+
+
+def _checked(given: dict[str, Any]) -> TaskFile:
+    """The task file that the flags stand for.
+
+    Raises:
+        TaskError: A value cannot be used; the message names its flag.
+    """
+    try:
+        return checked(given, "flags")
+    except TaskError as error:
+        key, _, reason = str(error).removeprefix("flags: ").partition(": ")
+        name = key.replace("robot.", "robot_").partition(".")[0]
+        raise TaskError(f"{flag(name)}: {reason}") from error
 
 
 def flag(field: str) -> str:
-    """The flag of a field: `--robot-radius`."""
+    """The flag of a field, as in `--robot-radius`."""
     return f"--{field.replace('_', '-')}"
 
 
 def as_word(value: object) -> str:
-    """A flag's value as it may be typed; a number keeps all of its digits."""
+    """A flag's value as typed on a command line; a number keeps all its digits."""
     return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
 def check_tier(name: str) -> None:
-    """Refuses the name of a sandbox tier that does not exist.
+    """Checks the name of a sandbox tier.
 
     Raises:
-        TaskError: It is none.
+        TaskError: There is no such tier.
     """
     names = ("auto", *(tier.name for tier in TIERS))
     if name not in names:
@@ -168,21 +183,31 @@ def check_tier(name: str) -> None:
 
 
 def check_finite(**points: tuple[float, ...] | None) -> None:
-    """Refuses `nan` and `inf`, which count as numbers on the command line.
+    """Refuses `nan` and `inf`, which the command line parses as numbers.
 
     Raises:
-        TaskError: A point has such a coordinate.
+        TaskError: A coordinate is not finite.
     """
     for name, point in points.items():
         if point is not None and not all(map(math.isfinite, point)):
             given = " ".join(map(str, point))
-            raise TaskError(f"expected --{name} to be finite, got {given}")
+            raise TaskError(f"--{name} must be finite, got {given}")
+
+
+def check_radius(radius: float | None) -> None:
+    """Checks the body radius.
+
+    Raises:
+        TaskError: It is not greater than 0.
+    """
+    if radius is not None and not radius > 0:
+        raise TaskError(f"--robot-radius must be greater than 0, got {radius:g}")
 
 
 def in_pixels(
     path: Path, start: Point | None, goal: Point | None, radius: float | None
 ) -> tuple[Point | None, Point | None, float | None]:
-    """Start, goal and body radius given in metres of the map's frame, in pixels.
+    """Converts start, goal and body radius from metres in the map's frame to pixels.
 
     Raises:
         MapError: The map has no resolution.
@@ -200,7 +225,7 @@ def in_pixels(
 
 
 def _text(given: str | None) -> str:
-    """The user's instructions: the text itself, or the contents of a file."""
+    """The user's instructions: the given text, or the contents of the file it names."""
     if given is None:
         return ""
     path = Path(given)

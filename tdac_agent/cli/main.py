@@ -1,7 +1,7 @@
 """The command line: `tdac map | world | synth | verify | play | evaluate | …`.
 
-Exit codes: 0 yes, 1 no (not verified), 2 usage or infeasible task, 3 infrastructure,
-4 budget, 130 interrupted.
+Exit codes: 0 success, 1 not verified, 2 usage or infeasible task, 3 infrastructure,
+4 budget exhausted, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from copy import copy
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from tdac_agent.cli import (
     campaign_flags,
@@ -33,21 +34,46 @@ from tdac_agent.cli import (
 from tdac_agent.cli.mistakes import explain, fail
 from tdac_agent.cli.terminal import filter_streams
 
+
+class _Command(TyperCommand):
+    """A command whose help shows no types of switches and arguments."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """All parameters, the option `--help` among them."""
+        return _without_types(super().get_params(ctx))
+
+
+class _Group(TyperGroup):
+    """A group of such commands."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """All parameters, the option `--help` among them."""
+        return _without_types(super().get_params(ctx))
+
+
+def _without_types(parameters: list[Any]) -> list[Any]:
+    for parameter in parameters:
+        if isinstance(parameter, TyperArgument) or parameter.is_bool_flag:
+            parameter.display_type_rich = lambda ctx: ""
+    return parameters
+
+
 app = typer.Typer(
     name="tdac",
+    cls=_Group,
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     help=(
-        "Write a robot controller from tests, and know that it works.\n\n"
-        "Start with `tdac synth`: it turns the bundled maze image into a verified "
-        "`controller.py`, with no key and no network."
+        "Write a robot controller and verify it with tests.\n\n"
+        "Start with `tdac synth`: it writes a verified `controller.py` for the bundled "
+        "maze, without an API key or a network."
     ),
 )
-# Each module has the flags of its commands and calls on their work when they are used:
-# the help of all of them needs nothing else. They are listed in this order.
+# In the order of `tdac --help`. These modules define flags only and import a command's
+# work when it runs, so that help is fast.
 PARTS = (
     map_flags.app,
     synth_flags.app,
@@ -78,33 +104,36 @@ def _root(
 
 
 def command_line(words: list[str]) -> typer.Typer:
-    """The commands, or the part of them that has the first word alone.
+    """The app, reduced to what the words need, since Typer is slow to read flags.
 
-    Typer reads the flags of all that it is given, and takes its time. The list of all
-    commands shows none.
+    It has only the command that is the first word; for `tdac --help` it has all
+    commands, without their flags.
     """
     line, first = copy(app), set(words[:1])
     line.registered_groups = []
     for part in [part for part in PARTS if first & _names(part)] or PARTS:
-        line.add_typer(part if first - FOR_HELP else _without_flags(part))
+        line.add_typer(_copy_of(part, with_flags=bool(first - FOR_HELP)))
     return line
 
 
-def _without_flags(part: typer.Typer) -> typer.Typer:
-    """The same commands and groups, to be listed only."""
-    listed = copy(part)
-    listed.registered_commands = [copy(info) for info in part.registered_commands]
-    for info in listed.registered_commands:
-        info.callback = _nothing_like(info.callback)
-    listed.registered_groups = [copy(info) for info in part.registered_groups]
-    for group in listed.registered_groups:
+def _copy_of(part: typer.Typer, *, with_flags: bool) -> typer.Typer:
+    """The same commands and groups; without flags, they can only be listed."""
+    made = copy(part)
+    made.registered_commands = [copy(info) for info in part.registered_commands]
+    for info in made.registered_commands:
+        info.cls = _Command
+        if not with_flags:
+            info.callback = _without_flags(info.callback)
+    made.registered_groups = [copy(info) for info in part.registered_groups]
+    for group in made.registered_groups:
         assert group.typer_instance is not None
-        group.typer_instance = _without_flags(group.typer_instance)
-    return listed
+        group.cls = _Group
+        group.typer_instance = _copy_of(group.typer_instance, with_flags=with_flags)
+    return made
 
 
-def _nothing_like(command: Callable[..., Any] | None) -> Callable[[], None]:
-    """Has its name and its help."""
+def _without_flags(command: Callable[..., Any] | None) -> Callable[[], None]:
+    """A function without parameters that has the command's name and help."""
 
     def nothing() -> None:
         pass
@@ -115,7 +144,7 @@ def _nothing_like(command: Callable[..., Any] | None) -> Callable[[], None]:
 
 
 def _names(part: typer.Typer) -> set[str | None]:
-    """Of the commands and groups of a part."""
+    """Names of the commands and groups of a part."""
     commands = {
         command.name or command.callback.__name__.replace("_", "-")
         for command in part.registered_commands
@@ -125,7 +154,7 @@ def _names(part: typer.Typer) -> set[str | None]:
 
 
 def with_heading(words: list[str]) -> list[str]:
-    """A command line in which `--start X Y YAW` is `--start X Y --heading YAW`."""
+    """The words with each `--start X Y YAW` as `--start X Y --heading YAW`."""
     for at, word in enumerate(words):
         pose = words[at + 1 : at + 4]
         if word == "--start" and len(pose) == 3 and all(map(_is_number, pose)):
@@ -142,15 +171,15 @@ def _is_number(word: str) -> bool:
 
 
 def main() -> None:
-    """Does what the command line says: every known error is one clear line."""
+    """Runs the command line; every known error is one line on stderr."""
     filter_streams()
-    # Its threads would keep a core busy, waiting for work that nothing here has.
+    # Idle OpenBLAS threads would keep a core busy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # To look for some, pydantic reads what every installed package says of itself.
+    # To find plugins, pydantic would read the metadata of every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # It writes names of files to stderr itself, past every filter.
+    # OpenCV would write unfiltered file names to stderr.
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
-    # It says at length where it keeps its fonts if it cannot write to a home.
+    # Matplotlib warns about its font cache if the home is not writable.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
@@ -164,6 +193,6 @@ def main() -> None:
         explain(error)
     if code == 130:
         fail("interrupted", 130)
-    # A last search for garbage would take longer than much of the rest.
+    # Skips the final garbage collection, which is slow.
     gc.freeze()
     sys.exit(code or 0)
