@@ -32,7 +32,7 @@ def campaign(
         typer.Option(
             min=1,
             metavar="N",
-            help="Concurrent runs; more than there are cores if they wait for models.  "
+            help="Concurrent runs; can exceed the cores if runs wait for models.  "
             "[default: one per core]",
         ),
     ] = None,
@@ -61,7 +61,7 @@ def campaign(
             min=0.0,
             callback=finite_cost,
             metavar="USD",
-            help="Limit of all runs together.  [default: the file's]",
+            help="Cost limit of all runs together.  [default: the file's]",
             rich_help_panel=BUDGET,
         ),
     ] = None,
@@ -71,7 +71,7 @@ def campaign(
             "--max-tokens",
             min=0,
             metavar="N",
-            help="Limit of all runs together, input plus output tokens.  "
+            help="Token limit of all runs together, input plus output.  "
             "[default: the file's]",
             rich_help_panel=BUDGET,
         ),
@@ -80,9 +80,10 @@ def campaign(
     key_over_http: KeyOverHttp = False,
     as_json: Json = False,
 ) -> None:
-    """Make R runs of each task × learner × optimizer × prompt × setting.
+    """Make all synthesis runs of an experiment, and their tables.
 
-    The same command continues an interrupted campaign; finished runs are not repeated.
+    The file asks for R runs of each task × learner × optimizer × prompt × setting. The
+    same command continues an interrupted campaign; finished runs are not repeated.
     """
     from tdac_agent.cli import campaign as command
 

@@ -93,7 +93,7 @@ class LiveView:
         return Group(table, *others, self._current_runs(doing), self._bar(), counts)
 
     def _sort_key(self, tally: Tally) -> tuple[bool, bool, bool]:
-        """Sort key: running kinds first, then those with halted runs, then unfinished."""
+        """Sorts running kinds first, then those with halted runs, then unfinished."""
         running = {one.planned.cell.folder for one in self._progress.doing.values()}
         unfinished = tally.finished < tally.planned
         return tally.cell.folder not in running, not tally.halted, not unfinished

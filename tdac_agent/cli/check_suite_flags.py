@@ -41,7 +41,7 @@ def check_suite(
     ] = 5,
     as_json: Json = False,
 ) -> None:
-    """Check a suite: a reference controller must pass it, bad ones must fail it."""
+    """Check that a suite passes a good controller and fails bad ones."""
     with begun():
         from tdac_agent.cli import check_suite as command
 

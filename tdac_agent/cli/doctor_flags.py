@@ -11,7 +11,7 @@ app = typer.Typer()
 
 @app.command(epilog="Example: `tdac doctor`")
 def doctor(as_json: Json = False) -> None:
-    """Check this machine: sandbox, compiled code, verification, video, extras, keys.
+    """Check what works on this machine: sandbox, judge, video, extras.
 
     Exits with 3 if a required part does not work.
     """
@@ -22,7 +22,7 @@ def doctor(as_json: Json = False) -> None:
 
 @app.command(epilog="Example: `tdac warm`")
 def warm() -> None:
-    """Compile everything now, so that no later command has to wait for it.
+    """Compile everything now, so that no later command has to wait.
 
     If an administrator runs it on an installed package, it serves all users.
     """

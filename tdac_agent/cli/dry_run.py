@@ -131,8 +131,8 @@ def _prices(outlook: Outlook) -> list[str]:
     if outlook.unknown_prices:
         names = " and ".join(outlook.unknown_prices)
         lines.append(
-            f"price of {names}: unknown; to see the cost, add it to a copy of {SHIPPED} "
-            "at ~/.config/tdac/prices.yaml (or at the path in $TDAC_PRICES)"
+            f"price of {names}: unknown; to see the cost, add it to a copy of "
+            f"{SHIPPED} at ~/.config/tdac/prices.yaml (or at the path in $TDAC_PRICES)"
         )
     if outlook.unknown_prices or outlook.first_cost is not None:
         lines.append(f"prices of {outlook.prices_dated}: {price_file()}")

@@ -28,7 +28,7 @@ def evaluate(
     tasks: Annotated[
         Optional[list[str]],  # noqa: UP045 - typer reads it at run time
         typer.Option(
-            "--task", metavar="TASK", help=f"{TASK}; repeatable.  [default: maze]"
+            "--task", metavar="PATH", help=f"{TASK}; repeatable.  [default: maze]"
         ),
     ] = None,
     episodes: Annotated[

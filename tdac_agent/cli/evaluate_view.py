@@ -24,10 +24,10 @@ NONE = "–"
 WIDEST = 12
 LEGEND = (
     "95 %: exact interval of the rate (Clopper-Pearson). hit: episodes with a contact. "
-    "time, path: ratio to the shortest path at full speed; SPARC: smoothness, spectral "
-    "arc length of the speed (0 is smoothest); all three: median of the successes. "
-    "gap: clearance beside the body, least / mean. ms/step: median / 99th percentile "
-    "of a policy call, measured by the judge."
+    "time, path: relative to the shortest path at full speed; SPARC: smoothness, "
+    "spectral arc length of the speed (0 is smoothest); these are medians of the "
+    "successes. gap: clearance beside the body, least / mean. ms/step: median / 99th "
+    "percentile of a policy call, measured by the judge."
 )
 PAIRED = (
     ">: reaches the goal more often; ~: no significant difference; by McNemar's exact "

@@ -54,7 +54,7 @@ class _Group(TyperGroup):
 def _without_types(parameters: list[Any]) -> list[Any]:
     for parameter in parameters:
         if isinstance(parameter, TyperArgument) or parameter.is_bool_flag:
-            parameter.display_type_rich = lambda ctx: ""
+            parameter.display_type_rich = lambda **_: ""
     return parameters
 
 

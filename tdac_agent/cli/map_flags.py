@@ -1,4 +1,4 @@
-"""The commands `tdac map` and `tdac world`: what is in a file."""
+"""The commands `tdac map` and `tdac world`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Annotated, Literal, Optional
 import typer
 
 from tdac_agent.cli.options import (
-    Goal,
+    MAP_FILE,
+    WORLD_FILE,
     Json,
     Metres,
     Polarity,
@@ -22,12 +23,17 @@ app = typer.Typer()
 
 @app.command("map", epilog="Example: `tdac map plan.png --start 90 302 --goal 178 386`")
 def map_command(
-    image: Annotated[str, typer.Argument(help="Map image or map file.")],
+    image: Annotated[
+        str, typer.Argument(metavar="IMAGE", help=f"{MAP_FILE}, or bundled map.")
+    ],
     start: Annotated[
         Optional[tuple[float, float]],  # noqa: UP045 - typer reads it at run time
-        typer.Option("--start", metavar="X Y", help="Start, px."),
+        typer.Option("--start", metavar="X Y", help="Start position, px."),
     ] = None,
-    goal: Goal = None,
+    goal: Annotated[
+        Optional[tuple[float, float]],  # noqa: UP045
+        typer.Option("--goal", metavar="X Y", help="Goal position, px."),
+    ] = None,
     robot_radius: Radius = None,
     snap: Snap = False,
     metres: Metres = False,
@@ -35,17 +41,19 @@ def map_command(
     threshold: Threshold = None,
     preset: Annotated[
         Literal["default", "paper"],
-        typer.Option(help="`default`, or `paper` for the literal grid search."),
+        typer.Option(help="Parameter search: the default one, or the paper's."),
     ] = "default",
     out: Annotated[
         Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option("--out", help="Folder to write.  [default: NAME-map]"),
+        typer.Option(
+            "--out", metavar="DIR", help="Output folder.  [default: NAME-map]"
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Turn a map image into an occupancy grid, and show how.
+    """Turn a map image into an occupancy grid, with a preview.
 
-    Without start and goal it writes a preview with rulers to read pixels off.
+    Without start and goal, the preview has rulers to read off pixel coordinates.
     """
     from tdac_agent.cli import maps
     from tdac_envs.mapping.params import Said
@@ -57,15 +65,18 @@ def map_command(
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")
 def world_command(
     file: Annotated[
-        str, typer.Argument(help="Webots world, V6 to R2025a, or a bundled name.")
+        str,
+        typer.Argument(
+            metavar="WORLD", help=f"{WORLD_FILE} of V6 to R2025a, or bundled world."
+        ),
     ],
     png: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--png", metavar="OUT", help="Draw it from above."),
+        typer.Option("--png", metavar="FILE", help="Draw the world from above."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Show what is in a Webots world: e-pucks, goal, arena, obstacles."""
+    """Show the e-pucks, goal, arena and obstacles of a Webots world."""
     from tdac_agent.cli import world
 
     world.run(file, png, as_json)

@@ -1,4 +1,4 @@
-"""`tdac map`."""
+"""`tdac map`: preprocesses a map image and shows the candidates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import check_finite, in_pixels
+from tdac_agent.cli.flags import check_finite, check_radius, in_pixels
 from tdac_envs.core.errors import PolarityError, TaskError
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import Candidate, Preset
@@ -36,7 +36,7 @@ def run(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Preprocesses, writes the map folder and prints the best candidates."""
+    """Preprocesses a map, writes its folder and prints the best candidates."""
     if (start is None) != (goal is None):
         raise TaskError("give both --start X Y and --goal X Y, or neither")
     check_finite(start=start, goal=goal)
@@ -48,6 +48,7 @@ def run(
         robot_radius = robot_radius or bundled.robot_radius
     if metres:
         start, goal, robot_radius = in_pixels(path, start, goal, robot_radius)
+    check_radius(robot_radius)
     radius = RobotParams().radius if robot_radius is None else robot_radius
     source = load_image(path)
     folder = out if out is not None else Path(f"{path.stem}-map")
@@ -69,7 +70,7 @@ def run(
         return
     console = Console(highlight=False)
     _print_reading(console, params, ranked[0])
-    if start is not None:  # without a task no candidate has figures, nor a place
+    if start is not None:  # candidates have figures only if there is a task
         _print_candidates(console, ranked)
     _print_files(console, params, folder)
 
@@ -89,7 +90,7 @@ def _row(candidate: Candidate) -> dict[str, object]:
 
 
 def _print_reading(console: Console, params: MapParams, chosen: Candidate) -> None:
-    """What the map is, and how it was read."""
+    """Prints the map's name and size, how it was read, and the notes."""
     size = f"{params.width} x {params.height} px"
     console.print(f"{escape(params.source)}, {size}: {escape(_describe(chosen))}")
     for note in params.notes:
@@ -97,7 +98,7 @@ def _print_reading(console: Console, params: MapParams, chosen: Candidate) -> No
 
 
 def _print_candidates(console: Console, ranked: list[Candidate]) -> None:
-    """The best candidates, and why the others are none."""
+    """Prints the best candidates, and why others are infeasible."""
     feasible = [c for c in ranked if c.terms is not None]
     readings = list(dict.fromkeys(_describe(c) for c in feasible[:SHOWN]))
     console.print(_table(feasible[:SHOWN], readings))
@@ -106,17 +107,18 @@ def _print_candidates(console: Console, ranked: list[Candidate]) -> None:
             console.print(f"reading {number}: {escape(reading)}")
     failed = [c for c in ranked if c.terms is None]
     for candidate in failed[:EXPLAINED]:
-        what = _describe(candidate)
+        text = _describe(candidate)
         if candidate.inflation:
-            what += f", margin {candidate.inflation} px"
-        console.print(f"[dim]not {escape(what)}: {escape(candidate.failure or '')}[/]")
+            text += f", margin {candidate.inflation} px"
+        failure = escape(candidate.failure or "")
+        console.print(f"[dim]infeasible: {escape(text)}: {failure}[/]")
     hidden = max(len(feasible) - SHOWN, 0) + max(len(failed) - EXPLAINED, 0)
     if hidden:
         console.print(f"and {hidden} more candidates (--json lists all)")
 
 
 def _table(candidates: list[Candidate], readings: list[str]) -> Table:
-    """Figures of feasible candidates; readings by number, if there are several."""
+    """The figures of feasible candidates, with their reading if there are several."""
     table = Table(title="Candidates, the chosen one first", title_justify="left")
     names = ["margin, px", "clearance, px", "path, px", "sharpness", "score"]
     for name in names if len(readings) == 1 else ["reading", *names]:
@@ -137,7 +139,7 @@ def _table(candidates: list[Candidate], readings: list[str]) -> Table:
 
 
 def _describe(candidate: Candidate) -> str:
-    """How a candidate's picture is read."""
+    """How a candidate reads the image."""
     reading = candidate.reading
     if reading.polarity == "given":
         return f"obstacles as the file says, {reading.method}"
@@ -152,5 +154,5 @@ def _print_files(console: Console, params: MapParams, folder: Path) -> None:
     console.print(f"wrote {escape(str(folder))}; look at {preview}")
     if params.start is None:
         console.print(
-            "read start and goal off its rulers, then give --start X Y --goal X Y"
+            "read off start and goal at its rulers, then give --start X Y --goal X Y"
         )

@@ -1,4 +1,4 @@
-"""Lines on stderr: what goes wrong, with its exit code, and that a command begins."""
+"""Lines on stderr: errors with their exit codes, and a note while a command loads."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 from tdac_agent.cli.terminal import unfiltered
 
 LONGEST_LINE = 1000
-# No machine would take such a name or such a file.
-_OF_THE_FILE = {errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL, errno.EFBIG}
+# The file or its name is wrong on every machine: a usage error.
+_WRONG_FILE = {errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL, errno.EFBIG}
 
 
 def explain(error: Exception) -> NoReturn:
-    """Ends the process with one line on what was wrong; a traceback only for a bug."""
+    """Ends the process with a one-line message; only a bug gets a traceback."""
     from tdac_agent.errors import Fault
     from tdac_envs.core.errors import LONGEST, PolarityError, TdacError
 
-    if hasattr(error, "format_message"):  # usage, as typer found it
+    if hasattr(error, "format_message"):  # a usage error found by typer
         _explain_usage(error)
     if isinstance(error, PolarityError):
-        fail(f"error: {error}{_shown(error)}", 2)
+        fail(f"error: {error}{_write_previews(error)}", 2)
     if isinstance(error, TdacError):
         *others, last = getattr(error, "lines", (str(error),))
         for line in others:
@@ -38,14 +38,14 @@ def explain(error: Exception) -> NoReturn:
     if isinstance(error, Fault):
         fail(f"infrastructure fault: {error}", 3)
     if isinstance(error, OSError) and error.filename:
-        code = 2 if error.errno in _OF_THE_FILE else 3
+        code = 2 if error.errno in _WRONG_FILE else 3
         fail(f"error: {str(error.filename)[:LONGEST]}: {error.strerror}", code)
     traceback.print_exception(error)
     fail("internal error: please report the lines above", 3)
 
 
-def _shown(error: PolarityError) -> str:
-    """Draws both readings of a map; says where, or nothing where that fails."""
+def _write_previews(error: PolarityError) -> str:
+    """Draws both readings of a map; returns where, or nothing if that fails."""
     from tdac_envs.core.errors import MapError
     from tdac_envs.mapping.map_folder import write_previews
 
@@ -57,10 +57,10 @@ def _shown(error: PolarityError) -> str:
 
 
 def fail(message: str, code: int) -> NoReturn:
-    """Ends the process with a line on stderr."""
+    """Ends the process with a line on stderr; cuts the middle of a long line."""
     sys.stdout.flush()
     line = " ".join(message.split())
-    if len(line) > LONGEST_LINE:  # of what it quotes the beginning is enough
+    if len(line) > LONGEST_LINE:
         line = f"{line[:600]} … {line[-300:]}"
     print(fitted(line), file=sys.stderr)
     sys.exit(code)
@@ -68,27 +68,27 @@ def fail(message: str, code: int) -> NoReturn:
 
 @contextmanager
 def begun() -> Generator[None]:
-    """Shows on a terminal that a command loads what it needs: that may take seconds."""
+    """Shows `starting …` on a terminal while a command's imports take seconds."""
     terminal = unfiltered(sys.stderr)
-    shown = terminal.isatty()
-    if shown:
+    is_terminal = terminal.isatty()
+    if is_terminal:
         print("starting …", end="\r", file=terminal, flush=True)
     try:
         yield
     finally:
-        if shown:
+        if is_terminal:
             print("\x1b[2K", end="", file=terminal, flush=True)
 
 
 def fitted(line: str) -> str:
-    """A line for stderr; a terminal gets it in its width, no word or path broken."""
+    """The line for stderr; wrapped to the width of a terminal, unchanged elsewhere."""
     if not sys.stderr.isatty():
         return line
     return folded(line, shutil.get_terminal_size().columns)
 
 
 def folded(line: str, width: int, hanging: int = 2) -> str:
-    """A line in a width, what goes on indented; no word or path is broken."""
+    """Wraps a line with a hanging indent; does not break words or paths."""
     return textwrap.fill(
         line,
         width,
@@ -99,23 +99,22 @@ def folded(line: str, width: int, hanging: int = 2) -> str:
 
 
 def _explain_usage(error: Any) -> NoReturn:
-    """What is wrong with the words typed, and whose help says more."""
+    """Prints a usage error and names the command whose help to read."""
     context = getattr(error, "ctx", None)
     option = getattr(error, "option_name", None)
-    # typer says of a choice what pydantic says of a value.
     reason = error.format_message().rstrip(".").replace("Value error, ", "")
-    # Without any word there is help, and nothing more to say.
+    # Without arguments, typer has already printed the help.
     if not reason:
         sys.exit(2)
     if option is not None and hasattr(error, "possibilities") and context is not None:
-        near = _nearest(option, [o for p in context.command.params for o in p.opts])
-        reason = error.message + (f"; did you mean {near}?" if near else "")
+        meant = _nearest(option, [o for p in context.command.params for o in p.opts])
+        reason = error.message + (f"; did you mean {meant}?" if meant else "")
     command = "tdac" if context is None else context.command_path
     fail(f"error: {reason}; see {command} --help", 2)
 
 
 def _nearest(typed: str, options: list[str]) -> str | None:
-    """The option that may be meant, whatever its case and number of dashes."""
+    """The most similar option, compared without case and leading dashes."""
     from tdac_envs.core.errors import nearest
 
     bare = {option.lstrip("-").lower(): option for option in options}

@@ -1,4 +1,4 @@
-"""Flags that several commands share."""
+"""Flags, and texts of flags, that several commands share."""
 
 from __future__ import annotations
 
@@ -22,94 +22,123 @@ import typer
 if TYPE_CHECKING:
     from tdac_agent.cli.flags import TaskFlags
 
+TASK = "Bundled task (`maze`, `epuck`, …), task.yaml, or run folder"
+CONTROLLER = "Controller file, or run folder, which brings its own task."
+MAP_FILE = "Map image, ROS map.yaml, MovingAI .map"
+WORLD_FILE = "Webots .wbt file"
+IGNORE = "Name or type of a world node to ignore although it may be solid; repeatable."
+VARIATION = (
+    "Start poses: the task's own (nominal), within a body radius of it (jitter), "
+    "jittered or any (mixed), any start and goal (random)."
+)
+WRAPPER = (
+    "Observation wrapper, innermost first; repeatable: `goal-relative`, `guidance`, "
+    "`flatten`, or `none`."
+)
+VIDEO = "Write a .mp4 or .gif video"
+RANGE_NOISE = "Noise of each range, standard deviation relative to the range."
+WHEEL_SLIP = "Noise of each wheel's speed, standard deviation relative to the speed."
+MOTOR_LAG = "Time constant of the wheel speeds, s."
+DELAY = "Steps by which each action takes effect late."
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 TaskOption = Annotated[
     Optional[str],  # noqa: UP045 - typer reads it at run time
-    typer.Option(
-        "--task",
-        help="Bundled name (`maze`, `epuck`, …), task.yaml, or run folder.  "
-        "[default: maze]",
-    ),
+    typer.Option("--task", metavar="PATH", help=f"{TASK}.  [default: maze]"),
 ]
 MapOption = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--map", help="Map image, ROS map.yaml, MovingAI .map, or bundled."),
+    typer.Option("--map", metavar="PATH", help=f"{MAP_FILE}, or bundled map."),
 ]
 WorldOption = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--world", help="Webots world of an e-puck: a .wbt file, or bundled."),
+    typer.Option(
+        "--world",
+        metavar="PATH",
+        help=f"{WORLD_FILE} with an e-puck, or bundled world.",
+    ),
 ]
 Ignore = Annotated[
     Optional[list[str]],  # noqa: UP045
-    typer.Option(
-        "--ignore",
-        metavar="NAME",
-        help="Name or type of a node of the world that may be missing; repeatable.",
-    ),
+    typer.Option("--ignore", metavar="NAME", help=IGNORE),
 ]
 Start = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
     typer.Option(
         "--start",
         metavar="X Y [YAW]",
-        help="Start: px on a map, m in a world; its third number is as --heading.",
+        help="Start position: px on a map, m in a world; for YAW, see --heading.",
     ),
 ]
 Goal = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
-    typer.Option("--goal", metavar="X Y", help="Goal: px on a map, m in a world."),
+    typer.Option(
+        "--goal", metavar="X Y", help="Goal position: px on a map, m in a world."
+    ),
 ]
 Radius = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--robot-radius", help="Body radius, px.  [default: 15]"),
+    typer.Option("--robot-radius", metavar="N", help="Body radius, px.  [default: 15]"),
 ]
 Heading = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
-        "--heading", help="Start heading, rad, from +x towards +y (down on a map)."
+        "--heading",
+        metavar="YAW",
+        help="Start heading, rad, from +x towards +y (down on a map).",
     ),
 ]
 RobotImage = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--robot-image", help="Picture of the robot, nose to the right."),
+    typer.Option(
+        "--robot-image",
+        metavar="FILE",
+        help="Picture of the robot, nose to the right.",
+    ),
 ]
 Snap = Annotated[
-    bool, typer.Option("--snap", help="Move start and goal to the nearest free place.")
+    bool,
+    typer.Option("--snap", help="Move start and goal to the nearest free position."),
 ]
 Metres = Annotated[
     bool,
-    typer.Option("--metres", help="Lengths are metres in the map's frame (map.yaml)."),
+    typer.Option(
+        "--metres", help="Lengths are in metres, in the frame of the map.yaml."
+    ),
 ]
 Polarity = Annotated[
     Optional[Literal["dark", "light"]],  # noqa: UP045
     typer.Option(
-        help="Which pixels of the map image are obstacles.  [default: found out]"
+        help="Obstacle pixels of the map image: dark or light.  [default: detected]"
     ),
 ]
 Threshold = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
-        metavar="LUMINANCE",
-        help="Above it a pixel of the map image is light, 0 to 255.  "
-        "[default: found out]",
+        metavar="N",
+        help="Luminance above which a map pixel is light, from 0 to below 255.  "
+        "[default: detected]",
     ),
 ]
 Instructions = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
-        "--instructions", help="Your own text to the model, or a file with it."
+        "--instructions",
+        metavar="TEXT",
+        help="Additional instructions for the model: a text, or a file with it.",
     ),
 ]
 Suite = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--suite", help="Folder with your own test_*.py files, run as well."),
+    typer.Option(
+        "--suite", metavar="DIR", help="Folder with additional test_*.py files to run."
+    ),
 ]
 Trust = Annotated[
     bool,
     typer.Option(
         "--trust",
-        help="Let a folder or file of somebody else's do what it wants: it is listed. "
-        "Holds for this command alone.",
+        help="For this command only, let a folder or file from elsewhere run and "
+        "contact what it names; each item is listed.",
     ),
 ]
 JitterSeed = Annotated[
@@ -117,26 +146,30 @@ JitterSeed = Annotated[
     typer.Option(
         "--seed",
         min=0,
-        help="Of the jittered starts.  [default: follows from controller, task and a "
-        "secret of this installation]",
+        metavar="N",
+        help="Seed of the jittered starts.  [default: derived from a secret of this "
+        "installation]",
     ),
 ]
 Tier = Annotated[
     str,
-    typer.Option(help="Sandbox tier; see `tdac doctor`."),
+    typer.Option(metavar="NAME", help="Sandbox tier; `tdac doctor` lists them."),
 ]
 Profile = Annotated[
     Optional[Literal["policy", "paper"]],  # noqa: UP045
-    typer.Option(help="What the file must define.  [default: the task's own]"),
+    typer.Option(
+        help="Functions that the controller must define: `policy(obs)` only, or those "
+        "of the paper.  [default: the task's]"
+    ),
 ]
 MODELS = "Models"
 Learner = Annotated[
     str,
     typer.Option(
         metavar="MODEL",
-        help="Who writes: `builtin` (a template, no model), `anthropic:MODEL`, "
-        "`openai:MODEL`, `command:PROGRAM`, `manual:DIR`, `replay:RUN` or "
-        "`scripted:SCRIPT`.",
+        help="Model that writes controllers: `builtin` (a template, no language "
+        "model), `anthropic:MODEL`, `openai:MODEL`, `command:PROGRAM`, `manual:DIR`, "
+        "`replay:RUN` or `scripted:SCRIPT`.",
         rich_help_panel=MODELS,
     ),
 ]
@@ -144,7 +177,8 @@ Optimizer = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
         metavar="MODEL",
-        help="Who edits what failed and writes rules.  [default: the learner]",
+        help="Model that repairs failed controllers and writes rules.  "
+        "[default: the learner]",
         rich_help_panel=MODELS,
     ),
 ]
@@ -153,8 +187,8 @@ BaseUrl = Annotated[
     typer.Option(
         "--base-url",
         metavar="URL",
-        help="Server of the `openai:` or `anthropic:` models: vLLM, Ollama, LM Studio, "
-        "as in http://localhost:8000/v1.",
+        help="Server of the `openai:` or `anthropic:` models (vLLM, Ollama, LM Studio, "
+        "…), for example http://localhost:8000/v1.",
         rich_help_panel=MODELS,
     ),
 ]
@@ -162,7 +196,7 @@ KeyOverHttp = Annotated[
     bool,
     typer.Option(
         "--key-over-http",
-        help="Let a key go unencrypted to a server on another machine.",
+        help="Allow sending an API key unencrypted to a server on another machine.",
         rich_help_panel=MODELS,
     ),
 ]
@@ -171,9 +205,9 @@ MaxOutput = Annotated[
     typer.Option(
         "--max-output",
         min=1,
-        metavar="TOKENS",
-        help="Of an answer, thinking included; twice as many after a cut one.  "
-        "[default: 16000]",
+        metavar="N",
+        help="Token limit of an answer, thinking included; doubled after an answer "
+        "that was cut off.  [default: 16000]",
         rich_help_panel=MODELS,
     ),
 ]
@@ -181,15 +215,15 @@ BUDGET = "Budget"
 
 
 def finite_cost(value: float | None) -> float | None:
-    """A limit in USD as it is; `inf` and `nan` count as numbers on the command line.
+    """The limit in USD; refuses `inf` and `nan`, which typer parses as numbers.
 
     Raises:
-        RunError: It is one of these.
+        RunError: The limit is not finite.
     """
     if value is not None and not math.isfinite(value):
         from tdac_agent.errors import RunError
 
-        raise RunError("expected --max-cost to be finite")
+        raise RunError("--max-cost must be finite")
     return value
 
 
@@ -200,8 +234,8 @@ MaxCost = Annotated[
         min=0.0,
         callback=finite_cost,
         metavar="USD",
-        help="Of the whole run; the worst case of each question is reserved before it "
-        "is put.  [default: 2]",
+        help="Cost limit of the whole run; the worst case of each question is reserved "
+        "before it is asked.  [default: 2]",
         rich_help_panel=BUDGET,
     ),
 ]
@@ -211,50 +245,48 @@ MaxTokens = Annotated[
         "--max-tokens",
         min=0,
         metavar="N",
-        help="Of the whole run, in and out together.  [default: no limit; 1000000 for "
-        "a server of your own without a price]",
+        help="Token limit of the whole run, input plus output.  [default: none; "
+        "1000000 for a server with unknown prices]",
         rich_help_panel=BUDGET,
     ),
 ]
-DISTURBED = "Disturbance of --robust, and of play --seed"
+DISTURBED = "Disturbance of verify --robust and play --seed"
 RangeNoise = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
-        help="Noise of each range, relative.  [default: 0.025]",
+        metavar="N",
+        help=f"{RANGE_NOISE}  [default: 0.025]",
         rich_help_panel=DISTURBED,
     ),
 ]
 WheelSlip = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
-        help="Noise of each wheel's speed in each step, relative.  [default: 0.03]",
+        metavar="N",
+        help=f"{WHEEL_SLIP}  [default: 0.03]",
         rich_help_panel=DISTURBED,
     ),
 ]
 MotorLag = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
-        help="Time constant of the wheel speeds, s.  [default: 0]",
-        rich_help_panel=DISTURBED,
+        metavar="N", help=f"{MOTOR_LAG}  [default: 0]", rich_help_panel=DISTURBED
     ),
 ]
 Delay = Annotated[
     Optional[int],  # noqa: UP045
-    typer.Option(
-        help="Steps by which an action is late.  [default: 1]",
-        rich_help_panel=DISTURBED,
-    ),
+    typer.Option(metavar="N", help=f"{DELAY}  [default: 1]", rich_help_panel=DISTURBED),
 ]
 
 
 class NamedTask(Protocol):
-    """What a command gets in the place of the flags that name its task.
+    """A command's parameter that replaces the flags of its task.
 
-    What reads them loads much, and is loaded when it is called.
+    The call is deferred because `TaskFlags` is slow to import.
     """
 
     def __call__(self) -> TaskFlags:
-        """The task that they name."""
+        """The flags of the task."""
 
 
 def task_flags(
@@ -273,7 +305,7 @@ def task_flags(
     threshold: Threshold = None,
     instructions: Instructions = None,
 ) -> TaskFlags:
-    """The task that these flags of a command name."""
+    """The flags that name the task of a command."""
     from tdac_agent.cli.flags import TaskFlags
 
     return TaskFlags(
@@ -295,17 +327,17 @@ def task_flags(
 
 
 Command = Callable[..., None]
-TOLD_TO_MODELS = ("robot_image", "instructions")
-"""Flags of a task that matter to nobody but a model."""
+ONLY_FOR_SYNTH = ("robot_image", "instructions")
+"""Task flags that only `tdac synth` has."""
 
 
 def takes_task(
-    *, but: Collection[str] = TOLD_TO_MODELS
+    *, but: Collection[str] = ONLY_FOR_SYNTH
 ) -> Callable[[Command], Command]:
-    """Gives a command the flags of `task_flags` where it has a parameter `named_task`.
+    """Replaces a command's parameter `named_task` by the flags of `task_flags`.
 
     Args:
-        but: Flags that it does not have.
+        but: Flags to leave out.
     """
     flags = [flag for flag in _parameters(task_flags) if flag.name not in but]
 
@@ -318,7 +350,7 @@ def takes_task(
             named = {flag.name: given.pop(flag.name) for flag in flags}
             command(**given, named_task=functools.partial(task_flags, **named))
 
-        # Typer reads both.
+        # Typer reads the signature and the annotations.
         parameters = [*own[:at], *flags, *own[at + 1 :]]
         called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         called.__annotations__ = {p.name: p.annotation for p in parameters}
@@ -329,7 +361,7 @@ def takes_task(
 
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
     """The parameters of a function, their annotations evaluated."""
-    # The one name that is not there at run time is none of a parameter.
+    # `TaskFlags` is not imported at run time; only the return annotation names it.
     hints = get_type_hints(function, localns={"TaskFlags": object}, include_extras=True)
     return [
         parameter.replace(annotation=hints[name])

@@ -1,4 +1,4 @@
-"""`tdac play`: one episode in a window or a video."""
+"""`tdac play`: shows one episode in a window or writes it as a video."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def run(
     disturbed: DisturbanceFlags,
     tier: str,
 ) -> int:
-    """Plays one episode; returns 0 if the goal was reached."""
+    """Plays one episode; returns 0 if the goal was reached, else 1."""
     check_tier(tier)
     if seed is None:
         refuse_without("--seed N", list(disturbed.given()))
@@ -48,23 +48,23 @@ def run(
         raise TaskError("give --episode or --seed, not both")
     name, disturbance = _checked(episode), disturbed.disturbance()
     if video is None and not has_display():
-        raise TaskError("there is no display here: give --video FILE.mp4 (or .gif)")
+        raise TaskError("there is no display: give --video FILE.mp4 (or .gif)")
     if video is not None and video.suffix not in SUFFIXES:
-        raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
+        raise TaskError(f"--video must end in .mp4 or .gif, got {video.name!r}")
     file, task = controller_and_task(controller, flags)
     if seed is None:
         rollout = drive(task, read_source(file), name, tier)
     else:
         driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
         rollout = driven.rollout
-    picked = pictures_of(task.setting).frames(rollout, STRIDE)
+    frames = pictures_of(task.setting).frames(rollout, STRIDE)
     rate = 1.0 / (task.nominal.dt * STRIDE)
     if video is not None:
-        write_video(picked, video, fps=2 * rate)
-        print(f"wrote {video} (twice real time)")
+        write_video(frames, video, fps=2 * rate)
+        print(f"wrote {video} (at twice real time)")
     else:
         window = Window(f"tdac: {task.name}", rate)
-        for frame in picked:
+        for frame in frames:
             window.show(frame)
         window.close()
     steps = rollout.trajectory.steps
@@ -73,7 +73,7 @@ def run(
 
 
 def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
-    """One judged episode of the suite, as its report names it."""
+    """Runs one judged episode of the suite, by its name in the report."""
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work = Path(folder)
         write_workdir(work, task)
@@ -88,7 +88,7 @@ def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
 def drive_disturbed(
     task: Task, source: bytes, seed: int, disturbance: Disturbance, tier: str
 ) -> Driven:
-    """The judged episode of a seed, as a robust verification runs it."""
+    """Runs the judged episode of a seed, as in a robust verification."""
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
         work, nursery = Path(folder) / "work", Nursery(ahead=False)
         write_workdir(work, task)
@@ -108,7 +108,7 @@ def _checked(episode: str | None) -> str:
     names = ["nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1))]
     if episode is not None and episode not in names:
         known = ", ".join(names)
-        raise TaskError(f"no episode {episode!r}; expected one of {known}")
+        raise TaskError(f"unknown --episode {episode!r}; expected one of {known}")
     return episode or "nominal"
 
 

@@ -8,6 +8,8 @@ from typing import Annotated, Optional
 import typer
 
 from tdac_agent.cli.options import (
+    CONTROLLER,
+    VIDEO,
     Delay,
     MotorLag,
     NamedTask,
@@ -26,22 +28,27 @@ app = typer.Typer()
 )
 @takes_task()
 def play(
-    controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
+    controller: Annotated[str, typer.Argument(metavar="CONTROLLER", help=CONTROLLER)],
     named_task: NamedTask,
     video: Annotated[
         Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option(help="Write .mp4 or .gif instead of opening a window."),
+        typer.Option(metavar="FILE", help=f"{VIDEO} instead of opening a window."),
     ] = None,
     episode: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option(
-            help="Episode of `tdac verify` without --seed: `nominal`, `jitter 1` …  "
-            "[default: nominal]"
+            metavar="NAME",
+            help="Episode of the suite, as `tdac verify` runs it without --seed: "
+            "`nominal`, `jitter 1`, …  [default: nominal]",
         ),
     ] = None,
     seed: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(min=0, help="The disturbed episode of this seed instead."),
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Seed of an episode of `tdac verify --robust` to play instead.",
+        ),
     ] = None,
     tier: Tier = "auto",
     range_noise: RangeNoise = None,
@@ -51,7 +58,7 @@ def play(
 ) -> None:
     """Show one episode of a controller, run in the sandbox.
 
-    It is one of those of `tdac verify`: of the suite, or with --seed of --robust.
+    The episode is one of `tdac verify`, or with --seed one of `tdac verify --robust`.
     """
     from tdac_agent.cli import play as command
     from tdac_agent.cli.robust_flags import DisturbanceFlags

@@ -1,4 +1,4 @@
-"""Live progress of a synthesis, from the records of its journal."""
+"""Live progress of a synthesis, printed from the records of its journal."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from tdac_agent.models.budget import told_usd
 _ANSWERS = (
     ("generate", "controller", "controllers"),
     ("edit", "edit", "edits"),
-    ("summarise", "about the rules", "about the rules"),
+    ("summarise", "rule update", "rule updates"),
 )
 
 
 class Progress:
-    """Turns journal records into lines: what is going on, and what came of it.
+    """Shows journal records as lines: current activity and results.
 
     Args:
-        console: Where to.
+        console: Console to print to.
         heading: Line to print when the run begins.
     """
 
@@ -54,8 +54,8 @@ class Progress:
         if kind in {"run.start", "run.resume"}:
             self._print_heading(record)
         elif kind == "prove.start":
-            told = "checking the suite: reference must pass, do-nothing must fail"
-            self._console.print(f"  {told}", style="dim")
+            check = "checking the suite: reference must pass, do-nothing must fail"
+            self._console.print(f"  {check}", style="dim")
             self._spinner.update(text="checking the suite")
         elif kind == "prove.step":
             self._spinner.update(text=f"checking the suite: {record['doing']} …")
@@ -86,22 +86,22 @@ class Progress:
         for note in record["notes"]:
             self._console.print(f"[yellow]note: {escape(note)}[/]")
         if record["event"] == "run.resume":
-            known = _known(record["answers"])
-            self._console.print(f"going on: {known}{_open(record)}")
+            answers = _answers(record["answers"])
+            self._console.print(f"continuing: {answers}{_unanswered(record)}")
 
     def _print_fault(self, at: str, record: dict[str, Any]) -> None:
         wait = record["wait"]
-        then = "given up" if wait is None else f"asking again in {wait:.0f} s"
-        told = f"{record['fault']} fault: {record['reason']}; {then}"
-        self._say(f"  {at}", escape(told), "yellow")
+        then = "giving up" if wait is None else f"asking again in {wait:.0f} s"
+        line = f"{record['fault']} fault: {record['reason']}; {then}"
+        self._say(f"  {at}", escape(line), "yellow")
 
     def _print_unused(self, at: str, record: dict[str, Any]) -> None:
-        """Why an answer is asked for again; what came of the last one follows."""
+        """Prints why an answer is requested again; not for the last one."""
         asked, most = record["asked"], record["most"]
         if asked < most:
-            why = f"answer {asked} of at most {most} cannot be used: "
-            told = f"{why}{record['problem']}; asking again"
-            self._say(f"  {at}", escape(told), "yellow")
+            problem = f"answer {asked} of at most {most} cannot be used: "
+            problem += f"{record['problem']}; asking again"
+            self._say(f"  {at}", escape(problem), "yellow")
         if not self._has_quoted:
             self._has_quoted = True
             said = f"it says: “{record['says']}”" if record["says"] else "it is empty"
@@ -114,39 +114,38 @@ class Progress:
             why = "; ".join(record["notes"][-1:])
             self._say(f"– {at}", escape(why), "yellow")
         elif record["unchanged"]:
-            self._say(f"= {at}", "the same code as before", "yellow")
+            self._say(f"= {at}", "same code as before", "yellow")
         else:
             failed = record["failed_tests"]
             names = escape(told_tests(failed, 3))
-            told = f"[red]{len(failed)} failed:[/] {names}"
-            self._say(f"[red]✘ {at}[/]", told)
+            self._say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
 
-    def _say(self, place: str, told: str, style: str = "") -> None:
-        """A line whose continuation is not mistaken for another one."""
+    def _say(self, place: str, text: str, style: str = "") -> None:
+        """Prints a line in two columns, so that wrapped text stays below the text."""
         line = Table.grid(padding=(0, 2, 0, 0))
         line.add_column(no_wrap=True)
         line.add_column(overflow="fold")
-        line.add_row(place, told, style=style)
+        line.add_row(place, text, style=style)
         self._console.print(line)
 
 
-def _known(answers: dict[str, int]) -> str:
-    """How many answers are on record, and what they are."""
-    total, parts = sum(answers.values()), []
-    for kind, one, more in _ANSWERS:
-        count = answers.get(kind, 0)
+def _answers(counts: dict[str, int]) -> str:
+    """The number of recorded answers, in all and by kind."""
+    total, parts = sum(counts.values()), []
+    for kind, singular, plural in _ANSWERS:
+        count = counts.get(kind, 0)
         if count:
-            parts.append(f"{count} {one if count == 1 else more}")
-    about = f" ({', '.join(parts)})" if parts else ""
-    return f"{total} answer{'' if total == 1 else 's'} on record{about}"
+            parts.append(f"{count} {singular if count == 1 else plural}")
+    kinds = f" ({', '.join(parts)})" if parts else ""
+    return f"{total} recorded answer{'' if total == 1 else 's'}{kinds}"
 
 
-def _open(record: dict[str, Any]) -> str:
-    """Questions without an answer on record, and what lost answers may have cost."""
+def _unanswered(record: dict[str, Any]) -> str:
+    """The questions without a recorded answer, and the cost of lost answers."""
     number, lost = record["unanswered"], record["lost_usd"]
-    told = ""
+    text = ""
     if number:
-        one = number == 1
-        who = "one question has" if one else f"{number} questions have"
-        told = f"; {who} no answer on record and {'is' if one else 'are'} put again"
-    return told + (f"; lost answers count with {told_usd(lost)}, at most" * bool(lost))
+        questions = "one question has" if number == 1 else f"{number} questions have"
+        again = "is" if number == 1 else "are"
+        text = f"; {questions} no recorded answer and {again} asked again"
+    return text + (f"; lost answers count as at most {told_usd(lost)}" * bool(lost))

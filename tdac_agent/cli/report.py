@@ -1,4 +1,4 @@
-"""`tdac report`: runs as one HTML file."""
+"""`tdac report`: writes one HTML file about runs."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ DEFAULT = "report.html"
 
 
 def run(place: Path, out: Path | None) -> int:
-    """Writes the file; returns the exit code.
+    """Writes the report and returns the exit code.
 
     Raises:
-        RunError: There is no run that can be read, or the file cannot be written.
+        RunError: No run can be read, or the file cannot be written.
     """
     file = out or place / DEFAULT
-    # A place that is not there is told by who reads it.
+    # `make_page` reports a missing place.
     if place.exists() and (file.is_dir() or not file.resolve().parent.is_dir()):
         reason = "it is a folder" if file.is_dir() else "there is no such folder"
         raise RunError(f"cannot write {file}: {reason}")
@@ -35,6 +35,6 @@ def run(place: Path, out: Path | None) -> int:
     for line in page.unreadable:
         tell(console, f"not readable: {line}", "yellow")
     runs = "1 run" if page.runs == 1 else f"{page.runs} runs"
-    told = f"{escape(str(file))}: {runs}, {page.verified} verified"
-    console.print(f"{told}; {len(page.html) / 1e6:.1f} MB", soft_wrap=True)
+    summary = f"{escape(str(file))}: {runs}, {page.verified} verified"
+    console.print(f"{summary}; {len(page.html) / 1e6:.1f} MB", soft_wrap=True)
     return 0

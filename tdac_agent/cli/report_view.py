@@ -1,4 +1,4 @@
-"""A report on the terminal."""
+"""Prints a verification report on the terminal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Failure, Report
 
 MOST_NAMES, SOME_NAMES = 6, 3
-"""Of tests that fail for one reason: how many are named, and how many of more."""
+"""Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
 
 
 def show_report(
@@ -30,10 +30,10 @@ def show_report(
     """Prints the verdict, the failures with their diagnosis, and the episodes.
 
     Args:
-        report: What to show.
-        console: Where to.
+        report: The report.
+        console: Console to print to.
         out: Folder to which the report and its pictures were written.
-        folder: Of the task's file, where it is not a bundled one.
+        folder: Folder of the task file; None for a bundled task.
     """
     verdict, about = report.verdict, report.provenance
     for warning in about.warnings:
@@ -55,7 +55,7 @@ def show_report(
         _show_files(out, console)
     colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
     task = about.called or about.task
-    # Anybody's task may have any name.
+    # Task names are not unique, so the folder is shown, too.
     task += f" of {folder}" if folder is not None and task != about.task else ""
     _, _, name = about.suite.partition(" + ")
     own = f" with the tests {name} ({about.own_suite})" if about.own_suite else ""
@@ -67,13 +67,13 @@ def show_report(
     )
     if _lacks_names(report):
         console.print(
-            "the profile paper asks for all these functions and constants; "
-            "--profile policy asks for policy(obs) alone"
+            "the profile paper needs all these functions and constants; "
+            "--profile policy needs only policy(obs)"
         )
 
 
 def _show_failed(console: Console, failures: Sequence[Failure]) -> None:
-    """Names of tests that fail for one reason, their file once; of many, the first."""
+    """Prints the names of tests that fail for one reason, grouped by file."""
     names = [failure.test for failure in failures]
     if len(names) > MOST_NAMES:
         names = names[:SOME_NAMES]
@@ -82,13 +82,13 @@ def _show_failed(console: Console, failures: Sequence[Failure]) -> None:
     for name in names:
         file, _, test = name.partition("::")
         files.setdefault(file, []).append(test)
-    told = "; ".join(f"{file}::{', '.join(tests)}" for file, tests in files.items())
-    told += f" and {more} more tests" if more else ""
-    console.print(f"[red]failed[/] [bold]{escape(told)}[/]")
+    shown = "; ".join(f"{file}::{', '.join(tests)}" for file, tests in files.items())
+    shown += f" and {more} more tests" if more else ""
+    console.print(f"[red]failed[/] [bold]{escape(shown)}[/]")
 
 
 def _lacks_names(report: Report) -> bool:
-    """Whether what the profile `paper` asks for by name is not there."""
+    """Whether functions or constants of the profile `paper` are missing."""
     failed = {failure.test.rpartition("::")[2] for failure in report.failures}
     parses = "test_source_parses" not in failed
     return parses and bool(failed & {"test_constants", "test_entry_points"})
@@ -101,7 +101,7 @@ def _show_files(out: Path, console: Console) -> None:
 
 
 def episode_table(report: Report) -> Table:
-    """The judged episodes, a row each."""
+    """One row per judged episode."""
     units = UNITS[report.provenance.unit]
     table = Table(
         title=f"Episodes as the environment recorded them ({units.length})",
@@ -112,7 +112,7 @@ def episode_table(report: Report) -> Table:
     )
     table.add_column("start", no_wrap=True)
     table.add_column("outcome", no_wrap=True)
-    figures = ("steps", "contacts", "path\nleft", "straight\nleft", "ms a\ncall")
+    figures = ("steps", "contacts", "path\nleft", "straight\nleft", "ms per\ncall")
     for name in figures:
         table.add_column(name, justify="right", no_wrap=True)
     for episode in (e for e in report.episodes if e.outcome != "not run"):
@@ -122,12 +122,12 @@ def episode_table(report: Report) -> Table:
             f"[{colour}]{escape(episode.outcome)}[/]",
             str(episode.steps),
             str(episode.collisions),
-            _of(units.scale, episode.d_min, episode.d0),
-            _of(units.scale, episode.d_min_euclidean, episode.d0_euclidean),
+            _fraction(units.scale, episode.d_min, episode.d0),
+            _fraction(units.scale, episode.d_min_euclidean, episode.d0_euclidean),
             f"{episode.call_ms_mean:.2f}" if episode.call_ms_p99 else "–",
         )
     return table
 
 
-def _of(scale: float, left: float, whole: float) -> str:
+def _fraction(scale: float, left: float, whole: float) -> str:
     return f"{scale * left:.0f} of {scale * whole:.0f}"

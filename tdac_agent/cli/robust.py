@@ -1,4 +1,4 @@
-"""The robust part of `tdac verify`, with its progress."""
+"""The robust verification of `tdac verify`, with a progress bar."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def measure(
     judge: WarmJudge,
     as_json: bool,
 ) -> RobustReport:
-    """Runs the disturbed episodes, with a bar for whoever watches."""
+    """Runs the disturbed episodes with a progress bar."""
     assert wanted.robust is not None
     columns = (
         TextColumn("disturbed episodes"),
@@ -37,13 +37,13 @@ def measure(
         TimeLeft(),
     )
     console = Console(stderr=as_json)
-    # Drawn where there is something new, and not ten times a second.
+    # Redrawn only on updates: a timer would cost CPU time.
     bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
-    seen = (0, 0)
+    counts = (0, 0)
 
     def watch(episodes: int, successes: int) -> None:
-        nonlocal seen
-        seen = episodes, successes
+        nonlocal counts
+        counts = episodes, successes
         bar.update(row, completed=episodes, successes=successes, refresh=True)
 
     row = bar.add_task("", total=wanted.robust, successes=0)
@@ -63,10 +63,11 @@ def measure(
                 watch=watch,
             )
     except KeyboardInterrupt:
-        console.print(f"{seen[1]} of {seen[0]} episodes had reached the goal; no rate")
+        reached = f"{counts[1]} of {counts[0]} episodes reached the goal"
+        console.print(f"{reached}; no success rate computed")
         if out is not None:
             console.print(
-                escape(f"{out} holds the report of the suite; no robust.json"),
+                escape(f"{out} contains the report of the suite, but no robust.json"),
                 soft_wrap=True,
             )
         raise

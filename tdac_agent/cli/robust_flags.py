@@ -1,4 +1,4 @@
-"""Flags of robust verification, and of the replay of one of its episodes."""
+"""Flags of robust verification and of playing one of its episodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tdac_envs.core.errors import TaskError
 
 @dataclass(frozen=True, slots=True)
 class DisturbanceFlags:
-    """How much to disturb; None where a flag is not given."""
+    """Sizes of the disturbances; None for a flag that is not given."""
 
     range_noise: float | None = None
     wheel_slip: float | None = None
@@ -20,11 +20,11 @@ class DisturbanceFlags:
     delay: int | None = None
 
     def given(self) -> dict[str, float]:
-        """Those that are given, by field."""
+        """The values of the given flags by field."""
         return {name: v for name, v in asdict(self).items() if v is not None}
 
     def words(self) -> list[str]:
-        """The command line that gives the same again."""
+        """The command line words that repeat these flags."""
         return [
             word
             for name, value in self.given().items()
@@ -32,17 +32,17 @@ class DisturbanceFlags:
         ]
 
     def disturbance(self) -> Disturbance:
-        """The defaults with what is given.
+        """The disturbance: the given values, defaults for the others.
 
         Raises:
-            TaskError: A value makes no sense.
+            TaskError: A value is out of range.
         """
         return Disturbance(**self.given())  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, slots=True)
 class RobustFlags:
-    """What `--robust` asks for; None where a flag is not given."""
+    """The flags of robust verification; None for a flag that is not given."""
 
     robust: int | None = None
     first_seed: int | None = None
@@ -51,10 +51,10 @@ class RobustFlags:
     disturbed: DisturbanceFlags = DisturbanceFlags()
 
     def check(self) -> None:
-        """Refuses, before anything is run, what makes no sense.
+        """Checks the flags before anything is run.
 
         Raises:
-            TaskError: A flag needs another one, or a value makes no sense.
+            TaskError: A flag needs another one, or a value is out of range.
         """
         own = {f.name for f in fields(self)} - {"robust", "disturbed"}
         given = [name for name in sorted(own) if getattr(self, name) is not None]
@@ -70,11 +70,11 @@ class RobustFlags:
 
 
 def refuse_without(needed: str, given: list[str]) -> None:
-    """Refuses flags that mean nothing without another one.
+    """Refuses flags that have no effect without another one.
 
     Raises:
-        TaskError: There are any.
+        TaskError: There are such flags.
     """
     if given:
         names = ", ".join(map(flag, given))
-        raise TaskError(f"{names} needs {needed}")
+        raise TaskError(f"{names} need{'s' if len(given) == 1 else ''} {needed}")

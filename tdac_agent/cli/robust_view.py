@@ -1,4 +1,4 @@
-"""A robust verification on the terminal."""
+"""Prints a robust verification on the terminal."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ REACHED = "reached"
 
 
 def show_robust(report: RobustReport, console: Console, play: list[str]) -> None:
-    """Prints the worst episodes, the count, and what follows from it.
+    """Prints the worst episodes, the success rate and the sequential test's decision.
 
     Args:
         report: The report.
-        console: Where to.
-        play: Command line that plays an episode, but for its seed.
+        console: Console to print to.
+        play: Command line that plays an episode, without `--seed`.
     """
     say = partial(console.print, highlight=False)
     say(worst_table(report))
     for error in _errors(report):
         tell(console, error, indent=2)
     replay = shlex.join([*play, "--seed", str(report.worst[0].seed)])
-    # A command is for copying: it is not wrapped.
-    told = f"  replay the first of them: [bold]{escape(replay)}[/]"
-    console.print(told, soft_wrap=True, highlight=False)
+    # Not wrapped, so that it can be copied.
+    line = f"  replay the first of them: [bold]{escape(replay)}[/]"
+    console.print(line, soft_wrap=True, highlight=False)
     say(f"  disturbance: {report.provenance.disturbance}")
     outcomes = report.outcomes.items()
     others = ", ".join(f"{count} {name}" for name, count in outcomes if name != REACHED)
@@ -43,8 +43,8 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
     )
     if report.time_outs:
         say(
-            f"[yellow]warning: {report.time_outs} of them timed out, also when tried "
-            "again alone; if this machine was busy, count again when it is not[/]"
+            f"[yellow]warning: {report.time_outs} of them timed out, also when retried "
+            "alone; if this machine was busy, repeat this when it is idle[/]"
         )
     if report.interval is not None and report.rate is not None:
         say(_rate(report.rate, report.interval))
@@ -59,7 +59,7 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
 
 
 def worst_table(report: RobustReport) -> Table:
-    """The worst seeds: every failure up to a number, then the slowest successes."""
+    """The worst episodes: up to `MOST` failures, then the slowest successes."""
     first, failures = report.provenance.first_seed, len(report.failed_seeds)
     units = UNITS[report.provenance.unit]
     seeds = f"the seeds {first} to {first + report.episodes - 1} ({units.length})"
@@ -96,7 +96,7 @@ def _place(episode: SeededEpisode, units: Units) -> str:
 
 
 def _errors(report: RobustReport) -> list[str]:
-    """What the controllers of the worst episodes did wrong, each thing once."""
+    """The distinct errors of the worst episodes, each with its first seed."""
     first: dict[str, int] = {}
     for episode in report.worst:
         if episode.error is not None:
@@ -117,21 +117,21 @@ def _decision(result: SequentialResult) -> str:
         return f"accepted at {_percent(result.test.accept_at)}"
     if result.decision == "rejected":
         return f"rejected at {_percent(result.test.accept_at)}"
-    return "undecided, and so not accepted,"
+    return "undecided, therefore not accepted,"
 
 
 def _error_rates(result: SequentialResult) -> str:
     low, high = result.at_refused_rate, result.at_accepted_rate
     return (
-        f"  a controller of {_percent(low.rate)} is accepted with probability "
+        f"  a true rate of {_percent(low.rate)} is accepted with probability "
         f"{_percent(low.accepted)}\n"
-        f"  a controller of {_percent(high.rate)} is rejected with probability "
+        f"  a true rate of {_percent(high.rate)} is rejected with probability "
         f"{_percent(high.rejected)}, undecided with {_percent(high.undecided)}"
     )
 
 
 def _percent(share: float) -> str:
-    """One decimal; three where one would make nearly all of it all."""
+    """A percentage with one decimal; with three if it would round to 0 or 100 %."""
     rounded = f"{100 * share:.1f}"
     if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
         rounded = f"{100 * share:.3f}"

@@ -1,4 +1,4 @@
-"""`tdac rules RUN`: the life of each repair rule of a run."""
+"""`tdac rules RUN`: the history of each repair rule of a run."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def run(folder: Path, as_json: bool) -> int:
     title = f"{record.task}: rules by {record.optimizer}, {record.status}"
     if book.rules:
         console.print(f"[bold]{escape(title)}[/]\n")
-        console.print(_lives(book))
+        console.print(_histories(book))
     else:
         console.print(escape(f"{title}; no rules: {_why_none(record)}"))
     return 0
 
 
-def _lives(book: RuleBook) -> Table:
-    """A paragraph for each rule: its text, then what became of it."""
+def _histories(book: RuleBook) -> Table:
+    """A paragraph per rule: its text, then its status and effect."""
     grid = Table.grid(padding=(0, 2, 0, 0))
     grid.add_column(no_wrap=True, style="bold")
     grid.add_column(overflow="fold")
@@ -43,7 +43,7 @@ def _lives(book: RuleBook) -> Table:
             f"[bold]{escape(rule.text)}[/]",
             *(f"[dim]{escape(edit)}[/]" for edit in rule.edits),
             f"{state} · {rule.scope} · since k={rule.born}",
-            f"failed before it: {escape(told_tests(rule.evidence, 4))}",
+            f"failed before: {escape(told_tests(rule.evidence, 4))}",
             f"effect: {escape(_effect(rule))}",
             "",
         ]
@@ -52,31 +52,31 @@ def _lives(book: RuleBook) -> Table:
 
 
 def _why_none(run: Run) -> str:
-    """What has to be known where there are no rules."""
+    """Why a run has no rules."""
     if not run.refine:
-        return "this run leaves its prompt as it is (--no-refine)"
+        return "this run does not refine its prompt (--no-refine)"
     failed = [attempt for attempt in run.attempts if not attempt.passed]
     if failed and not any(attempt.valid for attempt in run.attempts):
         number = len({attempt.k for attempt in failed})
         return f"no answer of {number} iteration{'s' * (number > 1)} could be used"
     if any(attempt.j == run.patience and attempt.valid for attempt in failed):
-        return "the optimizer had none to add"
-    return "no iteration has failed as a whole"
+        return "the optimizer added none"
+    return "no iteration has failed after all its edits"
 
 
 def _effect(rule: RepairRule) -> str:
-    """What came of it; where it did not cure all tests, those that it did by name."""
+    """The effect of a rule; names the cured tests unless it cured all or none."""
     pairs = list(zip(rule.evidence, rule.passes_each, strict=True))
     cured = [test for test, count in pairs if count == rule.tried]
-    some = [test for test, count in pairs if 0 < count < rule.tried]
-    told = rule.effect_told
+    sometimes = [test for test, count in pairs if 0 < count < rule.tried]
+    effect = rule.effect_told
     if not rule.tried or len(cured) == len(pairs):
-        return told
+        return effect
     if cured:
-        told += f"; cured: {told_tests(cured, 4)}"
-    if some:
-        told += f"; cured in some: {told_tests(some, 4)}"
-    return told
+        effect += f"; cured: {told_tests(cured, 4)}"
+    if sometimes:
+        effect += f"; cured sometimes: {told_tests(sometimes, 4)}"
+    return effect
 
 
 def _state(rule: RepairRule) -> str:

@@ -1,4 +1,4 @@
-"""A run for people: its attempts, how it ended, what it took."""
+"""Prints a run on the terminal: its attempts, result and cost."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tdac_agent.runs.records import Attempt, Run
 
 
 def show_run(run: Run, console: Console) -> None:
-    """Prints the attempts in a table, and what came of the run."""
+    """Prints the attempts in a table, then the result and the next commands."""
     if run.attempts:
         console.print(_attempts(run))
     usage, folder = _usage(run), run.folder
@@ -24,37 +24,37 @@ def show_run(run: Run, console: Console) -> None:
             f"[bold green]verified[/] in iteration {run.tau}, {run.seconds:.1f} s: "
         )
         console.print(f"{ending}{escape(str(run.controller))}", soft_wrap=True)
-        _tell_more(console, usage)
+        _print_indented(console, usage)
         evidence = f"{folder / 'report.json'}, {folder / 'trajectory.png'}"
-        _tell_way(console, f"evidence: {evidence}")
+        _print_unwrapped(console, f"evidence: {evidence}")
         drive = shlex.join(["tdac", "play", str(folder), "--video", "drive.mp4"])
-        _tell_way(console, f"see it drive: {drive}")
+        _print_unwrapped(console, f"watch it drive: {drive}")
     elif run.status == "budget":
         console.print(f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}")
-        _tell_more(console, usage)
-        _tell_more(console, run.outlook)
-        _tell_way(console, f"go on: {way_on(run)}")
+        _print_indented(console, usage)
+        _print_indented(console, run.outlook)
+        _print_unwrapped(console, f"to continue: {way_on(run)}")
     else:
         times = f"{run.iterations} iteration{'' if run.iterations == 1 else 's'}"
         ending = f"[bold red]not verified[/] after {times}; "
-        told = f"{ending}the attempts are in {escape(str(folder / 'iterations'))}"
-        console.print(told, soft_wrap=True)
-        _tell_more(console, usage)
+        attempts = escape(str(folder / "iterations"))
+        console.print(f"{ending}the attempts are in {attempts}", soft_wrap=True)
+        _print_indented(console, usage)
 
 
-def _tell_more(console: Console, told: str) -> None:
-    """A sentence that belongs to the line before, if there is something to say."""
-    if told:
-        console.print(Padding(escape(told), (0, 0, 0, 2)))
+def _print_indented(console: Console, text: str) -> None:
+    """Prints a wrapped sentence below the line that it belongs to, unless empty."""
+    if text:
+        console.print(Padding(escape(text), (0, 0, 0, 2)))
 
 
-def _tell_way(console: Console, told: str) -> None:
-    """A path or command, which stays in one piece to be copied."""
-    console.print(f"  {escape(told)}", soft_wrap=True)
+def _print_unwrapped(console: Console, text: str) -> None:
+    """Prints a path or command in one line, so that it can be copied."""
+    console.print(f"  {escape(text)}", soft_wrap=True)
 
 
 def _usage(run: Run) -> str:
-    """Tokens and money in a line; none where no model was asked."""
+    """Tokens and cost in one line; empty if no model was asked."""
     if run.tokens == 0 and run.cost == 0.0 and not run.cost_lost:
         return ""
     cached = f" ({run.tokens_cached} from a cache)" if run.tokens_cached else ""
@@ -65,12 +65,12 @@ def _usage(run: Run) -> str:
     if not run.tokens:
         tokens = "no tokens reported"
         if run.max_tokens is not None:
-            tokens += ": each answer counts with all that was reserved for it"
+            tokens += ": each answer counts as the full amount reserved for it"
     return f"{tokens}; {cost}"
 
 
 def way_on(run: Run) -> str:
-    """The command that goes on with a run; empty where it has come to its end."""
+    """The command that continues a run; empty if the run has finished."""
     if run.finished:
         return ""
     more = f" {run.enough}" if run.enough else ""
@@ -84,20 +84,20 @@ def _attempts(run: Run) -> Table:
     table.add_column("result")
     table.add_column("failed tests")
     for attempt in run.attempts:
-        told = told_tests(attempt.failed_tests, 4) or _why_invalid(attempt)
-        table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(told))
+        failed = told_tests(attempt.failed_tests, 4) or _why_invalid(attempt)
+        table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 
 
 def told_tests(tests: Sequence[str], most: int) -> str:
-    """The names of some tests, and how many more there are."""
+    """The names of the first `most` tests, and the number of the others."""
     names = [name.rpartition("::")[2] for name in tests]
     more = len(names) - most
     return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def _why_invalid(attempt: Attempt) -> str:
-    """Of an answer without code, the last reason; its notes end with it."""
+    """Why an attempt has no valid code, from its last note; empty if it has."""
     return "" if attempt.valid else "; ".join(attempt.notes[-1:])
 
 

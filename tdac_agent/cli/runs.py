@@ -1,4 +1,4 @@
-"""`tdac runs [DIR]`: the runs and trainings in a folder, and how to go on with them."""
+"""`tdac runs [DIR]`: lists the runs and trainings in a folder."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from tdac_agent.runs.records import JOURNAL, RUN_FILE, at_work, load_run, status
 from tdac_agent.training.curve import PLAN_FILE, read_curve
 
 USUAL = Path("runs")
-"""Where runs are written to; before the first one it is not there."""
+"""Default folder; it does not exist before the first run."""
 WIDE = 100
-"""Characters, with which there is room for all columns."""
+"""Console width from which all columns fit."""
 _COLOURS = {
     "verified": "green",
     "trained": "green",
@@ -35,7 +35,7 @@ _COLOURS = {
 
 
 def run(folder: Path, as_json: bool) -> int:
-    """Prints the runs, the newest last; returns the exit code.
+    """Prints the runs, the newest last; returns 0.
 
     Raises:
         RunError: There is no such folder.
@@ -57,16 +57,16 @@ def run(folder: Path, as_json: bool) -> int:
                 tell(console, f"{row['run']}: {row['reason']}", "red")
                 continue
             if "steps" in row:
-                tell(console, _learnt(row))
+                tell(console, _training_progress(row))
             if row["go_on"]:
-                console.print(f"go on: {escape(row['go_on'])}", soft_wrap=True)
+                console.print(f"to continue: {escape(row['go_on'])}", soft_wrap=True)
     else:
         console.print(f"no runs in {folder}; `tdac synth` makes one", soft_wrap=True)
     return 0
 
 
 def _folders(folder: Path) -> list[Path]:
-    """A run folder itself, or those in a folder; other things are not ours."""
+    """The folder itself and its subfolders, if they are run or training folders."""
     places = [folder, *(path for path in folder.iterdir() if path.is_dir())]
     return [place for place in places if _is_run(place)]
 
@@ -79,7 +79,7 @@ def _is_run(place: Path) -> bool:
 
 
 def _training(folder: Path) -> dict[str, Any]:
-    from tdac_agent.training.plan import read_plan  # with all of Gymnasium
+    from tdac_agent.training.plan import read_plan  # imports Gymnasium
 
     try:
         plan, points = read_plan(folder), read_curve(folder)
@@ -87,31 +87,31 @@ def _training(folder: Path) -> dict[str, Any]:
         return {"run": str(folder), "status": "unreadable", "reason": str(error)}
     last = max((point.steps for point in points), default=0)
     best = max(points, key=lambda point: point.worth, default=None)
-    over = last >= plan.steps
+    done = last >= plan.steps
     return {
         "run": str(folder),
         "task": ", ".join(plan.tasks),
         "learner": plan.algo,
-        "status": "trained" if over else "not at its end",
+        "status": "trained" if done else "not at its end",
         "steps": last,
         "of_steps": plan.steps,
         "success_rate": None if best is None else best.success_rate,
         "started": datetime.fromtimestamp(
             (folder / PLAN_FILE).stat().st_mtime, UTC
         ).isoformat(),
-        "go_on": "" if over else shlex.join(["tdac", "train", "--resume", str(folder)]),
+        "go_on": "" if done else shlex.join(["tdac", "train", "--resume", str(folder)]),
     }
 
 
-def _learnt(row: dict[str, Any]) -> str:
-    """How far a training is, and what its best policy does."""
+def _training_progress(row: dict[str, Any]) -> str:
+    """The steps of a training so far, and the success rate of its best policy."""
     rate = row["success_rate"]
     best = "" if rate is None else f", the best policy reached {rate:.0%} of the goals"
     return f"{row['run']}: {row['steps']:,} of {row['of_steps']:,} steps{best}"
 
 
 def _row(folder: Path) -> dict[str, Any]:
-    """What there is to say of a folder, also of a torn one."""
+    """The record of a run or training folder, also of a damaged one."""
     if (folder / PLAN_FILE).is_file():
         return _training(folder)
     before = at_work(folder)
@@ -147,7 +147,7 @@ def _age(row: dict[str, Any]) -> tuple[str, str]:
 
 
 def _table(rows: list[dict[str, Any]], width: int) -> Table:
-    """A line for each run: a long learner is cut, a narrow table has fewer columns."""
+    """One line per run; cuts long learner names, drops columns on a narrow console."""
     wide = width >= WIDE
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     table.add_column("run", no_wrap=True)
@@ -161,7 +161,7 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
     if wide:
         table.add_column("started", no_wrap=True)
     if any("–" in column for column in figures.values()):
-        table.caption = "–: no model was asked, or it reports none"
+        table.caption = "–: no model was asked, or it does not report this"
         table.caption_justify = "left"
     for number, row in enumerate(rows):
         status = row["status"]
@@ -169,7 +169,7 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
         table.add_row(
             escape(row["run"]),
             *([escape(task)] if wide else []),
-            # One word, so that it is not wrapped where it is cut.
+            # No-break spaces: the name is cut, not wrapped.
             escape(row.get("learner", "").replace(" ", "\N{NO-BREAK SPACE}")),
             f"[{_COLOURS.get(status, 'yellow')}]{status}[/]",
             *(column[number] for column in figures.values()),
@@ -179,17 +179,17 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
 
 
 def _figures(rows: list[dict[str, Any]]) -> dict[str, list[str]]:
-    """Columns of figures by their names; without those that say nothing at all."""
+    """The columns of figures by name, without empty ones."""
     lines = [_figures_of(row) for row in rows]
     columns = {
         name: [line[at] for line in lines]
         for at, name in enumerate(("k", "tokens", "cost"))
     }
-    return {name: told for name, told in columns.items() if set(told) - {"–", ""}}
+    return {name: cells for name, cells in columns.items() if set(cells) - {"–", ""}}
 
 
 def _figures_of(row: dict[str, Any]) -> tuple[str, str, str]:
-    """How far a run came, its tokens and its cost; a dash where none are reported."""
+    """Iterations, tokens and cost of a run; a dash for what is not reported."""
     if "k" not in row:
         return "", "", ""
     tokens = row["tokens_in"] + row["tokens_out"]

@@ -1,4 +1,4 @@
-"""The commands `tdac demo | rules | report | runs`: runs on record."""
+"""The commands `tdac demo`, `rules`, `report` and `runs`, about recorded runs."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ app = typer.Typer()
 @app.command(epilog="Example: `tdac demo`")
 def demo(
     out: Annotated[
-        Path | None, typer.Option(help="Run folder [default: runs/demo-N].")
+        Path | None,
+        typer.Option(metavar="DIR", help="Run folder.  [default: runs/demo-N]"),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Replay a recorded run of a language model: its answers, your machine's tests."""
+    """Replay a recorded run of a language model, with live tests."""
     from tdac_agent.cli import demo as command
 
     raise typer.Exit(command.run(out, as_json))
@@ -27,9 +28,10 @@ def demo(
 
 @app.command("rules", epilog="Example: `tdac rules runs/office-1`")
 def rules_command(
-    run: Annotated[Path, typer.Argument(help="A run folder.")], as_json: Json = False
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.")],
+    as_json: Json = False,
 ) -> None:
-    """Show what a run has learnt: each rule, where it came from, what came of it."""
+    """Show the repair rules of a run, with their origin and effect."""
     from tdac_agent.cli import rules
 
     raise typer.Exit(rules.run(run, as_json))
@@ -40,13 +42,17 @@ def rules_command(
     epilog="Examples: `tdac report runs/office-1`; `tdac report runs --out all.html`",
 )
 def report_command(
-    place: Annotated[Path, typer.Argument(help="A run folder, or a folder of runs.")],
+    place: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Run folder, or folder of runs.")
+    ],
     out: Annotated[
         Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option("--out", help="The file.  [default: report.html in the folder]"),
+        typer.Option(
+            "--out", metavar="FILE", help="Output file.  [default: DIR/report.html]"
+        ),
     ] = None,
 ) -> None:
-    """Make one HTML file of runs: verdicts, failures, code, rules, animations."""
+    """Write an HTML report of runs: failures, code, rules, animations."""
     from tdac_agent.cli import report
 
     raise typer.Exit(report.run(place, out))
@@ -54,12 +60,12 @@ def report_command(
 
 @app.command("runs", epilog="Examples: `tdac runs`; `tdac runs results --json`")
 def runs_command(
-    folder: Annotated[Path, typer.Argument(help="Where the run folders are.")] = Path(
-        "runs"
-    ),
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Run folder, or folder of runs.")
+    ] = Path("runs"),
     as_json: Json = False,
 ) -> None:
-    """List runs and trainings: how far each came, what it took, how to go on."""
+    """List runs and trainings: progress, cost, how to continue them."""
     from tdac_agent.cli import runs
 
     raise typer.Exit(runs.run(folder, as_json))

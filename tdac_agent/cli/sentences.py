@@ -1,4 +1,4 @@
-"""Sentences on a console: in its width on a terminal, each one line in a file."""
+"""Prints sentences: wrapped on a terminal, one line each in a file."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from tdac_agent.cli.mistakes import folded
 
 
 def tell(console: Console, words: str, style: str = "", *, indent: int = 0) -> None:
-    """Prints sentences; no word, path or command word is broken, nothing is cut.
+    """Prints sentences without breaking words or paths.
 
     Args:
-        console: Where to.
-        words: A line each; no markup.
-        style: Of all of it.
-        indent: Columns before it. What goes on in the next line has two at least.
+        console: Console to print to.
+        words: Text without markup, one sentence per line.
+        style: Style of the whole text.
+        indent: Columns to indent; wrapped lines are indented by at least two.
     """
     for line in words.splitlines():
-        told = " " * indent + line
+        text = " " * indent + line
         if console.is_terminal:
-            told = folded(told, console.width, indent or 2)
-        console.print(Text(told, style), soft_wrap=True)
+            text = folded(text, console.width, indent or 2)
+        console.print(Text(text, style), soft_wrap=True)

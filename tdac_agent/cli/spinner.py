@@ -1,4 +1,4 @@
-"""A spinner for what may be over before one is wanted."""
+"""A spinner that is loaded only when needed."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from contextlib import ExitStack
 
 
 class Spinner:
-    """Says on a terminal what is being done, from its first call on.
+    """Context manager that shows an activity on a terminal from its first call on.
 
-    Until then, and where stderr is no terminal, nothing that draws is loaded. A context
-    manager.
+    It imports rich on that call, and only if stderr is a terminal.
 
     Args:
-        text: What is being done.
+        text: Name of the activity.
     """
 
     def __init__(self, text: str) -> None:
@@ -22,7 +21,7 @@ class Spinner:
         self._done = not sys.stderr.isatty()
 
     def __call__(self) -> None:
-        """Shows it, unless it is shown already."""
+        """Shows the spinner, unless it is already shown."""
         if self._done:
             return
         self._done = True

@@ -1,4 +1,4 @@
-"""`tdac synth`: live progress, then a table and the run folder."""
+"""`tdac synth`: shows live progress, then a table and the run folder."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def run(
     trust: bool,
     as_json: bool,
 ) -> int:
-    """Synthesises and prints; returns the exit code.
+    """Synthesises a controller and prints the run; returns the exit code.
 
     Args:
-        flags: That name the task.
+        flags: Flags that name the task.
         wanted: Further arguments of `synthesize`.
         out: Run folder; the next free one by default.
         start_from: Controller to begin with.
-        suite: Folder with further tests.
-        trust: Whether what the task brings may run.
-        as_json: Whether to print the record.
+        suite: Folder with additional tests.
+        trust: Whether the task's own tests may run.
+        as_json: Whether to print the run record as JSON.
     """
     console = Console(stderr=as_json)
     source = None if start_from is None else read_text(start_from)
@@ -61,14 +61,14 @@ def resume(
     trust: bool,
     as_json: bool,
 ) -> int:
-    """Goes on with a run as it was begun; returns the exit code.
+    """Continues a run with its own settings; returns the exit code.
 
     Args:
-        folder: Of the run.
-        given: Flags that allow what the run of somebody else's wants.
-        limits: `max_cost` and `max_tokens`, None where they stay.
-        trust: Whether a run of somebody else's may do what it wants.
-        as_json: Whether to print the record.
+        folder: Run folder.
+        given: Flags given again, which permits their use by a run from elsewhere.
+        limits: `max_cost` and `max_tokens`; None keeps the run's limit.
+        trust: Whether a run from elsewhere may run and contact all that it names.
+        as_json: Whether to print the run record as JSON.
     """
     console = Console(stderr=as_json)
     before = load_run(folder)
@@ -81,11 +81,12 @@ def resume(
 
 
 def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:
-    """Synthesises with live progress, and prints what came out; the exit code.
+    """Synthesises with live progress and prints the run; returns the exit code.
 
     Args:
-        wanted: Arguments of `synthesize`, `optimizer` among them.
-        console: Where to; the record goes to stdout as JSON where this is stderr.
+        wanted: Arguments of `synthesize`, including `optimizer`.
+        console: Console to print to; if it is stderr, the run record goes to stdout as
+            JSON.
     """
     task, folder = wanted["task"], wanted["out"]
     optimizer = wanted["optimizer"]
@@ -101,29 +102,29 @@ def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:
 
 
 def _show(run: Run, console: Console, *, before: Run | None) -> int:
-    """Prints a run, as JSON where the console is not for it; returns the exit code."""
+    """Prints a run, as JSON if the console is stderr; returns the exit code."""
     if console.stderr:
         sys.stdout.write(run.model_dump_json(indent=2) + "\n")
         return _EXIT.get(run.status, 1)
     if before is not None and before.finished:
-        told = f"{run.folder} has ended before; nothing was done"
-        console.print(told, soft_wrap=True)
+        note = f"the run in {run.folder} has already finished; nothing was done"
+        console.print(note, soft_wrap=True)
     show_run(run, console)
     return _EXIT.get(run.status, 1)
 
 
 def _so_far(folder: Path) -> str:
-    """What there is of a run that did not come to its end."""
+    """Where the unfinished run is, and the command to continue it."""
     if not (folder / TASK_FILE).is_file():
-        return "nothing was begun"
-    return f"the run so far is in {folder}; go on: tdac synth --resume {folder}"
+        return "the run had not begun"
+    return f"the run so far is in {folder}; to continue: tdac synth --resume {folder}"
 
 
 def read_text(path: Path) -> str:
-    """Text of a controller file.
+    """The text of a controller file.
 
     Raises:
-        ControllerFileError: It cannot be read, or is not UTF-8.
+        ControllerFileError: The file cannot be read, or is not UTF-8.
     """
     try:
         return read_source(path).decode("utf-8")
@@ -140,14 +141,14 @@ def _heading(task: Task, learner: str, optimizer: str | None) -> str:
     if optimizer not in (None, learner):
         model += f", optimizer [bold]{escape(str(optimizer))}[/]"
     return (
-        f"task [bold]{escape(called(task))}[/]: {units.told(nominal.shortest)} for a "
-        f"disc of {radius:g} {units.length}, at most {nominal.horizon} steps; learner "
-        f"[bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
+        f"task [bold]{escape(called(task))}[/]: path {units.told(nominal.shortest)}, "
+        f"body radius {radius:g} {units.length}, at most {nominal.horizon} steps; "
+        f"learner [bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
     )
 
 
 def _remarks(task: Task) -> list[str]:
-    """How map or world was read, and what a person should look at."""
+    """Lines on how the map or world was read, and notes that need attention."""
     setting = task.setting
     lines = [f"\n{escape(line)}" for line in setting.remarks()]
     notes = [*setting.params.notes, *(f"left out: {name}" for name in setting.left_out)]
@@ -155,7 +156,7 @@ def _remarks(task: Task) -> list[str]:
 
 
 def next_folder(name: str) -> Path:
-    """`runs/NAME-1`, or the first number that is free."""
+    """`runs/NAME-N` with the first free number N."""
     for number in itertools.count(1):
         folder = Path("runs") / f"{name}-{number}"
         if not folder.exists():

@@ -29,7 +29,7 @@ ALLOWED = (
     *("learner", "optimizer", "base_url", "key_over_http"),
     *("prompt", "suite", "seed"),
 )
-"""Flags that allow what a run of somebody else's wants, beside --resume."""
+"""Flags that, given again with --resume, permit their use by a run from elsewhere."""
 WITH_RESUME = frozenset(
     {"resume", "max_cost", "max_tokens", "as_json", "trust", *ALLOWED}
 )
@@ -47,13 +47,19 @@ def synth(
     named_task: NamedTask,
     from_: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--from", help="Controller to begin with."),
+        typer.Option("--from", metavar="FILE", help="Controller to begin with."),
     ] = None,
     k: Annotated[
-        int, typer.Option("-K", "--iterations", min=1, help="Iterations at most.")
+        int,
+        typer.Option(
+            "-K", "--iterations", min=1, metavar="N", help="Maximum iterations."
+        ),
     ] = 20,
     j: Annotated[
-        int, typer.Option("-J", "--patience", min=0, help="Edits per iteration.")
+        int,
+        typer.Option(
+            "-J", "--patience", min=0, metavar="N", help="Maximum edits per iteration."
+        ),
     ] = 1,
     suite: Suite = None,
     learner: Learner = "builtin",
@@ -66,35 +72,39 @@ def synth(
     prompt: Annotated[
         str,
         typer.Option(
-            help="What is asked: `full`, `underspecified`, or your own template file."
+            metavar="NAME",
+            help="Prompt template: `full`, `underspecified`, or a file.",
         ),
     ] = "full",
     refine: Annotated[
         bool,
         typer.Option(
             "--refine/--no-refine",
-            help="Turn failures into rules of the prompt, or leave it as it is.",
+            help="Turn failures into rules in the prompt, or keep the prompt as it is.",
         ),
     ] = True,
     dry_run: Annotated[
         bool,
         typer.Option(
             "--dry-run",
-            help="Print the first prompt and the cost at most; asks nobody.",
+            help="Print the first prompt and the maximum cost; ask no model.",
         ),
     ] = False,
     out: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
             "--out",
-            help="Run folder; one with an unfinished run of the same goes on.  "
-            "[default: runs/TASK-N]",
+            metavar="DIR",
+            help="Run folder; an unfinished run of the same command in it is continued."
+            "  [default: runs/TASK-N]",
         ),
     ] = None,
     resume: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
-            "--resume", metavar="RUN", help="Go on with a run, as it was begun."
+            "--resume",
+            metavar="DIR",
+            help="Continue the run in this folder with its own settings.",
         ),
     ] = None,
     seed: JitterSeed = None,
@@ -136,10 +146,10 @@ def synth(
 
 
 def _refuse_others(context: typer.Context) -> None:
-    """Refuses flags beside --resume that the run folder answers already.
+    """Refuses flags whose values --resume takes from the run folder.
 
     Raises:
-        RunError: It names them.
+        RunError: Such a flag is given; the message names it.
     """
     from tdac_agent.errors import RunError
 
@@ -149,7 +159,8 @@ def _refuse_others(context: typer.Context) -> None:
         if parameter.name not in WITH_RESUME and _is_typed(context, str(parameter.name))
     ]
     if others:
-        raise RunError(f"a run goes on as it was begun: leave out {', '.join(others)}")
+        names = ", ".join(others)
+        raise RunError(f"--resume continues a run as it was begun: leave out {names}")
 
 
 def _is_typed(context: typer.Context, name: str) -> bool:

@@ -1,9 +1,9 @@
-"""The one door to the terminal: what passes it cannot steer the terminal.
+"""Filters all output, so that untrusted text cannot control the terminal.
 
 Controllers, models, servers, file names and tasks may contain escape sequences that
-clear the screen and write a verdict of their own. So nothing relies on its caller:
-`filter_streams` covers `print`, tracebacks, warnings and log lines, and our
-`Console`, in `commands.console`, all that rich draws.
+clear the screen and print a fake verdict. No caller has to filter: `filter_streams`
+covers `print`, tracebacks, warnings and log lines, and `tdac_agent.cli.console.Console`
+covers everything that rich draws.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ from tdac_agent.storage.plain import printable
 
 
 class FilteredStream:
-    """A text stream that writes a mark for each character that is not printable.
+    """A text stream that replaces each character that is not printable by a mark.
 
     Attributes:
-        rich_proxied_file: The stream behind it. rich looks for this name, and writes
+        rich_proxied_file: The unfiltered stream. rich looks for this name and writes
             its own escape sequences there.
 
     Args:
-        stream: Where to write.
+        stream: Stream to write to.
     """
 
     def __init__(self, stream: TextIO) -> None:
         self.rich_proxied_file = stream
 
     def write(self, text: str) -> int:
-        """Writes a text, filtered; returns its length."""
+        """Writes a filtered text; returns its length."""
         return self.rich_proxied_file.write(printable(text))
 
     def writelines(self, lines: Iterable[str]) -> None:
-        """Writes several texts, filtered."""
+        """Writes several filtered texts."""
         self.rich_proxied_file.writelines(map(printable, lines))
 
     def __getattr__(self, name: str) -> Any:
@@ -47,13 +47,13 @@ def filter_streams() -> None:
 
 
 def unfiltered(stream: TextIO) -> TextIO:
-    """The stream behind a filter, for escape sequences of our own."""
-    behind = getattr(stream, "rich_proxied_file", None)
-    return stream if behind is None else unfiltered(behind)
+    """The stream behind a filter, for tdac's own escape sequences."""
+    inner = getattr(stream, "rich_proxied_file", None)
+    return stream if inner is None else unfiltered(inner)
 
 
 def _filtered(stream: TextIO) -> TextIO:
-    # A closed one is None.
+    # A closed standard stream is None.
     if stream is None or isinstance(stream, FilteredStream):
         return stream
     return cast(TextIO, FilteredStream(stream))

@@ -1,4 +1,4 @@
-"""`tdac train`: live progress, a line for each evaluation, and the best policy."""
+"""`tdac train`: shows live progress, a line per evaluation, and the best policy."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tdac_agent.training.train import check_extra, train
 from tdac_envs.core.errors import TaskError
 
 NOISES = ("range_noise", "wheel_slip", "motor_lag", "delay")
-ALMOST = 0.95
+LEARNT_AT = 0.95
 """Success rate from which a policy counts as having learnt its task."""
 
 
@@ -42,19 +42,19 @@ def run(
     trust: bool,
     as_json: bool,
 ) -> int:
-    """Trains and prints; returns the exit code: 1 where nothing was learnt.
+    """Trains a policy and prints the results; returns 1 if it did not learn, else 0.
 
     Args:
-        given: Flags that were given, but for the next ones.
-        steps: Of training.
-        out: Folder; the next free one by default.
-        resume: Folder of a training to go on with.
-        trust: Whether its checkpoint may be loaded, whoever wrote it.
+        given: Values of the given flags by name, except the following.
+        steps: Training steps of all robots together; None for the default.
+        out: Training folder; the next free one by default.
+        resume: Folder of a training to continue.
+        trust: Whether to load its checkpoint even if it is from elsewhere.
         as_json: Whether to print JSON.
     """
     console = Console(stderr=as_json)
     with console.status("preparing the tasks …"):
-        plan, folder = _asked_for(given, steps, out, resume)
+        plan, folder = _plan_and_folder(given, steps, out, resume)
         check_extra()
     console.print(_heading(plan, folder), soft_wrap=True, highlight=False)
     columns = (
@@ -69,8 +69,8 @@ def run(
         try:
             points = train(plan, folder, watch, trust=trust)
         except KeyboardInterrupt:
-            told = f"go on: tdac train --resume {shlex.quote(str(folder))}"
-            console.print(escape(told), soft_wrap=True)
+            command = f"tdac train --resume {shlex.quote(str(folder))}"
+            console.print(escape(f"to continue: {command}"), soft_wrap=True)
             raise
     best = max(points, key=lambda point: point.worth)
     if as_json:
@@ -78,11 +78,11 @@ def run(
         sys.stdout.write(json.dumps(found, indent=2) + "\n")
     else:
         _show(plan, folder, best, points[-1], console)
-    return 0 if best.success_rate >= ALMOST else 1
+    return 0 if best.success_rate >= LEARNT_AT else 1
 
 
 class _Watch:
-    """Turns what a training tells into a bar and lines."""
+    """Shows training steps in a progress bar and evaluations as lines."""
 
     def __init__(self, bar: Progress, console: Console, plan: TrainingPlan) -> None:
         self._bar, self._console = bar, console
@@ -93,44 +93,45 @@ class _Watch:
         self._first = steps if self._first is None else self._first
         elapsed = self._bar.tasks[self._row].elapsed
         rate = (steps - self._first) / elapsed if elapsed else 0.0
-        told = "" if best is None else f"best {best.success_rate:.0%}"
+        shown = "" if best is None else f"best {best.success_rate:.0%}"
         self._bar.update(
-            self._row, completed=steps, rate=f"{rate:,.0f} steps/s", best=told
+            self._row, completed=steps, rate=f"{rate:,.0f} steps/s", best=shown
         )
         if point is not None:
             self._console.print(_line(point, point is best), highlight=False)
 
 
-def _asked_for(
+def _plan_and_folder(
     given: dict[str, Any], steps: int | None, out: Path | None, resume: Path | None
 ) -> tuple[TrainingPlan, Path]:
-    """Plan and folder.
+    """The training plan and the training folder.
 
     Raises:
-        TaskError: Flags contradict each other, or make no sense.
+        TaskError: Flags contradict each other, or a value is out of range.
     """
     if resume is not None:
         refused = [flag(name) for name in given] + ["--out"] * (out is not None)
         if refused:
+            names = ", ".join(refused)
             raise TaskError(
-                f"--resume goes on as it was begun: leave out {', '.join(refused)}"
+                f"--resume continues a training as it was begun: leave out {names}"
             )
         plan = read_plan(resume)
         if steps is not None:
-            often = max(steps // EVALUATIONS, 1)
-            update = {"steps": steps, "evaluate_every": often}
+            interval = max(steps // EVALUATIONS, 1)
+            update = {"steps": steps, "evaluate_every": interval}
             plan = plan.model_copy(update=update)
         return plan, resume
     wanted = {name: v for name, v in given.items() if name not in NOISES}
     tasks = tuple(wanted.pop("task", ("maze",)))
-    names = wanted.pop("wrapper", None)
+    wrappers = wanted.pop("wrapper", None)
     noise: dict[str, Any] = dict.fromkeys(NOISES, 0)
     noise |= {name: given[name] for name in NOISES if name in given}
     plan = make_plan(
         tasks,
         steps=steps,
         disturbance=Disturbance(**noise),
-        wrappers=None if names is None else tuple(wrapper_names(names)),
+        wrappers=None if wrappers is None else tuple(wrapper_names(wrappers)),
         **wanted,
     )
     return plan, out or _next_folder(plan)
@@ -143,11 +144,11 @@ def _next_folder(plan: TrainingPlan) -> Path:
 
 
 def _heading(plan: TrainingPlan, folder: Path) -> str:
-    sees = ", ".join(plan.wrappers) or "the environment's own observations"
+    wrappers = ", ".join(plan.wrappers) or "none"
     return (
         f"[bold]{plan.algo.upper()}[/] on [bold]{escape(', '.join(plan.tasks))}[/]: "
         f"{plan.steps:,} steps of {plan.n_envs} robots, {_starts(plan)}, seed "
-        f"{plan.seed}; sees {sees}; {escape(str(folder))}"
+        f"{plan.seed}; observation wrappers: {wrappers}; {escape(str(folder))}"
     )
 
 
@@ -155,7 +156,7 @@ def _starts(plan: TrainingPlan) -> str:
     trained = plan.env_kwargs.get("variation", plan.variation)
     if trained == plan.variation:
         return f"{trained} starts"
-    return f"{trained} starts ({plan.variation} to evaluate)"
+    return f"{trained} starts ({plan.variation} in evaluations)"
 
 
 def _line(point: Point, best: bool) -> str:
@@ -169,26 +170,27 @@ def _line(point: Point, best: bool) -> str:
 def _show(
     plan: TrainingPlan, folder: Path, best: Point, last: Point, console: Console
 ) -> None:
-    mark = "[green]✔[/]" if best.success_rate >= ALMOST else "[red]✘ not learnt:[/]"
+    mark = "[green]✔[/]" if best.success_rate >= LEARNT_AT else "[red]✘ not learnt:[/]"
     file = folder / POLICY
     console.print(
         f"{mark} {best.success_rate:.0%} of {plan.episodes} evaluation episodes "
-        "reached, "
-        f"{best.collision_rate:.0%} hit something, after {best.steps:,} of "
-        f"{last.steps:,} steps and {best.seconds:.0f} of {last.seconds:.0f} s",
+        f"reached the goal, {best.collision_rate:.0%} hit something, after "
+        f"{best.steps:,} of {last.steps:,} steps and {best.seconds:.0f} of "
+        f"{last.seconds:.0f} s",
         highlight=False,
         soft_wrap=True,
     )
     if last.steps != best.steps:
         console.print(
-            f"at the end: {last.success_rate:.0%} reached, "
-            f"{last.collision_rate:.0%} hit something; the best one is kept",
+            f"at the end: {last.success_rate:.0%} reached the goal, "
+            f"{last.collision_rate:.0%} hit something; the best policy is kept",
             highlight=False,
             soft_wrap=True,
         )
     tasks = " ".join(f"--task {shlex.quote(name)}" for name in plan.tasks)
-    words = f"tdac evaluate {shlex.quote(str(file))} follow-guidance reference {tasks}"
-    console.print(f"compare: {escape(words)}", soft_wrap=True, highlight=False)
+    command = f"tdac evaluate {shlex.quote(str(file))} follow-guidance reference"
+    line = escape(f"to compare: {command} {tasks}")
+    console.print(line, soft_wrap=True, highlight=False)
 
 
 def _json(point: Point) -> dict[str, float | None]:

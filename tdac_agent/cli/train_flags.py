@@ -1,4 +1,4 @@
-"""Flags of `tdac train`."""
+"""The command `tdac train`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.cli.options import Json, Trust
+from tdac_agent.cli.options import (
+    DELAY,
+    MOTOR_LAG,
+    RANGE_NOISE,
+    TASK,
+    VARIATION,
+    WHEEL_SLIP,
+    WRAPPER,
+    Json,
+    Trust,
+)
 
 app = typer.Typer()
 TRAINING, DISTURBED = "Training", "Variation and noise"
@@ -22,35 +32,46 @@ def train(
         Optional[list[str]],  # noqa: UP045
         typer.Option(
             "--task",
-            help="Bundled name, task.yaml, or run folder; repeatable: a set of maps, "
-            "or of worlds.  [default: maze]",
+            metavar="PATH",
+            help=f"{TASK}; repeatable, for several maps or several worlds.  "
+            "[default: maze]",
         ),
     ] = None,
     algo: Annotated[
         Optional[Literal["ppo", "sac", "td3"]],  # noqa: UP045
-        typer.Option(help="Of stable-baselines3.  [default: ppo]"),
+        typer.Option(help="Algorithm of stable-baselines3.  [default: ppo]"),
     ] = None,
     steps: Annotated[
         Optional[int],  # noqa: UP045
         typer.Option(
-            min=1, help="Of all robots together.  [default: the hyperparameters']"
+            min=1,
+            metavar="N",
+            help="Training steps of all robots together.  [default: from --config]",
         ),
     ] = None,
     seed: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(min=0, help="Of networks, starts and noise.  [default: 0]"),
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Seed of networks, starts and noise.  [default: 0]",
+        ),
     ] = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--out", metavar="DIR", help="[default: runs/ALGO-TASK-N]"),
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Training folder.  [default: runs/ALGO-TASK-N]",
+        ),
     ] = None,
     resume: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
             "--resume",
             metavar="DIR",
-            help="Go on with a training as it was begun, from its last checkpoint; "
-            "with --steps to another end.",
+            help="Continue the training in this folder with its own settings, from its "
+            "last checkpoint; --steps changes its length.",
         ),
     ] = None,
     wrappers: Annotated[
@@ -58,8 +79,7 @@ def train(
         typer.Option(
             "--wrapper",
             metavar="NAME",
-            help="What the policy sees, innermost first; repeatable: `goal-relative`, "
-            "`guidance`, `flatten`, or `none`.  [default: these three]",
+            help=f"{WRAPPER}  [default: from --config]",
             rich_help_panel=TRAINING,
         ),
     ] = None,
@@ -67,7 +87,8 @@ def train(
         Optional[int],  # noqa: UP045
         typer.Option(
             min=1,
-            help="Robots that are driven at a time.",
+            metavar="N",
+            help="Number of robots driven in parallel.  [default: from --config]",
             rich_help_panel=TRAINING,
         ),
     ] = None,
@@ -75,57 +96,63 @@ def train(
         Optional[int],  # noqa: UP045
         typer.Option(
             min=1,
-            help="Of each of the evaluations.  [default: 100]",
+            metavar="N",
+            help="Episodes per evaluation.  [default: 100]",
             rich_help_panel=TRAINING,
         ),
     ] = None,
     config: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
-            help="Hyperparameters, in the form of rl-zoo3.",
+            metavar="FILE",
+            help="Hyperparameters in rl-zoo3 format.  [default: bundled, by --algo]",
             rich_help_panel=TRAINING,
         ),
     ] = None,
     variation: Annotated[
         Optional[Literal["nominal", "jitter", "mixed", "random"]],  # noqa: UP045
         typer.Option(
-            help="Starts: the task's own, within a body radius of it, mixed with "
-            "any start, or any start and goal.  [default: mixed to train, jitter to "
-            "evaluate]",
+            help=f"{VARIATION}  [default: from --config for training, jitter for "
+            "evaluations]",
             rich_help_panel=DISTURBED,
         ),
     ] = None,
     range_noise: Annotated[
         Optional[float],  # noqa: UP045
         typer.Option(
-            help="Of each range, relative.  [default: 0]", rich_help_panel=DISTURBED
+            metavar="N",
+            help=f"{RANGE_NOISE}  [default: 0]",
+            rich_help_panel=DISTURBED,
         ),
     ] = None,
     wheel_slip: Annotated[
         Optional[float],  # noqa: UP045
         typer.Option(
-            help="Of each wheel's speed, relative.  [default: 0]",
+            metavar="N",
+            help=f"{WHEEL_SLIP}  [default: 0]",
             rich_help_panel=DISTURBED,
         ),
     ] = None,
     motor_lag: Annotated[
         Optional[float],  # noqa: UP045
         typer.Option(
-            help="Time constant of the wheels, s.  [default: 0]",
+            metavar="N",
+            help=f"{MOTOR_LAG}  [default: 0]",
             rich_help_panel=DISTURBED,
         ),
     ] = None,
     delay: Annotated[
         Optional[int],  # noqa: UP045
         typer.Option(
-            help="Steps by which an action is late.  [default: 0]",
+            metavar="N",
+            help=f"{DELAY}  [default: 0]",
             rich_help_panel=DISTURBED,
         ),
     ] = None,
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
-    """Train a baseline with stable-baselines3 on the same tasks."""
+    """Train a baseline policy with stable-baselines3 on the tasks."""
     from tdac_agent.cli import train as command
 
     noise = {

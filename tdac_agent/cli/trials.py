@@ -1,4 +1,4 @@
-"""What `tdac doctor` tries: each thing in a process of its own, which may die of it."""
+"""The trials of `tdac doctor`, each in its own process, since a trial may kill it."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from pathlib import Path
 from tdac_agent.errors import Fault
 from tdac_envs.core.errors import TdacError
 
-# The first time, a slow machine compiles for minutes.
+# On first use, a slow machine compiles for minutes.
 SECONDS = 900.0
 KNOWN = 3
-"""Exit code of a trial whose last words say all."""
-REINSTALL = "a package is broken here: install tdac in a new environment"
+"""Exit code of a trial whose last line on stderr explains the failure."""
+REINSTALL = "a package is broken: install tdac in a new environment"
 ADVICE: dict[int, str] = {
     signal.SIGILL: "code for another processor; try NUMBA_CPU_NAME=generic, else "
-    "install numba, numpy and opencv-python-headless anew",
-    signal.SIGKILL: "ended from outside, as the system does when memory is short",
-    signal.SIGSYS: "a filter of system calls, as of a container, forbids one of them",
-    signal.SIGTERM: "ended from outside",
+    "reinstall numba, numpy and opencv-python-headless",
+    signal.SIGKILL: "killed from outside, as the system does when memory is short",
+    signal.SIGSYS: "a system call filter, for example of a container, forbids a call",
+    signal.SIGTERM: "terminated from outside",
 }
 
 
 def attempt(name: str) -> tuple[bool, str]:
-    """Tries something in a process of its own.
+    """Runs a trial in its own process.
 
     Args:
-        name: Of `TRIALS`.
+        name: Key of `TRIALS`.
 
     Returns:
-        Whether it works, and how, or why not.
+        Whether it works, and a line on what works or why it does not.
     """
     command = [sys.executable, "-P", "-m", __name__, name]
     try:
@@ -45,22 +45,22 @@ def attempt(name: str) -> tuple[bool, str]:
             timeout=SECONDS,
         )
     except subprocess.TimeoutExpired:
-        return False, f"not done after {SECONDS:g} s"
+        return False, f"did not finish within {SECONDS:g} s"
     if done.returncode < 0:
         return False, died(-done.returncode)
     if done.returncode == 0:
         return True, _last_line(done.stdout)
-    told = _last_line(done.stderr) or f"ended with exit code {done.returncode}"
-    return False, told if done.returncode == KNOWN else f"{told}; {REINSTALL}"
+    reason = _last_line(done.stderr) or f"ended with exit code {done.returncode}"
+    return False, reason if done.returncode == KNOWN else f"{reason}; {REINSTALL}"
 
 
-def _last_line(said: bytes) -> str:
-    lines = said.decode("utf-8", "replace").splitlines()
+def _last_line(output: bytes) -> str:
+    lines = output.decode("utf-8", "replace").splitlines()
     return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
 
 def died(number: int) -> str:
-    """Says which signal ended a process, and what to do."""
+    """Names the signal that ended a process, and what to do."""
     try:
         name = signal.Signals(number).name
     except ValueError:
@@ -79,12 +79,12 @@ def compiled_step() -> str:
     env.reset(seed=0)
     observation = env.step(np.ones(2, np.float32))[0]
     if observation not in env.observation_space:
-        raise Fault(f"a step gave {observation}, which is no observation")
+        raise Fault(f"a step returned an invalid observation: {observation}")
     return "TDAC-Map2D-v0 takes a step"
 
 
 def verification() -> str:
-    """Has a good controller judged, in the sandbox tier in use."""
+    """Verifies a good controller in the sandbox tier in use."""
     from tdac_agent.builtin.provider import template_of
     from tdac_agent.tasks.task import load_task
     from tdac_agent.verification.verify import verify
@@ -95,9 +95,9 @@ def verification() -> str:
     report = verify(source, task, paper=True)
     if not report.passed:
         failed = report.failures[0]
-        told = f"{failed.test}: {failed.message}"
         raise Fault(
-            f"no verdict is worth anything here: a good controller fails {told}"
+            "verdicts are unreliable on this machine: a good controller fails "
+            f"{failed.test}: {failed.message}"
         )
     passed, seconds = len(report.tests), report.seconds
     return f"a good controller passes {passed} tests in {seconds:.1f} s"

@@ -1,4 +1,4 @@
-"""`tdac verify`."""
+"""`tdac verify`: tests a controller in the sandbox and prints the report."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def run(
     robust: RobustFlags,
     nursery: Nursery,
 ) -> int:
-    """Verifies and prints; returns the exit code."""
+    """Verifies a controller and prints the report; returns the exit code."""
     check_tier(tier)
     robust.check()
     if out is not None:
@@ -50,7 +50,7 @@ def run(
     gc.freeze()
     gc.enable()
     with WarmJudge(nursery) as judge:
-        # Loaded while the judge gets ready.
+        # Imported while the judge starts.
         from tdac_agent.verification.verify import verify
 
         with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
@@ -85,7 +85,7 @@ def run(
 
 
 def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
-    """The file and its task, which takes a while where it is not a run folder's own."""
+    """The file and its task; shows a status while a task is built from flags."""
     if not flags.given():
         return controller_and_task(controller, flags)
     from tdac_agent.cli.console import Console
@@ -113,24 +113,24 @@ def _show_robust(measured: RobustReport | None, replay: list[str]) -> None:
 
 
 def _json(report: Report, robust: RobustFlags, measured: RobustReport | None) -> str:
-    """The report; with `--robust`, a part of that name, null where it was not run."""
+    """The report as JSON; `--robust` adds the key `robust`, null if it was not run."""
     if robust.robust is None:
         return report.model_dump_json(indent=2)
     content = report.model_dump(mode="json")
-    part = None if measured is None else measured.model_dump(mode="json")
-    return json.dumps({**content, "robust": part}, indent=2, ensure_ascii=False)
+    added = None if measured is None else measured.model_dump(mode="json")
+    return json.dumps({**content, "robust": added}, indent=2, ensure_ascii=False)
 
 
 def _replay(
     controller: str, flags: TaskFlags, robust: RobustFlags, tier: str
 ) -> list[str]:
-    """The command line that plays an episode of the same, but for its seed."""
+    """The command line that plays one of the disturbed episodes, without `--seed`."""
     words = ["tdac", "play", controller, *flags.words(), *robust.disturbed.words()]
     return words if tier == "auto" else [*words, "--tier", tier]
 
 
 def _check_folder(out: Path) -> None:
-    """Says why the folder cannot be written to, before the work is done."""
+    """Checks before the work begins that the folder can be written to."""
     folder = out / "trajectories"
     missing = [each for each in (folder, out) if not each.exists()]
     try:
@@ -142,7 +142,7 @@ def _check_folder(out: Path) -> None:
 
 
 def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
-    """The file and its task; a run folder brings its own."""
+    """The controller file and its task; a run folder brings its own task."""
     path = Path(controller)
     if path.is_dir():
         file = path / "controller.py"
@@ -152,7 +152,7 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
     if not path.is_file():
         raise ControllerFileError(f"no controller {controller!r}: no such file")
     if path.suffix != ".py":
-        raise ControllerFileError(f"{controller!r} is no controller: expected a .py")
+        raise ControllerFileError(f"{controller!r} is not a controller: expected a .py")
     if not flags.given() and (path.parent / TASK_FILE).is_file():
         return path, load_task(path.parent)
     return path, flags.load()
@@ -160,16 +160,16 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
 
 def _without_controller(folder: Path) -> str:
     """Why a folder has no controller, and what to do."""
-    from tdac_agent.runs.records import RUN_FILE  # its models take a while to build
+    from tdac_agent.runs.records import RUN_FILE  # slow to import
 
     if (folder / RUN_FILE).is_file():
-        words = f"tdac synth --resume {shlex.quote(str(folder))}"
-        return f"the run {folder} has no controller yet; go on with it: {words}"
-    return f"{folder} is a folder without a controller.py"
+        command = f"tdac synth --resume {shlex.quote(str(folder))}"
+        return f"the run {folder} has no controller yet; to continue it: {command}"
+    return f"there is no controller.py in {folder}"
 
 
 def write_junit(report: Report, path: Path) -> None:
-    """Writes a JUnit XML file, a test case for each expected test."""
+    """Writes a JUnit XML file with a test case per expected test."""
     from xml.etree import ElementTree
 
     messages = {failure.test: failure.message for failure in report.failures}

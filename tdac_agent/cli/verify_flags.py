@@ -9,6 +9,7 @@ from typing import Annotated, Optional
 import typer
 
 from tdac_agent.cli.options import (
+    CONTROLLER,
     Delay,
     JitterSeed,
     Json,
@@ -32,11 +33,12 @@ app = typer.Typer()
 )
 @takes_task()
 def verify(
-    controller: Annotated[str, typer.Argument(help="controller.py, or a run folder.")],
+    controller: Annotated[str, typer.Argument(metavar="CONTROLLER", help=CONTROLLER)],
     named_task: NamedTask,
     profile: Profile = None,
     paper: Annotated[
-        bool, typer.Option("--paper", help="Nominal start only, as in the paper.")
+        bool,
+        typer.Option("--paper", help="Run only the nominal episode, as in the paper."),
     ] = False,
     suite: Suite = None,
     trust: Trust = False,
@@ -44,14 +46,15 @@ def verify(
     seed: JitterSeed = None,
     junit: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(help="Write a JUnit XML report."),
+        typer.Option(metavar="FILE", help="Write a JUnit XML report."),
     ] = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
             "--out",
-            help="Folder for report.json (and robust.json), the trajectories, and a "
-            "picture of each episode that failed.",
+            metavar="DIR",
+            help="Folder for report.json (and robust.json), the trajectories and a "
+            "picture of each failed episode.",
         ),
     ] = None,
     as_json: Json = False,
@@ -60,7 +63,8 @@ def verify(
         typer.Option(
             min=1,
             metavar="N",
-            help="Once verified, run N disturbed episodes and give the success rate.",
+            help="If the controller is verified, run N disturbed episodes and print "
+            "their success rate.",
             rich_help_panel="Robustness",
         ),
     ] = None,
@@ -68,7 +72,8 @@ def verify(
         Optional[int],  # noqa: UP045
         typer.Option(
             min=0,
-            help="Seed of the first disturbed episode.  [default: as of --seed]",
+            metavar="N",
+            help="Seed of the first disturbed episode.  [default: as for --seed]",
             rich_help_panel="Robustness",
         ),
     ] = None,
@@ -76,15 +81,17 @@ def verify(
         Optional[float],  # noqa: UP045
         typer.Option(
             metavar="RATE",
-            help="Stop as soon as a sequential test tells this success rate from one "
-            "that is --margin lower; exit 0 only if accepted.",
+            help="Stop as soon as a sequential test decides between this success rate "
+            "and one lower by --margin; exit 0 only if it accepts this one.",
             rich_help_panel="Robustness",
         ),
     ] = None,
     margin: Annotated[
         Optional[float],  # noqa: UP045
         typer.Option(
-            help="See --accept-at.  [default: 0.05]", rich_help_panel="Robustness"
+            metavar="N",
+            help="Distance of the two rates of --accept-at.  [default: 0.05]",
+            rich_help_panel="Robustness",
         ),
     ] = None,
     range_noise: RangeNoise = None,
@@ -92,12 +99,12 @@ def verify(
     motor_lag: MotorLag = None,
     delay: Delay = None,
 ) -> None:
-    """Test a controller in the sandbox; exit 0 only if every test passed."""
-    # What is loaded now stays: nothing of it is worth collecting.
+    """Test a controller in the sandbox; exit 0 only if all tests pass."""
+    # Imported objects live until exit: collecting them is a waste of time.
     gc.disable()
     from tdac_agent.verification.judge.children import Nursery
 
-    # Its first process starts while the rest is loaded.
+    # Its first process starts during the imports below.
     with Nursery() as nursery:
         from tdac_agent.cli import verify as command
         from tdac_agent.cli.robust_flags import DisturbanceFlags, RobustFlags

@@ -1,4 +1,4 @@
-"""`tdac warm`: compiles everything ahead, for this user or for all of a machine."""
+"""`tdac warm`: compiles everything ahead, for this user or for all users."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tdac_envs.core.code_cache import cache_folder
 
 
 def run() -> int:
-    """Compiles what is not compiled yet; 3 where it cannot be kept."""
+    """Compiles all kernels; returns 3 if compiled code cannot be cached, else 0."""
     for environment in own_environments():
         environment.use_kernels()
     folder = cache_folder()
     if folder is not None:
-        told = f"compiled code lies ready in {escape(str(folder))}"
-        Console().print(told, highlight=False, soft_wrap=True)
+        line = f"compiled code is cached in {escape(str(folder))}"
+        Console().print(line, highlight=False, soft_wrap=True)
     return 3 if folder is None else 0

@@ -1,4 +1,4 @@
-"""`tdac webots run`."""
+"""`tdac webots run`: runs a Webots controller in a Webots world, without Webots."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds.bundled import world_file
 
 STRIDE = 2
-# A line that a controller prints more often is shown once.
+# A line that a controller prints more often is shown once, with its count.
 REPEATS = 5
-_STEERING = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
+_CONTROL_SEQUENCES = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
 
 
 def run(
@@ -48,7 +48,7 @@ def run(
     tier: str,
     as_json: bool,
 ) -> int:
-    """Runs a controller and prints what it did; 0 if it passed."""
+    """Runs a controller and prints its report; returns 0 if it passed, else 1."""
     check_tier(tier)
     if heading is not None:
         if start is None:
@@ -56,7 +56,7 @@ def run(
         start = (*start, heading)
     check_finite(start=start, goal=goal)
     if video is not None and video.suffix.lower() not in SUFFIXES:
-        raise TaskError(f"cannot write {video.name!r}: expected .mp4 or .gif")
+        raise TaskError(f"--video must end in .mp4 or .gif, got {video.name!r}")
     stage = open_stage(world_file(world), goal, ignore, start)
     options: dict[str, Any] = {
         "steps": steps,
@@ -75,14 +75,16 @@ def run(
         _show(done.report, console)
     if video is not None:
         with console.status(f"drawing {escape(video.name)} …"):
-            _film(done, stage.make_env(**options, render_mode="rgb_array"), video)
+            _write_video(
+                done, stage.make_env(**options, render_mode="rgb_array"), video
+            )
         if not as_json:
-            print(f"wrote {video} (twice real time)")
+            print(f"wrote {video} (at twice real time)")
     return 0 if done.report.passed else 1
 
 
 def _bar(console: Console) -> Progress:
-    """For whoever watches; drawn where there is something new."""
+    """A progress bar that is redrawn only on updates."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     off = not console.is_terminal
     return Progress(
@@ -91,25 +93,25 @@ def _bar(console: Console) -> Progress:
 
 
 def _watcher(bar: Progress, name: str, most: int) -> Callable[[int], None]:
-    """What moves a bar over the steps of a run, each hundredth of them."""
-    row, told = bar.add_task(escape(name), total=most), 0
+    """A callback that advances the bar at every hundredth of the steps."""
+    row, shown = bar.add_task(escape(name), total=most), 0
 
     def watch(steps: int) -> None:
-        nonlocal told
-        if 100 * (steps - told) >= most:
-            told = steps
+        nonlocal shown
+        if 100 * (steps - shown) >= most:
+            shown = steps
             bar.update(row, completed=steps, refresh=True)
 
     return watch
 
 
-def _film(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
-    """The same run again, with a picture of every second step."""
+def _write_video(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
+    """Writes a video of the run, with a frame per `STRIDE` steps."""
     write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
 
 
-def _once(text: str) -> str:
-    """A text in which lines that repeat say how often, where they are first."""
+def _without_repeats(text: str) -> str:
+    """The text with each often repeated line once, followed by its count."""
     lines = text.rstrip().splitlines()
     counts = Counter(lines)
     kept: list[str] = []
@@ -126,13 +128,16 @@ def _once(text: str) -> str:
 def _show(report: WebotsReport, console: Console) -> None:
     if report.sandbox == "rlimits":
         console.print(
-            "[yellow]warning: sandbox tier rlimits: files and network are not closed "
-            "to the controller[/]"
+            "[yellow]warning: with the sandbox tier rlimits, the controller can access "
+            "files and the network[/]"
         )
     if report.output.strip():
         console.print("[cyan]the controller printed[/]")
         console.print(
-            Text(_once(printable(_STEERING.sub("", report.output)))), soft_wrap=True
+            Text(
+                _without_repeats(printable(_CONTROL_SEQUENCES.sub("", report.output)))
+            ),
+            soft_wrap=True,
         )
     if report.error is not None:
         console.print("[red]the controller failed[/]")
@@ -149,29 +154,29 @@ def _show(report: WebotsReport, console: Console) -> None:
 
 def _table(report: WebotsReport) -> Table:
     table = Table(
-        title="The run as the environment recorded it", title_justify="left",
+        title="Run as recorded by the environment", title_justify="left",
         show_header=False,
     )  # fmt: skip
     ended = report.goal is None and report.outcome == "out of time"
-    table.add_row("outcome", "drove to the end" if ended else report.outcome)
+    table.add_row("outcome", "all steps done" if ended else report.outcome)
     table.add_row("steps", f"{report.steps} ({report.time:.2f} s)")
     contact = report.first_contact
-    where = "" if contact is None else f", the first at {_at(*contact[1:])}"
+    where = "" if contact is None else f", the first at {_point(*contact[1:])}"
     step = "" if contact is None else f" in step {contact[0]}"
     table.add_row("steps with a contact", f"{report.collisions}{where}{step}")
     if report.goal is None:
         table.add_row("goal", "none in this world")
     else:
-        table.add_row("goal", _at(*report.goal))
+        table.add_row("goal", _point(*report.goal))
         table.add_row("path left", f"{report.d_min:.3f} m of {report.d0:.3f} m")
         table.add_row("straight left", f"{report.d_min_euclidean:.3f} m")
     table.add_row("driven", f"{report.way:.3f} m")
     for name, (x, y, heading) in (("start", report.start), ("end", report.end)):
-        table.add_row(name, f"{_at(x, y)}, heading {heading:.3f} rad")
+        table.add_row(name, f"{_point(x, y)}, heading {heading:.3f} rad")
     if report.left_out:
         table.add_row("ignored", ", ".join(map(escape, report.left_out)))
     return table
 
 
-def _at(x: float, y: float) -> str:
+def _point(x: float, y: float) -> str:
     return f"({x:.3f}, {y:.3f})"

@@ -7,12 +7,20 @@ from typing import Annotated, Optional
 
 import typer
 
-from tdac_agent.cli.options import Heading, Json, Start, Tier
+from tdac_agent.cli.options import (
+    IGNORE,
+    VIDEO,
+    WORLD_FILE,
+    Heading,
+    Json,
+    Start,
+    Tier,
+)
 
 webots_app = typer.Typer(
-    no_args_is_help=True, help="Run Webots controllers in worlds of Webots."
+    no_args_is_help=True, help="Run Webots controllers in Webots worlds."
 )
-export_app = typer.Typer(no_args_is_help=True, help="Take a controller elsewhere.")
+export_app = typer.Typer(no_args_is_help=True, help="Export a controller to Webots.")
 app = typer.Typer()
 app.add_typer(webots_app, name="webots")
 app.add_typer(export_app, name="export")
@@ -22,45 +30,58 @@ app.add_typer(export_app, name="export")
     "run", epilog="Example: `tdac webots run my_controller.py maze.wbt --steps 4000`"
 )
 def webots_run(
-    controller: Annotated[Path, typer.Argument(help="The controller's file.")],
-    world: Annotated[str, typer.Argument(help="A `.wbt` file, or a bundled world.")],
+    controller: Annotated[
+        Path, typer.Argument(metavar="CONTROLLER", help="Webots controller file.")
+    ],
+    world: Annotated[
+        str, typer.Argument(metavar="WORLD", help=f"{WORLD_FILE}, or bundled world.")
+    ],
     steps: Annotated[
         Optional[int],  # noqa: UP045 - typer reads it at run time
         typer.Option(
-            min=1, help="Steps of the world at most.  [default: as the env's horizon]"
+            min=1,
+            metavar="N",
+            help="Maximum steps of the world.  [default: the environment's horizon]",
         ),
     ] = None,
     start: Start = None,
     heading: Heading = None,
     goal: Annotated[
         Optional[tuple[float, float]],  # noqa: UP045
-        typer.Option("--goal", metavar="X Y", help="m.  [default: the world's GOAL]"),
+        typer.Option(
+            "--goal",
+            metavar="X Y",
+            help="Goal position, m.  [default: the world's node GOAL]",
+        ),
     ] = None,
     tolerance: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(help="How near to the goal is there, m.  [default: 0.02]"),
+        typer.Option(
+            metavar="N",
+            help="Distance at which the goal counts as reached, m.  [default: 0.02]",
+        ),
     ] = None,
     ignore: Annotated[
         Optional[list[str]],  # noqa: UP045
-        typer.Option(help="Name or type of a node that may be missing; repeatable."),
+        typer.Option(metavar="NAME", help=IGNORE),
     ] = None,
     webots_sensors: Annotated[
         bool,
         typer.Option(
             "--webots-sensors",
-            help="Sensors with Webots' noise and materials; the goal's mark is seen.",
+            help="Sensors with Webots' noise and materials, which see the goal marker.",
         ),
     ] = False,
     video: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(help="Write .mp4 or .gif."),
+        typer.Option(metavar="FILE", help=f"{VIDEO}."),
     ] = None,
     tier: Tier = "auto",
     as_json: Json = False,
 ) -> None:
-    """Run a Webots controller as it is, judged by the environment.
+    """Run an unmodified Webots controller, judged by the environment.
 
-    Exit 0: it reached the goal (if there is one) and touched nothing.
+    Exits with 0 if it reached the goal (if there is one) and touched nothing.
     """
     from tdac_agent.cli import webots
 
@@ -76,15 +97,20 @@ def webots_run(
     "webots", epilog="Example: `tdac export webots runs/epuck-1 --out my_project`"
 )
 def export_webots(
-    run: Annotated[Path, typer.Argument(help="Folder of a verified run.")],
-    out: Annotated[Path, typer.Option(help="Folder to write, new or empty.")],
+    run: Annotated[
+        Path,
+        typer.Argument(metavar="RUN", help="Run folder with a verified controller."),
+    ],
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Output folder, new or empty.")
+    ],
     tier: Tier = "auto",
     as_json: Json = False,
 ) -> None:
     """Write a Webots project with a verified e-puck controller.
 
-    The controller is not changed; an adapter beside it gives it what it observes. It
-    is then driven once here. Nothing is run in Webots itself.
+    The controller is unchanged; an adapter supplies its observations. The project is
+    then run once by tdac, not by Webots itself.
     """
     from tdac_agent.cli import export
 

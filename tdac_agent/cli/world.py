@@ -1,4 +1,4 @@
-"""`tdac world`."""
+"""`tdac world`: shows and draws the contents of a Webots world."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SHOWN = 60
 
 
 def run(file: str, png: Path | None, as_json: bool) -> None:
-    """Reads a world, draws it where asked to, and prints what is in it."""
+    """Reads a world, draws it if `png` is given, and prints its contents."""
     world = load_world(world_file(file))
     if png is not None:
         _draw(world, png)
@@ -37,7 +37,7 @@ def run(file: str, png: Path | None, as_json: bool) -> None:
     console = Console()
     console.print(f"[bold]{escape(world.source)}[/], Webots {world.version}", end="")
     console.print(f", step {world.time_step:g} ms")
-    console.print(_people(world))
+    console.print(_overview(world))
     console.print()
     if world.obstacles:
         console.print(_obstacles(world.obstacles))
@@ -47,8 +47,8 @@ def run(file: str, png: Path | None, as_json: bool) -> None:
         console.print(f"[yellow]note:[/] {escape(note)}")
     if any(node.may_be_solid for node in world.unmodelled):
         console.print(
-            "[yellow]synth and verify refuse this world, unless each of these nodes "
-            "is named by --ignore NAME (or TYPE)[/]"
+            "[yellow]synth and verify refuse this world unless --ignore NAME (or TYPE) "
+            "names each node that is perhaps solid[/]"
         )
     if png is not None:
         console.print(f"drew {escape(str(png))}")
@@ -56,23 +56,27 @@ def run(file: str, png: Path | None, as_json: bool) -> None:
 
 def _draw(world: World, png: Path) -> None:
     if png.suffix.lower() != ".png":
-        raise WorldError(f"--png: expected a file that ends in .png, got {png}")
+        raise WorldError(f"--png must end in .png, got {png}")
     _, data = cv2.imencode(".png", draw_world(world)[..., ::-1])
     png.parent.mkdir(parents=True, exist_ok=True)
     png.write_bytes(data.tobytes())
 
 
-def _people(world: World) -> Table:
-    """Robots, goal and floors."""
+def _overview(world: World) -> Table:
+    """A table of robots, goal and arenas."""
     table = Table.grid(padding=(0, 2))
     for index, robot in enumerate(world.robots):
-        what = "e-puck" if index == 0 else "stands still"
-        pose = f"{_at(robot.x, robot.y)}, heading {_short(robot.heading)} rad"
+        label = "e-puck" if index == 0 else "stands still"
+        pose = f"{_point(robot.x, robot.y)}, heading {_rounded(robot.heading)} rad"
         name = "" if robot.name == "e-puck" else f"{escape(robot.name)}: "
-        table.add_row(what, f"{name}{pose}, version {robot.version}")
+        table.add_row(label, f"{name}{pose}, version {robot.version}")
     if not world.robots:
         table.add_row("e-puck", "none in this file")
-    goal = "none in this file: give one" if world.goal is None else _at(*world.goal)
+    goal = (
+        "none: synth and verify need --goal X Y"
+        if world.goal is None
+        else _point(*world.goal)
+    )
     table.add_row("goal", goal)
     for arena in world.arenas:
         table.add_row("arena", f"{arena.kind} at {_floor(arena)}")
@@ -84,25 +88,25 @@ def _floor(arena: Arena) -> str:
     if isinstance(shape, Disc):
         size = f"radius {shape.radius:g} m"
     else:
-        turned = f", yaw {_short(shape.yaw)} rad" if shape.yaw else ""
+        turned = f", yaw {_rounded(shape.yaw)} rad" if shape.yaw else ""
         size = f"{shape.length:g} x {shape.width:g} m{turned}"
     if not arena.has_wall:
-        return f"{_at(shape.x, shape.y)}, {size}, no wall"
+        return f"{_point(shape.x, shape.y)}, {size}, no wall"
     wall = f"wall {arena.wall_thickness:g} x {arena.wall_height:g} m"
-    return f"{_at(shape.x, shape.y)}, {size}, {wall}"
+    return f"{_point(shape.x, shape.y)}, {size}, {wall}"
 
 
 def _obstacles(obstacles: Iterable[Obstacle]) -> Table:
-    """A line each, to the millimetre; --json has all digits."""
+    """A row per obstacle, rounded to millimetres; `--json` prints all digits."""
     things = list(obstacles)
     count = f"{len(things)} obstacle{'' if len(things) == 1 else 's'} (m, rad, kg)"
     rows = [_obstacle(thing) for thing in things[:SHOWN]]
-    told = {name for row in rows for name, value in row.items() if value}
-    table = _table(count, *(name for name in rows[0] if name in told))
+    shown = {name for row in rows for name, value in row.items() if value}
+    table = _table(count, *(name for name in rows[0] if name in shown))
     if any(not thing.solid for thing in things):
-        table.caption, table.caption_justify = " * is seen, and not solid", "left"
+        table.caption, table.caption_justify = " * visible but not solid", "left"
     for row in rows:
-        table.add_row(*(value for name, value in row.items() if name in told))
+        table.add_row(*(value for name, value in row.items() if name in shown))
     if len(things) > SHOWN:
         table.add_row("…", f"{len(things) - SHOWN} more", "--json lists all")
     return table
@@ -112,7 +116,7 @@ def _obstacle(thing: Obstacle) -> dict[str, str]:
     return {
         "name": escape(thing.name),
         "type": escape(thing.kind),
-        "at": _at(thing.x, thing.y),
+        "at": _point(thing.x, thing.y),
         "footprint": _footprint(thing),
         "yaw": _yaw(thing),
         "height": _heights(thing),
@@ -129,19 +133,19 @@ def _table(title: str, *columns: str) -> Table:
 
 
 def _heights(thing: Obstacle) -> str:
-    """Up to where it reaches, and from where if it hangs."""
+    """The top of an obstacle; `bottom…top` if it does not stand on the floor."""
     parts = thing.solid or thing.visible
     if not parts:
         return ""
-    bottom, top = min(p.bottom for p in parts), _short(max(p.top for p in parts))
-    hangs = bottom > 0.0 and _short(bottom) not in ("0", top)
-    return f"{_short(bottom)}…{top}" if hangs else top
+    bottom, top = min(p.bottom for p in parts), _rounded(max(p.top for p in parts))
+    hangs = bottom > 0.0 and _rounded(bottom) not in ("0", top)
+    return f"{_rounded(bottom)}…{top}" if hangs else top
 
 
 def _footprint(thing: Obstacle) -> str:
     parts = thing.solid or thing.visible
     if not parts:
-        return "a mark"
+        return "marker"
     shape = parts[0].shape
     ghost = "" if thing.solid else " *"
     if len(parts) > 1:
@@ -156,7 +160,7 @@ def _footprint(thing: Obstacle) -> str:
 def _yaw(thing: Obstacle) -> str:
     parts = thing.solid or thing.visible
     alone = parts[0].shape if len(parts) == 1 else None
-    return _short(alone.yaw) if isinstance(alone, Rectangle) else ""
+    return _rounded(alone.yaw) if isinstance(alone, Rectangle) else ""
 
 
 def _unmodelled(nodes: tuple[Unmodelled, ...]) -> Table:
@@ -165,7 +169,7 @@ def _unmodelled(nodes: tuple[Unmodelled, ...]) -> Table:
         table.add_row(
             escape(node.name),
             escape(node.kind),
-            _at(node.x, node.y),
+            _point(node.x, node.y),
             str(node.line),
             "[yellow]perhaps[/]" if node.may_be_solid else "no",
             escape(node.why),
@@ -175,17 +179,17 @@ def _unmodelled(nodes: tuple[Unmodelled, ...]) -> Table:
     return table
 
 
-def _at(x: float, y: float) -> str:
-    return f"({_short(x)}, {_short(y)})"
+def _point(x: float, y: float) -> str:
+    return f"({_rounded(x)}, {_rounded(y)})"
 
 
-def _short(value: float) -> str:
-    """Three decimals at most: a millimetre."""
+def _rounded(value: float) -> str:
+    """A number with at most three decimals."""
     return f"{round(value, 3) + 0.0:.3f}".rstrip("0").rstrip(".")
 
 
 def _record(world: World) -> dict[str, Any]:
-    """Everything, in metres and radians, ENU."""
+    """The JSON record of a world, in metres and radians, ENU."""
     record = asdict(world)
     record["floor"] = floor_under(world)
     pairs = zip(world.obstacles, record["obstacles"], strict=True)

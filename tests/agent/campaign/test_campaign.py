@@ -29,7 +29,7 @@ def test_runs_that_fail_stop_no_other_and_say_why(once):
     assert said.count("replay") > 0
     assert "2 × fault: replay:demo: the question differs from" in said
     assert "2 of 4 runs have ended, 2 of them now" in said
-    assert "go on: tdac campaign broken.yaml --workers 2 --out out" in said
+    assert "to continue: tdac campaign broken.yaml --workers 2 --out out" in said
     assert said.count(" fault, ") == 4  # tried once more, after all others
 
 
@@ -50,8 +50,8 @@ def test_the_same_command_again_does_nothing_and_says_so(once):
     table = small.table()
     code, said, _ = small.run()
     assert code == 0
-    assert "all of them have come to their end before; nothing was done" in said
-    assert "1 other kinds of run are in" in said
+    assert "all runs have already finished; nothing was done" in said
+    assert "ignoring 1 other kind of run in" in said
     after = {p: p.stat().st_mtime_ns for p in (small.folder / "out/runs").rglob("*")}
     assert after == before
     assert small.table() == table
@@ -103,7 +103,7 @@ def test_a_dry_run_writes_nothing_and_needs_no_key(tdac, monkeypatch):
     code, said, _ = tdac("campaign", "paper_2d", "--dry-run")
     assert code == 0
     assert "25 runs; no model was asked" in said
-    assert "all runs together stop at 50.00 USD" in said
+    assert "limit of all runs together: 50.00 USD" in said
     assert not list(Path().iterdir())
 
 

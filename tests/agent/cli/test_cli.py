@@ -148,7 +148,7 @@ def test_the_help_is_quick():
         ("map x.png --start 1 2 0.5", "unexpected extra argument(s) (0.5)"),
         ("synth --start 330 --goal 99 100", "Invalid value for '--start'"),
         ("syth", "No such command 'syth'"),
-        ("verify", "Missing argument 'controller'; see tdac verify --help"),
+        ("verify", "Missing argument 'CONTROLLER'; see tdac verify --help"),
     ],
 )
 def test_words_that_are_not_understood(tdac, words, expected):
@@ -236,7 +236,7 @@ PLACES = {
     "unknown optimizer": ([*ENDS, "--optimizer", "gpt"], "unknown model 'gpt'"),
     "from a missing file": ([*ENDS, "--from", "no.py"], "'no.py'"),
     "no iterations": ([*ENDS, "-K", 0], "-K"),
-    "instructions": ([*ENDS, "--task", "maze"], "--task already says it all"),
+    "instructions": ([*ENDS, "--task", "maze"], "--task already defines the task"),
 }
 
 

@@ -75,15 +75,15 @@ def test_a_long_line_goes_on_below_itself():
 @pytest.mark.parametrize(
     ("answers", "unanswered", "lost", "expected"),
     [
-        ({}, 0, 0.0, "0 answers on record"),
-        ({"generate": 1}, 0, 0.0, "1 answer on record (1 controller)"),
+        ({}, 0, 0.0, "0 recorded answers"),
+        ({"generate": 1}, 0, 0.0, "1 recorded answer (1 controller)"),
         (
             {"generate": 2, "edit": 1, "summarise": 2},
             1,
             0.25,
-            "5 answers on record (2 controllers, 1 edit, 2 about the rules); one "
-            "question has no answer on record and is put again; lost answers count "
-            "with 0.25 USD, at most",
+            "5 recorded answers (2 controllers, 1 edit, 2 rule updates); one question "
+            "has no recorded answer and is asked again; lost answers count as at most "
+            "0.25 USD",
         ),
     ],
 )
@@ -91,7 +91,7 @@ def test_what_is_on_record_is_told_apart(answers, unanswered, lost, expected):
     """By kind, so that it can be compared with the lines that follow."""
     facts = {"answers": answers, "unanswered": unanswered, "lost_usd": lost}
     _, words = shown({"event": "run.resume", "notes": [], **facts})
-    assert words == f"task: what it is going on: {expected}"
+    assert words == f"task: what it is continuing: {expected}"
 
 
 def test_some_names_and_how_many_more():
@@ -136,10 +136,12 @@ def test_a_run_that_the_budget_has_stopped():
     )
     show_run(run, console)
     lines, words = told(console)
-    way = f"  go on: tdac synth --resume {shlex.quote(folder)} --max-tokens 216112"
+    way = (
+        f"  to continue: tdac synth --resume {shlex.quote(folder)} --max-tokens 216112"
+    )
     assert lines[-1] == way
     assert max(map(len, lines[:-1])) <= 80
-    assert "no tokens reported: each answer counts with all that was reserved" in words
+    assert "no tokens reported: each answer counts as the full amount reserved" in words
     assert "at most 3 questions are left: --max-tokens 108056 is enough" in words
     assert "a:task:of mine: command:./my [bold] program" in words
     assert "test_number_3_of_many and 5 more" in " ".join(
@@ -165,7 +167,7 @@ def test_runs_in_a_table(tdac, monkeypatch, columns):
         assert words in row
     assert ("started" in out) == ("a:task:of mine" in row) == (columns == 120)
     assert max(map(len, out.splitlines())) <= columns
-    assert "go on: tdac synth --resume runs/epuck-clutter-12" in out
+    assert "to continue: tdac synth --resume runs/epuck-clutter-12" in out
 
 
 def test_no_column_of_dashes(tdac):
@@ -177,4 +179,6 @@ def test_no_column_of_dashes(tdac):
         Path("runs", name, "run.json").write_text(run.model_dump_json())
         told = tdac("runs")[1]
         assert ("tokens" in told.splitlines()[1]) == (name == "b")
-        assert ("–: no model was asked, or it reports none" in told) == (name == "b")
+        assert ("–: no model was asked, or it does not report this" in told) == (
+            name == "b"
+        )

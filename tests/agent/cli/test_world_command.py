@@ -59,7 +59,7 @@ def test_a_thing_has_a_line(tdac, monkeypatch, world):
     _, out, _ = tdac(world)
     _, _, table = out.partition("obstacles (m, rad, kg)")
     _, _, *rows, mark = [line for line in table.splitlines() if line.strip()]
-    assert mark.strip() == "* is seen, and not solid"
+    assert mark.strip() == "* visible but not solid"
     assert len(rows) == len(load_world(world_file(world)).obstacles)
     assert max(map(len, out.splitlines())) <= 80
 
@@ -95,7 +95,7 @@ def test_its_json_is_complete(tdac):
     [
         (["nope.wbt"], "error: nope.wbt: no such file; check the path"),
         (["broken.wbt"], "error: broken.wbt, line 1, column 1: expected a header"),
-        (["small.wbt", "--png", "x.jpg"], "error: --png: expected a file that ends in"),
+        (["small.wbt", "--png", "x.jpg"], "error: --png must end in .png, got x.jpg"),
     ],
 )
 def test_mistakes_are_one_line(tdac, tmp_path, words, said):

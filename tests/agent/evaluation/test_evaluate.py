@@ -419,7 +419,7 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
     assert code == 0, errors
     told = " ".join(text.split())
     assert told.startswith("small (map ")
-    assert "): 4 episodes each, moved starts, seed 0 " in told
+    assert "): 4 episodes each, jittered starts, seed 0 " in told
     assert "reference ~ go-to-goal" in text or "reference > go-to-goal" in text
     frame = pd.read_csv(tmp_path / "all.csv")
     assert frame["success"].tolist() == [True] * 4 + [False] * 4

@@ -445,7 +445,7 @@ def test_the_decision_is_the_exit_code(tdac, good):
     code, out, _ = tdac(*words, "--delay", 40, "--wheel-slip", 0.9)
     assert code == 1
     assert "rejected at 90.0 % after 2 of at most 30 episodes" in out
-    assert "a controller of 50.0 % is accepted with probability" in out
+    assert "a true rate of 50.0 % is accepted with probability" in out
     assert "interval" not in out
 
 
@@ -501,8 +501,10 @@ def test_an_interrupt_leaves_nothing(good, no_traces):
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert err.decode().strip().splitlines()[-1] == "interrupted"
-    assert re.search(r"episodes had reached the goal; no rate", out.decode())
-    assert f"{kept} holds the report of the suite; no robust.json" in out.decode()
+    assert re.search(r"episodes reached the goal; no success rate", out.decode())
+    assert (
+        f"{kept} contains the report of the suite, but no robust.json" in out.decode()
+    )
     assert (kept / "report.json").is_file()
     assert not (kept / "robust.json").exists()
 

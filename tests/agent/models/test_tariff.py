@@ -135,7 +135,7 @@ def test_an_exhausted_budget_stops_a_run(
     exit_code, told, _ = tdac("synth", "--resume", out)
     assert exit_code == 4
     assert "stopped by the budget: 0.0600 USD of 0.12 USD are spent" in told
-    assert f"go on: tdac synth --resume {out} --max-cost 0.2" in told
+    assert f"to continue: tdac synth --resume {out} --max-cost 0.2" in told
     assert "at most 59 questions are left: --max-cost 0." in told
     assert "8000 tokens in (2000 from a cache), 4000 out; 0.0600 USD" in told
     limits["max_cost"] = 0.5
@@ -159,7 +159,7 @@ def test_answers_that_report_no_tokens(tmp_path, tdac):
     exit_code, told, _ = tdac("synth", *words, "--max-tokens", 60_000)
     assert exit_code == 4
     assert re.search(r"\d+ of 60000 tokens are spent or reserved", told)
-    assert "no tokens reported: each answer counts with all that was reserved" in told
+    assert "no tokens reported: each answer counts as the full amount reserved" in told
 
 
 def test_a_shared_budget_has_limits_of_its_own(tmp_path, small_task, warm):
@@ -203,5 +203,5 @@ def test_words_that_bound_nothing(tdac, monkeypatch):
     assert "no price is known for openai:unheard-of" in err
     exit_code, _, err = tdac(*words, "openai:gpt-4o", "--max-cost", "inf")
     assert exit_code == 2
-    assert "expected --max-cost to be finite" in err
+    assert "--max-cost must be finite" in err
     assert not Path("r").exists()

@@ -131,7 +131,7 @@ def test_an_interrupt_in_a_call(server, task_file, tmp_path, no_traces, vendor):
     assert process.returncode == 130
     assert stderr.splitlines()[-1] == "interrupted"
     assert "interrupted" not in stdout
-    assert f"go on: tdac synth --resume {out}" in stdout
+    assert f"to continue: tdac synth --resume {out}" in stdout
     assert "Traceback" not in stderr
     assert load_run(out).status == "interrupted"
     assert len(server.seen) == 1

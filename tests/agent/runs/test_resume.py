@@ -125,7 +125,7 @@ def test_a_run_that_has_ended(once_verified, out, tdac):
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*")}
     code, told, _ = tdac("synth", "--resume", out)
     assert code == 0
-    assert "has ended before; nothing was done" in " ".join(told.split())
+    assert "has already finished; nothing was done" in " ".join(told.split())
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == before
     record = json.loads((out / "run.json").read_text())
     (out / "run.json").write_text(json.dumps(record | {"status": "not verified"}))
@@ -247,7 +247,7 @@ def test_resume_takes_no_other_flags(tdac, halted):
     """It goes on as it was begun; a folder without a run is one clear line."""
     code, _, err = tdac("synth", "--resume", halted, "-K", 3, "--out", "x")
     assert code == 2
-    assert "a run goes on as it was begun: leave out -K, --out" in err
+    assert "--resume continues a run as it was begun: leave out -K, --out" in err
     code, _, err = tdac("synth", "--resume", halted, "--learner", "builtin")
     assert code == 2
     assert "contains another run (learner " in err
@@ -297,7 +297,7 @@ def test_runs_are_listed(tdac, halted, once_verified):
     exit_code, told, _ = tdac("runs", place)
     assert exit_code == 0
     assert "foreign" not in told
-    assert f"go on: tdac synth --resume {halted}" in told
+    assert f"to continue: tdac synth --resume {halted}" in told
     assert "verified" in told
     told = tdac("runs", place, "--json")[1]
     rows = {Path(row["run"]).name: row for row in json.loads(told)}

@@ -233,9 +233,9 @@ def test_what_a_rule_cured_is_said_by_name(tmp_path, tdac):
     told = " ".join(shown.split())
     assert (
         "effect: cured 2 of 6 tests in 2 tries, 1 more in some of them; cured: "
-        "test_a, test_d; cured in some: test_b" in told
+        "test_a, test_d; cured sometimes: test_b" in told
     )
-    assert "failed before it: test_a, test_b, test_c, test_d and 2 more" in told
+    assert "failed before: test_a, test_b, test_c, test_d and 2 more" in told
 
 
 INVALID = Attempt(k=1, j=0, valid=False, passed=False)
@@ -245,15 +245,15 @@ FAILED = Attempt(k=1, j=0, valid=True, passed=False, failed_tests=TESTS)
 @pytest.mark.parametrize(
     ("facts", "why"),
     [
-        ({}, "no iteration has failed as a whole"),
+        ({}, "no iteration has failed after all its edits"),
         ({"attempts": [FAILED.model_copy(update={"passed": True})]}, "no iteration"),
         ({"attempts": [INVALID]}, "no answer of 1 iteration could be used"),
         (
             {"attempts": [INVALID, INVALID.model_copy(update={"k": 2})]},
             "no answer of 2 iterations could be used",
         ),
-        ({"attempts": [INVALID, FAILED]}, "the optimizer had none to add"),
-        ({"attempts": [FAILED], "refine": False}, "leaves its prompt as it is"),
+        ({"attempts": [INVALID, FAILED]}, "the optimizer added none"),
+        ({"attempts": [FAILED], "refine": False}, "does not refine its prompt"),
     ],
 )
 def test_why_there_are_no_rules(tmp_path, tdac, facts, why):

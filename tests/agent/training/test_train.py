@@ -91,7 +91,7 @@ def test_it_is_among_the_runs(tdac, tmp_path, small, config, steps):
         return
     assert f"{steps} of 512 steps, the best policy reached 25% of the goals" in told
     assert (row["status"] == "trained") == (steps == 512)
-    assert (f"go on: tdac train --resume {folder}" in told) == (steps == 256)
+    assert (f"to continue: tdac train --resume {folder}" in told) == (steps == 256)
 
 
 def without_seconds(points):
@@ -320,7 +320,7 @@ def test_the_shipped_hyperparameters_are_whole(algo, env):
         (["--task", "maez"], "no task 'maez'"),
         (["--task", "maze", "--task", "epuck"], "expected tasks of one environment"),
         (["--wrapper", "relative"], "unknown wrapper 'relative'"),
-        (["--wrapper", "none", "--wrapper", "flatten"], "contradict each other"),
+        (["--wrapper", "none", "--wrapper", "flatten"], "cannot be combined"),
         (["--task", "rooms", "--task", "maze", "--wrapper", "guidance"], "several"),
         (["--range-noise", "-1"], "expected a range noise from 0 to 1"),
         (["--algo", "dqn"], "'dqn' is not one of 'ppo', 'sac', 'td3'"),

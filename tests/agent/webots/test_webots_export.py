@@ -220,7 +220,7 @@ def test_command(tdac, verified):
     """Exit 0; it says what it wrote, what came out, and what was not tried."""
     code, out, _ = tdac("export", "webots", verified, "--out", "project")
     assert code == 0
-    assert "driven here, as a Webots controller: reached the goal after" in out
+    assert "run by tdac, as a Webots controller: reached the goal after" in out
     assert "not run in Webots itself" in out
     assert Path("project/worlds/tdac_my_open_world.wbt").is_file()
 
