@@ -25,8 +25,8 @@ from tdac_agent.synthesis.outlook import Outlook, foresee
 
 LEGEND = (
     "K: iterations; J: repairs per iteration; asked: questions of all runs if no "
-    "controller ever passes; USD at most: each question is asked once; asked 3 times: "
-    "each question is asked three times"
+    "controller ever passes; USD at most: if each question is asked once; asked 3 "
+    "times: if each question is asked three times"
 )
 
 
@@ -54,12 +54,7 @@ class Row:
 
 
 def run(wanted: Wanted, as_json: bool) -> int:
-    """Prints the plan and returns 0; asks no model, needs no key, writes nothing.
-
-    Args:
-        wanted: Settings of the command.
-        as_json: Whether to print JSON.
-    """
+    """Prints the plan and returns 0; asks no model, needs no key, writes nothing."""
     console = make_console(stderr=as_json)
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
     config = with_limits(read_config(file), wanted.limits)

@@ -7,7 +7,15 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.cli.options import BUDGET, Json, KeyOverHttp, Trust, finite_cost
+from tdac_agent.cli.options import (
+    BUDGET,
+    Json,
+    KeyOverHttp,
+    Trust,
+    dir_flag,
+    finite_cost,
+    number_flag,
+)
 
 app = typer.Typer()
 
@@ -18,10 +26,7 @@ app = typer.Typer()
 )
 def campaign(
     config: Annotated[
-        str,
-        typer.Argument(
-            metavar="CONFIG", help="Campaign YAML file, or name of a bundled campaign."
-        ),
+        str, typer.Argument(help="Campaign YAML file, or name of a bundled campaign.")
     ],
     executor: Annotated[
         Literal["local", "ray"],
@@ -29,9 +34,8 @@ def campaign(
     ] = "local",
     workers: Annotated[
         Optional[int],  # noqa: UP045 - typer reads it at run time
-        typer.Option(
+        number_flag(
             min=1,
-            metavar="N",
             help="Concurrent runs; can exceed the cores if runs wait for models.  "
             "[default: one per core]",
         ),
@@ -44,9 +48,7 @@ def campaign(
     ] = "1/1",
     out: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--out", metavar="DIR", help="Campaign folder.  [default: campaigns/NAME]"
-        ),
+        dir_flag("--out", help="Campaign folder.  [default: campaigns/NAME]"),
     ] = None,
     dry_run: Annotated[
         bool,
@@ -67,10 +69,9 @@ def campaign(
     ] = None,
     max_tokens: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
+        number_flag(
             "--max-tokens",
             min=0,
-            metavar="N",
             help="Token limit of all runs together, input plus output.  "
             "[default: the file's]",
             rich_help_panel=BUDGET,

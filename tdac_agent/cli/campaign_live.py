@@ -31,13 +31,7 @@ BAR_WIDTH = 60
 
 
 class LiveView:
-    """Context manager that shows the progress of a campaign.
-
-    Args:
-        console: Console to print to.
-        progress: Progress of the campaign.
-        terms: Settings that all runs share.
-    """
+    """Context manager that shows the progress of a campaign."""
 
     def __init__(self, console: Console, progress: Progress, terms: Terms) -> None:
         self._console = console

@@ -24,11 +24,7 @@ SOMETIMES = ("optimizer", "prompt", "setting")
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """The labels that distinguish the kinds of run of a campaign.
-
-    Attributes:
-        names: Names of the label columns.
-    """
+    """The names of the labels that distinguish the kinds of run of a campaign."""
 
     names: tuple[str, ...]
 

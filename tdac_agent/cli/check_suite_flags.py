@@ -15,6 +15,7 @@ from tdac_agent.cli.options import (
     Suite,
     Tier,
     Trust,
+    number_flag,
     takes_task,
 )
 
@@ -22,8 +23,7 @@ app = typer.Typer()
 
 
 @app.command(
-    "check-suite",
-    epilog="Example: `tdac check-suite --task office --suite my_tests`",
+    "check-suite", epilog="Example: `tdac check-suite --task office --suite my_tests`"
 )
 @takes_task()
 def check_suite(
@@ -34,10 +34,7 @@ def check_suite(
     tier: Tier = "auto",
     seed: JitterSeed = None,
     repeats: Annotated[
-        int,
-        typer.Option(
-            min=1, metavar="N", help="Verifications per controller; they must agree."
-        ),
+        int, number_flag(min=1, help="Verifications per controller; they must agree.")
     ] = 5,
     as_json: Json = False,
 ) -> None:

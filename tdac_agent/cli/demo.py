@@ -21,12 +21,7 @@ _ABOUT = (
 
 
 def run(out: Path | None, as_json: bool) -> int:
-    """Replays the bundled run; returns the exit code.
-
-    Args:
-        out: Run folder; the next free one by default.
-        as_json: Whether to print the run record as JSON.
-    """
+    """Replays the bundled run, by default into a new folder; returns the exit code."""
     console = Console(stderr=as_json)
     recorded = load_run(DEMO)
     about = {"prompt": recorded.prompt, "task": recorded.task}

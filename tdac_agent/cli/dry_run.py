@@ -104,7 +104,7 @@ def _budget(outlook: Outlook) -> list[str]:
         limits.append(f"{outlook.max_tokens} tokens (--max-tokens)")
     if not limits:
         return []
-    verdict = "enough for the first question; the run stops before one it cannot pay"
+    verdict = "enough for the first question; the run stops before exceeding it"
     if outlook.first_needs:
         needs = outlook.first_needs
         verdict = f"not enough for the first question: give {needs} or more"

@@ -7,7 +7,16 @@ from typing import Annotated, Literal, Optional
 
 import typer
 
-from tdac_agent.cli.options import TASK, VARIATION, WRAPPER, Json, Tier
+from tdac_agent.cli.options import (
+    TASK,
+    VARIATION,
+    WRAPPER,
+    Json,
+    Tier,
+    dir_flag,
+    file_flag,
+    number_flag,
+)
 
 app = typer.Typer()
 
@@ -32,13 +41,10 @@ def evaluate(
         ),
     ] = None,
     episodes: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Episodes per policy and task.")
+        int, number_flag(min=1, help="Episodes per policy and task.")
     ] = 100,
     seed: Annotated[
-        int,
-        typer.Option(
-            min=0, metavar="N", help="Seed of the episodes, the same for all policies."
-        ),
+        int, number_flag(min=0, help="Seed of the episodes, the same for all policies.")
     ] = 0,
     variation: Annotated[
         Literal["nominal", "jitter", "mixed", "random"], typer.Option(help=VARIATION)
@@ -53,13 +59,12 @@ def evaluate(
     ] = None,
     csv: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--csv", metavar="FILE", help="Write a CSV row per episode."),
+        file_flag("--csv", help="Write a CSV row per episode."),
     ] = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
+        dir_flag(
             "--out",
-            metavar="DIR",
             help="Folder for evaluation.json, episodes.csv, timing.csv and, per task, "
             "a picture of all trajectories.",
         ),

@@ -120,12 +120,7 @@ def _notes(rows: Sequence[Row]) -> list[str]:
 
 
 def comparison_table(pairs: Sequence[Comparison], *, several: bool) -> Table:
-    """One row per pair of policies.
-
-    Args:
-        pairs: The comparisons.
-        several: Whether they cover several tasks.
-    """
+    """One row per pair of policies; with a column for the task if `several`."""
     table = _plain_table("The same episodes, paired")
     for name in (*(("task",) if several else ()), "policies"):
         table.add_column(name, overflow="fold")

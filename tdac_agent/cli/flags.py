@@ -147,11 +147,7 @@ class TaskFlags:
 
 
 def _checked(given: dict[str, Any]) -> TaskFile:
-    """The task file that the flags stand for.
-
-    Raises:
-        TaskError: A value cannot be used; the message names its flag.
-    """
+    """The task file that the flags stand for; an error names the flag."""
     try:
         return checked(given, "flags")
     except TaskError as error:

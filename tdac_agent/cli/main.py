@@ -36,24 +36,22 @@ from tdac_agent.cli.terminal import filter_streams
 
 
 class _Command(TyperCommand):
-    """A command whose help shows no types of switches and arguments."""
-
     def get_params(self, ctx: Any) -> list[Any]:
-        """All parameters, the option `--help` among them."""
         return _without_types(super().get_params(ctx))
 
 
 class _Group(TyperGroup):
-    """A group of such commands."""
-
     def get_params(self, ctx: Any) -> list[Any]:
-        """All parameters, the option `--help` among them."""
         return _without_types(super().get_params(ctx))
 
 
 def _without_types(parameters: list[Any]) -> list[Any]:
+    """The parameters, with capital names of arguments and no needless types."""
     for parameter in parameters:
-        if isinstance(parameter, TyperArgument) or parameter.is_bool_flag:
+        is_argument = isinstance(parameter, TyperArgument)
+        if is_argument:
+            parameter.metavar = parameter.metavar or parameter.name.upper()
+        if is_argument or parameter.is_bool_flag:
             parameter.display_type_rich = lambda **_: ""
     return parameters
 

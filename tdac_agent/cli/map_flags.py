@@ -10,12 +10,15 @@ import typer
 from tdac_agent.cli.options import (
     MAP_FILE,
     WORLD_FILE,
+    Goal,
     Json,
     Metres,
     Polarity,
     Radius,
     Snap,
     Threshold,
+    dir_flag,
+    file_flag,
 )
 
 app = typer.Typer()
@@ -23,17 +26,12 @@ app = typer.Typer()
 
 @app.command("map", epilog="Example: `tdac map plan.png --start 90 302 --goal 178 386`")
 def map_command(
-    image: Annotated[
-        str, typer.Argument(metavar="IMAGE", help=f"{MAP_FILE}, or bundled map.")
-    ],
+    image: Annotated[str, typer.Argument(help=f"{MAP_FILE}, or bundled map.")],
     start: Annotated[
         Optional[tuple[float, float]],  # noqa: UP045 - typer reads it at run time
-        typer.Option("--start", metavar="X Y", help="Start position, px."),
+        typer.Option("--start", metavar="X Y", help="Start: px on a map."),
     ] = None,
-    goal: Annotated[
-        Optional[tuple[float, float]],  # noqa: UP045
-        typer.Option("--goal", metavar="X Y", help="Goal position, px."),
-    ] = None,
+    goal: Goal = None,
     robot_radius: Radius = None,
     snap: Snap = False,
     metres: Metres = False,
@@ -45,9 +43,7 @@ def map_command(
     ] = "default",
     out: Annotated[
         Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option(
-            "--out", metavar="DIR", help="Output folder.  [default: NAME-map]"
-        ),
+        dir_flag("--out", help="Output folder.  [default: NAME-map]"),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -65,14 +61,11 @@ def map_command(
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")
 def world_command(
     file: Annotated[
-        str,
-        typer.Argument(
-            metavar="WORLD", help=f"{WORLD_FILE} of V6 to R2025a, or bundled world."
-        ),
+        str, typer.Argument(help=f"{WORLD_FILE} of V6 to R2025a, or bundled world.")
     ],
     png: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--png", metavar="FILE", help="Draw the world from above."),
+        file_flag("--png", help="Draw the world from above."),
     ] = None,
     as_json: Json = False,
 ) -> None:

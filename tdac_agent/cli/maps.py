@@ -154,5 +154,5 @@ def _print_files(console: Console, params: MapParams, folder: Path) -> None:
     console.print(f"wrote {escape(str(folder))}; look at {preview}")
     if params.start is None:
         console.print(
-            "read off start and goal at its rulers, then give --start X Y --goal X Y"
+            "read start and goal off its rulers, then give --start X Y --goal X Y"
         )

@@ -22,11 +22,12 @@ import typer
 if TYPE_CHECKING:
     from tdac_agent.cli.flags import TaskFlags
 
+number_flag = functools.partial(typer.Option, metavar="N")
+dir_flag = functools.partial(typer.Option, metavar="DIR")
+file_flag = functools.partial(typer.Option, metavar="FILE")
 TASK = "Bundled task (`maze`, `epuck`, …), task.yaml, or run folder"
-CONTROLLER = "Controller file, or run folder, which brings its own task."
 MAP_FILE = "Map image, ROS map.yaml, MovingAI .map"
 WORLD_FILE = "Webots .wbt file"
-IGNORE = "Name or type of a world node to ignore although it may be solid; repeatable."
 VARIATION = (
     "Start poses: the task's own (nominal), within a body radius of it (jitter), "
     "jittered or any (mixed), any start and goal (random)."
@@ -40,6 +41,10 @@ RANGE_NOISE = "Noise of each range, standard deviation relative to the range."
 WHEEL_SLIP = "Noise of each wheel's speed, standard deviation relative to the speed."
 MOTOR_LAG = "Time constant of the wheel speeds, s."
 DELAY = "Steps by which each action takes effect late."
+Controller = Annotated[
+    str,
+    typer.Argument(help="Controller file, or run folder, which brings its own task."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 TaskOption = Annotated[
     Optional[str],  # noqa: UP045 - typer reads it at run time
@@ -59,51 +64,45 @@ WorldOption = Annotated[
 ]
 Ignore = Annotated[
     Optional[list[str]],  # noqa: UP045
-    typer.Option("--ignore", metavar="NAME", help=IGNORE),
+    typer.Option(
+        "--ignore",
+        metavar="NAME",
+        help="Name or type of a world node to ignore although it may be solid; "
+        "repeatable.",
+    ),
 ]
 Start = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
     typer.Option(
         "--start",
         metavar="X Y [YAW]",
-        help="Start position: px on a map, m in a world; for YAW, see --heading.",
+        help="Start: px on a map, m in a world; for YAW, see --heading.",
     ),
 ]
 Goal = Annotated[
     Optional[tuple[float, float]],  # noqa: UP045
-    typer.Option(
-        "--goal", metavar="X Y", help="Goal position: px on a map, m in a world."
-    ),
+    typer.Option("--goal", metavar="X Y", help="Goal: px on a map, m in a world."),
 ]
 Radius = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option("--robot-radius", metavar="N", help="Body radius, px.  [default: 15]"),
+    number_flag("--robot-radius", help="Body radius, px.  [default: 15]"),
 ]
 Heading = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
-        "--heading",
-        metavar="YAW",
-        help="Start heading, rad, from +x towards +y (down on a map).",
+        metavar="YAW", help="Start heading, rad, from +x towards +y (down on a map)."
     ),
 ]
 RobotImage = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--robot-image",
-        metavar="FILE",
-        help="Picture of the robot, nose to the right.",
-    ),
+    file_flag("--robot-image", help="Picture of the robot, nose to the right."),
 ]
 Snap = Annotated[
-    bool,
-    typer.Option("--snap", help="Move start and goal to the nearest free position."),
+    bool, typer.Option("--snap", help="Move start and goal to the nearest free place.")
 ]
 Metres = Annotated[
     bool,
-    typer.Option(
-        "--metres", help="Lengths are in metres, in the frame of the map.yaml."
-    ),
+    typer.Option("--metres", help="Lengths are metres in the map's frame (map.yaml)."),
 ]
 Polarity = Annotated[
     Optional[Literal["dark", "light"]],  # noqa: UP045
@@ -113,10 +112,9 @@ Polarity = Annotated[
 ]
 Threshold = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option(
-        metavar="N",
+    number_flag(
         help="Luminance above which a map pixel is light, from 0 to below 255.  "
-        "[default: detected]",
+        "[default: detected]"
     ),
 ]
 Instructions = Annotated[
@@ -129,9 +127,7 @@ Instructions = Annotated[
 ]
 Suite = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option(
-        "--suite", metavar="DIR", help="Folder with additional test_*.py files to run."
-    ),
+    dir_flag("--suite", help="Folder with additional test_*.py files to run."),
 ]
 Trust = Annotated[
     bool,
@@ -143,17 +139,15 @@ Trust = Annotated[
 ]
 JitterSeed = Annotated[
     Optional[int],  # noqa: UP045
-    typer.Option(
+    number_flag(
         "--seed",
         min=0,
-        metavar="N",
         help="Seed of the jittered starts.  [default: derived from a secret of this "
         "installation]",
     ),
 ]
 Tier = Annotated[
-    str,
-    typer.Option(metavar="NAME", help="Sandbox tier; `tdac doctor` lists them."),
+    str, typer.Option(metavar="NAME", help="Sandbox tier; `tdac doctor` lists them.")
 ]
 Profile = Annotated[
     Optional[Literal["policy", "paper"]],  # noqa: UP045
@@ -202,10 +196,9 @@ KeyOverHttp = Annotated[
 ]
 MaxOutput = Annotated[
     Optional[int],  # noqa: UP045
-    typer.Option(
+    number_flag(
         "--max-output",
         min=1,
-        metavar="N",
         help="Token limit of an answer, thinking included; doubled after an answer "
         "that was cut off.  [default: 16000]",
         rich_help_panel=MODELS,
@@ -241,10 +234,9 @@ MaxCost = Annotated[
 ]
 MaxTokens = Annotated[
     Optional[int],  # noqa: UP045
-    typer.Option(
+    number_flag(
         "--max-tokens",
         min=0,
-        metavar="N",
         help="Token limit of the whole run, input plus output.  [default: none; "
         "1000000 for a server with unknown prices]",
         rich_help_panel=BUDGET,
@@ -253,29 +245,19 @@ MaxTokens = Annotated[
 DISTURBED = "Disturbance of verify --robust and play --seed"
 RangeNoise = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option(
-        metavar="N",
-        help=f"{RANGE_NOISE}  [default: 0.025]",
-        rich_help_panel=DISTURBED,
-    ),
+    number_flag(help=f"{RANGE_NOISE}  [default: 0.025]", rich_help_panel=DISTURBED),
 ]
 WheelSlip = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option(
-        metavar="N",
-        help=f"{WHEEL_SLIP}  [default: 0.03]",
-        rich_help_panel=DISTURBED,
-    ),
+    number_flag(help=f"{WHEEL_SLIP}  [default: 0.03]", rich_help_panel=DISTURBED),
 ]
 MotorLag = Annotated[
     Optional[float],  # noqa: UP045
-    typer.Option(
-        metavar="N", help=f"{MOTOR_LAG}  [default: 0]", rich_help_panel=DISTURBED
-    ),
+    number_flag(help=f"{MOTOR_LAG}  [default: 0]", rich_help_panel=DISTURBED),
 ]
 Delay = Annotated[
     Optional[int],  # noqa: UP045
-    typer.Option(metavar="N", help=f"{DELAY}  [default: 1]", rich_help_panel=DISTURBED),
+    number_flag(help=f"{DELAY}  [default: 1]", rich_help_panel=DISTURBED),
 ]
 
 

@@ -8,14 +8,16 @@ from typing import Annotated, Optional
 import typer
 
 from tdac_agent.cli.options import (
-    CONTROLLER,
     VIDEO,
+    Controller,
     Delay,
     MotorLag,
     NamedTask,
     RangeNoise,
     Tier,
     WheelSlip,
+    file_flag,
+    number_flag,
     takes_task,
 )
 
@@ -28,11 +30,11 @@ app = typer.Typer()
 )
 @takes_task()
 def play(
-    controller: Annotated[str, typer.Argument(metavar="CONTROLLER", help=CONTROLLER)],
+    controller: Controller,
     named_task: NamedTask,
     video: Annotated[
         Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option(metavar="FILE", help=f"{VIDEO} instead of opening a window."),
+        file_flag(help=f"{VIDEO} instead of opening a window."),
     ] = None,
     episode: Annotated[
         Optional[str],  # noqa: UP045
@@ -44,10 +46,8 @@ def play(
     ] = None,
     seed: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
-            min=0,
-            metavar="N",
-            help="Seed of an episode of `tdac verify --robust` to play instead.",
+        number_flag(
+            min=0, help="Seed of an episode of `tdac verify --robust` to play instead."
         ),
     ] = None,
     tier: Tier = "auto",

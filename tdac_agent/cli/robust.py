@@ -37,7 +37,6 @@ def measure(
         TimeLeft(),
     )
     console = Console(stderr=as_json)
-    # Redrawn only on updates: a timer would cost CPU time.
     bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
     counts = (0, 0)
 

@@ -21,10 +21,7 @@ REACHED = "reached"
 def show_robust(report: RobustReport, console: Console, play: list[str]) -> None:
     """Prints the worst episodes, the success rate and the sequential test's decision.
 
-    Args:
-        report: The report.
-        console: Console to print to.
-        play: Command line that plays an episode, without `--seed`.
+    `play` is the command line that plays an episode, without `--seed`.
     """
     say = partial(console.print, highlight=False)
     say(worst_table(report))

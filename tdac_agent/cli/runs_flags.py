@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from tdac_agent.cli.options import Json
+from tdac_agent.cli.options import Json, dir_flag, file_flag
 
 app = typer.Typer()
 
@@ -15,8 +15,7 @@ app = typer.Typer()
 @app.command(epilog="Example: `tdac demo`")
 def demo(
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Run folder.  [default: runs/demo-N]"),
+        Path | None, dir_flag(help="Run folder.  [default: runs/demo-N]")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -28,8 +27,7 @@ def demo(
 
 @app.command("rules", epilog="Example: `tdac rules runs/office-1`")
 def rules_command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.")],
-    as_json: Json = False,
+    run: Annotated[Path, typer.Argument(help="Run folder.")], as_json: Json = False
 ) -> None:
     """Show the repair rules of a run, with their origin and effect."""
     from tdac_agent.cli import rules
@@ -47,9 +45,7 @@ def report_command(
     ],
     out: Annotated[
         Optional[Path],  # noqa: UP045 - typer reads it at run time
-        typer.Option(
-            "--out", metavar="FILE", help="Output file.  [default: DIR/report.html]"
-        ),
+        file_flag("--out", help="Output file.  [default: DIR/report.html]"),
     ] = None,
 ) -> None:
     """Write an HTML report of runs: failures, code, rules, animations."""

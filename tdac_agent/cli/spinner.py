@@ -10,9 +10,6 @@ class Spinner:
     """Context manager that shows an activity on a terminal from its first call on.
 
     It imports rich on that call, and only if stderr is a terminal.
-
-    Args:
-        text: Name of the activity.
     """
 
     def __init__(self, text: str) -> None:

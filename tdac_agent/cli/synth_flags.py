@@ -21,6 +21,9 @@ from tdac_agent.cli.options import (
     Optimizer,
     Suite,
     Trust,
+    dir_flag,
+    file_flag,
+    number_flag,
     takes_task,
 )
 
@@ -47,19 +50,13 @@ def synth(
     named_task: NamedTask,
     from_: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--from", metavar="FILE", help="Controller to begin with."),
+        file_flag("--from", help="Controller to begin with."),
     ] = None,
     k: Annotated[
-        int,
-        typer.Option(
-            "-K", "--iterations", min=1, metavar="N", help="Maximum iterations."
-        ),
+        int, number_flag("-K", "--iterations", min=1, help="Maximum iterations.")
     ] = 20,
     j: Annotated[
-        int,
-        typer.Option(
-            "-J", "--patience", min=0, metavar="N", help="Maximum edits per iteration."
-        ),
+        int, number_flag("-J", "--patience", min=0, help="Maximum edits per iteration.")
     ] = 1,
     suite: Suite = None,
     learner: Learner = "builtin",
@@ -72,8 +69,7 @@ def synth(
     prompt: Annotated[
         str,
         typer.Option(
-            metavar="NAME",
-            help="Prompt template: `full`, `underspecified`, or a file.",
+            metavar="NAME", help="Prompt template: `full`, `underspecified`, or a file."
         ),
     ] = "full",
     refine: Annotated[
@@ -92,19 +88,16 @@ def synth(
     ] = False,
     out: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
+        dir_flag(
             "--out",
-            metavar="DIR",
             help="Run folder; an unfinished run of the same command in it is continued."
             "  [default: runs/TASK-N]",
         ),
     ] = None,
     resume: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--resume",
-            metavar="DIR",
-            help="Continue the run in this folder with its own settings.",
+        dir_flag(
+            "--resume", help="Continue the run in this folder with its own settings."
         ),
     ] = None,
     seed: JitterSeed = None,

@@ -21,9 +21,6 @@ class FilteredStream:
     Attributes:
         rich_proxied_file: The unfiltered stream. rich looks for this name and writes
             its own escape sequences there.
-
-    Args:
-        stream: Stream to write to.
     """
 
     def __init__(self, stream: TextIO) -> None:

@@ -17,6 +17,9 @@ from tdac_agent.cli.options import (
     WRAPPER,
     Json,
     Trust,
+    dir_flag,
+    file_flag,
+    number_flag,
 )
 
 app = typer.Typer()
@@ -43,33 +46,23 @@ def train(
     ] = None,
     steps: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
+        number_flag(
             min=1,
-            metavar="N",
             help="Training steps of all robots together.  [default: from --config]",
         ),
     ] = None,
     seed: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
-            min=0,
-            metavar="N",
-            help="Seed of networks, starts and noise.  [default: 0]",
-        ),
+        number_flag(min=0, help="Seed of networks, starts and noise.  [default: 0]"),
     ] = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="Training folder.  [default: runs/ALGO-TASK-N]",
-        ),
+        dir_flag("--out", help="Training folder.  [default: runs/ALGO-TASK-N]"),
     ] = None,
     resume: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
+        dir_flag(
             "--resume",
-            metavar="DIR",
             help="Continue the training in this folder with its own settings, from its "
             "last checkpoint; --steps changes its length.",
         ),
@@ -85,26 +78,23 @@ def train(
     ] = None,
     n_envs: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
+        number_flag(
             min=1,
-            metavar="N",
             help="Number of robots driven in parallel.  [default: from --config]",
             rich_help_panel=TRAINING,
         ),
     ] = None,
     episodes: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
+        number_flag(
             min=1,
-            metavar="N",
             help="Episodes per evaluation.  [default: 100]",
             rich_help_panel=TRAINING,
         ),
     ] = None,
     config: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
-            metavar="FILE",
+        file_flag(
             help="Hyperparameters in rl-zoo3 format.  [default: bundled, by --algo]",
             rich_help_panel=TRAINING,
         ),
@@ -119,35 +109,19 @@ def train(
     ] = None,
     range_noise: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(
-            metavar="N",
-            help=f"{RANGE_NOISE}  [default: 0]",
-            rich_help_panel=DISTURBED,
-        ),
+        number_flag(help=f"{RANGE_NOISE}  [default: 0]", rich_help_panel=DISTURBED),
     ] = None,
     wheel_slip: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(
-            metavar="N",
-            help=f"{WHEEL_SLIP}  [default: 0]",
-            rich_help_panel=DISTURBED,
-        ),
+        number_flag(help=f"{WHEEL_SLIP}  [default: 0]", rich_help_panel=DISTURBED),
     ] = None,
     motor_lag: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(
-            metavar="N",
-            help=f"{MOTOR_LAG}  [default: 0]",
-            rich_help_panel=DISTURBED,
-        ),
+        number_flag(help=f"{MOTOR_LAG}  [default: 0]", rich_help_panel=DISTURBED),
     ] = None,
     delay: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
-            metavar="N",
-            help=f"{DELAY}  [default: 0]",
-            rich_help_panel=DISTURBED,
-        ),
+        number_flag(help=f"{DELAY}  [default: 0]", rich_help_panel=DISTURBED),
     ] = None,
     trust: Trust = False,
     as_json: Json = False,

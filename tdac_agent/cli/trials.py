@@ -27,10 +27,7 @@ ADVICE: dict[int, str] = {
 
 
 def attempt(name: str) -> tuple[bool, str]:
-    """Runs a trial in its own process.
-
-    Args:
-        name: Key of `TRIALS`.
+    """Runs a trial of `TRIALS` in its own process.
 
     Returns:
         Whether it works, and a line on what works or why it does not.

@@ -9,7 +9,7 @@ from typing import Annotated, Optional
 import typer
 
 from tdac_agent.cli.options import (
-    CONTROLLER,
+    Controller,
     Delay,
     JitterSeed,
     Json,
@@ -21,6 +21,9 @@ from tdac_agent.cli.options import (
     Tier,
     Trust,
     WheelSlip,
+    dir_flag,
+    file_flag,
+    number_flag,
     takes_task,
 )
 
@@ -33,7 +36,7 @@ app = typer.Typer()
 )
 @takes_task()
 def verify(
-    controller: Annotated[str, typer.Argument(metavar="CONTROLLER", help=CONTROLLER)],
+    controller: Controller,
     named_task: NamedTask,
     profile: Profile = None,
     paper: Annotated[
@@ -46,13 +49,12 @@ def verify(
     seed: JitterSeed = None,
     junit: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(metavar="FILE", help="Write a JUnit XML report."),
+        file_flag(help="Write a JUnit XML report."),
     ] = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(
+        dir_flag(
             "--out",
-            metavar="DIR",
             help="Folder for report.json (and robust.json), the trajectories and a "
             "picture of each failed episode.",
         ),
@@ -60,9 +62,8 @@ def verify(
     as_json: Json = False,
     robust: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
+        number_flag(
             min=1,
-            metavar="N",
             help="If the controller is verified, run N disturbed episodes and print "
             "their success rate.",
             rich_help_panel="Robustness",
@@ -70,9 +71,8 @@ def verify(
     ] = None,
     first_seed: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option(
+        number_flag(
             min=0,
-            metavar="N",
             help="Seed of the first disturbed episode.  [default: as for --seed]",
             rich_help_panel="Robustness",
         ),
@@ -88,8 +88,7 @@ def verify(
     ] = None,
     margin: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(
-            metavar="N",
+        number_flag(
             help="Distance of the two rates of --accept-at.  [default: 0.05]",
             rich_help_panel="Robustness",
         ),

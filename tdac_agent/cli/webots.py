@@ -75,9 +75,8 @@ def run(
         _show(done.report, console)
     if video is not None:
         with console.status(f"drawing {escape(video.name)} …"):
-            _write_video(
-                done, stage.make_env(**options, render_mode="rgb_array"), video
-            )
+            env = stage.make_env(**options, render_mode="rgb_array")
+            _write_video(done, env, video)
         if not as_json:
             print(f"wrote {video} (at twice real time)")
     return 0 if done.report.passed else 1
@@ -133,12 +132,8 @@ def _show(report: WebotsReport, console: Console) -> None:
         )
     if report.output.strip():
         console.print("[cyan]the controller printed[/]")
-        console.print(
-            Text(
-                _without_repeats(printable(_CONTROL_SEQUENCES.sub("", report.output)))
-            ),
-            soft_wrap=True,
-        )
+        output = printable(_CONTROL_SEQUENCES.sub("", report.output))
+        console.print(Text(_without_repeats(output)), soft_wrap=True)
     if report.error is not None:
         console.print("[red]the controller failed[/]")
         console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)

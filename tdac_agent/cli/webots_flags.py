@@ -8,13 +8,16 @@ from typing import Annotated, Optional
 import typer
 
 from tdac_agent.cli.options import (
-    IGNORE,
     VIDEO,
     WORLD_FILE,
     Heading,
+    Ignore,
     Json,
     Start,
     Tier,
+    dir_flag,
+    file_flag,
+    number_flag,
 )
 
 webots_app = typer.Typer(
@@ -30,17 +33,12 @@ app.add_typer(export_app, name="export")
     "run", epilog="Example: `tdac webots run my_controller.py maze.wbt --steps 4000`"
 )
 def webots_run(
-    controller: Annotated[
-        Path, typer.Argument(metavar="CONTROLLER", help="Webots controller file.")
-    ],
-    world: Annotated[
-        str, typer.Argument(metavar="WORLD", help=f"{WORLD_FILE}, or bundled world.")
-    ],
+    controller: Annotated[Path, typer.Argument(help="Webots controller file.")],
+    world: Annotated[str, typer.Argument(help=f"{WORLD_FILE}, or bundled world.")],
     steps: Annotated[
         Optional[int],  # noqa: UP045 - typer reads it at run time
-        typer.Option(
+        number_flag(
             min=1,
-            metavar="N",
             help="Maximum steps of the world.  [default: the environment's horizon]",
         ),
     ] = None,
@@ -51,20 +49,16 @@ def webots_run(
         typer.Option(
             "--goal",
             metavar="X Y",
-            help="Goal position, m.  [default: the world's node GOAL]",
+            help="Goal: m in a world.  [default: its node GOAL]",
         ),
     ] = None,
     tolerance: Annotated[
         Optional[float],  # noqa: UP045
-        typer.Option(
-            metavar="N",
-            help="Distance at which the goal counts as reached, m.  [default: 0.02]",
+        number_flag(
+            help="Distance at which the goal counts as reached, m.  [default: 0.02]"
         ),
     ] = None,
-    ignore: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(metavar="NAME", help=IGNORE),
-    ] = None,
+    ignore: Ignore = None,
     webots_sensors: Annotated[
         bool,
         typer.Option(
@@ -74,7 +68,7 @@ def webots_run(
     ] = False,
     video: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option(metavar="FILE", help=f"{VIDEO}."),
+        file_flag(help=f"{VIDEO}."),
     ] = None,
     tier: Tier = "auto",
     as_json: Json = False,
@@ -97,13 +91,8 @@ def webots_run(
     "webots", epilog="Example: `tdac export webots runs/epuck-1 --out my_project`"
 )
 def export_webots(
-    run: Annotated[
-        Path,
-        typer.Argument(metavar="RUN", help="Run folder with a verified controller."),
-    ],
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Output folder, new or empty.")
-    ],
+    run: Annotated[Path, typer.Argument(help="Run folder with a verified controller.")],
+    out: Annotated[Path, dir_flag(help="Output folder, new or empty.")],
     tier: Tier = "auto",
     as_json: Json = False,
 ) -> None:

@@ -72,11 +72,7 @@ def _overview(world: World) -> Table:
         table.add_row(label, f"{name}{pose}, version {robot.version}")
     if not world.robots:
         table.add_row("e-puck", "none in this file")
-    goal = (
-        "none: synth and verify need --goal X Y"
-        if world.goal is None
-        else _point(*world.goal)
-    )
+    goal = "none: needs --goal X Y" if world.goal is None else _point(*world.goal)
     table.add_row("goal", goal)
     for arena in world.arenas:
         table.add_row("arena", f"{arena.kind} at {_floor(arena)}")
