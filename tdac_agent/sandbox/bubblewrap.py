@@ -40,7 +40,7 @@ def bubblewrap_command(
     words += _each("--ro-bind", seen.system)
     for path in seen.hidden:
         words += ["--tmpfs", path]
-    # numpy may be in a hidden folder, which therefore becomes read-only afterwards.
+    # numpy may be in a hidden folder, which can become read-only only afterwards.
     words += _each("--ro-bind", (*seen.packages, str(parent)))
     for path in seen.hidden:
         words += ["--remount-ro", path]

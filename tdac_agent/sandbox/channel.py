@@ -15,11 +15,11 @@ CHUNK = 1 << 16
 # Most answers are short, and a large buffer costs more than the whole round trip.
 SHORT = 1 << 12
 KEPT_OUTPUT = 4000
-# Most answers come sooner; later ones have their run-queue wait time measured.
+# Most answers come sooner; run-queue wait time is measured only for later ones.
 SOON_SECONDS = 0.25
 MOST_WAITED_SECONDS = 300.0
 # A child is busy if it was on a CPU for this share of its time outside the run queue.
-# Below it the machine may be to blame, such as the host of a virtual machine.
+# Below it the machine may be to blame, e.g. the host of a virtual machine.
 BUSY_SHARE = 0.9
 
 
@@ -31,7 +31,7 @@ class DeadlineError(Exception):
     """The deadline passed before a whole frame was sent or received.
 
     Args:
-        busy: Whether the child was on a CPU for all of its time.
+        busy: Whether the child was on a CPU for nearly all of its time.
     """
 
     def __init__(self, *, busy: bool) -> None:
@@ -48,10 +48,10 @@ class OutputFloodError(Exception):
 
 
 class Channel:
-    """Sends requests, receives answers, and keeps head and tail of the printed output.
+    """Sends requests, receives answers, keeps the head and tail of the printed output.
 
     Args:
-        requests: Descriptor to write requests to; `close` closes all three.
+        requests: Descriptor to write requests to.
         answers: Descriptor to read answers from.
         output: Descriptor to read printed output from.
         frame_bytes: Largest payload of an answer.
@@ -69,7 +69,7 @@ class Channel:
         line: Line,
     ) -> None:
         self._line = line
-        # Last look at the child's times: when, the times, and for which deadline.
+        # Last reading of the run-queue statistics: when, values, for which deadline.
         self._seen_at, self._seen_times, self._seen_deadline = 0.0, (0.0, 0.0), 0.0
         self._requests, self._answers, self._output = requests, answers, output
         self._frame_bytes, self._output_bytes = frame_bytes, output_bytes

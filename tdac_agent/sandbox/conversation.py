@@ -111,7 +111,7 @@ class Conversation:
 
     def breach(self, what: str, phase: str) -> NoReturn:
         """End the child because it sent something that our server never sends."""
-        message = f"wrote to the judge's channel at {phase}: {what}"
+        message = f"misused the judge's channel at {phase}: {what}"
         self.give_up(ControllerProtocolError(message, phase))
 
     def stop(self) -> ChildUsage:

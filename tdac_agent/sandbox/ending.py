@@ -50,7 +50,7 @@ class Ending:
     def __call__(self) -> ChildUsage:
         """Kill the process group, wait for it, and delete the folder."""
         if self._usage is None:
-            # Stays if `_end` is interrupted, so that nothing is closed twice.
+            # Kept if `_end` is interrupted, so that nothing is closed twice.
             self._usage = ChildUsage(0.0, 0, 0, "", "", -signal.SIGKILL)
             self._usage = _end(self._forked)
         return self._usage
@@ -68,7 +68,7 @@ def _end(forked: Forked) -> ChildUsage:
     finally:
         channel.close()
         os.close(forked.lifeline)
-        # A folder that cannot be removed must not cost a verdict.
+        # A folder that cannot be removed must not prevent a verdict.
         with contextlib.suppress(OSError):
             forked.folder.remove()
     return ChildUsage(

@@ -40,11 +40,11 @@ def _revive(
 
 
 class ControllerError(ControllerFault):
-    """An exception was raised in the controller; the child still answers.
+    """The controller raised an exception; the child keeps running.
 
     Args:
         type_name: Class of the exception.
-        text: Its message, bounded, without paths and memory addresses.
+        text: Its message, truncated, without paths and memory addresses.
         line: Line of `controller.py`, 0 if unknown.
         traceback: The controller's own lines, outermost first.
         phase: What the controller was doing.
@@ -68,8 +68,8 @@ class ControllerTimeout(ControllerFault):
     Args:
         phase: What the controller was doing.
         seconds: Time limit.
-        busy: Whether it was on a CPU all that time; if not, it may have been waiting
-            for something.
+        busy: Whether it was on a CPU nearly all that time; if not, it may have been
+            waiting for something.
     """
 
     def __init__(self, phase: str, seconds: float, *, busy: bool = False) -> None:
@@ -93,7 +93,7 @@ class ControllerDied(ControllerFault):
 
 
 class ControllerProtocolError(ControllerFault):
-    """The controller wrote its own bytes to the channel."""
+    """The controller itself wrote to the judge's channel or closed it."""
 
 
 class ControllerOutputFlood(ControllerFault):

@@ -42,7 +42,7 @@ def exposure() -> Exposure:
     program = os.path.realpath(getattr(sys, "_base_executable", sys.executable))
     stdlib = os.path.dirname(os.path.realpath(os.__file__))
     folders = _outermost({stdlib, *_extension_folders(), *_library_folders()})
-    # Only the parent is resolved: programs ask for the loader by this file name.
+    # Only the folder is resolved: programs refer to the loader by its unresolved name.
     roots = [Path(folder).resolve() for folder in ("/lib", "/lib64")]
     loaders = [str(path) for root in roots for path in root.glob("ld-*.so*")]
     files = [program, *loaders, "/etc/ld.so.cache", "/etc/alternatives"]
@@ -113,7 +113,7 @@ def entries_but_hidden(seen: Exposure) -> tuple[list[str], list[str]]:
     """Return `system` without `hidden`, for a sandbox that cannot mask a folder.
 
     Returns:
-        Paths that may be read with everything below, folders that may only be listed.
+        Paths that are readable recursively, and folders that can only be listed.
     """
     readable, listable = [], []
     pending = list(seen.system)

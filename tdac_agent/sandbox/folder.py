@@ -34,7 +34,7 @@ class PrivateFolder:
             folder.mkdir(mode=0o700)
 
     def furnish(self, workdir: Path | None, source: bytes) -> None:
-        """Copy in the files of `workdir` and write the controller.
+        """Copy the files of `workdir` to `work` and write the controller.
 
         Raises:
             SandboxError: The folder cannot be read or is too large.

@@ -29,9 +29,8 @@ def start(
     """Start a child in a sandbox, with numpy loaded and no controller imported yet.
 
     Args:
-        workdir: Folder whose files the controller may read. Without a source nothing
-            is copied yet; see `Child.furnish`.
-        controller_source: Text of `controller.py`.
+        workdir: Folder whose files the controller may read; ignored without a source.
+        controller_source: Text of `controller.py`; None to call `Child.furnish` later.
         tier: Name of a tier, or "auto" for the best one that works on this machine.
         limits: Resource limits of the child.
 
@@ -85,7 +84,7 @@ def fork_child(zygote: Zygote, tier: Tier, limits: Limits) -> Child:
 
     Raises:
         SandboxError: It did not start, or a promise of the tier does not hold.
-        NoRoomError: The zygote can have no more children.
+        NoRoomError: The zygote has no free folder for another child.
     """
     child = Child(tier.name, limits, zygote.fork(limits))
     try:
@@ -110,7 +109,7 @@ def available_tiers() -> list[TierStatus]:
 
 @functools.cache
 def best_tier() -> Tier:
-    """Return the best tier that works on this machine and promises something.
+    """Return the best tier with promises that works on this machine.
 
     Raises:
         SandboxError: There is none. A tier without promises must be named explicitly.
@@ -125,16 +124,16 @@ def best_tier() -> Tier:
 
 
 def nothing_confines(reasons: list[str]) -> SandboxError:
-    """Return the error that refuses to run a controller unconfined.
+    """Return the error for a machine on which no tier with promises works.
 
     Args:
         reasons: Why each tier does not work.
     """
     return SandboxError(
-        "no sandbox on this machine shields your files and network from a controller; "
-        "use Linux on x86-64 or aarch64 (apt install bubblewrap may help), or run a "
-        "controller that you trust unconfined: tdac verify --tier rlimits "
-        f"(why: {'; '.join(reasons)})"
+        "no sandbox that shields your files and network from a controller works on "
+        "this machine; use Linux on x86-64 or aarch64 (apt install bubblewrap may "
+        "help), or run a trusted controller unconfined: tdac verify --tier rlimits "
+        f"(reasons: {'; '.join(reasons)})"
     )
 
 

@@ -11,19 +11,19 @@ MAX_SOURCE_BYTES = 200_000
 class Limits:
     """Resource limits of one child.
 
-    Wall times of the controller exclude its run-queue wait time, so that a busy machine
-    does not decide a verdict (on Linux; up to five minutes each).
+    On Linux each wall time of the controller excludes up to five minutes of run-queue
+    wait time, so that a busy machine does not decide a verdict.
 
     Attributes:
         start_seconds: Wall time until the child is ready; no controller code runs yet.
-        import_seconds: Wall time of importing the controller.
+        import_seconds: Wall time to import the controller.
         reset_seconds: Wall time of one `reset`.
         call_seconds: Wall time of one call, `policy` included.
         cpu_seconds: CPU time of the child in total.
         memory_bytes: Size of the address space.
         output_bytes: Size of the printed output.
         frame_bytes: Size of one encoded value.
-        scratch_bytes: Size of the scratch folder, or of each file in it without tmpfs.
+        scratch_bytes: Size of the scratch folder; without a tmpfs, of each file in it.
         open_files: Number of open descriptors.
     """
 

@@ -41,7 +41,7 @@ class ProgramWorld(Protocol):
         """Whether the world has ended, so that the program should end too."""
 
     def reset(self) -> Any:
-        """Return the data that the program gets at the beginning."""
+        """Return the data that the program gets when it starts."""
 
     def step(self, action: Any) -> Any:
         """Return the answer to a request; raises like `EpisodeEnv.step`."""
@@ -54,8 +54,8 @@ class Child:
     """One sandboxed process with numpy loaded, for one controller and one use.
 
     A context manager; `close` kills the child. Methods that run the controller can
-    raise a `ControllerFault`; after any but a `ControllerError` the child is gone, and
-    each further request raises the same fault again.
+    raise a `ControllerFault`. Unless it is a `ControllerError`, the child has ended,
+    and each further request raises the same fault again.
 
     Attributes:
         tier: Name of its sandbox tier.
@@ -113,7 +113,7 @@ class Child:
         """Copy a working folder and a controller into a child that has none yet.
 
         Args:
-            workdir: Folder whose files the controller may read; not its subfolders.
+            workdir: Folder whose files the controller may read, without subfolders.
             controller_source: Text of `controller.py`.
 
         Raises:
@@ -128,7 +128,7 @@ class Child:
         self.folder.furnish(workdir, controller_source)
 
     def load(self, timeout: float | None = None) -> dict[str, str]:
-        """Import the controller; return its public names with their types' names."""
+        """Import the controller; return the type name of each public name."""
         seconds = timeout or self.limits.import_seconds
         names = self._talk.request(Kind.LOAD, None, "import", seconds)
         if type(names) is not dict or not all(map(is_name, chain(*names.items()))):
@@ -235,7 +235,7 @@ class Child:
         phase: str,
         env: Answering,
         timeout: float,
-        most: Callable[[], float],
+        max_left: Callable[[], float],
     ) -> Any:
         """Send a request, and answer the controller's own requests until it is done.
 
@@ -245,9 +245,9 @@ class Child:
             phase: Name of the request in messages.
             env: Answers the controller's requests.
             timeout: Seconds that the controller itself may take in total.
-            most: Returns the current upper bound on the seconds left.
+            max_left: Returns the current upper bound on the seconds left.
         """
-        left = min(timeout, most())
+        left = min(timeout, max_left())
         self._talk.send(kind, value, phase, time.monotonic() + left, timeout)
         while True:
             start = time.monotonic()
@@ -265,7 +265,7 @@ class Child:
             except BaseException:
                 self.close()
                 raise
-            left = min(left, most())
+            left = min(left, max_left())
             self._talk.send(*reply, phase, time.monotonic() + left, timeout)
 
 

@@ -1,10 +1,10 @@
 """The tiers of the sandbox, best first, and the promises of each.
 
 Every tier limits time, memory, descriptors, file size and output, scrubs the
-environment, and ends the child with its judge. Where the kernel filters system calls,
-`rlimits` denies network and processes too, but promises nothing. Under `landlock` a
-controller can find out whether a path exists, and the size limit of the scratch folder
-applies to each file; in the two tiers above, a tmpfs limits the whole folder.
+environment, and kills the child when its judge ends. `bubblewrap` and `namespaces`
+limit the whole scratch folder with a tmpfs; the other tiers limit each file in it.
+Under `landlock` a controller can find out whether a path exists. `rlimits` promises
+nothing, but denies network and processes if the kernel can filter system calls.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Tier:
         name: Name in verdicts.
         steps: Confinement steps that the child takes after it has imported numpy.
         promises: Some of `hides_files` (only needed files can be read), `hides_names`
-            (nor can it find out whether others exist), `denies_network` and
+            (the child cannot find out whether other files exist), `denies_network` and
             `denies_processes` (no fork, no program, no thread).
     """
 

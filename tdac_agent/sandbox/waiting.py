@@ -1,7 +1,7 @@
 """Run-queue statistics: how long a process was ready to run but had no CPU.
 
 Source: Linux, `Documentation/scheduler/sched-stats.rst`: time on a CPU and run-queue
-wait time, both of the first thread and in ns. Without them both times are 0.
+wait time, both of the first thread and in ns. If they cannot be read, both are 0.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Line:
     pid: int | str
 
     def waited(self) -> float:
-        """Returns the total run-queue wait time, s, up to when it last got a CPU."""
+        """Returns the total run-queue wait time, s, until it last got a CPU."""
         return self.times()[1]
 
     def times(self) -> tuple[float, float]:

@@ -45,7 +45,7 @@ OPTIONS = ("-s", "-S", "-P", "-B", "-u", "-X", "utf8")
 SLOTS = 16
 KEPT_OUTPUT = 4000
 REAP_SECONDS = 10.0
-# Indices of the counters: folders that are in use or were, and living children.
+# Indices of the counters: folders handed out so far, and living children.
 GIVEN, ALIVE = 0, 1
 
 Reaped = tuple[int, float, int]
@@ -74,15 +74,15 @@ class Forked:
 
 
 class NoRoomError(Exception):
-    """A zygote can have no more children."""
+    """The zygote has no free folder for another child."""
 
 
 class Zygote:
     """Forks one child for each of its folders; ends with the last child.
 
     Where the kernel cannot separate the files of its children, it has only one child.
-    Forks of the process that made it may use it too, and share its folders; only that
-    process ends it.
+    Forks of the process that made the zygote may use it too, and share its folders;
+    only the process that made it ends it.
 
     Args:
         tier: Name of the tier.
@@ -104,7 +104,7 @@ class Zygote:
         self._counts = shared_counters(2)
         self.parent = Path(tempfile.mkdtemp(prefix="tdac-child-")).resolve()
         self.site = self.parent / "site"
-        # No child may be able to read this file.
+        # Children must not be able to read this file.
         self.witness = self.parent / "witness"
         try:
             self._furnish()
@@ -148,8 +148,8 @@ class Zygote:
             self._counts[GIVEN] += 1
             self._counts[ALIVE] += 1
         write, read, printed, lifeline = outer
-        frame, most, line = limits.frame_bytes, limits.output_bytes, Line(pid)
-        channel = Channel(write, read, printed, frame, most, line)
+        frame, output, line = limits.frame_bytes, limits.output_bytes, Line(pid)
+        channel = Channel(write, read, printed, frame, output, line)
         return Forked(pid, folder, channel, line, lifeline, lambda: self._reap(number))
 
     @property
@@ -287,7 +287,7 @@ def _end(
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return a zygote's whole environment, which takes only library paths from ours."""
+    """Return a zygote's whole environment; only the library path comes from ours."""
     environment = {
         "HOME": str(folder),
         "TMPDIR": str(folder),

@@ -15,7 +15,7 @@ from . import kernel, landlock, namespaces, seccomp
 def confine(setup: dict[str, Any]) -> dict[str, int]:
     """Apply `setup["steps"]` in order; return which promises hold.
 
-    The result also has `pid`, this process's ID outside, if a step has changed it.
+    If a step has changed the process, the result also has `pid`, its ID outside.
 
     Args:
         setup: The judge's setup frame.

@@ -74,7 +74,7 @@ def decode(data: bytes, pos: int = 0, resolve: Resolver | None = None) -> Any:
     except (struct.error, KeyError, IndexError, ValueError, TypeError) as error:
         raise WireError(f"not a value: {error}") from None
     if reader.pos != len(data):
-        raise WireError(f"{len(data) - reader.pos} bytes too many after a value")
+        raise WireError(f"{len(data) - reader.pos} extra bytes after a value")
     return value
 
 
@@ -214,17 +214,17 @@ def _take_error(r: _Reader) -> RemoteError:
 def _take_name(r: _Reader) -> str:
     name = _take_text(r)
     if not is_name(name):
-        raise WireError("a text that is too long or cannot be printed")
+        raise WireError("a string that is too long or cannot be printed")
     return name
 
 
 def _take_text(r: _Reader) -> str:
     if r.data[r.pos] != ord("s"):
-        raise WireError("expected a text")
+        raise WireError("expected a string")
     r.pos += 1
     text = _take_str(r)
     if printable(text, MAX_TEXT) != text:
-        raise WireError("a text that is too long or cannot be printed")
+        raise WireError("a string that is too long or cannot be printed")
     return text
 
 

@@ -137,7 +137,7 @@ def _put_items(w: _Writer, tag: bytes, items: Any) -> None:
 def _descend(w: _Writer) -> None:
     w.depth -= 1
     if w.depth < 0:
-        raise WireError(f"a value is nested deeper than {MAX_DEPTH}")
+        raise WireError(f"a value is nested deeper than {MAX_DEPTH} levels")
 
 
 def _put_list(w: _Writer, value: list[Any]) -> None:
@@ -187,7 +187,7 @@ def _put_other_array(w: _Writer, value: Any) -> None:
     if dtype in CODES and value.ndim <= MAX_DIMENSIONS:
         _put_array(w, value.astype(dtype))
     elif w.keep is None:
-        raise WireError(f"an array of {value.dtype}, {value.ndim}-D cannot be sent")
+        raise WireError(f"a {value.ndim}-D array of {value.dtype} cannot be sent")
     else:
         _put_handle(w, w.keep(value))
 

@@ -34,7 +34,7 @@ class Layout:
 
     @classmethod
     def of(cls, value: object) -> Layout | None:
-        """Return the layout of a value, or None if it is no suitable dict of arrays."""
+        """Return the layout of a value, or None if it is not a suitable dict."""
         if type(value) is not dict or not value:
             return None
         for key, item in value.items():

@@ -14,7 +14,7 @@ from .wire import Kind
 
 
 def main(requests: int, answers: int, lifeline: int, site: str) -> None:
-    """Serve the judge on two descriptors until it closes them.
+    """Serve the judge on two descriptors until the judge closes them.
 
     Args:
         requests: Descriptor to read requests from.

@@ -28,9 +28,9 @@ _PID = struct.Struct("=i")
 
 
 def enter(setup: dict[str, Any]) -> dict[str, int]:
-    """Move this process into new namespaces; return in their first process.
+    """Make new namespaces and fork; return only in their first process.
 
-    The calling process stays outside, and ends as the inner one does.
+    The calling process waits for the inner one and ends with the same status.
 
     Returns:
         The ID of the inner process as seen from outside, with which the judge reads
@@ -106,9 +106,9 @@ def _show(path: str, root: str, recursive: int) -> None:
 
 
 def _hide_parents(setup: dict[str, Any], root: str) -> None:
-    """Prevent the listing of the parent folders of visible paths.
+    """Make the parent folders of visible paths impossible to list.
 
-    Their names show where this machine has its files, and differ from run to run.
+    Their entries show where this machine has its files, and differ from run to run.
     """
     shown = (*setup["system"], *setup["packages"], setup["root"], setup["site"])
     device = os.stat(root).st_dev

@@ -15,7 +15,7 @@ PACKAGE = "controller"
 
 
 def run_program(source: bytes, arguments: list[str], world: Any) -> int | str | None:
-    """Run a program as `__main__`; return its argument of `sys.exit`, or None.
+    """Run a program as `__main__`; return what it passes to `sys.exit`, or None.
 
     It runs in a writable copy of its folder.
 
@@ -43,7 +43,7 @@ def run_program(source: bytes, arguments: list[str], world: Any) -> int | str | 
 
 
 def _copy(source: str, target: str) -> None:
-    """Copy a folder without permissions, which a sandboxed process may not set."""
+    """Copy a folder but not its permissions, which a sandboxed process may not set."""
     os.mkdir(target)
     for entry in os.scandir(source):
         copy = os.path.join(target, entry.name)

@@ -80,7 +80,7 @@ def _guards(lifeline: int) -> dict[str, list[Instruction]]:
         "ioctl": [*_one_of(1, _IOCTLS), (_RETURN, 0, 0, _ALLOW)],
         "kill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
         "tgkill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
-        # Private ones only: other children map the same files.
+        # Only private futexes: shared ones could reach children that map the same file.
         "futex": [*_one_of(1, _FUTEXES), (_RETURN, 0, 0, _ALLOW)],
         # It may read its own limits, but set none.
         "prlimit64": [

@@ -19,7 +19,7 @@ MAX_NAMES = 1000
 
 
 class Server:
-    """One controller module, the objects it has handed out, and the link.
+    """Serves one controller module, and keeps the objects that it hands out.
 
     Args:
         link: The channel to the judge.

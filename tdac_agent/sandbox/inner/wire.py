@@ -23,13 +23,13 @@ MAX_ITEMS = 1_000_000
 # keys, and the items in them, count ten times, so that decoding takes under a second.
 MAX_DICT_ITEMS = 10_000
 ODD_KEY = 10
-# An array counts as so many items, since it is the slowest item to print.
+# An array counts as this many items, since it is the slowest item to print.
 ARRAY_ITEMS = 10
 # Below CPython's limit of 4300 decimal digits, so that every int can be printed.
 MAX_INT_BYTES = 1024
 # With more dimensions numpy prints many items, even of a summarized array.
 MAX_DIMENSIONS = 4
-# Characters of a name, and of any other text about an exception.
+# Maximum characters of a name, and of any other text about an exception.
 MAX_NAME, MAX_TEXT = 200, 2000
 
 _INTEGERS = ("i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8")

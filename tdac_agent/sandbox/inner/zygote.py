@@ -1,6 +1,6 @@
 """A process with numpy loaded that forks one child after another.
 
-No controller's code runs here: a child reads its first request only after the fork.
+No controller code runs in it: a child reads its first request only after the fork.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from .main import main as serve
 # Command, and for REAP the process ID of the child.
 REQUEST = struct.Struct("<cI")
 FORK, REAP = b"F", b"R"
-# To FORK, from the child itself: its process ID in this namespace; or -1 and an error
-# number. To REAP: exit code or minus the signal, CPU seconds, `ru_maxrss`.
+# Reply to FORK: the child sends its process ID in this namespace, or the zygote sends
+# -1 and an error number. To REAP: exit code or minus the signal number, CPU seconds,
+# `ru_maxrss`.
 REPLY = struct.Struct("<qdq")
 DESCRIPTORS = 4
 # Common imports of controllers and `sensors.py`, loaded once and not in each child.
@@ -44,7 +45,7 @@ LIKELY = (
 
 
 def main(control: int, lifeline: int, site: str) -> None:
-    """Serve the judge on a socket until it closes it.
+    """Serve the judge on a socket until the judge closes it.
 
     Args:
         control: Descriptor of the socket.

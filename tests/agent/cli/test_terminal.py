@@ -194,5 +194,5 @@ def test_a_name_that_nothing_can_print_is_no_fault_of_ours(tdac, tmp_path, kind)
         code, out, err = tdac(command, evil, "--task", place, *flags)
         assert (code, err) == (expected, "")
         assert not set(out) & STEERING
-        assert command == "evaluate" or "wrote to the judge's channel" in out
+        assert command == "evaluate" or "misused the judge's channel" in out
         assert not re.search(r"^\s*verified", out, re.MULTILINE)

@@ -406,7 +406,7 @@ def test_closing_the_channel_is_noticed(launch, tier):
         "import os\ndef policy(obs):\n    os.closerange(3, 64)\n    while True: pass\n",
     )
     with pytest.raises(
-        ControllerProtocolError, match=r"wrote to the judge's channel.*closed it"
+        ControllerProtocolError, match=r"misused the judge's channel.*closed it"
     ):
         child.policy(OBS)
 

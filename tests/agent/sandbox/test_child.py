@@ -398,7 +398,7 @@ def test_frames_of_the_controllers_own_are_a_breach(launch, forged):
     )
     child = launch(source)
     child.load()
-    with pytest.raises(ControllerProtocolError, match="wrote to the judge's channel"):
+    with pytest.raises(ControllerProtocolError, match="misused the judge's channel"):
         child.policy(OBS)
 
 

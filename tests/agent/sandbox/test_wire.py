@@ -252,7 +252,7 @@ def test_a_list_that_holds_itself_is_refused():
     [
         (b"", "not a value"),
         (b"?", "not a value"),
-        (b"NN", "1 bytes too many"),
+        (b"NN", "1 extra bytes"),
         (b"l\xff\xff\xff\xff", "too many items"),
         (b"d\x02\0\0\0NNNN", "same key twice"),
         (b"d\x01\0\0\0l\0\0\0\0N", "unhashable"),
@@ -266,7 +266,7 @@ def test_a_list_that_holds_itself_is_refused():
         (b"a\x0b\x03\0\0\0\0\xff\xff\xff\xff\xff\xff\xff\xff", "not a value"),
         (b"n\x00\x07", "neither 0 nor 1"),
         (b"n\x63", "not a value"),
-        (b"h\0\0\0\0N", "expected a text"),
+        (b"h\0\0\0\0N", "expected a string"),
         (b"l\x01\0\0\0" * 40, "nested too deep"),
         (encode(Handle(0, "\ud800")), "cannot be printed"),
         (encode(Handle(0, "\x1b[2J")), "cannot be printed"),

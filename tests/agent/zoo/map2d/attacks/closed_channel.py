@@ -3,7 +3,7 @@
 # onto: frames.py
 # tiers: every
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel.*closed it
+# error: misused the judge's channel.*closed it
 # why: a closed channel ends the process; the lifeline cannot be closed
 def policy(obs):
     for number in descriptors():

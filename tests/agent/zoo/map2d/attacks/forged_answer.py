@@ -3,7 +3,7 @@
 # also: epuck
 # onto: frames.py
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel
+# error: misused the judge's channel
 # why: an answer has the number of its request, and exactly one is due
 def policy(obs):
     for sequence in range(1, 9):

@@ -2,7 +2,7 @@
 # profile: policy
 # onto: frames.py
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel
+# error: misused the judge's channel
 # why: the content of an error frame is checked
 def policy(obs):
     write(HEADER.pack(len(WHEELS), ERROR, 3) + WHEELS)

@@ -2,7 +2,7 @@
 # profile: policy
 # onto: frames.py
 # fails: test_imports, test_short_rollout_is_stable[10], test_reaches_goal
-# error: wrote to the judge's channel at policy: a text that is too long
+# error: misused the judge's channel at policy: a string that is too long
 # why: what an exception says is bounded and printable, or the channel is broken
 def text(value):
     data = value.encode("utf-8", "surrogatepass")

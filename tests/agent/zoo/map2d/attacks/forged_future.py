@@ -2,7 +2,7 @@
 # profile: policy
 # onto: frames.py
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel|exit code 0
+# error: misused the judge's channel|exit code 0
 # why: bytes after an answer are a breach; so is the end of the process
 def policy(obs):
     data = b"".join(

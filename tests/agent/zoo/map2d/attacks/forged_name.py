@@ -3,7 +3,7 @@
 # onto: frames.py
 # also: epuck
 # fails: test_imports, test_short_rollout_is_stable[10], test_reaches_goal
-# error: wrote to the judge's channel at policy: a text that is too long
+# error: misused the judge's channel at policy: a string that is too long
 # why: names are bounded and printable, or the channel is broken
 def policy(obs):
     name = "\ud800\x1b[2J".encode("utf-8", "surrogatepass")

@@ -2,7 +2,7 @@
 # profile: policy
 # onto: frames.py
 # fails: test_reaches_goal
-# error: wrote to the judge's channel at import: expected the controller's names
+# error: misused the judge's channel at import: expected the controller's names
 # why: what an import tells is checked like any other answer
 def text(value):
     data = value.encode("utf-8", "surrogatepass")

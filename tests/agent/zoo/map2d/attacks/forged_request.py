@@ -2,7 +2,7 @@
 # profile: policy
 # onto: frames.py
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel
+# error: misused the judge's channel
 # why: only answers are accepted from policy()
 def policy(obs):
     write(HEADER.pack(len(WHEELS), ENV_STEP, 3) + WHEELS)

@@ -2,7 +2,7 @@
 # profile: policy
 # onto: frames.py
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel.*a frame of
+# error: misused the judge's channel.*a frame of
 # why: the size is refused before anything is read
 def policy(obs):
     write(HEADER.pack(0xFFFFFFFF, VALUE, 3))

@@ -3,7 +3,7 @@
 # onto: frames.py
 # tiers: every
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel
+# error: misused the judge's channel
 # why: whatever is no frame is a breach
 def policy(obs):
     write(bytes((17 * k * k + 5) % 256 for k in range(100_000)))

@@ -2,7 +2,7 @@
 # profile: policy
 # onto: frames.py
 # fails: test_imports, test_reaches_goal
-# error: wrote to the judge's channel
+# error: misused the judge's channel
 # why: what is printed is no frame
 def policy(obs):
     for number in descriptors():
