@@ -1,7 +1,7 @@
 """Spending limits: the worst case of a call is reserved before the call is made.
 
 Reservations and spending together never exceed the limits, however many runs share
-them. Threads share one `Budget`; processes share a ledger file, each with its `Budget`.
+them. Threads share one `Budget`; processes share a ledger file, each with a `Budget`.
 """
 
 from __future__ import annotations
@@ -158,11 +158,7 @@ class Budget:
                     self._take(call, amount)
 
     def _check(self, taken: Amount, worst: Amount) -> None:
-        """Checks that the limits allow another `worst`.
-
-        Raises:
-            BudgetExhausted: They do not.
-        """
+        """Raises BudgetExhausted unless the limits allow another `worst`."""
         both, cost, tokens = taken.plus(worst), self.max_cost, self.max_tokens
         if cost is not None and worst.usd and both.usd > cost + ROUNDING:
             raise BudgetExhausted(

@@ -36,7 +36,7 @@ IN_FILES = frozenset({"replay", "scripted"})
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What a provider may need besides the text after the colon.
+    """Options for making a provider, besides the text after the colon.
 
     Attributes:
         setting: Setting of the task, for providers that know the environments.
@@ -130,10 +130,10 @@ def answers_sha256(name: str, options: Options) -> str | None:
 
 
 def check_name(name: str) -> None:
-    """Checks that a provider with this name exists; makes none, and needs no key.
+    """Checks that a provider with this name exists, without making it or reading a key.
 
     Raises:
-        ProviderError: None exists; the message lists the known forms.
+        ProviderError: The name is unknown; the message lists the known forms.
     """
     kind = name.partition(":")[0]
     others = {point.name for point in entry_points(group=GROUP)}
@@ -156,11 +156,7 @@ def _load(point: EntryPoint) -> Make:
 
 
 def _check_url(url: str, named: list[str]) -> None:
-    """Checks that a URL is valid, applies to one vendor and contains no secret.
-
-    Raises:
-        ProviderError: It does not; the message says what to do.
-    """
+    """Raises ProviderError unless a URL is valid, secret-free and for one vendor."""
     try:
         parts = urlsplit(url)
         usable = parts.scheme in {"http", "https"} and bool(parts.hostname)

@@ -22,17 +22,17 @@ def make(words: str, options: Options) -> Command:
     """Returns a provider that runs a program.
 
     Raises:
-        ProviderError: There is no such program, or the words cannot be split.
+        ProviderError: There is no such program, or the command cannot be parsed.
     """
     del options
     try:
         argv = shlex.split(words)
     except ValueError as error:
-        raise ProviderError(f"cannot read command:{words}: {error}") from error
+        raise ProviderError(f"cannot parse command:{words}: {error}") from error
     if not argv:
         raise ProviderError("command: needs a program, as in command:'llm -m my-model'")
     if shutil.which(argv[0]) is None:
-        raise ProviderError(f"there is no program {argv[0]!r} that can be run")
+        raise ProviderError(f"there is no program {argv[0]!r}, or it is not executable")
     return Command(argv)
 
 
@@ -65,7 +65,7 @@ class Command:
                 self._argv, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
             )
         except OSError as error:
-            raise ProviderFault(f"the program cannot start: {error.strerror}") from None
+            raise ProviderFault(f"cannot start the program: {error.strerror}") from None
         try:
             out, err = process.communicate(prompt, timeout=seconds)
         except subprocess.TimeoutExpired:

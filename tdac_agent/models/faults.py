@@ -15,8 +15,8 @@ Headers = Mapping[str, str]
 
 # Transient besides 5xx: request time-out, conflict, too early.
 TRANSIENT_STATUS = frozenset({408, 409, 425})
-# Types and codes in the body of an error, of both vendors. They are all that identifies
-# an error in mid-stream, since its status is 200.
+# Types and codes in the body of an error, of both vendors. Only they identify an error
+# in mid-stream, since its status is 200.
 LIMITED_WORDS = frozenset({"rate_limit_error", "rate_limit_exceeded"})
 PERMANENT_WORDS = frozenset(
     {
@@ -41,7 +41,7 @@ def fault_of(error: Exception) -> ProviderFault:
     message = _message(error, status, words, text, headers)
     kind = _kind(status, words)
     fault = kind(message, None if kind is PermanentFault else retry_after(headers))
-    # A server that was not reached, or that sent an error status, began no answer.
+    # Nothing is billed if no connection was made or the server sent an error status.
     fault.billed = status == 200 and not _unsent(error)
     return fault
 

@@ -59,7 +59,7 @@ class Gathered:
         """Returns the whole answer.
 
         Raises:
-            ProviderFault: No known stop reason was received: it may be truncated.
+            ProviderFault: Without a known stop reason, the answer may be truncated.
         """
         if self.reason is None:
             chars = f"{self._chars} characters"

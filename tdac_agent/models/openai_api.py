@@ -41,7 +41,7 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
         import httpx2
         import openai
 
-        # Local servers know only the limit's older name, OpenAI wants the newer one.
+        # Local servers know only the older name of the limit; OpenAI needs the newer.
         is_openai = self._base_url is None
         gathered = Gathered(STOPS)
         with as_faults((openai.OpenAIError, httpx2.HTTPError)):

@@ -25,7 +25,8 @@ class Request:
         controller: Source that failed, for `edit` and `summarise`.
         report: Report on the failure, for `edit` and `summarise`.
         rules: Text of each repair rule in force.
-        sample: (run, k, j), which makes repeated questions different samples.
+        sample: Indices of run, iteration k and repair j; they make repeated questions
+            different samples.
         stable: Number of characters at the start of the prompt that are the same in
             all questions of a run; a provider may cache them.
         max_tokens: Token limit of the answer.
@@ -71,7 +72,7 @@ class Reply:
         tokens_written: Part of `tokens_in` that was written to a cache.
         model: The model's name as reported, if it is.
         request_id: The vendor's ID of the call, if it has one.
-        notes: Lines for the journal, e.g. which test changed what.
+        notes: Lines for the journal, e.g. which test changed which parameter.
     """
 
     text: str
@@ -104,8 +105,8 @@ class Provider(Protocol):
     def complete(self, request: Request) -> Reply:
         """Answers one request, without retries: the caller decides about those.
 
-        A truncated or refused answer is a `Reply`, since it is paid for; its `stop`
-        says so. An answer without a stop reason is a fault.
+        A truncated or refused answer is paid for, so it is a `Reply` with `stop` set
+        to `length` or `refusal`. An answer without a stop reason is a fault.
 
         Raises:
             ProviderFault: The provider cannot be reached or is broken. This is neither
@@ -127,13 +128,13 @@ def recorded_seed(model: Provider) -> int | None:
 
 
 def missing_for(model: Provider) -> tuple[str, ...]:
-    """Returns what a model still needs before it can be asked, a line each."""
+    """Returns a line for each thing that a model still needs before it can be asked."""
     missing: tuple[str, ...] = getattr(model, "missing", ())
     return missing
 
 
 class ProviderFault(Exception):
-    """An infrastructure fault of a provider; transient, unless a subclass differs.
+    """An infrastructure fault of a provider; transient unless a subclass differs.
 
     Args:
         message: One line.
@@ -152,7 +153,7 @@ class ProviderFault(Exception):
 
 
 class RateLimited(ProviderFault):
-    """Too many requests or tokens for now."""
+    """The provider's rate limit was reached."""
 
     kind = "rate limit"
     billed = False

@@ -19,7 +19,7 @@ from tdac_agent.models.provider import (
 
 @dataclass(frozen=True, slots=True)
 class RetryPolicy:
-    """When a question is asked again after a fault, and when it is given up.
+    """Rules for asking again after a fault, and for giving up.
 
     Attributes:
         retries: Retries after transient faults; rate limits are not counted.
@@ -65,7 +65,7 @@ def answer(
         request: The question.
         policy: Number of retries and length of the waits.
         on_fault: Called after each failed call, before the wait.
-        sleep: Waits for some seconds; an interrupt ends it at once.
+        sleep: Waits for the given seconds; an interrupt ends it at once.
 
     Raises:
         ProviderFault: The last fault, when the question is given up.

@@ -51,7 +51,7 @@ class Tariff:
         return Amount(tokens_in + tokens_out, usd)
 
     def spent(self, request: Request, reply: Reply) -> Amount:
-        """Returns what an answer took; the worst case if it reports no tokens."""
+        """Returns the amount an answer took; the worst case if it reports no tokens."""
         tokens = reply.tokens_in + reply.tokens_out
         if self.free or tokens == 0:
             return self.worst(request)
@@ -124,7 +124,7 @@ def bounds_of(
         place = "" if address is None else f" at {address}"
         notes.append(
             f"no price is known for {model.name}{place}: its cost is not counted; "
-            f"at most {max_tokens} tokens (--max-tokens) bound the run"
+            f"the run is limited to {max_tokens} tokens (--max-tokens)"
         )
     if problems:
         raise ProviderError("; and ".join(dict.fromkeys(problems)))

@@ -11,11 +11,11 @@ BYTES_PER_TOKEN = 3.0
 
 
 def estimate_tokens(text: str) -> int:
-    """Returns an estimate, rather too high than too low for English and code."""
+    """Returns an estimate that is usually too high for English and code."""
     size = len(text.encode("utf-8", "surrogatepass"))
     return math.ceil(size / BYTES_PER_TOKEN)
 
 
 def most_tokens(text: str) -> int:
-    """Returns an upper bound for any tokenizer: no token has less than one byte."""
+    """Returns an upper bound for any tokenizer: no token is shorter than one byte."""
     return len(text.encode("utf-8", "surrogatepass")) + WRAPPING

@@ -74,7 +74,7 @@ class VendorModel(ABC, Generic[C]):
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What is missing before it can be asked: package and key, a line each."""
+        """A line each for the package and the key, if they are missing."""
         vendor, found = self.vendor, []
         # The import takes a second or two, so it is left to the first question.
         if importlib.util.find_spec(vendor.package) is None:
