@@ -51,7 +51,7 @@ def _write(handle: int, line: bytes) -> None:
 
 
 def read_records(path: Path) -> list[JournalRecord]:
-    """Returns all valid records, no torn or foreign lines; [] for a missing file."""
+    """Returns all records, without torn or invalid lines; [] for a missing file."""
     try:
         raw = read_file(path, JOURNAL_BYTES)
     except FileNotFoundError:

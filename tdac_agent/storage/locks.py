@@ -18,7 +18,7 @@ TRY_SECONDS = 0.1
 def open_lock(file: Path) -> int:
     """Returns a descriptor of a lock file, which is created if it is missing.
 
-    A symbolic link raises OSError: it could create a file wherever it points to.
+    A symbolic link raises OSError: following it could create a file elsewhere.
     """
     return os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
 

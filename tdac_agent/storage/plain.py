@@ -8,7 +8,7 @@ from typing import Any
 
 MAX_MESSAGE = 300
 MAX_VALUE = 80
-"""Most characters of a quoted value."""
+"""Maximum length of a quoted value."""
 MARK = "\N{REPLACEMENT CHARACTER}"
 # Legitimate whitespace that `str.isprintable` rejects.
 _KEPT = frozenset("\n\t\u00a0\u2009\u202f\u3000")
@@ -20,7 +20,7 @@ def printable(text: str) -> str:
     """Replaces each character that is not displayed as itself with a mark.
 
     This covers control characters (and so escape sequences), lone surrogates, and
-    characters that have no width or change the writing direction. The length stays.
+    characters that have no width or change the writing direction. The length is kept.
     """
     if text.isprintable():
         return text
@@ -58,6 +58,6 @@ def shown(value: object, most: int = MAX_VALUE) -> str:
 
 
 def plain(message: str) -> str:
-    """Returns one bounded line: folders as `…/`, no addresses, no final full stop."""
+    """Returns one short line: folders as `…/`, no addresses, no final full stop."""
     line = one_line(_ADDRESS.sub("", _FOLDERS.sub("…/", message))).rstrip(".")
     return line if len(line) <= MAX_MESSAGE else f"{line[:MAX_MESSAGE]} …"

@@ -19,7 +19,7 @@ def read_yaml(file: Path, form: type[M], what: str, refusal: type[TdacError]) ->
     Args:
         file: File to read.
         form: Model of its contents.
-        what: Its contents in messages, such as `the prices in`.
+        what: Words before the file name in messages, such as `the prices in`.
         refusal: Error to raise if it cannot be read or has a wrong or unknown key.
     """
     try:
