@@ -74,7 +74,7 @@ def several(
 
     Args:
         make: Class of the environments.
-        each: Arguments that differ, as passed to `make_vec`.
+        each: Arguments of each environment; they override `options`.
         options: Arguments that all environments share.
         count: Number of robots.
 
@@ -138,7 +138,7 @@ def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
 
 
 def seeds_of(seed: Any, count: int) -> Sequence[int | None]:
-    """The seeds of the robots: `seed + i` for an int, else one for each, or None.
+    """The seed of each robot: `seed + i` for an int, else `seed[i]`, or None.
 
     Raises:
         ValueError: `seed` is neither an int nor one seed for each robot.

@@ -13,10 +13,10 @@ class RewardWeights(NamedTuple):
     """Weights of the four reward terms.
 
     Attributes:
-        progress: Reward for progress along the shortest path, per full-speed step.
+        progress: Reward per full-speed step of progress along the shortest path.
         goal: Reward for reaching the goal.
-        collision: Penalty of a step with a contact.
-        time: Penalty of each step.
+        collision: Penalty for a step with a contact.
+        time: Penalty for each step.
     """
 
     progress: float = 0.1

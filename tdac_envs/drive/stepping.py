@@ -37,7 +37,7 @@ N_OUTCOME = 10
 def clear(
     state: Array, queue: Array, wheel_speeds: NDArray[np.float32], outcome: Array
 ) -> None:
-    """Clears the last episode, except for the pose and the remaining path length."""
+    """Resets a robot for a new episode, except for pose and remaining path length."""
     state[LEFT] = state[RIGHT] = 0.0
     state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
     state[STEPS] = 0.0
@@ -57,7 +57,7 @@ def batch_at(batch: Words) -> tuple[Flags, Array, Array, Words]:
         batch: Shape (4 or more, 4): addresses and shapes of the arrays.
 
     Returns:
-        over: Shape (n,): whether a robot's episode is over, so that the next begins.
+        over: Shape (n,): whether a robot's episode is over and the next one begins.
         commands: Shape (n, 2): commanded wheel speeds.
         starts: Shape (n, 4): start pose, and length of the path from there.
         words: Shape (n, arrays, 4): addresses and shapes of each robot's arrays.
@@ -191,7 +191,7 @@ def move(
 def free_way(rest: float, approach: float, curvature: float) -> float:
     """Arc length h that is certainly free of contact.
 
-    It is the positive root of `rest + approach * h - curvature * h**2 / 2`, if any.
+    h is the positive root of `rest + approach * h - curvature * h**2 / 2`, or inf.
 
     Args:
         rest: Distance to the obstacle.

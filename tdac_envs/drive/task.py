@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 VARIATIONS = ("nominal", "jitter", "mixed", "random")
-"""How starts, and for the last one goals, are drawn."""
+"""How starts are drawn; `"random"` also draws the goal."""
 MIN_HORIZON = 2500
 JITTER_HEADING = 0.5
 MAX_DRAWS = 1000

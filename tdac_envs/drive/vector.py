@@ -50,8 +50,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         step_rows: The compiled loop over robots; see
             `tdac_envs.map2d.kernels.step_rows`.
         copied: Observation keys that this loop fills in.
-        last_poses: True poses of all robots before the last autoreset of the mode
-            `SAME_STEP`, shape (num_envs, 3).
+        last_poses: True poses of all robots before the last `SAME_STEP` autoreset,
+            shape (num_envs, 3).
     """
 
     step_rows: Callable[..., None]
@@ -192,11 +192,11 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._bind()
 
     def _seen(self) -> Observations:
-        """The observations that the kernels write, as the robots' own arrays."""
+        """The robots' own observation arrays, without noise."""
         raise NotImplementedError
 
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
-        """Adds what no kernel computes; draws new noise for these robots."""
+        """Adds observations that no kernel computes, and new noise for these robots."""
         raise NotImplementedError
 
     def _bind(self) -> None:
@@ -208,7 +208,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._shared = Addresses([shared])
 
     def _results(self) -> tuple[Observations, Array]:
-        """New arrays for the result of a step, with all that no step changes."""
+        """New arrays for the result of a step; fills in keys that no step changes."""
         seen = self._seen()
         results = {key: np.empty_like(array) for key, array in seen.items()}
         for key in seen.keys() - set(self.copied):
@@ -232,7 +232,6 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         return *self.setups[i].world(self.tasks[i]), *self.robots.row(i)
 
     def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
-        """Begins episodes of the robots in a mask."""
         chosen = np.flatnonzero(mask)
         if options or self._tasks_change:
             self._draw(chosen, options)
@@ -242,7 +241,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._over[chosen] = False
 
     def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
-        """Draws the tasks of the next episodes of some robots."""
+        """Draws the next tasks of some robots."""
         drawn = [
             (i, self.setups[i].draw(options, self._random(i)))
             for i in robots.tolist()
@@ -252,7 +251,6 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             self._assign(i, task)
 
     def _assign(self, i: int, task: Any) -> None:
-        """Assigns a task to a robot."""
         self._tasks_change = True
         before = self.tasks[i]
         self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
