@@ -46,8 +46,8 @@ def first_contact(
         radius: Disc radius, px.
 
     Returns:
-        In [0, 1), or 2.0 if the step is free. A disc that starts in contact and moves
-        away from the wall or along it is free.
+        In [0, 1), or 2.0 if the step is free. Moving away from or along a wall that the
+        disc already touches is no contact.
     """
     end_x, end_y, _ = move(x, y, heading, forward, turn)
     return contact_before(clear, x, y, heading, forward, turn, radius, end_x, end_y)

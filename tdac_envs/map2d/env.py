@@ -59,8 +59,8 @@ class Map2DEnv(DrivenEnv):
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
-    - `progress`: +0.1 for each full-speed step's length by which the shortest path of
-      the body to the goal gets shorter (negative if it gets longer),
+    - `progress`: +0.1 times the decrease of the shortest path length to the goal,
+      divided by the distance of one step at full speed,
     - `goal`: +10 if the goal is reached,
     - `collision`: -10 if the body touches an obstacle,
     - `time`: -0.01.
@@ -72,7 +72,7 @@ class Map2DEnv(DrivenEnv):
     - `"mixed"`: as `"jitter"`, or with probability 0.5 any feasible start,
     - `"random"`: any feasible start and goal.
 
-    `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides it.
+    `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides `variation`.
 
     ## Episode End
     The episode ends if one of the following happens:

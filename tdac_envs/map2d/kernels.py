@@ -44,7 +44,7 @@ from tdac_envs.drive.stepping import (
     within,
     wrap_angle,
 )
-from tdac_envs.drive.stepping import clear as forget
+from tdac_envs.drive.stepping import clear as clear_state
 from tdac_envs.grid.grid import FloatGrid
 from tdac_envs.map2d.contact import contact_before
 from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
@@ -106,9 +106,9 @@ def _path_distance(
 ) -> float:
     """Length of the shortest path from a point to the goal, px.
 
-    It is the minimum, over the nearby visible pixels, of the distance to the pixel plus
-    the path length from there, which is in `field`. The result is `previous` if no
-    pixel within 2 px has a path, as when the body is pressed into a corner.
+    It is the least sum of the distance to a nearby visible pixel and the path length
+    from there (`field`), or `previous` if no pixel within 2 px has a path, as when the
+    body is pressed into a corner.
     """
     height, width = field.shape
     column, row = math.floor(x), math.floor(y)
@@ -179,7 +179,7 @@ def _begin(
 
     `outcome[REMAINING]` must be the length of the shortest path from there.
     """
-    forget(state, queue, wheel_speeds, outcome)
+    clear_state(state, queue, wheel_speeds, outcome)
     remaining = outcome[REMAINING]
     _observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
@@ -201,12 +201,12 @@ def _drive(
     ranges: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """One step of the environment, except for the random numbers.
+    """Runs one step of the environment; `state` already contains the wheel slip.
 
     `field`, shape (height, width), is the path length to the goal from each pixel, px;
     `directions` are from `rays.fan`. `constants` and the arrays after it are those of
-    `Robot`; all but `constants`, and the commands and the slip in `state`, are
-    overwritten.
+    `Robot`. All of them are overwritten except `constants` and, in `state`, the
+    commands and the slip.
     """
     apply_command(constants, state, queue, wheel_speeds, outcome)
     limit, before = constants[MAX_SPEED], outcome[REMAINING]
@@ -256,7 +256,7 @@ def begin(words: Words) -> None:
 
 @kernel
 def drive(words: Words) -> None:
-    """One step of a robot; `words` as for `begin`."""
+    """Runs one step of a robot; `words` as for `begin`."""
     _drive(*_arrays_at(words))
 
 
@@ -264,14 +264,14 @@ def drive(words: Words) -> None:
 def step_rows(batch: Words, rows: Words) -> None:
     """Steps many robots, or begins the next episode of those whose episode is over.
 
-    The results are copied here, while the robots' own arrays are in the cache of the
-    core that steps them.
+    The results are copied here because the robots' own arrays are still in the cache
+    of the core that steps them.
 
     Args:
-        batch: Shape (8, 4): addresses and shapes of the arrays of
-            `tdac_envs.drive.stepping.batch_at`, with `words` of shape (n, 11, 4), and
-            of the arrays to overwrite, with one row per robot: outcome, pose, wheel
-            speeds and ranges.
+        batch: Shape (8, 4): addresses and shapes of four input arrays (see
+            `tdac_envs.drive.stepping.batch_at`; `words` has shape (n, 11, 4)) and of
+            four output arrays with one row per robot: outcome, pose, wheel speeds,
+            ranges.
         rows: Indices of the robots, shape (k,).
     """
     over, commands, starts, words = batch_at(batch)

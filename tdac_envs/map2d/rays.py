@@ -29,10 +29,10 @@ def leaps_of(cells: BoolGrid) -> LeapGrid:
         cells: Shape (height, width), bool, True = occupied.
 
     Returns:
-        Shape (4, height + 2, width + 2), uint8: the side of the largest square of
-        free pixels with the pixel in its corner that extends into the quadrant, at
-        most 255 px; 0 in obstacles. A ray in the pixel leaves this square through one
-        of its two far sides.
+        Shape (4, height + 2, width + 2), uint8: side of the largest free square that
+        has the pixel as a corner and extends into the quadrant, at most 255 px; 0 in
+        obstacles. A ray in the pixel leaves this square through one of its two far
+        sides.
     """
     height, width = cells.shape
     leaps = np.zeros((4, height + 2, width + 2), np.uint8)

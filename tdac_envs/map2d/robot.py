@@ -21,8 +21,8 @@ class Robot(NamedTuple):
 
     Attributes:
         constants: Shape (17,), float64: axle length (px), full wheel speed (px/s), dt
-            (s), body radius, largest range (px), fraction of its speed that a wheel
-            keeps from one step to the next, delay (steps), whether a contact ends the
+            (s), body radius, largest range (px), fraction of a wheel's speed that
+            remains after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (px); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (px), horizon (steps).
         state: Shape (8,), float64: x, y (px), heading (rad); unclipped commands of the

@@ -138,7 +138,7 @@ class _Given:
 
 
 def _with_task(prepared: Prepared, given: _Given) -> Prepared:
-    """Replaces the task in the params by the options that are not None."""
+    """Overrides the task in the params with the options that are not None."""
     changes: dict[str, Any] = {
         name: value
         for name in ("start", "goal", "heading")
