@@ -1,6 +1,7 @@
 """Compiled motion of a disc among prisms, up to its first contact.
 
-Headings are counter-clockwise; `tdac_envs.epuck.gaps` documents lengths and parts.
+Lengths are metres, headings counter-clockwise. `tdac_envs.epuck.gaps` documents the
+arguments `points`, `first`, `extent`, `listed`, `begin` and `end`.
 """
 
 from __future__ import annotations
@@ -42,9 +43,9 @@ def first_touch(
     Exact for the arc of constant wheel speeds, to 1e-11 m.
 
     Args:
-        points: See the module.
-        first: See the module.
-        extent: See the module.
+        points: See `tdac_envs.epuck.gaps`.
+        first: See `tdac_envs.epuck.gaps`.
+        extent: See `tdac_envs.epuck.gaps`.
         x: x of the disc's centre.
         y: y of the disc's centre.
         heading: Heading, rad.
@@ -53,8 +54,8 @@ def first_touch(
         radius: Radius of the disc.
 
     Returns:
-        In [0, 1), or 2.0 if the step is free. A disc that starts in contact and moves
-        away from the part or along it is free.
+        In [0, 1), or 2.0 if the step is free. Moving away from or along a part that the
+        disc already touches is no contact.
     """
     return touch_of(
         points, first, extent, first[:0], 0, extent.shape[0],
@@ -149,7 +150,7 @@ def _travel(
 ) -> float:
     """Arc length at which the gap of disc and part falls to `floor`, at most `limit`.
 
-    The search is that of `tdac_envs.map2d.contact._travel`.
+    The method is that of `tdac_envs.map2d.contact._travel`.
     """
     length = abs(forward)
     curvature = abs(turn) / length
@@ -188,9 +189,9 @@ def advance(
     """Moves a disc along an arc, up to a contact.
 
     Args:
-        points: See the module.
-        first: See the module.
-        extent: See the module.
+        points: See `tdac_envs.epuck.gaps`.
+        first: See `tdac_envs.epuck.gaps`.
+        extent: See `tdac_envs.epuck.gaps`.
         listed: Indices of the parts to check.
         begin: First entry of `listed` to check.
         end: End of these entries.

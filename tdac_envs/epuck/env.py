@@ -45,8 +45,8 @@ class EPuckEnv(DrivenEnv):
     37 mm radius with two wheels of 20 mm radius, 52 mm apart. It moves along the exact
     arc of its wheel speeds, which are constant during a step. The disc swept along this
     arc is tested exactly against the shapes of all solid objects, so no step can jump
-    through a thin wall; a contact stops the robot. A fence that the sensors do not see
-    surrounds the world (0.5 m away from its objects if the world has no walls).
+    through a thin wall; a contact stops the robot. The world is surrounded by a fence,
+    invisible to the sensors (0.5 m from the outermost objects if there are no walls).
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
@@ -75,8 +75,8 @@ class EPuckEnv(DrivenEnv):
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
-    - `progress`: +0.1 for each full-speed step's length by which the shortest path of
-      the body to the goal gets shorter (negative if it gets longer),
+    - `progress`: +0.1 times the decrease of the shortest path length to the goal,
+      divided by the distance of one step at full speed,
     - `goal`: +10 if the goal is reached,
     - `collision`: -10 if the body touches an obstacle,
     - `time`: -0.01.
@@ -91,7 +91,7 @@ class EPuckEnv(DrivenEnv):
     - `"mixed"`: as `"jitter"`, or with probability 0.5 any feasible start,
     - `"random"`: any feasible start and goal.
 
-    `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides it.
+    `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides `variation`.
 
     ## Episode End
     The episode ends if one of the following happens:
@@ -116,18 +116,18 @@ class EPuckEnv(DrivenEnv):
             e-puck of version 2.
         on_collision: `"terminate"` or `"block"`; see Episode End.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
-        sensor_noise: Noise of the infra-red sensors, as a factor of the published one.
+        sensor_noise: Infra-red noise relative to the published noise: 0 is none.
         reflectance: `"ideal"`: every object has the reflectance of the sensor's table;
-            `"webots"`: the reflectance of the file's materials, with which, for
-            instance, a WoodenBox is visible only within 15 mm.
+            `"webots"`: objects have the reflectance of the file's materials; a
+            WoodenBox, for example, is visible only within 15 mm.
         goal_visible: Whether the sensors see the file's goal marker.
         wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
         reward_weights: Reward weights by name, where they differ from the defaults.
             Keep the defaults when comparing rewards.
-        ignore: Names or types of nodes that may be left out. Other nodes that may be
-            solid but are not modelled raise an error.
+        ignore: Names or types of unmodelled nodes to leave out. Any other unmodelled
+            node that may be solid raises an error.
         ground_sensors: Whether to observe `ground`.
         gps: Whether to observe `gps`.
         compass: Whether to observe `compass`.

@@ -109,12 +109,12 @@ def clear_grid(
     spacing: float,
     clear: Array,
 ) -> None:
-    """Lowers each entry of `clear` to the distance from its point to the parts.
+    """Lowers each entry of `clear` to the distance to the nearest part.
 
     Args:
-        points: See the module.
-        first: See the module.
-        extent: See the module.
+        points: See the module docstring.
+        first: See the module docstring.
+        extent: See the module docstring.
         left: x of `clear[:, 0]`.
         low: y of `clear[0, :]`.
         spacing: Distance between grid points.

@@ -40,8 +40,8 @@ class Ground:
         solid: Parts that the body can hit, with a fence around the world.
         bounds: (left, low, right, high) inside the fence, m.
         spacing: Distance between grid points, m.
-        clear: Shape (height, width): distance from grid point (u, v), which is at
-            (left + u spacing, low + v spacing), to the nearest solid part, up to 0.1 m.
+        clear: Shape (height, width): distance from each grid point to the nearest solid
+            part, at most 0.1 m; `clear[v, u]` is at left + u spacing, low + v spacing.
         centres: Shape (k, 2): initial centres of the objects that can be pushed, m.
         masses: Shape (k,): masses of these objects, kg.
     """
@@ -89,9 +89,9 @@ class Ground:
         return left + column * self.spacing, low + row * self.spacing
 
     def free(self, radius: float) -> NDArray[np.bool_]:
-        """Grid points where a disc may stand, shape (height, width), bool.
+        """Grid points where a disc fits, shape (height, width), bool.
 
-        It may also move straight between two neighbouring ones; see `grid.body_free`.
+        It also fits on the straight line between two neighbouring ones.
         """
         return np.asarray(self.clear >= math.hypot(radius, self.spacing / 2**0.5))
 

@@ -205,22 +205,23 @@ def sense(
 ) -> None:
     """Computes the readings of ps0 to ps7, without noise.
 
-    A ray rises from 33 mm to 44 mm above the floor and sees nothing below or above. The
-    reading follows from the distance to the nearest part hit, divided by the part's
-    reflectance.
+    A ray rises from 33 mm to 44 mm above the floor and misses parts that lie below or
+    above it. The reading follows from the distance to the nearest part hit, divided by
+    the part's reflectance.
 
     Args:
-        points: Visible parts; see `tdac_envs.epuck.gaps`.
-        first: Visible parts.
-        extent: Visible parts.
+        points: Vertices of the visible parts; see `tdac_envs.epuck.gaps`.
+        first: See `points`.
+        extent: See `points`.
         listed: Indices of the parts to check.
         begin: First entry of `listed` to check.
         end: End of these entries.
         floor: Height of the ground, m.
         state: Begins with x, y and heading.
         readings: Shape (8,), overwritten.
-        hits: Shape (8, 3), overwritten: distance along the ray to the hit or 0.07 m,
-            reflectance of the part hit, relative standard deviation of the reading.
+        hits: Shape (8, 3), overwritten: distance along the ray to the hit (0.07 m if
+            none), reflectance of the part hit, relative standard deviation of the
+            reading.
     """
     x, y, heading = state[0], state[1], state[2]
     cos, sin = math.cos(heading), math.sin(heading)

@@ -71,9 +71,9 @@ def way_left(
 ) -> float:
     """Length of the shortest path from a point to the goal, m.
 
-    It is the minimum, over grid points nearer than the body radius (nothing can be in
-    between), of the distance to the grid point plus the path length from there. The
-    result is `previous` if no such point has a path.
+    It is the least sum of the distance to a grid point and the path length from there,
+    or `previous` if no grid point has a path. Only grid points nearer than the body
+    radius count, since nothing can be in between.
     """
     height, width = field.shape
     spacing = constants[SPACING]
@@ -113,7 +113,7 @@ def _observe(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Updates observation and `outcome` for the current pose; arguments as `_drive`."""
+    """Updates observation and `outcome` for the current pose; see `_drive`."""
     x, y, goal_x, goal_y = state[X], state[Y], constants[GOAL_X], constants[GOAL_Y]
     left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
     pose[0], pose[1], pose[2] = x, y, state[HEADING]
@@ -255,13 +255,13 @@ def _drive(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """One step in which nothing is pushed, except for the random numbers.
+    """Runs one step without pushing; `state` already contains the wheel slip.
 
     `points` to `listed` describe the solid parts and `seen_points` to `seen_listed` the
     visible ones; see `tdac_envs.epuck.gaps` and `tdac_envs.epuck.nearby.Nearby`.
     `field`, shape (height, width), is the path length to the goal from each grid point,
-    m. The others are the arrays of `Robot`; all but `constants`, and the commands and
-    the slip in `state`, are overwritten.
+    m. The others are the arrays of `Robot`. All of them are overwritten except
+    `constants` and, in `state`, the commands and the slip.
     """
     _turn_wheels(constants, state, queue, wheel_speeds, outcome)
     forward, turn, x, y = outcome[FORWARD], outcome[TURN], state[X], state[Y]
@@ -324,7 +324,7 @@ def begin(words: Words) -> None:
 
 @kernel
 def drive(words: Words) -> None:
-    """One step in which nothing is pushed; `words` as for `begin`."""
+    """Runs one step without pushing; `words` as for `begin`."""
     _drive(*_arrays_at(words))
 
 
@@ -342,7 +342,7 @@ def turn_wheels(words: Words) -> None:
 
 @kernel
 def finish(words: Words) -> None:
-    """Completes such a step, once `outcome[TOUCHED]` is known."""
+    """Completes the step after `turn_wheels`, once `outcome[TOUCHED]` is set."""
     _finish(*_arrays_at(words))
 
 
@@ -350,14 +350,14 @@ def finish(words: Words) -> None:
 def step_rows(batch: Words, rows: Words) -> None:
     """Steps many robots, or begins the next episode of those whose episode is over.
 
-    The results are copied here, while the robots' own arrays are in the cache of the
-    core that steps them.
+    The results are copied here because the robots' own arrays are still in the cache
+    of the core that steps them.
 
     Args:
-        batch: Shape (9, 4): addresses and shapes of the arrays of
-            `tdac_envs.drive.stepping.batch_at`, with `words` of shape (n, 20, 4), and
-            of the arrays to overwrite, with one row per robot: outcome, pose, wheel
-            speeds, wheel angles and readings.
+        batch: Shape (9, 4): addresses and shapes of four input arrays (see
+            `tdac_envs.drive.stepping.batch_at`; `words` has shape (n, 20, 4)) and of
+            five output arrays with one row per robot: outcome, pose, wheel speeds,
+            wheel angles, readings.
         rows: Indices of the robots, shape (k,).
     """
     over, commands, starts, words = batch_at(batch)

@@ -16,8 +16,9 @@ from tdac_envs.epuck.infrared import FARTHEST, at_ray_height
 from tdac_envs.epuck.prisms import FIXED, Array, Index, Prisms
 
 _CELL = 0.04
-"""Width of a cell, m; larger if there were more than `_MOST_DISTANCES` distances."""
+"""Minimum width of a cell, m; `_MOST_DISTANCES` may require wider cells."""
 _MOST_DISTANCES = 1_000_000
+"""Maximum number of cells times parts."""
 _ROUNDING = 1e-9
 
 
@@ -44,10 +45,10 @@ class Surroundings:
         width: Width of a cell, m; the first cell begins at the lower left corner of the
             ground's bounds.
         visible: Parts that the infra-red sensors see.
-        solid: Solid parts that a step may touch or that may be the nearest, and all
-            that can be pushed.
-        seen: Visible parts that may be in range of the sensors, and all that can be
-            pushed.
+        solid: Solid parts that a step may touch, that may be the nearest or that can
+            be pushed.
+        seen: Visible parts at the height of the rays that may be in range or that can
+            be pushed.
     """
 
     width: float

@@ -66,7 +66,7 @@ def _nearest_place(ground: Ground, x: float, y: float) -> str:
 def entry(
     ground: Ground, field: NDArray[np.float32], at: Point
 ) -> tuple[int, int] | None:
-    """The nearest grid point (column, row) that the body can reach straight on, if any.
+    """The nearest grid point (column, row) reachable in a straight line, or None.
 
     Args:
         ground: The world.
@@ -196,7 +196,7 @@ def field_to(ground: Ground, goal: tuple[int, int]) -> NDArray[np.float32]:
 
 
 def path_down(ground: Ground, field: NDArray[np.float32], start: Point) -> Path:
-    """The shortest path from a position by a field of `route`, shape (n, 2), m.
+    """The shortest path from a position, given a field of `route`, shape (n, 2), m.
 
     It ends at the grid point of the goal. It is empty if there is no path.
     """

@@ -1,9 +1,8 @@
-"""Physics of an e-puck that pushes objects, in the plane, by pymunk.
+"""2D physics (pymunk) of an e-puck that pushes objects.
 
-It is only used for steps in which an object that can be pushed is near or moves; all
+It is used only for steps in which an object that can be pushed is near or moves; all
 other steps are exact and need no physics engine. Each step creates a new pymunk space
-from poses and velocities alone, so an episode that is copied at any step continues
-identically.
+from poses and velocities alone, so a copy of an episode continues identically.
 """
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ class Robot(NamedTuple):
 
     Attributes:
         constants: Shape (22,), float64: axle length (m), full wheel speed (rad/s), dt
-            (s), body radius, sensor range (m), fraction of its speed that a wheel keeps
-            from one step to the next, delay (steps), whether a contact ends the
+            (s), body radius, sensor range (m), fraction of a wheel's speed that remains
+            after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (m); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (m), horizon (steps);
             height of the floor, x and y of the lower left corner of the path field and

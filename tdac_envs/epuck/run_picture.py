@@ -19,7 +19,7 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.picture import SIDE, View, draw_things
 
 Points = NDArray[np.float64]
-# Width of the scale bar's place at the right of the strip, frame px.
+# Width reserved for the scale bar at the right of the strip, frame px.
 _SCALE = 170
 
 

@@ -24,13 +24,13 @@ def open_world(
 ) -> World:
     """Loads a world and sets the pose of its first e-puck and its goal.
 
-    The file's goal marker never becomes an obstacle, even if `goal` is elsewhere.
+    The file's goal marker never becomes an obstacle, even if `goal` is given.
 
     Args:
         source: Name of a bundled world, path of a `.wbt` file, or a world.
         start: (x, y) or (x, y, heading), m and rad; by default the file's e-puck.
         goal: (x, y), m; by default the file's goal.
-        ignore: Names or types of nodes that may be left out; see `check_modelled`.
+        ignore: Names or types of unmodelled nodes to leave out; see `check_modelled`.
 
     Raises:
         WorldError: The world cannot be used.
@@ -43,11 +43,9 @@ def open_world(
     if goal is not None:
         world = replace(world, goal=finite_point("goal", goal))
     if world.goal is None:
-        raise TaskError(f"{_name(world)} names no goal; give goal=(x, y), in metres")
+        raise TaskError(f"{_name(world)} has no goal; give goal=(x, y) in metres")
     if start is None and not world.robots:
-        raise TaskError(
-            f"{_name(world)} has no e-puck in it; give start=(x, y, heading)"
-        )
+        raise TaskError(f"{_name(world)} has no e-puck; give start=(x, y, heading)")
     return world if start is None else started(world, start)
 
 

@@ -69,10 +69,10 @@ class EPuckVectorEnv(DrivenVectorEnv):
             autoreset_mode=autoreset_mode,
             threads=threads,
         )
-        self._kinds = [envs[i % len(envs)] for i in range(num_envs)]
-        self._factors = np.array([env.sensor_noise for env in self._kinds])
+        self._envs = [envs[i % len(envs)] for i in range(num_envs)]
+        self._factors = np.array([env.sensor_noise for env in self._envs])
         self._noisy = set(np.flatnonzero(self._factors).tolist())
-        self._floors = np.array([env.task.ground.floor for env in self._kinds])
+        self._floors = np.array([env.task.ground.floor for env in self._envs])
         self._last_ps = self.robots.readings.copy()
         self._last_ground = np.zeros((num_envs, 3), np.float32)
 
@@ -87,7 +87,7 @@ class EPuckVectorEnv(DrivenVectorEnv):
         }
 
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
-        one = self._kinds[0]
+        one = self._envs[0]
         if self._noisy:
             self._add_noise([i for i in robots if i in self._noisy])
             observations["ps"][:] = np.where(
@@ -113,7 +113,7 @@ class EPuckVectorEnv(DrivenVectorEnv):
 
     def _ground(self, i: int) -> Observed:
         """Readings of one robot's ground sensors."""
-        env = self._kinds[i]
+        env = self._envs[i]
         seen, floor = env.setup.around.visible, env.task.ground.floor
         readings, spreads = ground_readings(seen, floor, self.robots.row(i))
         if i not in self._noisy:

@@ -373,9 +373,9 @@ class TestArguments:
 
     def test_a_world_without_goal_or_robot_asks_for_them(self):
         empty = read_world(text("RectangleArena { floorSize 2 2 }"))
-        with pytest.raises(TaskError, match="names no goal; give goal="):
+        with pytest.raises(TaskError, match="has no goal; give goal="):
             EPuckEnv(empty)
-        with pytest.raises(TaskError, match="no e-puck in it; give start="):
+        with pytest.raises(TaskError, match="no e-puck; give start="):
             EPuckEnv(empty, goal=(0.5, 0.5))
         assert EPuckEnv(empty, (-0.5, 0, 0), (0.5, 0.5)).task.shortest > 1.0
 
