@@ -12,7 +12,7 @@ BODY_RADIUS = 0.037
 BODY_BOTTOM, BODY_TOP = 0.0025, 0.0475
 """Lowest and highest point of an e-puck's body above the ground, m."""
 
-_STEP_DOWN = 0.01
+_MAX_RISE = 0.01
 """Maximum height of the ground above the robot's origin, m."""
 _NEAR = 0.005
 """Largest gap at which an obstacle still rests on what is below it, m."""
@@ -37,7 +37,7 @@ def floor_under(world: World) -> float:
     """
     if not world.robots:
         return 0.0
-    x, y, reach = world.robot.x, world.robot.y, world.robot.z + _STEP_DOWN
+    x, y, reach = world.robot.x, world.robot.y, world.robot.z + _MAX_RISE
     under = [part for thing in world.obstacles for part in thing.solid]
     tops = [part.top for part in under if part.shape.contains(x, y)]
     tops += [arena.z for arena in world.arenas if arena.inside.contains(x, y)]

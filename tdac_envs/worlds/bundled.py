@@ -17,9 +17,9 @@ def bundled_worlds() -> tuple[str, ...]:
 
 
 def world_file(source: str | Path) -> Path:
-    """The path of a bundled world, given by name, or `source` as a path.
+    """The path of the bundled world that `source` names, else `source` as a path.
 
-    If there is no file `maze.wbt`, this name selects the bundled world `maze`.
+    `maze.wbt` also names the bundled world `maze`, unless such a file exists.
 
     Raises:
         WorldError: There is no world of this name; the message suggests the closest.

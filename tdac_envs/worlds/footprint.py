@@ -81,7 +81,8 @@ class Rectangle:
     Attributes:
         x: x of the centre, m.
         y: y of the centre, m.
-        yaw: Direction of the length, rad: in [-pi/2, pi/2), of a square [-pi/4, pi/4).
+        yaw: Direction of the longer side, rad, in [-pi/2, pi/2); [-pi/4, pi/4) for a
+            square.
         length: Longer side, m, along `yaw`; the sides are swapped if necessary.
         width: Shorter side, m, above 0.
     """
@@ -138,7 +139,7 @@ class Polygon:
     """A convex polygon; `Polygon.around` builds one from any points.
 
     Attributes:
-        points: Vertices, counter-clockwise from the leftmost (of several, the lowest).
+        points: Vertices, counter-clockwise from the leftmost (the lowest in a tie).
     """
 
     points: tuple[tuple[float, float], ...]
@@ -216,7 +217,7 @@ def ring(
 
 
 def frame(floor: Rectangle, thickness: float) -> list[Polygon | Rectangle]:
-    """Four walls around a rectangle; the two along its length cover the corners."""
+    """Four walls around a rectangle; the two long ones cover the corners."""
     middle, turn = np.array([floor.x, floor.y]), floor.turn
     out = (floor.length / 2 + thickness / 2, 0.0)
     up = (0.0, floor.width / 2 + thickness / 2)

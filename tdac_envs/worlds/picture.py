@@ -105,7 +105,7 @@ class View:
             self.canvas.line(corners[[-1, 0]], colour, 1, alpha)
 
     def wash(self, shapes: Iterable[Footprint], colour: Colour, alpha: float) -> None:
-        """Paints footprints as one transparent layer, even where they overlap."""
+        """Paints footprints as one transparent layer; overlaps are not darker."""
         before = self.canvas.image.copy()
         for shape in shapes:
             self.fill(shape, colour)
@@ -113,7 +113,7 @@ class View:
         image[...] = np.rint(alpha * image + (1.0 - alpha) * before)
 
     def grid(self) -> None:
-        """Draws faint lines at round lengths, slightly stronger through the origin."""
+        """Draws faint grid lines, slightly stronger through the origin."""
         step = self.round_length(60.0)
         for x in np.arange(np.ceil(self._left / step), self._right / step) * step:
             self._grid_line([(x, self._low), (x, self._high)], x)

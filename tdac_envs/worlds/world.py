@@ -33,7 +33,7 @@ MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A vertical prism; one lower than 0.1 mm is extended downwards to 0.1 mm.
+    """A vertical prism at least 0.1 mm high; a lower one is extended downwards.
 
     Attributes:
         shape: Footprint.
@@ -179,7 +179,7 @@ class Arena:
         return self.wall_height > 0.0
 
     def wall(self) -> Obstacle:
-        """The wall as an obstacle of convex parts; it has no parts without a wall."""
+        """The wall as an obstacle of convex parts; no parts if there is no wall."""
         shape, thickness = self.inside, self.wall_thickness
         if not self.has_wall:
             return Obstacle("", self.kind, shape.x, shape.y)
@@ -225,7 +225,7 @@ class World:
 
     Attributes:
         robots: E-pucks; the first is driven, the others stand still.
-        goal: Point (x, y), m; None if the file names no goal.
+        goal: Point (x, y), m; None if the file has no goal.
         arenas: Floors, with or without walls.
         obstacles: Everything else, without the walls of the arenas.
         time_step: Physics time step, ms.
@@ -277,14 +277,15 @@ class World:
 
 
 def check_modelled(world: World, ignore: Iterable[str] = ()) -> tuple[Unmodelled, ...]:
-    """Returns the unmodelled nodes that may be solid, if `ignore` names all of them.
+    """Checks that `ignore` names all unmodelled nodes that may be solid; returns them.
 
     Args:
         world: The world.
-        ignore: Names or types of nodes that the user allows to be left out.
+        ignore: Names or types of unmodelled nodes to leave out.
 
     Raises:
-        WorldError: Such a node is not named, or a name matches no node.
+        WorldError: `ignore` does not name such a node, or one of its names matches no
+            unmodelled node.
     """
     names = tuple(ignore)
     open_ = [node for node in world.unmodelled if node.may_be_solid]

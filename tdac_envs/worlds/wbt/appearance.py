@@ -13,13 +13,13 @@ def reflectance(shape: Node) -> float:
     """The factor `f` of a Shape: a sensor measures its distance divided by `f`.
 
     f = 0.2 + 0.8 red (1 - transparency) (1 - roughness / 2); only a PBRAppearance has
-    a roughness. Where f depends on textures or PROTOs, it is unknown and taken as 1.
+    a roughness. If f depends on textures or PROTOs, it is unknown and taken as 1.
 
     Args:
         shape: A Shape node.
 
     Raises:
-        WorldError: A field of its appearance is broken.
+        WorldError: A field of its appearance is invalid.
     """
     look = child(shape, "appearance")
     if look is None:

@@ -23,7 +23,7 @@ def arena(node: Node, frame: Frame) -> Arena | str:
         The arena, or the reason why it cannot be modelled.
 
     Raises:
-        WorldError: A field is broken.
+        WorldError: A field is invalid.
     """
     own = placed(node, frame).flu()
     if not abs(own.tilt) < _LEVEL:

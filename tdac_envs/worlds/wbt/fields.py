@@ -5,11 +5,11 @@ from __future__ import annotations
 from tdac_envs.worlds.wbt.tree import Node
 
 LARGEST = 1e6
-"""Largest absolute value of a number; worlds measure only some metres."""
+"""Largest absolute value of a number; real worlds span only a few metres."""
 
 
 def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-    """The numbers of a field, as many as in the default.
+    """The numbers of a field; `default` also sets their count.
 
     Raises:
         WorldError: The field has other values, or a number beyond `LARGEST`.
@@ -52,10 +52,10 @@ def text(node: Node, name: str, default: str = "") -> str:
 
 
 def flag(node: Node, name: str, default: bool) -> bool:
-    """The TRUE or FALSE of a field.
+    """The boolean of a field.
 
     Raises:
-        WorldError: The field is neither.
+        WorldError: The field is neither TRUE nor FALSE.
     """
     if name not in node.fields:
         return default

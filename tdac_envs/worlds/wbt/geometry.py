@@ -27,8 +27,8 @@ class Pieces:
 
     Attributes:
         parts: Prisms.
-        volume: Volume, m³, from which Webots computes a mass by density: overlaps
-            count twice.
+        volume: Volume from which Webots computes a mass by density, m³; overlaps count
+            twice.
         missing: Descriptions of the geometry that cannot be converted.
     """
 
@@ -52,7 +52,7 @@ def bounds(node: Node, frame: Frame) -> Pieces:
         frame: Frame of the Solid.
 
     Raises:
-        WorldError: A field is broken.
+        WorldError: A field is invalid.
     """
     if node.kind in GROUPS:
         inner = frame if node.kind == "Group" else placed(node, frame, scaled=True)
@@ -81,7 +81,7 @@ def geometry(node: Node, frame: Frame) -> Pieces:
         frame: Frame of the node, in the file's object axes (FLU or RUB).
 
     Raises:
-        WorldError: A field is broken.
+        WorldError: A field is invalid.
     """
     if node.kind == "IndexedFaceSet":
         found = mesh(node, frame)

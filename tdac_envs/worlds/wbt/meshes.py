@@ -15,7 +15,7 @@ from tdac_envs.worlds.world import Part
 MOST_FACES = 1000
 """Maximum number of faces of a non-convex mesh."""
 MOST_CORNERS = 100
-"""Maximum number of corners of a non-convex face; of all such faces, ten times that."""
+"""Maximum corners of a non-convex face; ten times as many for all of them together."""
 
 Points = NDArray[np.float64]
 Face = NDArray[np.int64]
@@ -35,7 +35,7 @@ def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
         The parts, or a description of the mesh if it cannot be converted.
 
     Raises:
-        WorldError: The points or indices are broken.
+        WorldError: The points or indices are invalid.
     """
     points = frame.at(_points(node))
     faces = _faces(node, len(points))

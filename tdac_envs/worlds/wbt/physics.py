@@ -17,7 +17,7 @@ def mass_of(node: Node, volume: float) -> float | None:
         volume: Volume of its boundingObject, m³.
 
     Raises:
-        WorldError: A field of the Physics node is broken.
+        WorldError: A field of the Physics node is invalid.
     """
     physics = child(node, "physics")
     if physics is None:

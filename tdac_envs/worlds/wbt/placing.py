@@ -27,7 +27,7 @@ def placed(
         scaled: Whether to apply the node's `scale` field.
 
     Raises:
-        WorldError: A field is broken, or its values are too large.
+        WorldError: A field is invalid, or its values are too large.
     """
     translation = numbers(node, "translation", own_axes(default, frame.y_up))
     rotation = numbers(node, "rotation", _NO_TURN)

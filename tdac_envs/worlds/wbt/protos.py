@@ -176,7 +176,7 @@ def _solid_pipe(node: Node, frame: Frame) -> Body:
 
 
 def _facets(node: Node, radius: float, thickness: float) -> int:
-    """Webots' number of facets; more if they deviate too much from a round pipe."""
+    """Webots' number of facets; more if that deviates too much from a round pipe."""
     own = number(node, "subdivision", 24.0)
     smooth = math.pi / math.sqrt(2.0 * _ROUNDNESS * thickness / radius)
     return math.ceil(min(max(own, smooth, 8.0), 200.0))
@@ -214,7 +214,7 @@ def _column(
 
 
 def _size(node: Node, frame: Frame, default: Size) -> Size:
-    """Size (forward, left, up), m; the default if one is not above 0, as in Webots."""
+    """Size (forward, left, up), m; the default if any is not above 0, as in Webots."""
     own: Point = default
     if frame.y_up:
         x, y, z = own_axes(default, True)
@@ -229,7 +229,7 @@ def _clamped(size: Size, least: float, most: float) -> Size:
 
 
 def _box_mass(node: Node, size: Size, heaviest: float) -> float | None:
-    """The mass of a box, kg, clamped to a range from its size; None if it is fixed."""
+    """The mass of a box, kg, clamped to limits set by its size; None if it is fixed."""
     mass, least = number(node, "mass", 0.0), math.prod(size) ** (2.0 / 3.0)
     return min(max(mass, least), heaviest * least) if mass > 0.0 else None
 

@@ -44,7 +44,7 @@ def load_world(
         goal: Point (x, y), m, ENU; by default the position of the node named GOAL.
 
     Raises:
-        WorldError: The file cannot be read or is broken; errors in the file are
+        WorldError: The file cannot be read or is invalid; errors in the file are
             reported with line and column.
     """
     file = Path(path)
@@ -127,7 +127,7 @@ def frame_of(document: Document) -> Frame:
             )
         z_up = _Z_UP[system]
     elif info is not None and not z_up and len(_items(info, "gravity")) == 3:
-        # In old files gravity is a vector, which shows the vertical axis.
+        # In old files gravity is a vector, which gives the vertical axis.
         x, y, z = numbers(info, "gravity", (0.0, -9.81, 0.0))
         z_up = -z > max(abs(x), abs(y))
     return world_frame(z_up, y_up_objects=document.release < _FLU_SINCE)
@@ -179,5 +179,5 @@ def _notes(world: World, found: Found) -> list[str]:
         if fallen != thing:
             drop = thing.solid[0].top - fallen.solid[0].top
             name = thing.name or thing.kind
-            notes.append(f"{name} hangs {drop:.3g} m up; it is modelled as fallen")
+            notes.append(f"{name} floats {drop:.3g} m in the air; modelled as fallen")
     return notes

@@ -33,7 +33,7 @@ def epuck(node: Node, frame: Frame) -> EPuck:
     """Reads an e-puck.
 
     Raises:
-        WorldError: A field is broken.
+        WorldError: A field is invalid.
     """
     own = placed(node, frame)
     ahead = _ahead(node, own) if node.kind in ROBOTS else None
@@ -64,8 +64,8 @@ def inside(node: Node) -> Iterator[Node]:
 def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
     """Direction of the robot's axis that points to its front sensors, ps0 and ps7.
 
-    A Robot node keeps the axes of the version that it was written for, whatever the
-    version of the file.
+    A Robot node keeps the axes of the Webots version that it was written for, which may
+    differ from the version of the file.
     """
     front = {
         text(part, "name"): numbers(part, "translation", (0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Parses a `.wbt` file to nodes, with every type and every field as written."""
+"""Parses a `.wbt` file into nodes; keeps all types and fields as written."""
 
 from __future__ import annotations
 

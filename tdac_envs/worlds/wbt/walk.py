@@ -40,7 +40,7 @@ def walk(node: Node, frame: Frame, found: Found) -> None:
         found: The content of the file so far.
 
     Raises:
-        WorldError: A field is broken; the message gives line and column.
+        WorldError: A field is invalid; the message gives line and column.
     """
     if node.kind in _NEVER_SOLID:
         return

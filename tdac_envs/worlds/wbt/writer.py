@@ -24,7 +24,7 @@ _FROM_ABOVE = "-0.57735 0.57735 0.57735 2.0944"
 
 
 def write_world(world: World, *, supervisor: bool = False) -> str:
-    """The text of a `.wbt` file; `read_world` returns an equal world from it.
+    """The text of a `.wbt` file, from which `read_world` returns an equal world.
 
     Every obstacle is a top-level Solid. A single part is its boundingObject; several
     parts are each in a Pose. Unmodelled nodes appear only in comments.
@@ -120,7 +120,7 @@ def _obstacle(thing: Obstacle) -> str:
 
 
 def _single(thing: Obstacle) -> Part | None:
-    """The only part of an obstacle, if the Solid itself can hold it; else None."""
+    """The only part of an obstacle if it needs no Pose of its own, else None."""
     pieces = set(thing.solid) | set(thing.visible)
     if len(pieces) != 1 or max(len(thing.solid), len(thing.visible)) > 1:
         return None
@@ -131,7 +131,7 @@ def _single(thing: Obstacle) -> Part | None:
 
 
 def _placed(thing: Obstacle, part: Part, single: Part | None, visible: bool) -> str:
-    """A part: its geometry, in a Shape if visible, in a Pose if not the only one."""
+    """The geometry of a part, in a Shape if visible, in a Pose if one of several."""
     piece = _geometry(part, thing.x, thing.y)
     if visible:
         red = _n(red_of(thing.reflectance))
@@ -145,7 +145,7 @@ def _placed(thing: Obstacle, part: Part, single: Part | None, visible: bool) -> 
 
 
 def _pose(part: Part, x: float, y: float, from_x: float, from_y: float) -> list[str]:
-    """Pose of a part: (x, y) for a polygon, else relative to (from_x, from_y)."""
+    """Pose of a part: at (x, y) for a polygon, else relative to (from_x, from_y)."""
     shape, z = part.shape, (part.bottom + part.top) / 2
     if isinstance(shape, Polygon):
         return [_translation(x, y, z)]
