@@ -116,7 +116,7 @@ class EPuckEnv(DrivenEnv):
             e-puck of version 2.
         on_collision: `"terminate"` or `"block"`; see Episode End.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
-        sensor_noise: Infra-red noise relative to the published noise: 0 is none.
+        sensor_noise: Infra-red noise relative to the published noise; 0 for none.
         reflectance: `"ideal"`: every object has the reflectance of the sensor's table;
             `"webots"`: objects have the reflectance of the file's materials; a
             WoodenBox, for example, is visible only within 15 mm.

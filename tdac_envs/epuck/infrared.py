@@ -219,9 +219,8 @@ def sense(
         floor: Height of the ground, m.
         state: Begins with x, y and heading.
         readings: Shape (8,), overwritten.
-        hits: Shape (8, 3), overwritten: distance along the ray to the hit (0.07 m if
-            none), reflectance of the part hit, relative standard deviation of the
-            reading.
+        hits: Shape (8, 3), overwritten: length of the ray to the hit, at most 0.07 m;
+            reflectance of the part hit; relative standard deviation of the reading.
     """
     x, y, heading = state[0], state[1], state[2]
     cos, sin = math.cos(heading), math.sin(heading)
