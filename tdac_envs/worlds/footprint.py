@@ -81,8 +81,7 @@ class Rectangle:
     Attributes:
         x: x of the centre, m.
         y: y of the centre, m.
-        yaw: Direction of the longer side, rad, in [-pi/2, pi/2); [-pi/4, pi/4) for a
-            square.
+        yaw: Direction of the longer side, rad: [-pi/2, pi/2), a square [-pi/4, pi/4).
         length: Longer side, m, along `yaw`; the sides are swapped if necessary.
         width: Shorter side, m, above 0.
     """

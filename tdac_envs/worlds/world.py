@@ -284,8 +284,7 @@ def check_modelled(world: World, ignore: Iterable[str] = ()) -> tuple[Unmodelled
         ignore: Names or types of unmodelled nodes to leave out.
 
     Raises:
-        WorldError: `ignore` does not name such a node, or one of its names matches no
-            unmodelled node.
+        WorldError: `ignore` does not name such a node, or names an unknown one.
     """
     names = tuple(ignore)
     open_ = [node for node in world.unmodelled if node.may_be_solid]
