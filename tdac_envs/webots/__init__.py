@@ -1,5 +1,5 @@
 """Runs Webots controllers in simulated worlds: `controller` module and step server.
 
-A controller imports the package `controller` in a process of its own;
-`server.StepServer` holds the environment and takes the steps.
+A controller runs in its own process and imports the package `controller`;
+`server.StepServer` steps the environment.
 """

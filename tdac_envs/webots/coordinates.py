@@ -40,7 +40,7 @@ class FileFrame:
 
     @classmethod
     def of(cls, top: Frame, robot: Frame, heading: float) -> FileFrame:
-        """From the frames of the file and of the robot, and its heading, rad."""
+        """The conversion for the frame of a file and a robot's frame and heading."""
         return cls(top.matrix, robot.matrix, heading, float(robot.origin[2]))
 
     def vector(self, x: float, y: float, z: float = 0.0) -> list[float]:
@@ -57,7 +57,7 @@ class FileFrame:
         return np.asarray(self.world.T @ spin @ self.turn)
 
     def axis_angle(self, heading: float) -> list[float]:
-        """The same rotation as an axis (x, y, z) and an angle in [0, pi]."""
+        """`rotation` as an axis (x, y, z) and an angle in [0, pi]."""
         vector = Rotation.from_matrix(self.rotation(heading)).as_rotvec()
         angle = float(np.linalg.norm(vector))
         if angle < 1e-12:
@@ -65,7 +65,7 @@ class FileFrame:
         return [*(float(part / angle) for part in vector), angle]
 
     def attitude(self, heading: float) -> list[float]:
-        """Roll, pitch, yaw (rad) and quaternion (x, y, z, w) as in an InertialUnit."""
+        """Roll, pitch, yaw (rad) and quaternion (x, y, z, w) of an InertialUnit."""
         turn = self.rotation(heading)
         if abs(self.world[2, 2]) > 0.5:  # z is up
             roll = math.atan2(turn[2, 1], turn[2, 2])

@@ -38,10 +38,10 @@ class DeviceFacts:
 
     Attributes:
         name: Device name.
-        kind: Class of the `controller` package.
+        kind: Name of its class in the `controller` package.
         node_type: Webots' number of the node type.
         more: Further facts that the class needs.
-        offset: Position in the robot's axes, m, where it matters.
+        offset: Position in the robot's axes, m; used for a GPS only.
     """
 
     name: str

@@ -23,7 +23,7 @@ class Log:
     Attributes:
         poses: Poses x, y (m), heading (rad), start included.
         actions: Wheel speeds as fractions of the maximum, shape (2,), float32.
-        path_distances: Lengths of the shortest path left to the goal, m.
+        path_distances: Lengths of the shortest path to the goal, m.
         distances: Straight-line distances to the goal, m.
         collisions: Number of steps with a contact.
         first_contact: Step, x and y (m) of the first contact.

@@ -36,7 +36,7 @@ class Movable:
     origin: Point
 
     def place(self, x: float, y: float, turn: float) -> Place | None:
-        """Translation and rotation in the file; None if it has not moved.
+        """Translation and rotation in file coordinates; None if it has not moved.
 
         Args:
             x: x of its centre, m.

@@ -45,7 +45,7 @@ class Sampler:
             self._sampling.pop(sensor, None)
 
     def sample(self, now: float, observation: Observation, poses: list[Pose]) -> None:
-        """Reads the sensors whose period is over.
+        """Reads the sensors that are due.
 
         Args:
             now: Simulated time, ms.
@@ -59,7 +59,7 @@ class Sampler:
                 self._fresh[name] = self._readers[name]()
 
     def take(self) -> dict[str, Any]:
-        """Returns the latest new sample of each sensor, and forgets these samples."""
+        """Returns the latest sample of each sensor that is new since the last call."""
         fresh, self._fresh = self._fresh, {}
         return fresh
 

@@ -1,4 +1,4 @@
-"""The nodes of a file as a supervisor sees them, and which it may change."""
+"""The nodes of a file as a supervisor sees them, and the fields that it may write."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tdac_envs.worlds.wbt.tree import Field, Item, Node
 SF_BOOL, SF_INT32, SF_FLOAT, SF_VEC2F, SF_VEC3F = 1, 2, 3, 4, 5
 SF_ROTATION, SF_COLOR, SF_STRING, SF_NODE, MF = 6, 7, 8, 9, 16
 
-# A file does not state the types of fields; these do not follow from the values.
+# A file does not state field types; those below do not follow from the values.
 _LISTS = {
     **dict.fromkeys(
         ("children", "device", "turretSlot", "groundSensorsSlot", "bodySlot"),
@@ -112,14 +112,14 @@ class Scene:
         return self._numbers[id(node)]
 
     def has(self, number: int, field: str) -> bool:
-        """Whether a node exists, and its field too, unless `field` is empty."""
+        """Whether a node exists and, unless `field` is empty, has this field."""
         if not 0 <= number < len(self.nodes):
             return False
         names = [name for name, _, _ in self.nodes[number].fields]
         return not field or field in names
 
     def may_write(self, number: int, field: str) -> bool:
-        """Whether a field may change in a judged run, since it moves nothing."""
+        """Whether a field may be written in a judged run, since that moves nothing."""
         return self.nodes[number].base in _FREE_NODES or field in _FREE_FIELDS
 
     def describe(self, number: int) -> str:

@@ -1,4 +1,4 @@
-"""The judge's side of a Webots run: takes the steps and keeps the record."""
+"""The server of a Webots run: steps the environment and records the run."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class StepServer:
     """Answers requests of the `controller` package; see `controller.connection`.
 
     Args:
-        env: The judge's environment of the stage.
+        env: Environment of the stage, from `Stage.make_env`.
         stage: Stage with the world and the robot.
-        folder: Project path that the controller gets.
+        folder: Project path reported to the controller.
     """
 
     def __init__(self, env: EPuckEnv, stage: Stage, folder: str = "") -> None:
@@ -84,7 +84,7 @@ class StepServer:
         return self._answer()
 
     def _advance(self, duration: int) -> None:
-        """Takes steps for `duration` ms, rounded up to whole steps."""
+        """Runs steps for `duration` ms, rounded up to whole steps."""
         count = math.ceil(duration / self._basic - 1e-9)
         if abs(count * self._basic - duration) > 1e-6:
             self._warn(
@@ -164,7 +164,7 @@ class StepServer:
         self._sampler.enable(device, period, self._now())
 
     def _handle_event(self, call: str, node: int | None, field_name: str) -> None:
-        """Judges a call of a supervisor; most calls end the run."""
+        """Handles a supervisor call; most calls end the run."""
         if call == "simulationQuit":
             self.log.outcome = "quit"
             return
@@ -197,7 +197,7 @@ class StepServer:
         return [*motion, *frame.vector(0.0, 0.0, turn_rate(poses, dt))]
 
     def _places(self) -> dict[int, tuple[list[float], list[float]]]:
-        """Poses of moved nodes, for a supervisor; empty while the file's are valid."""
+        """Poses of moved nodes for a supervisor; empty while all are as in the file."""
         stage, at_start = self._stage, self.log.steps == 0
         if not stage.is_supervisor or (at_start and not stage.is_moved):
             return {}

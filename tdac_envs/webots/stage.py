@@ -37,8 +37,9 @@ class Stage:
         text: Content of the file.
         world: World, always with a goal; see `has_goal`.
         is_moved: Whether the robot starts elsewhere than in the file.
-        has_goal: Whether a goal is given; else that of `world` is the farthest place.
-        left_out: Names or types of unmodelled nodes that are ignored.
+        has_goal: Whether a goal is given; else that of `world` is a placeholder, the
+            farthest reachable point.
+        left_out: Names or types of unmodelled nodes that are left out.
         scene: Nodes of the file.
         robot: Node of the robot.
         frame: Conversion of the robot's pose to the file's coordinates.
@@ -66,7 +67,7 @@ class Stage:
         return flag(self.robot, "supervisor", False)
 
     def facts(self) -> dict[str, Any]:
-        """The facts that the `controller` package gets at the start."""
+        """The facts that the `controller` package receives at the start."""
         number = self.scene.number(self.robot)
         nodes = [node.plain() for node in self.scene.nodes]
         return {
@@ -129,7 +130,7 @@ def open_stage(
     Args:
         path: The `.wbt` file.
         goal: (x, y), m; by default the file's, if it has one.
-        ignore: Names or types of unmodelled nodes that may be left out.
+        ignore: Names or types of unmodelled nodes to leave out.
         start: (x, y) or (x, y, heading), m and rad; by default the file's.
 
     Raises:
@@ -183,7 +184,7 @@ def _find_robot(nodes: Iterable[Node], top: Frame, name: str) -> Found:
 
 
 def _farthest(world: World) -> tuple[float, float]:
-    """The reachable place farthest from the robot; its own if it is shut in."""
+    """The reachable point farthest from the robot; its position if there is none."""
     ground = Ground.of(world)
     free = open_field(ground.free(BODY_RADIUS))
     begin = entry(ground, free, world.robot.pose[:2])

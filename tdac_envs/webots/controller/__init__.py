@@ -1,9 +1,9 @@
 """The `controller` package of a run: the Python API of Webots R2025a.
 
 The package is copied to the folder in which a controller runs, so it uses only the
-standard library and nothing else of tdac. It knows the simulation only through the
+standard library and nothing else of tdac. It accesses the simulation only through the
 `World` given to `connect`, one step at a time. It handles invalid calls as Webots
-does, as far as that is known.
+does, where that is known.
 """
 
 from .absent import (

@@ -1,7 +1,7 @@
 """Devices that are not modelled.
 
-Devices of every e-puck are present, but return no data, and print this once. The other
-classes exist only so that they can be imported.
+Devices that every e-puck has return no data and print this once. The other classes
+exist only so that they can be imported.
 """
 
 from __future__ import annotations

@@ -102,7 +102,7 @@ def c_int(value: Any) -> int:
     """Returns a value that Webots' C functions accept as an int.
 
     Raises:
-        ctypes.ArgumentError: They do not accept it; 32.0 is refused, too.
+        ctypes.ArgumentError: The value is not an int; even 32.0 is not accepted.
     """
     if not isinstance(value, int):
         raise ctypes.ArgumentError(
@@ -115,6 +115,6 @@ def c_double(value: Any) -> float:
     """Returns a value that Webots' C functions accept as a double.
 
     Raises:
-        TypeError: They do not accept it.
+        TypeError: The value is not a number.
     """
     return ctypes.c_double(value).value

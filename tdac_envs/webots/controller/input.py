@@ -1,4 +1,4 @@
-"""Keyboard, mouse and joystick, none of which gives any input."""
+"""Keyboard, mouse and joystick, which never give any input."""
 
 from __future__ import annotations
 

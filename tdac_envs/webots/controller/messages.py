@@ -23,7 +23,7 @@ def once(text: str) -> None:
 
 
 def unsupported(call: str, result: Any = None) -> Callable[..., Any]:
-    """Makes a function for an unsupported call: prints that once, returns `result`."""
+    """A function that prints once that `call` is unsupported and returns `result`."""
 
     def absent(*_: Any, **__: Any) -> Any:
         once(f"tdac: {call}() is not supported; it has no effect")

@@ -68,7 +68,7 @@ class Motor(Device):
         connection.command(self.name, "pid", gains)
 
     def getTargetPosition(self) -> float:
-        """Target angle as set, rad."""
+        """Angle given to `setPosition`, rad."""
         return self.target_position
 
     def getMinPosition(self) -> float:
@@ -80,7 +80,7 @@ class Motor(Device):
         return 0.0
 
     def getVelocity(self) -> float:
-        """Velocity as set, not as driven, rad/s."""
+        """Velocity given to `setVelocity`, not the actual velocity, rad/s."""
         return self.target_velocity
 
     def getMaxVelocity(self) -> float:
@@ -88,11 +88,11 @@ class Motor(Device):
         return self.max_velocity
 
     def getAcceleration(self) -> float:
-        """Acceleration as set, rad/s²."""
+        """Acceleration given to `setAcceleration`, rad/s²."""
         return self.target_acceleration
 
     def getAvailableTorque(self) -> float:
-        """Torque as set, N m."""
+        """Torque given to `setAvailableTorque`, N m."""
         return self._torque
 
     def getMaxTorque(self) -> float:

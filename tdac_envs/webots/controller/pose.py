@@ -34,7 +34,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def moved(a: Matrix, by: list[float], point: list[float]) -> list[float]:
-    """Converts a point of a frame to the parent frame: a point + by."""
+    """Converts a point of a frame to the parent frame: `a @ point + by`."""
     return [by[i] + sum(a[i][k] * point[k] for k in range(3)) for i in range(3)]
 
 

@@ -12,7 +12,7 @@ from .robot import Robot
 
 
 class Supervisor(Robot):
-    """A robot with `supervisor TRUE`; without this field its calls are refused.
+    """A robot with `supervisor TRUE`; without it, supervisor calls are refused.
 
     It may query everything, but not move anything, since the run is judged.
     """
@@ -59,7 +59,7 @@ class Supervisor(Robot):
         may_supervise("wb_supervisor_node_get_selected")
 
     def simulationGetMode(self) -> int:
-        """Mode as set; initially SIMULATION_MODE_FAST."""
+        """Mode given to `simulationSetMode`; initially SIMULATION_MODE_FAST."""
         return self._mode
 
     def simulationSetMode(self, mode: int) -> None:
@@ -127,7 +127,7 @@ def _scene() -> list[dict[str, Any]]:
 
 
 def _defined(name: str, within: int) -> int:
-    """Number of the first node of a DEF name (inside `within`, unless -1), or -1."""
+    """Number of the first node with a DEF name (in `within` unless -1); -1 if none."""
     for number, node in enumerate(_scene()):
         if node["def"] == name and (within < 0 or _is_in(number, within)):
             return number
