@@ -68,7 +68,9 @@ def make(words: str, options: Options) -> Scripted:
         ProviderError: The script cannot be used.
     """
     if not words:
-        raise ProviderError("which script? As in scripted:weak, or scripted:my.yaml")
+        raise ProviderError(
+            "scripted: needs a script, as in scripted:weak or scripted:my.yaml"
+        )
     own = shipped(f"scripts/{words}.yaml")
     file = own if own.is_file() else Path(words)
     script = read_yaml(file, Script, "the script", ProviderError)

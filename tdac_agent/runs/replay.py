@@ -34,7 +34,7 @@ def make(words: str, options: Options) -> Replay:
     """
     del options
     if not words:
-        raise ProviderError("which run? As in replay:runs/maze-1")
+        raise ProviderError("replay: needs a run, as in replay:runs/maze-1")
     folder = DEMO if words == "demo" else Path(words)
     try:
         recorded = load_run(folder)

@@ -140,6 +140,11 @@ def kept_report(
     return report if same else None
 
 
+def _suite_name(task: Task, folder: Path) -> str:
+    own = task.environment
+    return own.folder.name if folder == own.suite else folder.name
+
+
 def suite_sha256(task: Task) -> str:
     """Hash of all tests that controllers of a task must pass."""
     return _hash_of_suites(_suites(task))
@@ -225,7 +230,7 @@ def _provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
         called=called(task),
         own_suite=_own_suite_hash(suites),
-        suite=" + ".join(folder.name for folder in suites.values()),
+        suite=" + ".join(_suite_name(task, folder) for folder in suites.values()),
         suite_sha256=_hash_of_suites(suites),
         profile=job.profile,
         paper=job.paper,

@@ -45,7 +45,7 @@ def test_held_out_starts_are_told_by_name_only(small_task, warm):
     )
     text = render_feedback(report_with(report, failure))
     assert "test_gap" in text
-    assert "held out" in text
+    assert "held-out" in text
     assert "1.25" not in text
     assert "71" not in text
 

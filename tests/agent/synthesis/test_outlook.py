@@ -141,8 +141,8 @@ def test_a_dry_run_with_models_of_ones_own(tmp_path, tdac):
         ("antropic:x", "did you mean 'anthropic'"),
         ("command:none-such", "there is no program 'none-such'"),
         ("replay:none", "cannot replay: none is not a run folder"),
-        ("manual:", "which folder"),
-        ("openai:", "which model"),
+        ("manual:", "needs a folder, as in"),
+        ("openai:", "needs a model, as in"),
     ],
 )
 def test_a_dry_run_of_what_cannot_be(tmp_path, tdac, name, reason):

@@ -143,7 +143,7 @@ OFFERS = [
     _offer("crowded", _crowded, "more than 10000 files"),
     _offer("bomb", _bomb, "more than 128 MB when unpacked"),
     _offer("inner_bomb", _inner_bomb, "more than 128 MB when unpacked"),
-    _offer("other_method", _bzip2, "a method that is not used here"),
+    _offer("other_method", _bzip2, "unsupported compression method"),
     _offer("lying", _lying, "damaged zip file"),
     _offer("data_torn", policy(b"{"), "its `data` is damaged"),
     _offer("data_deep", policy(b"[" * 100_000), "its `data` is damaged"),

@@ -22,7 +22,7 @@ OFFERS = [
     _offer("endless", link("w.wbt", "/dev/zero"), "not a regular file", True),
     _offer("pipe", pipe("w.wbt"), "not a regular file", True),
     _offer("large", text("w.wbt", b" " * 2_000_001), "larger than 2 MB"),
-    _offer("deep", world("Group { children [ " * 3000), "at most 100 nodes"),
+    _offer("deep", world("Group { children [ " * 3000), "at most 100 nested nodes"),
     _offer("digits", world(f"WorldInfo {{ basicTimeStep {'9' * 5000} }}"), "number"),
     _offer("far", world("E-puck { translation 1e300 0 0 }"), "beyond 1e\\+06"),
     _offer("nan", world("E-puck { translation nan 0 0 }"), "after nan"),
@@ -30,5 +30,5 @@ OFFERS = [
         "thin", world("Solid { children [ Shape { geometry Sphere { radius -1e9"), ""
     ),
     _offer("string", world('E-puck { name "never closed'), "not closed"),
-    _offer("itself", world("DEF A Group { children [ USE A ] }"), "no DEF A above"),
+    _offer("itself", world("DEF A Group { children [ USE A ] }"), "no DEF A before it"),
 ]

@@ -181,7 +181,7 @@ class TestRefused:
             ("mase", r"no map 'mase': no such file \(did you mean 'maze'\?\)"),
             ("nowhere/map.png", "no map 'nowhere/map.png': no such file"),
             (np.zeros((4, 4)), "expected a bool array .* got float64"),
-            ([[0, 1], [0]], "rows of the same length"),
+            ([[0, 1], [0]], "rows of the map to have the same length"),
             ([[0, 2], [0, 1]], "expected a bool array"),
             (None, "expected a bool array"),
             (np.zeros(4, bool), "expected a 2-D grid"),

@@ -249,7 +249,9 @@ def test_a_mesh_beyond_all_bounds_is_not_modelled():
     )
     (node,) = world.unmodelled
     assert node.may_be_solid
-    assert node.why.startswith("its boundingObject is a mesh with 1100 faces")
+    assert node.why.startswith(
+        "its boundingObject is a non-convex mesh with 1100 faces"
+    )
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(3, 40))
