@@ -51,7 +51,7 @@ class Addresses:
 
 
 def words_of(arrays: Iterable[NDArray[Any]]) -> Words:
-    """The words of some arrays, shape (arrays, 4); the caller keeps these alive."""
+    """The words of arrays, shape (arrays, 4); the caller must keep the arrays alive."""
     words = []
     for array in arrays:
         if not array.flags.c_contiguous:
@@ -77,21 +77,21 @@ _pointer = ctypes.c_void_p if config.DISABLE_JIT else _compiled_pointer
 
 @subkernel
 def line(words: Words, dtype: type[Any]) -> NDArray[Any]:
-    """The one-dimensional array with these words."""
+    """The one-dimensional array that the four words describe."""
     array: NDArray[Any] = carray(_pointer(int(words[0])), (words[1],), dtype)
     return array
 
 
 @subkernel
 def plane(words: Words, dtype: type[Any]) -> NDArray[Any]:
-    """The two-dimensional array with these words."""
+    """The two-dimensional array that the four words describe."""
     array: NDArray[Any] = carray(_pointer(int(words[0])), (words[1], words[2]), dtype)
     return array
 
 
 @subkernel
 def block(words: Words, dtype: type[Any]) -> NDArray[Any]:
-    """The three-dimensional array with these words."""
+    """The three-dimensional array that the four words describe."""
     shape = words[1], words[2], words[3]
     array: NDArray[Any] = carray(_pointer(int(words[0])), shape, dtype)
     return array

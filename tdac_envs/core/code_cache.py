@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parents[1]
 
 
 def has_code(package: str) -> bool:
-    """Whether compiled steps of an environment, of any version, are on disk.
+    """Whether compiled code for an environment's steps, of any version, is on disk.
 
     Does not import numba, which is slow.
 

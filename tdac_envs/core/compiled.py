@@ -28,9 +28,9 @@ KERNELS: list[Any] = []
 def kernel(function: F) -> F:
     """Decorator: compiles a function at its first call, or loads it from disk.
 
-    All calls from Python must use the same types: numbers are float or int as
-    annotated, arrays that are only read are `constant`. Each other combination is
-    compiled separately, and numba may lose some if processes write at the same time.
+    All calls from Python must use the same types: float or int as annotated, and
+    `constant` for arrays that are only read. Every other combination of types is
+    compiled separately, and concurrent processes may lose each other's results.
 
     With `NUMBA_DISABLE_JIT=1` the function is not compiled.
     """

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 LONGEST = 200
-"""Most characters that an error quotes from a file."""
+"""Largest number of characters that an error quotes from a file."""
 
 
 class TdacError(Exception):
@@ -26,11 +26,11 @@ class TaskError(TdacError):
 
 
 class PolarityError(TaskError):
-    """Dark and light obstacles are both likely: the user must choose.
+    """A map's obstacles may be dark or light: the user must choose.
 
     Attributes:
         name: Name of the map.
-        pictures: Image, grid and parameters of the preview of each polarity.
+        pictures: Image, grid and parameters for a preview, by polarity.
         folder: Folder for both previews, set by the command line; None for the default.
     """
 
@@ -54,7 +54,7 @@ class WorldFileError(WorldError):
 def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
     """The first problem of a validation error, as `path.to.key: problem`.
 
-    Unknown keys come first: a misspelt key also makes the right one missing.
+    Unknown keys are reported before missing ones: a misspelt key causes both.
 
     Args:
         error: Error of a pydantic model.
@@ -71,7 +71,7 @@ def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
 
 
 def why(error: Exception) -> str:
-    """Why a file cannot be used, in one line: its OS error or its first problem."""
+    """One-line reason for not using a file: the OS error or the first problem."""
     from pydantic import ValidationError
 
     if isinstance(error, ValidationError):

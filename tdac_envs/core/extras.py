@@ -14,9 +14,9 @@ PACKAGE = "tdac"
 
 
 def install_command(extra: str) -> str:
-    """The command that installs an extra from the source of the package itself.
+    """The command that installs an extra from where the package was installed from.
 
-    An installed package has a record of its source unless it came from an index
+    pip records the source of a package unless it came from an index
     (PEP 610).
 
     Args:

@@ -80,7 +80,7 @@ def read_file(path: str | Path, most: int, offset: int = 0) -> bytes:
         raise
     finally:
         os.close(handle)
-    if data is None:  # no data yet: it only claims to be regular
+    if data is None:  # a read would block, so the file is not really regular
         raise _refused(errno.EINVAL, "not a regular file", path)
     if len(data) > most:
         raise _too_large(most, path)
@@ -136,7 +136,7 @@ def read_zip(
     Raises:
         ValueError: It is not a zip file, is damaged, or a limit is exceeded.
     """
-    # zipfile reads the whole directory, in which each file has this signature.
+    # Each entry of the zip directory begins with this signature.
     if data.count(b"PK\x01\x02") > _MOST_FILES:
         raise ValueError(f"more than {_MOST_FILES} files in the zip file")
     try:
@@ -207,7 +207,7 @@ def check(value: Any, *, any_text: bool = False) -> None:
 
     Args:
         value: The parsed value.
-        any_text: Whether strings may have lone surrogates, as replies of models do.
+        any_text: Whether strings may have lone surrogates, as model replies may.
 
     Raises:
         ValueError: A number is not finite or has more than 64 bits, a string has a lone
@@ -245,7 +245,7 @@ def _is_unicode(text: str) -> bool:
 
 
 class _Loader(yaml.SafeLoader):
-    """Limits the depth, and the number of nodes with aliases expanded."""
+    """Limits the nesting depth and the number of nodes after expanding aliases."""
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)

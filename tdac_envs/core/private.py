@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-# Bytes. On a full disk, numba would fail only after it has compiled a kernel.
+# Bytes. On a full disk, numba fails only after compiling a kernel.
 LEAST_FREE = 100_000_000
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 Rows = NDArray[np.int64]
 
-# Rows per thread from which another thread is worthwhile.
+# With fewer rows per thread, another thread does not pay off.
 _LEAST = 64
 
 
@@ -87,7 +87,7 @@ class Slices:
 
 
 def _cores() -> int:
-    """Number of cores that this process may use; outside Linux, of all cores."""
+    """Number of cores that this process may use; of all cores if that is unknown."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

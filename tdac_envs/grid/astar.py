@@ -1,7 +1,7 @@
 """A* on a grid: 8-connected, octile cost, no corner cutting.
 
-The lengths are exact on all shortest paths, not just on one: a descent takes the same
-path as on a complete `plan.distance_field`.
+The lengths are exact on all shortest paths, not just on one, so a descent takes the
+same path as on a complete `plan.distance_field`.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ _DX = np.array([1, -1, 0, 0, 1, 1, -1, -1])
 _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _SQRT2 = 2.0**0.5
 _BITS, _DIRECTION = 4, 15
-"""The low bits of a bucket's entry: the direction in which its pixel was reached."""
+"""Number and mask of an entry's low bits: the direction in which it was reached."""
 _NO_DIRECTION = 8
 """Direction of the first pixel, to which no step leads."""
 _ONWARD = np.array([1 << k for k in range(4)] + [0x15, 0x29, 0x46, 0x8A] + [0xFF])
 """Bits of the directions to search, by the direction in which a pixel was reached."""
 _ASIDE = np.array([[0x14, 0x28], [0x44, 0x88], [0x11, 0x42], [0x21, 0x82]])
-"""Bits to add after a straight step, for a wall on either side of its origin."""
+"""Bits to add after a straight step with a wall to one side of its origin."""
 _PER_PIXEL = 2
 """Buckets per px of path length: within half a px, few pixels are reached twice."""
 _BUCKETS = 8
@@ -35,13 +35,13 @@ _BUCKETS = 8
 _PIXELS_PER_ENTRY = 4
 """Pixels of the map per entry of a bucket of initial size."""
 ROUNDING = 1e-6
-"""Above the rounding error of a sum of steps; distinct lengths differ by > 1e-5 px."""
+"""Tolerance, px: above the rounding errors, below the gap between lengths (1e-5)."""
 _LEVEL, _DONE, _COUNTS = 0, 1, 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Guide:
-    """Lengths from the start, a heuristic for searches in subsets of the same space.
+    """Lengths from the start, as a heuristic for searches in subsets of the space.
 
     Attributes:
         lengths: Shape (height + 2, width + 2), float64, from `lengths_between`.
@@ -55,7 +55,7 @@ class Guide:
 def lengths_between(
     free: BoolGrid, start: Point, goal: Point, guide: Guide | None = None
 ) -> Lengths:
-    """Lengths to the goal from the pixels on the shortest paths from the start.
+    """Lengths to the goal from all pixels on the shortest paths from start to goal.
 
     Args:
         free: Shape (height, width), bool, True where the path may go.
@@ -64,9 +64,9 @@ def lengths_between(
         guide: Result of a search in the other direction, in `free` or a superset.
 
     Returns:
-        Shape (height + 2, width + 2), float64, with a border: an upper bound of the
-        length at other pixels, inf at the start if there is no path, and -1 where no
-        path may go.
+        Shape (height + 2, width + 2), float64, with a border. At pixels on no shortest
+        path it is an upper bound; at the start inf if there is no path; and -1 where
+        the path may not go.
     """
     height, width = free.shape
     field: Lengths = np.empty((height + 2, width + 2))
@@ -123,7 +123,7 @@ def _heuristic(
 
 @subkernel
 def _directions(field: Lengths, width: int, cell: int, direction: int) -> int:
-    """Bits of the directions to search from a pixel that was reached in a direction.
+    """Bits of the directions to search from a pixel, by how it was reached.
 
     Of several equally long paths to a pixel, only the one that starts with its diagonal
     steps must be found; the pixels on the others are found in the same manner. Source:

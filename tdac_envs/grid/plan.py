@@ -150,7 +150,7 @@ def plan_path(
     goal: tuple[int, int],
     guide: Guide | None = None,
 ) -> Path:
-    """The shortest path between two pixels: that of `descend` on a complete field.
+    """The shortest path between two pixels, as from `descend` on a complete field.
 
     Args:
         free: Shape (height, width), bool, True where the path may go.
@@ -200,7 +200,7 @@ def plan_paths(
 
 
 def _path_in(free: BoolGrid, lengths: Lengths | None, start: tuple[int, int]) -> Path:
-    """The path of `plan_path` in a subset of a space, if as short as in the space.
+    """The result of `plan_path` in a subset, if it is as short as in the whole space.
 
     Args:
         free: The subset, shape (height, width).
