@@ -16,7 +16,7 @@ CLOSE_UP = 372
 
 
 class Window(NamedTuple):
-    """A square part of a map or world: least x and y, and side, in units of places."""
+    """A square part of a map or world: smallest x and y, and side length, px or m."""
 
     x: float
     y: float
@@ -24,7 +24,7 @@ class Window(NamedTuple):
 
 
 class Chart(Protocol):
-    """A canvas and the conversion of places to its coordinates."""
+    """A canvas and the conversion of map or world points to its coordinates."""
 
     @property
     def canvas(self) -> Canvas:
@@ -35,7 +35,7 @@ class Chart(Protocol):
         """Frame px per unit of length."""
 
     def at(self, points: Points) -> Points:
-        """Places, shape (n, 2), converted to canvas coordinates."""
+        """Points, shape (n, 2), px or m, converted to canvas coordinates."""
 
     def turned(self, heading: float) -> float:
         """A heading converted to the canvas, where y points down; rad."""
@@ -46,13 +46,13 @@ class Backdrop(Protocol):
 
     @property
     def radius(self) -> float:
-        """Radius of the body, in units of places."""
+        """Radius of the body, px or m."""
 
     def whole(self) -> Chart:
         """A chart of the whole map or world, with start, goal and shortest path."""
 
     def window(self, middle: Points, extent: float) -> Window:
-        """A part around a place, at least `extent` wide."""
+        """A part around a point, at least `extent` wide."""
 
     def close_up(self, window: Window) -> Chart:
         """A chart of a part, `CLOSE_UP` px wide."""

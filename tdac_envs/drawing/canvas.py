@@ -1,4 +1,4 @@
-"""A canvas for maps: it takes map pixels and draws anti-aliased frame pixels."""
+"""A canvas for maps: takes map coordinates and draws anti-aliased frame pixels."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _TEXT_ZOOM = 4
 
 
 def frame_scale(width: int, height: int) -> float:
-    """Frame pixels per map pixel: whole for small maps, below 1 for huge ones."""
+    """Frame pixels per map pixel: an integer for small maps, below 1 for huge ones."""
     longest = max(width, height)
     if longest > LARGEST:
         return LARGEST / longest
@@ -54,7 +54,7 @@ class Canvas:
         strip: Height of the strip, frame px.
         scale: Frame pixels per map pixel; by default `frame_scale`.
         origin: Map pixel (x, y) of the first cell, for a part of a map.
-        narrowest: Least width, frame px.
+        narrowest: Minimum width, frame px.
 
     Attributes:
         image: Shape (rows, columns, 3), uint8 RGB; both sides are even, as video

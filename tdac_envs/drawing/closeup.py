@@ -30,10 +30,10 @@ EARLY: Colour = (176, 168, 232)
 COLUMN, MARGIN = 400, 14
 _LINE, _CHARACTERS = 21, 50
 _PIECES = 16
-# Least margin around the event in a close-up, body radii.
-_AROUND = 5.0
-# Least enlargement at which a close-up is worthwhile.
-_WORTH = 1.5
+# Minimum margin around the event in a close-up, body radii.
+_MARGIN_RADII = 5.0
+# Minimum enlargement that justifies a close-up.
+_MIN_ZOOM = 1.5
 _SMALLEST_BODY = 4.0
 
 
@@ -44,7 +44,7 @@ class Event:
     Attributes:
         title: First line of the caption, ASCII.
         facts: Further lines of the caption; long ones are wrapped.
-        where: Shape (n, 2): places that the close-up must contain.
+        where: Shape (n, 2): points that the close-up must contain.
         contact: Point of a wall that the body touched.
         way: Shape (m, 2): the shortest path from the last position.
     """
@@ -67,7 +67,7 @@ def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
     chart, radius = background.whole(), background.radius
     canvas = chart.canvas
     window = _window(background, event, poses, chart.scale)
-    _draw_run(chart, poses, event, radius, way=window is None)
+    _draw_run(chart, poses, event, radius, show_path=window is None)
     close = None
     if window is not None:
         _draw_window(chart, window)
@@ -82,11 +82,11 @@ def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
 
 
 def _draw_run(
-    chart: Chart, poses: Points, event: Event, radius: float, *, way: bool
+    chart: Chart, poses: Points, event: Event, radius: float, *, show_path: bool
 ) -> None:
-    """Draws trail, last pose, contact and, if `way`, the shortest path from there."""
+    """Draws trail, last pose and contact; optionally the shortest path from there."""
     canvas, places = chart.canvas, chart.at(poses[:, :2])
-    if way and event.way is not None:
+    if show_path and event.way is not None:
         canvas.line(chart.at(event.way), GREEN, 2, 0.9, dash=6)
     body = max(radius * chart.scale, _SMALLEST_BODY)
     canvas.disc(places[0], 4, FREE)
@@ -121,9 +121,9 @@ def _window(
     """The part to enlarge; None if no close-up is worthwhile."""
     for where in (event.where, poses[-1:, :2]):
         low, high = where.min(axis=0), where.max(axis=0)
-        extent = float((high - low).max()) + 2.0 * _AROUND * background.radius
+        extent = float((high - low).max()) + 2.0 * _MARGIN_RADII * background.radius
         window = background.window((low + high) / 2.0, extent)
-        if CLOSE_UP / window.side >= _WORTH * scale:
+        if CLOSE_UP / window.side >= _MIN_ZOOM * scale:
             return window
     return None
 
@@ -140,7 +140,7 @@ def _draw_window(chart: Chart, window: Window) -> None:
 
 def _close_up(chart: Chart, poses: Points, event: Event, radius: float) -> Image:
     """The framed close-up of the run around the event."""
-    _draw_run(chart, poses, event, radius, way=True)
+    _draw_run(chart, poses, event, radius, show_path=True)
     close = chart.canvas.image[: chart.canvas.strip_top]
     cv2.rectangle(close, (0, 0), (close.shape[1] - 1, close.shape[0] - 1), EVENT, 2)
     return close

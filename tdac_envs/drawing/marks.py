@@ -29,10 +29,10 @@ Sprite = NDArray[np.float32]
 
 
 def load_sprite(file: Path, radius: float) -> Sprite | None:
-    """The robot's picture for `Canvas.paste`: three times a body of `radius` frame px.
+    """The robot's picture for `Canvas.paste`, for a body of `radius` frame px.
 
     Returns:
-        None if there is no such picture.
+        None if the file is missing or not an 8-bit picture.
     """
     picture = cv2.imread(str(file), cv2.IMREAD_UNCHANGED) if file.is_file() else None
     if picture is None or picture.dtype != np.uint8:

@@ -63,7 +63,7 @@ def write_video(frames: Iterable[Image], path: str | Path, fps: float) -> None:
 def _encode(
     frames: Iterable[Image], film: Path, fps: float, options: Sequence[str]
 ) -> None:
-    """Pipes the frames through one ffmpeg."""
+    """Pipes the frames through one ffmpeg process."""
     rest = iter(frames)
     first = next(rest, None)
     if first is None:
@@ -130,7 +130,7 @@ def _failure(code: int, messages: bytes) -> VideoError:
 
 
 def _ffmpeg() -> list[str]:
-    """The bundled ffmpeg with the options of every call."""
+    """The bundled ffmpeg with the options common to all calls."""
     from imageio_ffmpeg import get_ffmpeg_exe
 
     return [get_ffmpeg_exe(), "-hide_banner", "-loglevel", "error", "-nostdin", "-y"]

@@ -1,1 +1,1 @@
-"""For learning: observation wrappers, guidance, batches for Stable-Baselines3."""
+"""Observation wrappers, guidance and Stable-Baselines3 batches for learning."""

@@ -1,4 +1,4 @@
-"""Reference routes to a goal, and the next waypoint from any place."""
+"""Reference routes to a goal, and the next waypoint from any position."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ MARGINS = (0.5, 0.25, 0.1)
 REACH = 0.6
 """Distance of the next waypoint along the route, in body radii.
 
-A robot that drives straight at a waypoint cuts corners, the more the farther ahead it
-is; at this distance the body stays clear on every bundled map and world.
+A robot that drives straight to a waypoint cuts corners, more so the farther ahead it
+is; at this distance the body does not touch walls on any bundled map or world.
 """
 # Largest ratio of the length of a route with a margin to that of the shortest path.
 _DETOUR = 1.25
 _SQRT2 = 2.0**0.5
-# Distance from a goal within which the end of its routes is searched, grid points.
+# Largest distance of a route's end from the goal if possible, grid points.
 _BESIDE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """Routes to a goal from all places of a map or a world.
+    """Routes to a goal from all points of a map or a world.
 
-    A route follows the shortest path for the body to where a margin is free, and from
-    there the shortest path that keeps this margin.
+    A route follows the shortest path for the body until there is room for a margin,
+    then the shortest path that keeps this margin.
 
     Attributes:
-        goal: Point (x, y), px or m, like all places.
+        goal: Point (x, y), px or m.
         reach: Distance of a waypoint along the route, px or m.
         roomy: Shape (height, width), float32: length of the path with the margin from
             each grid point, in grid spacings; inf where there is none.
@@ -62,14 +62,14 @@ class Route:
     frame: tuple[float, float, float]
 
     def ahead(self, places: ArrayLike) -> NDArray[np.float64]:
-        """The next waypoint from each place.
+        """The next waypoint from each point.
 
         Args:
             places: Points or poses, shape (n, 2) or (n, 3).
 
         Returns:
-            Shape (n, 2): points `reach` further on the route, or the goal if it is
-            nearer or no route is near.
+            Shape (n, 2): points `reach` further along the route, or the goal if it is
+            nearer or there is no route nearby.
         """
         left, low, spacing = self.frame
         points = np.asarray(places, np.float64)[:, :2]
@@ -154,7 +154,7 @@ def _roomy(
 
 
 def _length(field: Lengths, at: Any, far: float) -> float:
-    """The shortest length from a point to the goal through a grid point nearby."""
+    """The shortest length from a point to the goal through a nearby grid point."""
     column, row, reach = round(at[0]), round(at[1]), math.ceil(far) + 1
     top, left = max(row - reach, 0), max(column - reach, 0)
     part = field[top : row + reach + 1, left : column + reach + 1]
@@ -165,11 +165,11 @@ def _length(field: Lengths, at: Any, far: float) -> float:
 
 @subkernel
 def _entry(shortest: Lengths, column: float, row: float) -> tuple[int, int, float]:
-    """Column and row of the nearest grid point with a route, or -1; its distance."""
+    """Column, row and distance of the nearest grid point with a route; -1, -1, inf."""
     height, width = shortest.shape
     x, y, best = -1, -1, math.inf
     at_x, at_y = round(column), round(row)
-    # The body may be slightly beside the points with a route.
+    # The body may be slightly off the points with a route.
     for j in range(max(at_y - 3, 0), min(at_y + 4, height)):
         for i in range(max(at_x - 3, 0), min(at_x + 4, width)):
             hop = math.hypot(i - column, j - row)
@@ -180,7 +180,7 @@ def _entry(shortest: Lengths, column: float, row: float) -> tuple[int, int, floa
 
 @subkernel
 def _next(field: Lengths, x: int, y: int) -> tuple[int, int, float]:
-    """The next grid point down a field, and the length of the step; 0 at its end."""
+    """The next grid point down a field, and the length of the step; 0 at the goal."""
     height, width = field.shape
     least, to_x, to_y, step = math.inf, x, y, 0.0
     for j in range(max(y - 1, 0), min(y + 2, height)):
@@ -202,7 +202,7 @@ def _look_ahead(
     reach: float,
     found: NDArray[np.float64],
 ) -> None:
-    """Finds the next waypoint from a place; all lengths in spacings.
+    """Finds the next waypoint from a point; all lengths in grid spacings.
 
     Args:
         roomy: See `Route`.
@@ -231,7 +231,7 @@ def look_ahead(batch: Words, rows: Words) -> None:
     Args:
         batch: A row of `tdac_envs.core.addresses.Addresses` of four arrays: the
             `words` of `roomy` and `shortest` of each robot's route, shape (n, 2, 4);
-            places, shape (n, 2), fractional columns and rows; reaches, shape (n,), in
+            points, shape (n, 2), fractional columns and rows; reaches, shape (n,), in
             spacings; waypoints, shape (n, 2), overwritten with grid points, inf for the
             goal itself.
         rows: Indices of the robots, shape (k,).

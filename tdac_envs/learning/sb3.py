@@ -34,9 +34,9 @@ Indices = int | Iterable[int] | None
 class SB3VecEnv(VecEnv):
     """A batch as a Stable-Baselines3 `VecEnv`; arrays are passed on without a copy.
 
-    A robot's `info` is empty except in the last step of an episode, where it is that of
-    a single environment with `terminal_observation` and `TimeLimit.truncated`: filling
-    a thousand dictionaries would take longer than the step.
+    Filling a thousand `info` dictionaries would take longer than the step, so they are
+    empty except in the last step of an episode: there, a robot's `info` is that of a
+    single environment, with `terminal_observation` and `TimeLimit.truncated` added.
 
     Args:
         batch: Made with `autoreset_mode="SameStep"`; may be a `WrappedVectorEnv`.

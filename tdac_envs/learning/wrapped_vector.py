@@ -21,7 +21,7 @@ from tdac_envs.learning.wrappers import Frame, check_wrappers, guided_space
 
 Array = NDArray[np.float64]
 Seen = Any
-"""Observations of a batch, or one array where they are flattened."""
+"""Observations of a batch: a dict of arrays, or one array if flattened."""
 
 
 class Routes:

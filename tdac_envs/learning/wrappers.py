@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 Env = gym.Env[Any, NDArray[np.float32]]
 
 MIDDLE = 10.0
-"""Distance of the goal that is observed as 1/2, in body radii."""
+"""Goal distance that is observed as 1/2, in body radii."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ class Frame:
         return cls(task.body_radius, True, "ps", float(LARGEST))
 
     def seen(self, poses: ArrayLike, places: ArrayLike) -> NDArray[np.float64]:
-        """Places in the robot's frame: distances ahead and to its left.
+        """Points in the robot's frame: distances ahead and to its left.
 
         Args:
             poses: Shape (…, 3): x, y, heading.
@@ -87,7 +87,7 @@ class Frame:
         return np.stack([dx * cos + dy * sin, left if self.up else -left], axis=-1)
 
     def goal_relative(self, observation: Observation) -> Observation:
-        """An observation or a batch as `GoalRelativeObservation` returns it."""
+        """Converts an observation, or a batch, as `GoalRelativeObservation` does."""
         seen = self.seen(observation["pose"], observation["goal"])
         distance = np.hypot(seen[..., 0], seen[..., 1])[..., None]
         near = distance / (distance + MIDDLE * self.radius)
@@ -156,7 +156,7 @@ class GoalRelativeObservation(
     | `goal` | (3,) | [-1, 1] | direction of the goal in the robot's frame: ahead and |
     | | | | left (a unit vector); its distance d as d / (d + 10 body radii) |
     | `wheel_speeds` | (2,) | [-1, 1] | left, right, as last applied |
-    | `ranges` or `ps` | (n,) | [0, 1] | share of the largest reading |
+    | `ranges` or `ps` | (n,) | [0, 1] | reading / largest possible reading |
 
     Left is the robot's left in the picture, in both environments.
 
@@ -189,8 +189,8 @@ class Guidance(
 
     The route is the shortest path for the body that keeps a margin
     (`tdac_envs.learning.guidance`), from the robot's current position. The waypoint is
-    `reach` further on it, or the goal if that is nearer. The route is computed from the
-    whole map and the true pose, so a policy with guidance has more than its sensors.
+    `reach` further along it, or the goal if that is nearer. The route is computed from
+    the whole map and the true pose, so a policy with guidance uses more than sensors.
 
     Args:
         env: Either environment; its observations must be a `Dict`.
@@ -244,7 +244,7 @@ def wrap(env: Env, names: Sequence[str]) -> Env:
 
     Args:
         env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0`.
-        names: Names in `WRAPPERS`; `flatten` makes the `Dict` a `Box`, by sorted keys.
+        names: Names in `WRAPPERS`; `flatten` concatenates a `Dict` by sorted keys.
 
     Raises:
         TaskError: A name is unknown, or a wrapper does not support the observations.
