@@ -1,1 +1,1 @@
-"""From a map picture to an occupancy grid and its parameters."""
+"""Converts a map picture to an occupancy grid and its parameters."""

@@ -46,7 +46,7 @@ def unknown_level(luminance: GreyImage) -> int | None:
     """The grey that a mapping tool wrote for "unknown", or None.
 
     It is about 205 (ROS `map_saver`) or 128; in a negative 50 or 127. It counts only if
-    it is a large, flat level and there are black and white pixels, too.
+    many pixels have exactly this level and there are black and white pixels, too.
     """
     share = np.bincount(luminance.ravel(), minlength=256) / luminance.size
     written = saved_level(luminance)
@@ -64,10 +64,10 @@ def unknown_level(luminance: GreyImage) -> int | None:
 
 
 def outside(luminance: GreyImage, light_free: bool, ignored: BoolGrid) -> BoolGrid:
-    """The paper around a plan: all that is connected to the border without a line.
+    """The paper around a plan: the area connected to the border without crossing lines.
 
     Half the contrast of Otsu's threshold is enough for a line, so that windows drawn in
-    grey are lines.
+    grey count as lines.
 
     Args:
         luminance: Shape (height, width), uint8.

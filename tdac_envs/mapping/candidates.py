@@ -77,7 +77,7 @@ def ranked(scene: Scene, preset: Preset) -> list[Candidate]:
     positive("robot_radius", scene.radius)  # checks the upper limit
     search = _paper_grid if preset == "paper" else _staged_search
     tried = list(search(scene))
-    # The failure of the plainest reading comes first: later ones only ignore more.
+    # The failure of the plainest reading comes first: later readings only ignore more.
     return sorted(tried, key=lambda c: (c.reason is not None, -c.score))
 
 
@@ -117,7 +117,7 @@ def _paper_grid(scene: Scene) -> list[Candidate]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Family:
-    """Readings of one polarity, and a guide for their paths; None if there are none."""
+    """Readings of one polarity, and a guide for their paths; None if no path exists."""
 
     readings: list[Reading]
     guide: Guide | None

@@ -23,9 +23,9 @@ def cleanings(cells: BoolGrid, strengths: Sequence[int]) -> list[BoolGrid]:
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
-        strengths: In ascending order. Obstacle pieces (8-connected) and then holes
-            (free pieces, 4-connected) with fewer pixels are removed, and obstacles are
-            closed with a 3 x 3 square. 0 changes nothing.
+        strengths: In ascending order, px. Obstacle pieces (8-connected) and then holes
+            (free pieces, 4-connected) with fewer pixels than this are removed, and
+            obstacles are closed with a 3 x 3 square. 0 changes nothing.
 
     Returns:
         One grid per strength, shape (height, width), bool; the same array again if two

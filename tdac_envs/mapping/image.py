@@ -1,4 +1,4 @@
-"""Loads the pictures of map files; obstacles are decided later."""
+"""Loads map files; obstacles that a file does not define are inferred later."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MAX_PIXELS = 64_000_000
 """Largest number of pixels of a picture."""
 
-# Formats that decode without a helper program, so that no file starts a process.
+# Formats that Pillow decodes without starting a helper process.
 _FORMATS = ("PNG", "JPEG", "PPM", "BMP", "GIF", "TIFF", "WEBP")
 
 _BT709 = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -216,7 +216,7 @@ def _to_eight_bits(values: NDArray[np.float64]) -> GreyImage:
 
 
 def _composite(rgba: NDArray[np.uint8]) -> ColourImage:
-    """Composites over white, or over black for light ink on a transparent sheet."""
+    """Composites over white, or over black for light ink on a transparent page."""
     alpha = rgba[..., 3:].astype(np.float32) / 255.0
     inked = rgba[..., :3] * alpha
     over_white = np.rint(inked + 255.0 * (1.0 - alpha)).astype(np.uint8)

@@ -1,8 +1,8 @@
-"""Evens the light of photographed plans, so that one threshold separates the walls.
+"""Evens the light in photographed plans, so that one threshold separates the walls.
 
 At the edge of a wall, the right threshold is half-way between the two sides. A smooth
-surface through these values follows the light (Yanowitz and Bruckstein, 1989), for dark
-walls as for light ones.
+surface through these values follows the light (Yanowitz and Bruckstein, 1989), for both
+dark and light walls.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from tdac_envs.mapping.image import ColourImage, GreyImage, luminance
 LEVEL = 127.5
 """Luminance threshold of an evened picture."""
 _FEW_LEVELS, _DRAWN = 8, 0.7
-"""A drawing, unlike a photograph, has this share of its pixels in so few levels."""
+"""A drawing, unlike a photograph, has 0.7 of its pixels in its 8 commonest levels."""
 _CELL = 8
 """Side of the squares in which edges are summed up, px."""
 _WINDOW = np.ones((7, 7), np.uint8)
 _STRONG, _WEAK = 0.45, 0.25
-"""Least contrast of edges that set the threshold, and of edges that may separate two
+"""Minimum contrast of edges that set the threshold, and of edges that may separate two
 areas, as shares of the strongest."""
 
 Surface = NDArray[np.float32]
@@ -44,10 +44,10 @@ class Evened:
 
 
 def photographed(grey: GreyImage) -> bool:
-    """Whether the picture is a photograph: it, or its lighter side, has many levels.
+    """Whether the picture, or its light part, has many levels, as in a photograph.
 
     A drawing has most of its pixels in a few levels, even if it is anti-aliased. The
-    darker side of a photograph may have few levels, too.
+    dark part of a photograph may have few levels, too.
     """
     counts = np.bincount(grey.ravel(), minlength=256)
     lighter = counts[int(otsu(grey)) + 1 :]
@@ -55,7 +55,7 @@ def photographed(grey: GreyImage) -> bool:
 
 
 def _in_few(counts: NDArray[np.intp]) -> float:
-    """Share of the pixels in the fullest levels."""
+    """Share of the pixels in the commonest levels."""
     return float(np.sort(counts)[-_FEW_LEVELS:].sum() / max(counts.sum(), 1))
 
 
@@ -102,8 +102,8 @@ class _Edges:
 def _surface(edges: _Edges) -> Surface:
     """The threshold of each pixel: a smooth surface through the middles of the edges.
 
-    It is fitted to logarithms, since light multiplies: first a paraboloid to the whole
-    picture, then the residuals in smaller and smaller neighbourhoods.
+    It is fitted to logarithms, since light is multiplicative: first a paraboloid to the
+    whole picture, then the residuals in smaller and smaller neighbourhoods.
     """
     height, width = edges.middle.shape
     size = -(-width // _CELL), -(-height // _CELL)

@@ -26,7 +26,7 @@ Shade = Literal["dark", "light"]
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """The user's settings for reading a picture; None where they are to be inferred.
+    """The user's settings for reading a picture; None to infer a setting.
 
     Attributes:
         polarity: Which pixels are obstacles.
@@ -39,7 +39,7 @@ class Said:
     def __post_init__(self) -> None:
         if self.polarity not in (None, "dark", "light"):
             raise TaskError(
-                f"unknown polarity {self.polarity!r}; expected 'dark' where dark "
+                f"unknown polarity {self.polarity!r}; expected 'dark' if dark "
                 "pixels are the obstacles, or 'light'"
             )
         if self.threshold is not None and not 0 <= self.threshold < 255:
@@ -64,7 +64,7 @@ class RobotParams(_Record):
         gt=0,
         ge=SMALLEST,
         le=2 * LARGEST,
-        description="Distance between the wheels, px; for `disc`, the diameter.",
+        description="Distance between the wheels, px; from `disc`, the diameter.",
     )
     max_wheel_speed: Length = Field(75.59, description="Wheel speed limit, px/s.")
     n_rays: int = Field(18, ge=1, le=MOST_RAYS, description="Number of range rays.")
@@ -98,7 +98,7 @@ class MapParams(_Record):
     schema_version: Literal[1] = 1
     source: str = Field(description="File name of the map image.")
     source_sha256: str = Field(
-        description="SHA-256 of the map image's bytes; of a grid, `grid.sha256()`."
+        description="SHA-256 of the map image's bytes; for a grid, `grid.sha256()`."
     )
     width: int = Field(gt=0, description="px")
     height: int = Field(gt=0, description="px")
@@ -112,7 +112,9 @@ class MapParams(_Record):
     method: str = Field(description="How the image was binarised.")
     threshold: float | None = Field(None, description="Luminance, 0..255.")
     cleanup: int = Field(0, ge=0, description="Strength of the noise removal, px.")
-    opening: int = Field(0, ge=0, description="Thinner obstacle lines are dropped, px.")
+    opening: int = Field(
+        0, ge=0, description="Obstacle lines under this width are dropped, px."
+    )
     inflation: float = Field(0, ge=0, le=LARGEST, description="Planner's margin, px.")
     score: float | None = None
     score_terms: ScoreTerms | None = None

@@ -34,7 +34,7 @@ _LEFT, _TOP, _RIGHT, _ROW = 52, 30, 14, 22
 def draw_preview(
     source: ColourImage, cells: BoolGrid, params: MapParams, path: Path
 ) -> Picture:
-    """The source image, free space tinted, with task, legend and rulers, uint8 RGB.
+    """The tinted source image with task, legend and rulers, uint8 RGB.
 
     Args:
         source: Shape (height, width, 3), uint8 RGB, as read.
@@ -151,7 +151,7 @@ def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
 
 
 def _places(params: MapParams) -> list[tuple[Colour, str]]:
-    """Legend entries of start, goal and path, as far as given."""
+    """Legend entries of start, goal and path, those that are given."""
     entries: list[tuple[Colour, str]] = []
     if params.start is not None:
         entries.append((TRAIL, f"start {_text(params.start)}"))

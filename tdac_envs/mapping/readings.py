@@ -37,7 +37,7 @@ _FAINT = 0.3
 def readings(scene: Scene) -> Iterator[Reading]:
     """Readings of the likelier polarity, the plainest first.
 
-    Without start and goal there is only one, with marks ignored: nothing would show
+    Without start and goal there is only one, with marks ignored, because nothing shows
     whether a bolder one is needed.
     """
     given = scene.image.occupied
@@ -86,7 +86,7 @@ def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
 
 
 def _with_outside_closed(reading: Reading, beyond: BoolGrid) -> Reading:
-    """The reading with the paper around the building occupied.
+    """The reading with the paper around the building marked as occupied.
 
     Windows are drawn with thin or grey lines, but no robot may leave through them.
     """
@@ -98,7 +98,7 @@ def _with_outside_closed(reading: Reading, beyond: BoolGrid) -> Reading:
 
 
 def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
-    """Free pieces close to the outside: blurred edges, gaps in letters."""
+    """Free pieces only close to the outside, e.g. blurred edges, gaps in letters."""
     count, labels = cv2.connectedComponents((~cells).astype(np.uint8), connectivity=4)
     apart = cv2.distanceTransform((~beyond).astype(np.uint8), cv2.DIST_L2, 3) > SLIVER
     deep = np.bincount(labels[apart], minlength=count) > 0
@@ -135,7 +135,7 @@ def plain_reading(scene: Scene, light_free: bool) -> Reading:
 
 
 def _of_photo(scene: Scene, light_free: bool, method: str) -> Reading:
-    """A photograph cut nearer to the floor, since blur makes thin walls faint."""
+    """A photograph's reading, its threshold nearer the floor: blur fades thin walls."""
     grey = scene.luminance
     floor = float(np.median(grey[(grey > scene.threshold) == light_free]))
     cut = scene.threshold + _FAINT * (floor - scene.threshold)
@@ -161,7 +161,7 @@ def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Re
 
 
 def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
-    """Whether strong colours are marks: few pixels, and few of the walls' pixels."""
+    """Whether strong colours are marks: few pixels, covering few wall pixels."""
     on_walls = int((strong & plain.cells).sum())
     allowed = 0.05 if touches(strong, scene.ends) else 0.02
     few = float(strong.mean()) <= allowed
@@ -184,7 +184,7 @@ def _mixed(scene: Scene) -> Reading | None:
     """The reading by colour distance from the floor, for a floor of a middle tone.
 
     None unless much of the floor's rim is darker and much of it is lighter, so that no
-    threshold separates the floor. Its colour is that at start and goal.
+    threshold separates the floor. The floor has the colour of start and goal.
     """
     shape, colour = scene.luminance.shape, scene.image.colour
     spots = [disc(shape, x, y, scene.radius / 2) for x, y in scene.ends]

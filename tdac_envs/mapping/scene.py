@@ -18,7 +18,7 @@ from tdac_envs.mapping.score import Point, Trip
 
 Polarity = Shade | Literal["mixed", "given"]
 
-# In a real task, the body's disc at start and goal is free. So two clean discs outweigh
+# Weight of start and goal, where the body's disc must be free. Two clean discs outweigh
 # an unclear picture, but not a clear one.
 _W_TASK = 2.5
 CLOSE = 0.5
@@ -27,13 +27,13 @@ CLOSE = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """One way to tell obstacles from free space.
+    """One interpretation of a picture: which pixels are obstacles.
 
     Attributes:
         cells: Shape (height, width), bool, True = occupied.
-        polarity: Which pixels are obstacles.
+        polarity: Which pixels are obstacles; "given" if the file defines them.
         method: Description of how the picture was read.
-        threshold: Luminance at which the picture was cut, 0..255.
+        threshold: Luminance threshold that was applied, 0..255.
         cleanup: Strength of `cleanup.cleanings`, or largest size of dropped specks, px.
         opening: Lines thinner than this were dropped, px.
     """
@@ -77,10 +77,10 @@ class Scene:
         radius: float,
         said: Said = UNSAID,
     ) -> Scene:
-        """The scene of an image and a task; start and goal may be missing."""
+        """The scene of an image and a task; start and goal may be None."""
         grey, task = luminance(image.colour), (start, goal, radius, said)
-        by_itself = image.occupied is None and said.threshold is None
-        even = evened(image.colour, grey) if by_itself and photographed(grey) else None
+        automatic = image.occupied is None and said.threshold is None
+        even = evened(image.colour, grey) if automatic and photographed(grey) else None
         if even is None:
             return cls(image, grey, *task)
         return cls(replace(image, colour=even.colour), even.luminance, *task, True)
@@ -132,9 +132,9 @@ class Scene:
 
     @cached_property
     def unknown(self) -> int | None:
-        """The "unknown" grey, unless all given ends are on it."""
-        by_itself = self.said.threshold is None and not self.photo
-        level = unknown_level(self.luminance) if by_itself else None
+        """The "unknown" grey; None if there is none or all given ends are on it."""
+        automatic = self.said.threshold is None and not self.photo
+        level = unknown_level(self.luminance) if automatic else None
         if level is None:
             return None
         shades = [abs(int(self.luminance[y, x]) - level) for x, y in self.ends]

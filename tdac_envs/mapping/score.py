@@ -22,8 +22,8 @@ _WEIGHTS = (2.5, -0.02, -1.2)
 def sharpness(cells: BoolGrid) -> float:
     """Changes between free and occupied among neighbouring pixels, per pixel.
 
-    The boundary term of Algorithm 1 (the paper favours "boundary smoothness" and
-    leaves it undefined): 0 for an empty map, 2 for a chessboard.
+    The boundary term of Algorithm 1 (the paper favours "boundary smoothness" but
+    does not define it): 0 for an empty map, 2 for a chessboard.
     """
     flips = np.count_nonzero(cells[1:] != cells[:-1])
     flips += np.count_nonzero(cells[:, 1:] != cells[:, :-1])
@@ -66,7 +66,7 @@ class Ground:
 def terms_of(
     grounds: Sequence[Ground], trip: Trip, margins: Sequence[int], guide: Guide
 ) -> list[list[ScoreTerms | None]]:
-    """Terms of the score of each grid with each planner's margin.
+    """Score terms of each grid with each margin of the planner.
 
     Args:
         grounds: Grids of the same size; fastest with the fewest obstacles last.

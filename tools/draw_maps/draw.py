@@ -44,7 +44,7 @@ _MAPS: dict[str, tuple[Callable[[np.random.Generator], Image], _Task]] = {
     ),
     "cave": (
         draw_cave,
-        _Task((370, 180), _UP, (430, 425), 12, "A cave; a squeeze leads to the hall."),
+        _Task((370, 180), _UP, (430, 425), 12, "A cave; a tight gap leads to a hall."),
     ),
     "clutter": (
         draw_clutter,
@@ -68,7 +68,7 @@ _MAPS: dict[str, tuple[Callable[[np.random.Generator], Image], _Task]] = {
     ),
     "street": (
         draw_street,
-        _Task((288, 430), -1.4486, (450, 450), 12, "Streets; to a court with a gate."),
+        _Task((288, 430), -1.4486, (450, 450), 12, "Streets; to a gated courtyard."),
     ),
     "thin_walls": (
         draw_thin_walls,
@@ -76,7 +76,7 @@ _MAPS: dict[str, tuple[Callable[[np.random.Generator], Image], _Task]] = {
     ),
     "warehouse": (
         draw_warehouse,
-        _Task((560, 221), 0.0, (560, 385), 12, "Racking; the goal aisle has one end."),
+        _Task((560, 221), 0.0, (560, 385), 12, "Racks; the goal is in a dead end."),
     ),
 }
 
