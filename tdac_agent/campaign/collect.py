@@ -38,7 +38,7 @@ def write_tables(frames: Frames, out: Path) -> pd.DataFrame:
 
 
 def _records(plan: Plan, runs: Path) -> Iterator[Run]:
-    """Yields the readable records; executing the run again reports a damaged one."""
+    """Yields the readable records; damaged ones are reported when runs are resumed."""
     for planned in plan.all():
         folder = runs / planned.name
         if (folder / RUN_FILE).is_file():

@@ -62,7 +62,7 @@ class CampaignConfig(BaseModel):
     max_cost: float | None = Field(None, ge=0, description="Limit for all runs, USD.")
     max_tokens: int | None = Field(None, ge=0, description="Token limit for all runs.")
     keep: Keep = Field(
-        "all", description="`records`: only what the tables need of finished runs."
+        "all", description="`records` keeps only what tables need of finished runs."
     )
 
     @model_validator(mode="after")

@@ -52,13 +52,13 @@ def core_locks() -> Path:
         if _is_private(place):
             return place
     raise Fault(
-        f"no folder for the core locks: {places[0]} is not a folder of your own that "
-        "is writable; remove it, or set TMPDIR to another folder"
+        f"no folder for the core locks: {places[0]} is not a writable folder of your "
+        "own; remove it, or set TMPDIR to another folder"
     )
 
 
 def _is_private(folder: Path) -> bool:
-    """Makes a folder with mode 0700; whether it is owned, writable and no symlink."""
+    """Makes a folder with mode 0700; False unless owned, writable and no symlink."""
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

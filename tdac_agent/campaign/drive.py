@@ -30,7 +30,7 @@ class _Queue:
     _retried: set[str] = field(default_factory=set)
 
     def next(self) -> PlannedRun | None:
-        """The next run; those that a fault ended come once more after all others."""
+        """The next run; runs that a fault ended are retried once, after all others."""
         while self.todo:
             planned = self.todo.popleft()
             if not (self.progress.exhausted and planned.cell.asks_models):
@@ -50,7 +50,7 @@ class _Queue:
 
 
 def look(plan: Plan, shard: Shard, runs: Path) -> tuple[Progress, list[PlannedRun]]:
-    """Reads the progress of a campaign from its folder, and the runs that are left."""
+    """Reads the progress and the remaining runs of a campaign from its folder."""
     progress, left = Progress.of(plan, shard), []
     for planned in plan.all(shard):
         known = read_outcome(planned.name, runs)
@@ -70,7 +70,7 @@ def carry_out(
 ) -> None:
     """Executes the runs that are left; a run that fails does not stop the others.
 
-    Once the budget is exhausted, no further run begins that may cost money.
+    Once the budget is exhausted, no further run that may cost money begins.
 
     Args:
         progress: Updated in place.
@@ -118,6 +118,6 @@ def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
 
 
 def foreign(plan: Plan, runs: Path) -> list[str]:
-    """Run folders that are not in the plan: of other files, tasks or versions."""
+    """Run folders that are not in the plan, e.g. of a changed task or file."""
     known = {cell.folder for cell in plan.cells}
     return sorted(path.name for path in runs.iterdir() if path.name not in known)

@@ -31,7 +31,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """A run has ended, with whatever status."""
+    """A run has ended, with any status."""
 
     planned: PlannedRun
     outcome: Outcome

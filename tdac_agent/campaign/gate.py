@@ -33,7 +33,7 @@ FIRST = 8.0
 """Initial number of places."""
 CUT = 0.5
 LOOK_SECONDS = 0.2
-"""Mean time between two tries for a free place."""
+"""Mean time between two attempts to get a free place."""
 
 
 class Gate:
@@ -55,7 +55,7 @@ class Gate:
 
     @property
     def places(self) -> float:
-        """Number of places, of which only whole ones are used."""
+        """Number of places; a fraction of a place is not used."""
         return self._read()[0]
 
     @contextmanager
@@ -137,7 +137,7 @@ class Gated:
 
 
 def gated(model: Provider, folder: Path, most: int) -> Provider:
-    """Puts a provider behind the gate of its vendor or server, unless it is free."""
+    """Puts a paid provider behind the gate of its vendor or server."""
     if not model.paid:
         return model
     kind = model.name.partition(":")[0]

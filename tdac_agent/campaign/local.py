@@ -95,7 +95,7 @@ class _Pool:
         return [worker for worker in self.workers if worker.planned is not None]
 
     def idle(self) -> _Worker | None:
-        """An idle worker, or a new one while there are too few."""
+        """An idle worker, or a new one; None if all workers are busy."""
         for worker in self.workers:
             if worker.planned is None and worker.runs < MOST_RUNS:
                 return worker

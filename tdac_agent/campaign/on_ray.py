@@ -20,7 +20,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.extras import install_command
 
 STORE_BYTES = 96 << 20
-"""Object store of a local cluster; small, since data pass through folders."""
+"""Object store of a local cluster; small, since runs exchange data as files."""
 WAIT_SECONDS = 1.0
 
 
@@ -104,7 +104,7 @@ def _start(workers: int) -> Any:
     options = {} if os.environ.get("RAY_ADDRESS") else local
     try:
         ray.init(log_to_driver=False, logging_level=logging.ERROR, **options)
-    except Exception as error:  # of any type, after 30 s a bare Exception
+    except Exception as error:  # of many types; after 30 s a plain Exception
         reason = " ".join(str(error).split())[:300]
         raise Fault(f"Ray did not start: {reason}") from error
     return ray

@@ -28,7 +28,7 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
-"""Longer than for a single run, since nobody waits for an answer of a campaign."""
+"""Longer than for a single run, since no user is waiting."""
 RUNS = "runs"
 """Folder of the runs, inside the campaign folder."""
 KEPT = frozenset({RUN_FILE, JOURNAL, TASK_FILE, "controller.py", "report.json"})
@@ -180,7 +180,7 @@ def _seed(planned: PlannedRun, task: Task, folder: Path) -> int:
 
 @functools.lru_cache(maxsize=1)
 def _budget(terms: Terms) -> Budget:
-    """The shared budget; cached, since it reads only what is new in its ledger."""
+    """The shared budget; cached, so that it reads only new entries of its ledger."""
     ledger = Path(terms.folder) / "ledger.jsonl"
     return Budget(terms.max_cost, terms.max_tokens, ledger)
 

@@ -1,4 +1,4 @@
-"""Progress of a campaign: counts instead of runs, so that memory stays bounded."""
+"""Progress of a campaign, kept as counts so that memory stays bounded."""
 
 from __future__ import annotations
 

@@ -44,7 +44,9 @@ def test_the_place_of_somebody_else_is_not_used(temporary, monkeypatch, make):
     for folder in (elsewhere, own):
         folder.mkdir()
     make(temporary / NAME, elsewhere)
-    with pytest.raises(Fault, match=f"{NAME} is not a folder of your own") as caught:
+    with pytest.raises(
+        Fault, match=f"{NAME} is not a writable folder of your own"
+    ) as caught:
         core_locks()
     assert "\n" not in str(caught.value)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(own))
@@ -68,7 +70,7 @@ def test_a_campaign_without_a_place_says_so_at_once(temporary, small):
     small.write(learners=["builtin"])
     code, _, complained = small.run("--workers", 1)
     assert code == 3
-    assert f"{temporary / NAME} is not a folder of your own" in complained
+    assert f"{temporary / NAME} is not a writable folder of your own" in complained
     assert "died" not in complained
 
 
