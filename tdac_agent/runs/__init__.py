@@ -1,1 +1,1 @@
-"""Runs on disk: written, read, resumed, replayed."""
+"""Writes, reads, resumes and replays run folders."""

@@ -1,4 +1,4 @@
-"""Reads a run folder as far as possible, also a damaged one."""
+"""Reads as much as possible of a run folder, even of a damaged one."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ class Tried:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """A run with all that can be read of it.
+    """A run with everything that could be read from its folder.
 
     Attributes:
         run: Its record.
         status: Its present status; see `status_now`.
-        task: Its task, unless that cannot be read.
+        task: Its task; None if it cannot be read.
         tried: Its candidates, oldest first.
         report: Report on the verified controller, or else the last report.
         source: The verified controller, or else the last candidate with code.
@@ -105,7 +105,7 @@ def learner_named(learner: str) -> str:
 
 
 def gather_run(source: Path | Run) -> Told:
-    """Reads a run, also a damaged one or one that is still running.
+    """Reads a run, even if it is damaged or still running.
 
     Args:
         source: Its folder, or its record.

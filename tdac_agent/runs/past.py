@@ -30,7 +30,7 @@ _REPORTED = (
 
 
 def call_key(model: Provider, request: Request) -> str:
-    """Hash of all that shapes an answer, including which sample it is."""
+    """Hash of everything that an answer depends on, including the sample's indices."""
     facts = {
         "schema": KEY_SCHEMA,
         "model": model.name,
@@ -63,7 +63,7 @@ class Past:
         lost: Calls whose answer was lost, but may have been billed.
         open: Calls with neither an answer nor a fault on record.
         attempts: Number of calls by key.
-        steps: Number of records of each step that need not be recorded again.
+        steps: Number of records of each step that no repetition has used up yet.
         started: Whether all files of a new run were written.
         seconds: Duration of the run so far.
     """

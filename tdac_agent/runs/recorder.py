@@ -67,7 +67,7 @@ class Recorder:
     def start(
         self, task: Task, template: PromptTemplate, given: str | None, **facts: Any
     ) -> None:
-        """Fills the folder: task, original, suite, working files; begins the journal.
+        """Writes the task and its files, and begins the journal.
 
         Args:
             task: What the controller must do.
@@ -92,7 +92,7 @@ class Recorder:
             write_atomic(folder / GIVEN_FILE, given)
         self.run.mark = sign(self.run, folder / OWN_SUITE if task.suite else None)
         self.save()
-        # Written after the mark: a run with a task but no mark was not begun here.
+        # Written last: a run with a task but no mark is from another installation.
         write_atomic(folder / TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE))
         self.event("run.start", task=task.name, learner=self.run.learner, **facts)
 
@@ -177,7 +177,7 @@ class Recorder:
         spent: Amount,
         cost: float | None,
     ) -> None:
-        """Records an answer as it came."""
+        """Records an answer as it was received."""
         record = {
             **_about(request, key),
             **{k: v for k, v in asdict(reply).items() if k != "text"},
@@ -239,7 +239,7 @@ class Recorder:
             j: Edit of the candidate.
             report: Its report; None if the model gave no code.
             notes: Notes on the model's answer.
-            unchanged: Whether the report is that of the attempt before.
+            unchanged: Whether the report is that of the previous attempt.
         """
         failed = () if report is None else tuple(f.test for f in report.failures)
         attempt = Attempt(

@@ -38,7 +38,7 @@ class Attempt(PrintableRecord):
     seed: int | None = Field(None, description="Seed of its jittered starts.")
     notes: tuple[str, ...] = ()
     unchanged: bool = Field(
-        False, description="Same code as the attempt before, whose report is reused."
+        False, description="Same code as the previous attempt, whose report is reused."
     )
 
 
@@ -72,7 +72,7 @@ class Run(PrintableRecord):
     prompt: str = Field("full", description="Template of the first question.")
     refine: bool = Field(True, description="Whether failures become rules.")
     max_output: int = Field(0, description="Token limit of an answer.")
-    index: int = Field(0, description="Index among equal runs.")
+    index: int = Field(0, description="Index among otherwise equal runs.")
     version: str = Field("", description="Version of tdac.")
     suite_sha256: str = ""
     prompt_sha256: str = Field("", description="Hash of the first question.")

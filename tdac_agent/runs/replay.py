@@ -34,7 +34,7 @@ def make(words: str, options: Options) -> Replay:
     """
     del options
     if not words:
-        raise ProviderError("replay: needs a run, as in replay:runs/maze-1")
+        raise ProviderError("replay: needs a run folder, as in replay:runs/maze-1")
     folder = DEMO if words == "demo" else Path(words)
     try:
         recorded = load_run(folder)
@@ -55,8 +55,8 @@ class Replay:
         words: The run as the user named it.
         folder: Folder of the run.
         journal: Its records.
-        reworded: Whether a question may begin with additional text, and may differ from
-            the repair rules on; differences are noted.
+        reworded: Whether a question may have additional text before the recorded one,
+            and may differ from the repair rules onwards; differences are noted.
         seed: Seed of its jittered starts; None if it has none, or is not trusted.
     """
 
@@ -116,7 +116,7 @@ class Replay:
         """Compares a question with the recorded one; notes a permitted difference.
 
         Raises:
-            PermanentFault: The questions differ; names the first line that does.
+            PermanentFault: The questions differ; the message names the first such line.
         """
         asked = request.prompt
         if recorded == asked:

@@ -24,7 +24,7 @@ from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 CONFIGURATION = {
     "version": "version of tdac",
     "task": "task",
-    "task_sha256": "map, places or limits of the task",
+    "task_sha256": "map, start, goal or limits of the task",
     "suite_sha256": "suite",
     "learner": "learner",
     "optimizer": "optimizer",
@@ -59,7 +59,7 @@ def run_there(folder: Path) -> Run | None:
 
 
 def check_same(before: Run, now: Run) -> None:
-    """Checks that the run in the folder is the one to make.
+    """Checks that the run in the folder is the requested one.
 
     Raises:
         RunError: They differ; names all differences.
@@ -85,9 +85,9 @@ def check_own(before: Run) -> None:
     """
     if not is_own_folder(before):
         raise RunError(
-            f"{before.folder} contains a run that was not begun here and claims to be "
-            f"{before.status}: test it with tdac verify {before.folder}, or give a new "
-            "folder with --out"
+            f"{before.folder} contains a run that this installation did not begin "
+            f"and that claims to be {before.status}: test it with tdac verify "
+            f"{before.folder}, or give a new folder with --out"
         )
 
 

@@ -234,7 +234,7 @@ def test_a_miss_is_an_error(policy_task, recorded, tmp_path, small_task, warm):
         ("command:no-such-program-here -x", "no program 'no-such-program-here'"),
         ("manual:", "manual: needs a folder, as in"),
         ("manual:/proc/none/x", "cannot make /proc/none/x"),
-        ("replay:", "which run"),
+        ("replay:", "needs a run folder"),
         ("replay:/nowhere", "cannot replay: /nowhere is not a run folder"),
     ],
 )
