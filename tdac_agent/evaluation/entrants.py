@@ -55,7 +55,7 @@ def entrants_of(
     Args:
         policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
             controller files, run folders, policies saved by stable-baselines3.
-        wrappers: Wrappers of saved policies that do not name their own.
+        wrappers: Wrappers of saved policies that do not record their own.
 
     Raises:
         TaskError: No policy is given, one is given twice, or a wrapper is unknown.
@@ -131,9 +131,9 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
 
 
 def write_builtin(task: Task) -> tuple[bytes, bool]:
-    """The controller that `tdac synth` writes without a model; whether it is verified.
+    """Writes a controller without a model; returns it and whether it is verified.
 
-    If no candidate is verified, it is the last one.
+    If no candidate is verified, the controller is the last one.
     """
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
         run = synthesize(task, BUILTIN, out=Path(name) / "run")

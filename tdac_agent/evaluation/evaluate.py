@@ -75,7 +75,7 @@ def evaluate(
         seed: Seed from which the seeds of the episodes are drawn.
         variation: Variation of the starts: `nominal`, `jitter`, `mixed`, or `random`,
             which also varies the goals.
-        wrappers: Wrappers of saved policies that do not name their own.
+        wrappers: Wrappers of saved policies that do not record their own.
         tier: Sandbox tier; `auto` for the best one on this machine.
         limits: Limits of a controller's process in each episode.
         out: Folder for `evaluation.json`, `episodes.csv`, `timing.csv`, and a picture
@@ -171,7 +171,7 @@ def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:
 
     Raises:
         TaskError: No task is given, one cannot be used, or two have the same name,
-            which results and pictures go by.
+            which results and pictures are named after.
     """
     loaded = [task if isinstance(task, Task) else load_task(task) for task in tasks]
     if not loaded:
@@ -186,7 +186,7 @@ def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:
 def _compete(
     entrant: Entrant, task: Task, job: SeededJob, judge: WarmJudge, watch: Watch | None
 ) -> tuple[Result, NDArray[np.float32], list[NDArray[np.float32]]]:
-    """Runs a policy on a task: the result, its call times in s, and its poses."""
+    """Runs a policy on a task; returns the result, call times in s, and poses."""
     contender, sha256, note = entrant.contender, entrant.sha256, None
     if entrant.is_builtin:
         if watch is not None:

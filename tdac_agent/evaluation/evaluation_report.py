@@ -35,7 +35,7 @@ class EvaluatedTask(_Record):
     """A task of the evaluation."""
 
     name: str
-    called: str = Field("", description="Display name, detailed unless bundled.")
+    called: str = Field("", description="Display name; with details unless bundled.")
     task_sha256: str
     map_sha256: str
     unit: Place = Field(description="Unit of lengths.")
@@ -76,7 +76,9 @@ class Row(_Record):
     smoothness: float | None = Field(
         description="Median over successes: spectral arc length of the speed (SPARC)."
     )
-    clearance_min: float = Field(description="Smallest gap to the body; 0: a contact.")
+    clearance_min: float = Field(
+        description="Smallest gap to the body; 0 for a contact."
+    )
     clearance_mean: float = Field(description="Mean over the episodes' mean gaps.")
     reasons: dict[str, int] = Field(description="Most frequent errors, counted.")
     controller_sha256: str | None = None
@@ -209,7 +211,7 @@ def _median(values: Iterable[float | None]) -> float | None:
 
 
 def comparisons_of(results: Sequence[Result]) -> tuple[Comparison, ...]:
-    """Compares all pairs of policies on each task; equal information first."""
+    """Compares all pairs of policies on each task; those of equal information first."""
     pairs = [
         compare(one, other)
         for one, other in combinations(results, 2)

@@ -65,7 +65,7 @@ def verify_robust(
             has no rate and no interval.
         margin: See `accept_at`.
         tier: Sandbox tier; `auto` for the best one on this machine.
-        limits: Limits of the controller's process in each episode, `cpu_seconds` too.
+        limits: Limits of the controller's process, `cpu_seconds` too, in each episode.
         out: Folder for `robust.json`; by default nothing is written.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with the numbers of episodes and successes so far.
@@ -73,7 +73,7 @@ def verify_robust(
     Raises:
         ControllerFileError: The file cannot be read.
         TaskError: A number is invalid.
-        Fault: The sandbox is broken: neither pass nor fail.
+        Fault: The sandbox is broken; the controller neither passes nor fails.
     """
     began = time.monotonic()
     whole_number("episodes", episodes, 1, MOST_EPISODES)

@@ -28,7 +28,7 @@ class _Record(PrintableRecord):
 
 
 class RobustProvenance(_Record):
-    """What the results apply to; together with a seed it determines an episode."""
+    """What the results apply to; together with a seed, it determines an episode."""
 
     task: str
     task_sha256: str
@@ -65,7 +65,7 @@ class SequentialResult(_Record):
 
     decision: Decision
     test: SequentialTest
-    refuse_at: float = Field(description="Rate that must not be accepted.")
+    refuse_at: float = Field(description="Success rate that the test should reject.")
     at_refused_rate: Characteristics
     at_accepted_rate: Characteristics
 
@@ -91,7 +91,7 @@ class RobustReport(_Record):
 
     @property
     def accepted(self) -> bool:
-        """Whether the sequential test accepts; True where there was none."""
+        """Whether the sequential test accepts; True if there was none."""
         return self.sequential is None or self.sequential.decision == "accepted"
 
 

@@ -24,7 +24,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import DEADLINE_SECONDS
 
 E = TypeVar("E", SeededEpisode, Measured)
-# A policy is stopped when twice too slow, and a time-out is repeated once.
+# Wall time / simulated time: a policy is stopped at 2, a time-out is repeated once.
 SLOWEST = 4.0
 
 
