@@ -30,7 +30,7 @@ _ENDED = {"length": "it was truncated", "refusal": "it was refused"}
 
 
 class Candidate(NamedTuple):
-    """Source of a controller (None if the model gave no code), notes on the answer."""
+    """Source of a controller (None if the model gave none) and notes on the answer."""
 
     source: str | None
     notes: tuple[str, ...] = ()
@@ -80,7 +80,7 @@ class Dialogue:
     def summarise(self, k: int, j: int, source: str, report: Report) -> None:
         """Asks for changes of the rules after a failure, and applies them.
 
-        After a malformed answer, asks again up to twice; then the rules stay.
+        After a malformed answer, asks up to twice more; then the rules stay unchanged.
         """
         request = self._repair("summarise", source, report, self._at(k, j))
         evidence = tuple(failure.test for failure in report.failures)
@@ -99,12 +99,12 @@ class Dialogue:
         self.calls.recorder.rules(k, self.book, ("no usable answer: rules unchanged",))
 
     def saw_no_change(self, k: int, j: int) -> None:
-        """Notes that candidate (k, j) has the same code as the attempt before."""
+        """Notes that candidate (k, j) has the same code as the previous attempt."""
         self.earlier = (*self.earlier, f"k={k} j={j}: no change: {_SAME}")
         self._unchanged = True
 
     def saw(self, k: int, j: int, report: Report) -> None:
-        """Notes the result of candidate (k, j), also for the rules in force."""
+        """Notes the result of candidate (k, j), and updates the rules in force."""
         self._unchanged = False
         failed = tuple(failure.test for failure in report.failures)
         if j == 0 and self.book.in_force:
@@ -143,7 +143,7 @@ class Dialogue:
         )
 
     def _code(self, model: Provider, request: Request) -> Candidate:
-        """Asks for code, again up to twice after an unusable answer.
+        """Asks for code; up to twice more after an unusable answer.
 
         The repeated question says what was wrong. A truncated answer is never used; it
         is requested again with a higher token limit.

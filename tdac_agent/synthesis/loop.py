@@ -85,7 +85,7 @@ def synthesize(
         max_cost: Limit in USD; by default the one the run was begun with, or 2.
         max_tokens: Limit of input plus output; by default the earlier one, or none.
         budget: Budget shared with other runs, instead of these limits.
-        index: Index among equal runs, which keeps their samples apart.
+        index: Index among otherwise equal runs, which keeps their answers apart.
         retry: Retry policy after faults.
         judge: A warm judge, to reuse in consecutive runs; None starts one.
         on_event: Called with each journal record.
@@ -99,7 +99,7 @@ def synthesize(
             what it costs.
         PriceError: The user's price file is broken.
         PromptError: The template cannot be used.
-        Fault: The sandbox, suite or provider is broken, which is also recorded.
+        Fault: The sandbox, suite or provider is broken; the fault is also recorded.
     """
     template = load_template(prompt)
     models = choose_models(

@@ -41,10 +41,10 @@ class Outlook(PrintableRecord):
     )
     questions: int = Field(description="Questions of the run, if no candidate passes.")
     cost_once: float | None = Field(
-        description="Maximum in USD if each question is answered at once."
+        description="Maximum in USD if each first answer can be used."
     )
     cost_most: float | None = Field(
-        description="Maximum in USD if each answer is truncated and requested thrice."
+        description="Maximum in USD if each answer is truncated and requested 3 times."
     )
     unknown_prices: tuple[str, ...] = Field(description="Models without a price.")
     uncounted: tuple[str, ...] = Field(

@@ -72,7 +72,7 @@ def rest_of(
     worst: Amount,
     max_output: int,
 ) -> Rest:
-    """What may be left of a run from a question on, if each is answered at once.
+    """What may be left of a run from a question on, if each first answer is used.
 
     Args:
         run: Its models, K and J.

@@ -14,7 +14,6 @@ from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 CURVE_FILE = "learning_curve.csv"
 PLAN_FILE = "training.json"
-"""In the same folder."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,7 +83,7 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
             `noise_type: normal` and `noise_std` for action noise.
 
     Raises:
-        TaskError: A rate or noise has another form.
+        TaskError: A schedule or type of noise is not supported.
     """
     found = {key: _scheduled(key, value) for key, value in model.items()}
     kind, spread = found.pop("noise_type", None), found.pop("noise_std", 0.0)
@@ -99,7 +99,7 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
 
 def _wrapper_names(paths: list[str] | str) -> tuple[str, ...]:
     known = {f"{w.__module__}.{w.__qualname__}": name for name, w in WRAPPERS.items()}
-    # Packages export their wrappers from a module that does not define them.
+    # The public module `wrappers` of a package may re-export its wrappers.
     known |= {
         f"{w.__module__.partition('.')[0]}.wrappers.{w.__qualname__}": name
         for name, w in WRAPPERS.items()
@@ -121,5 +121,5 @@ def _scheduled(key: str, value: Any) -> Any:
 
 
 def linear(first: float) -> Callable[[float], float]:
-    """A schedule that falls from `first` to zero with the remaining training."""
+    """A schedule that falls linearly from `first` to zero during the training."""
     return lambda left: left * first

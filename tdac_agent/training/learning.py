@@ -135,7 +135,7 @@ class _Evaluations(BaseCallback):
             self._evaluate(steps)
 
     def finish(self) -> None:
-        """Evaluates any training since the last evaluation."""
+        """Evaluates the model if it was trained after the last evaluation."""
         steps = int(self.model.num_timesteps)
         if not self.points or self.points[-1].steps < steps:
             self._evaluate(steps)

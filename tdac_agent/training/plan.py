@@ -1,4 +1,4 @@
-"""The plan of a training: all that is needed to resume it from its folder."""
+"""The plan of a training: everything needed to resume it from its folder."""
 
 from __future__ import annotations
 
@@ -40,7 +40,9 @@ class TrainingPlan(BaseModel):
 
     schema_version: Literal[1] = 1
     algo: Algo
-    tasks: tuple[str, ...] = Field(description="Robot i has task i modulo their count.")
+    tasks: tuple[str, ...] = Field(
+        description="Robot i has task i modulo their number."
+    )
     task_sha256: tuple[str, ...]
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
     variation: Variation = Field("jitter", description="Starts in evaluations.")
@@ -79,8 +81,8 @@ def make_plan(
         algo: Algorithm.
         steps: Training steps, all robots together.
         seed: Seed of networks, starts and noise.
-        variation: Variation of the starts in training and evaluation. The default is
-            `jitter` in evaluation, and in training as in the hyperparameter file.
+        variation: Variation of the starts in training and evaluation. By default
+            `jitter` in evaluation, and that of the hyperparameter file in training.
         disturbance: Noise and delay; none by default.
         wrappers: Names of wrappers, innermost first.
         n_envs: Number of robots in parallel.

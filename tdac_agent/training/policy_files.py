@@ -50,7 +50,7 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> 
         "cores": os.cpu_count(),
         "versions": {**versions(), **_learner_versions()},
     }
-    # JSON has no nan, the success rate in training before its first episode ends.
+    # JSON has no nan; the training success rate is nan until an episode has ended.
     text = json.dumps(_without_nan(facts), indent=2, allow_nan=False)
     write_atomic(folder / FACTS, text + "\n")
 

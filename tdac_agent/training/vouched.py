@@ -1,4 +1,4 @@
-"""Marks the checkpoints of this installation, since loading one can run any code."""
+"""Marks the checkpoints of this installation; loading others could run any code."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KEPT = 4
 
 
 def put(draft: Path, file: Path) -> None:
-    """Adds the mark of a draft, then moves the draft to its final place."""
+    """Marks a draft as written by this installation, then renames it to `file`."""
     marks = file.parent / MARKS
     if lasting_secret() is not None:
         lines = [*_lines(marks)[1 - KEPT :], _mark(file.name, draft)]

@@ -53,7 +53,7 @@ class WebotsRun:
 
 
 class _World:
-    """A step server whose refusals are errors of the sandbox."""
+    """A step server that refuses requests with an error of the sandbox."""
 
     def __init__(self, server: StepServer, watch: Watch | None) -> None:
         self._server, self._watch = server, watch
