@@ -14,7 +14,7 @@ LARGEST = 1e9
 SMALLEST = 1e-9
 """Smallest value of an argument that must be above 0."""
 MOST_STEPS = 10_000_000
-"""Longest horizon, steps: enough for the longest path on the largest map, slowly."""
+"""Longest horizon, steps: the longest path on the largest map, driven at low speed."""
 
 
 def finite_numbers(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:

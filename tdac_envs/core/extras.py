@@ -14,7 +14,7 @@ PACKAGE = "tdac"
 
 
 def install_command(extra: str) -> str:
-    """The command that installs an extra from where the package was installed from.
+    """The command that installs an extra from the same source as this installation.
 
     pip records the source of a package unless it came from an index
     (PEP 610).

@@ -21,7 +21,7 @@ _DX = np.array([1, -1, 0, 0, 1, 1, -1, -1])
 _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _SQRT2 = 2.0**0.5
 _BITS, _DIRECTION = 4, 15
-"""Number and mask of an entry's low bits: the direction in which it was reached."""
+"""Number and mask of an entry's low bits: how its pixel was reached."""
 _NO_DIRECTION = 8
 """Direction of the first pixel, to which no step leads."""
 _ONWARD = np.array([1 << k for k in range(4)] + [0x15, 0x29, 0x46, 0x8A] + [0xFF])
@@ -64,9 +64,9 @@ def lengths_between(
         guide: Result of a search in the other direction, in `free` or a superset.
 
     Returns:
-        Shape (height + 2, width + 2), float64, with a border. At pixels on no shortest
-        path it is an upper bound; at the start inf if there is no path; and -1 where
-        the path may not go.
+        Shape (height + 2, width + 2), float64, with a border: upper bounds at pixels on
+        no shortest path, inf at the start if there is no path, and -1 where the path
+        may not go.
     """
     height, width = free.shape
     field: Lengths = np.empty((height + 2, width + 2))

@@ -201,7 +201,7 @@ def inflate(cells: BoolGrid, radius: float) -> BoolGrid:
 
 
 def body_free(clear: FloatGrid, radius: float) -> BoolGrid:
-    """Pixels where a disc of `radius` px fits, also on the step to any such neighbour.
+    """Pixels where a disc of `radius` px fits, also while it steps between neighbours.
 
     If the clearance is at least `sqrt(radius**2 + 1/2)` at both ends of a step to one
     of the eight neighbours, it is at least `radius` along the whole step.

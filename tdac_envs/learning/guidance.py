@@ -35,7 +35,7 @@ is; at this distance the body does not touch walls on any bundled map or world.
 # Largest ratio of the length of a route with a margin to that of the shortest path.
 _DETOUR = 1.25
 _SQRT2 = 2.0**0.5
-# Largest distance of a route's end from the goal if possible, grid points.
+# Distance from the goal within which its routes should end, grid points.
 _BESIDE = 4
 
 

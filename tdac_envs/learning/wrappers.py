@@ -190,7 +190,7 @@ class Guidance(
     The route is the shortest path for the body that keeps a margin
     (`tdac_envs.learning.guidance`), from the robot's current position. The waypoint is
     `reach` further along it, or the goal if that is nearer. The route is computed from
-    the whole map and the true pose, so a policy with guidance uses more than sensors.
+    the whole map and the true pose, so guidance gives a policy more than sensor data.
 
     Args:
         env: Either environment; its observations must be a `Dict`.

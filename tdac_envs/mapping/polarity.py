@@ -21,7 +21,7 @@ _W_SAVED = 15.0
 _TOO_THIN = 2.5
 """Mean distance to the other side, px, below which no robot fits."""
 _WIDE = 0.01
-"""The same distance above which a shape is not a wall, as a share of the side."""
+"""The distance above which a shape is too wide for a wall, as a share of the side."""
 
 
 def light_free_evidence(
@@ -103,7 +103,7 @@ def _clip(value: float, limit: float) -> float:
 
 
 def _pieces(side: BoolGrid) -> tuple[float, int]:
-    """Share of the largest connected piece, and the number of pieces but for specks."""
+    """Share of the largest connected piece, and the number of pieces except specks."""
     stats = cv2.connectedComponentsWithStats(side.astype(np.uint8), connectivity=4)[2]
     areas = stats[1:, cv2.CC_STAT_AREA]
     smallest = max(20, side.size // 10000)

@@ -151,7 +151,7 @@ def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
 
 
 def _places(params: MapParams) -> list[tuple[Colour, str]]:
-    """Legend entries of start, goal and path, those that are given."""
+    """Legend entries of start, goal and path, each if it is given."""
     entries: list[tuple[Colour, str]] = []
     if params.start is not None:
         entries.append((TRAIL, f"start {_text(params.start)}"))

@@ -98,7 +98,7 @@ def _with_outside_closed(reading: Reading, beyond: BoolGrid) -> Reading:
 
 
 def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
-    """Free pieces only close to the outside, e.g. blurred edges, gaps in letters."""
+    """Free pieces only near the outside, such as blurred edges or gaps in letters."""
     count, labels = cv2.connectedComponents((~cells).astype(np.uint8), connectivity=4)
     apart = cv2.distanceTransform((~beyond).astype(np.uint8), cv2.DIST_L2, 3) > SLIVER
     deep = np.bincount(labels[apart], minlength=count) > 0
@@ -135,7 +135,7 @@ def plain_reading(scene: Scene, light_free: bool) -> Reading:
 
 
 def _of_photo(scene: Scene, light_free: bool, method: str) -> Reading:
-    """A photograph's reading, its threshold nearer the floor: blur fades thin walls."""
+    """A photograph's reading; a threshold nearer the floor keeps blurred thin walls."""
     grey = scene.luminance
     floor = float(np.median(grey[(grey > scene.threshold) == light_free]))
     cut = scene.threshold + _FAINT * (floor - scene.threshold)
