@@ -39,12 +39,7 @@ class Ended:
 
 @dataclass(frozen=True, slots=True)
 class Died:
-    """The process of a run has died; another process will continue the run.
-
-    Attributes:
-        planned: The run.
-        reason: Cause of the death.
-    """
+    """The process of a run has died; another process will continue the run."""
 
     planned: PlannedRun
     reason: str

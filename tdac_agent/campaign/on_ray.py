@@ -80,12 +80,7 @@ def _in_task(planned: PlannedRun, terms: Terms) -> Outcome:
 
 
 def _start(workers: int) -> Any:
-    """Returns Ray, connected to the cluster in `RAY_ADDRESS` or to a new local one.
-
-    Raises:
-        ProviderError: Ray is not installed.
-        Fault: Ray does not start, or cannot be reached.
-    """
+    """Returns Ray, connected to the cluster in `RAY_ADDRESS` or to a new local one."""
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     # By default Ray runs tasks at low priority, and the judge would starve.

@@ -76,9 +76,7 @@ class Row(_Record):
     smoothness: float | None = Field(
         description="Median over successes: spectral arc length of the speed (SPARC)."
     )
-    clearance_min: float = Field(
-        description="Smallest gap to the body; 0 for a contact."
-    )
+    clearance_min: float = Field(description="Smallest gap to the body; 0 if touched.")
     clearance_mean: float = Field(description="Mean over the episodes' mean gaps.")
     reasons: dict[str, int] = Field(description="Most frequent errors, counted.")
     controller_sha256: str | None = None

@@ -113,7 +113,6 @@ def report_of(
 def _why_not(
     outcome: Outcome, log: Log, stage: Stage, error: ControllerFault | None
 ) -> str:
-    """Why a run did not pass; empty if it passed."""
     if log.teleport is not None:
         return f"teleport: {log.teleport}"
     if error is not None:

@@ -41,12 +41,7 @@ Watch = Callable[[int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WebotsRun:
-    """The report on a run, and the record for drawing it.
-
-    Attributes:
-        report: The report.
-        log: The judge's record.
-    """
+    """The report on a run, and the judge's record for drawing it."""
 
     report: WebotsReport
     log: Log

@@ -30,8 +30,8 @@ def write_map(
     """Writes the four files of a preprocessed map; all of them or none.
 
     `occupancy.npy` is bool `[y, x]`, True = occupied; `occupancy.png` is 8-bit grey,
-    obstacles black on white; `params.json` contains `params`; `preview.png` is a
-    picture for visual checks.
+    obstacles black on white; `params.json` contains `params`; `preview.png` shows
+    the result.
 
     Args:
         folder: Target folder, created if missing.

@@ -112,9 +112,7 @@ class MapParams(_Record):
     method: str = Field(description="How the image was binarised.")
     threshold: float | None = Field(None, description="Luminance, 0..255.")
     cleanup: int = Field(0, ge=0, description="Strength of the noise removal, px.")
-    opening: int = Field(
-        0, ge=0, description="Obstacle lines under this width are dropped, px."
-    )
+    opening: int = Field(0, ge=0, description="Lines under this width are dropped, px.")
     inflation: float = Field(0, ge=0, le=LARGEST, description="Planner's margin, px.")
     score: float | None = None
     score_terms: ScoreTerms | None = None
