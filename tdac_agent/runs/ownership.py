@@ -43,7 +43,7 @@ def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
     if task.suite is not None and "suite" not in given:
         yield suite_wish(task.suite)
     if run.seed is not None and "seed" not in given:
-        what = f"choose the moved starts (seed {run.seed})"
+        what = f"choose the jittered starts (seed {run.seed})"
         yield Wish(what, ("--seed", str(run.seed)))
     if run.max_cost is not None and run.max_cost > MAX_COST and "max_cost" not in given:
         what = f"spend up to {run.max_cost:g} USD"

@@ -237,7 +237,7 @@ def server_that_gets_the_key(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
-@attack(r"choose the moved starts \(seed 0\).*--seed 0", works=False)
+@attack(r"choose the jittered starts \(seed 0\).*--seed 0", works=False)
 def seed_that_suits_a_tape(place: Place) -> list[str | Path]:
     place.change(seed=0)
     return ["synth", "--resume", place.run]
