@@ -447,7 +447,7 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
         (["text.zip"], "'text.zip' is no policy of stable-baselines3"),
         (["plain.zip"], "does not say which observations .* --wrapper NAME"),
         (["random", "--wrapper", "flat"], "unknown wrapper 'flat'; expected some of"),
-        (["random", "--wrapper", "none", "--wrapper", "flatten"], "contradict"),
+        (["random", "--wrapper", "none", "--wrapper", "flatten"], "cannot be combined"),
         (["random", "--csv", "no/where.csv"], "cannot write no/where.csv"),
         (["random", "--task", "maze", "--task", "maze"], "two tasks are called 'maze'"),
         (["random", "--tier", "strong"], "unknown sandbox tier 'strong'"),

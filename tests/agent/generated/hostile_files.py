@@ -24,7 +24,7 @@ from tdac_agent.builtin.scripted import Script
 from tdac_agent.campaign.config import read_config
 from tdac_agent.cli import runs as runs_command
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.rules import _lives
+from tdac_agent.cli.rules import _histories
 from tdac_agent.cli.run_view import show_run
 from tdac_agent.models.choice import Options
 from tdac_agent.models.prices import load_prices
@@ -143,7 +143,7 @@ def use_rules(folder: Path) -> None:
     """Shows the rules, and adds one."""
     book = load_rules(folder)
     with contextlib.redirect_stdout(io.StringIO()):
-        Console().print(_lives(book))
+        Console().print(_histories(book))
     book.add("Stop before walls.", "task", 3, ("test_a",)).bounded(4)
     book.observed(("test_a",), 1)
     use_run(folder)
