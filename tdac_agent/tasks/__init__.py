@@ -1,1 +1,1 @@
-"""From a `task.yaml` to a feasible task."""
+"""Tasks: from a `task.yaml` to a feasible task."""

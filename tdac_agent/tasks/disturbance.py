@@ -1,4 +1,4 @@
-"""What a robust verification disturbs, and how much."""
+"""Disturbances of a robust verification: sensor noise, wheel slip, lag and delay."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from typing import Any
 from tdac_envs.core.arguments import finite, whole_number
 from tdac_envs.core.errors import TaskError
 
-# Later than this, no action of an ordinary episode takes effect in time to matter.
+# With a longer delay, no action of an ordinary episode takes effect in time.
 MAX_DELAY = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """Noise and lateness of a robot, beside a jittered start; zeros for none.
+    """Noise and delays of a robot, in addition to a jittered start; 0 disables each.
 
-    The defaults are of the size that published models of small robots have.
+    The defaults follow published models of small robots.
 
     Attributes:
-        range_noise: Standard deviation of each range, relative to it. The table of the
-            e-puck's sensors in Webots has 0.2 to 4.9 %, on average 2.4 %; of an
-            e-puck it is that average.
-        wheel_slip: Standard deviation of each wheel's speed in each step, relative to
-            it. Enki's e-puck and Khepera draw it within 5 % either way: 2.9 %.
-        motor_lag: Time constant of the wheel speeds, s. The robot has none: its wheels
-            are stepped.
-        delay: Steps by which an action takes effect late. One: sensing, computing and
-            sending take a step, as on any robot that reads, then acts.
+        range_noise: Relative standard deviation of each range; for an e-puck, the mean
+            over all distances. Webots' table for the e-puck has 0.2 to 4.9 %, 2.4 % on
+            average.
+        wheel_slip: Relative standard deviation of each wheel's speed in each step.
+            Enki draws it uniformly within ±5 % for the e-puck and Khepera, which is a
+            standard deviation of 2.9 %.
+        motor_lag: Time constant of the wheel speeds, s. The default is 0 because the
+            e-puck has stepper motors.
+        delay: Number of steps until an action takes effect. The default is 1: sensing,
+            computing and sending take one step on a robot that reads, then acts.
     """
 
     range_noise: float = 0.025
@@ -36,16 +37,16 @@ class Disturbance:
     delay: int = 1
 
     def __post_init__(self) -> None:
-        _within("range noise", self.range_noise, 1.0)
-        _within("wheel slip", self.wheel_slip, 1.0)
-        _within("motor lag", self.motor_lag, 60.0)
+        _check_range("range noise", self.range_noise, 1.0)
+        _check_range("wheel slip", self.wheel_slip, 1.0)
+        _check_range("motor lag", self.motor_lag, 60.0)
         if whole_number("delay", self.delay, 0) > MAX_DELAY:
             raise TaskError(
                 f"expected a delay of at most {MAX_DELAY} steps, got {self.delay}"
             )
 
     def env_options(self) -> dict[str, Any]:
-        """Arguments of `Map2DEnv` beside the task's own; the start is jittered, too."""
+        """Returns the additional arguments of `Map2DEnv`, with a jittered start."""
         return {"variation": "jitter", **asdict(self)}
 
     def __str__(self) -> str:
@@ -58,6 +59,6 @@ class Disturbance:
         return ", ".join(["jittered starts", *(p for p, size in parts.items() if size)])
 
 
-def _within(name: str, value: float, most: float) -> None:
+def _check_range(name: str, value: float, most: float) -> None:
     if not 0.0 <= finite(name, value) <= most:
         raise TaskError(f"expected a {name} from 0 to {most:g}, got {value!r}")

@@ -1,4 +1,4 @@
-"""What an environment brings for its tasks to be judged, drawn and explained."""
+"""Base class of registered environments: how their tasks are judged and drawn."""
 
 from __future__ import annotations
 
@@ -23,13 +23,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What a controller of the profile `paper` must define at its top level.
-
-    Attributes:
-        constants: Assigned names.
-        functions: Plain functions.
-        classes: Classes.
-    """
+    """Names that a controller of the profile `paper` must define at its top level."""
 
     constants: tuple[str, ...]
     functions: tuple[str, ...]
@@ -37,10 +31,11 @@ class Names:
 
 
 class Environment(ABC):
-    """An entry of the registry: everything that differs between environments.
+    """A registry entry: everything that differs between environments.
 
-    Further environments are found by the entry-point group `tdac.environments`: the
-    name is the Gymnasium id, the object an instance of a subclass of this class.
+    Other packages register environments with the entry-point group
+    `tdac.environments`: the entry's name is the Gymnasium id, its object an instance
+    of a subclass of this class.
 
     Attributes:
         id: Gymnasium id.
@@ -48,9 +43,9 @@ class Environment(ABC):
             `prompts/`, and the controllers `controller.py.j2` (of the provider
             `builtin`) and `privileged.py.j2` (which proves that a task can be passed).
         units: Units of places and lengths.
-        keys: Keys of a task file that only this environment has; the first one names
-            the map or world.
-        names: What controllers of the profile `paper` must define.
+        keys: Task file keys that only this environment has; the first one names the
+            map or world.
+        names: Names that controllers of the profile `paper` must define.
         kernels: Package with the compiled functions.
     """
 
@@ -68,11 +63,11 @@ class Environment(ABC):
 
     @abstractmethod
     def bundled(self) -> dict[str, str]:
-        """Name of each bundled task, with the map or world it is about."""
+        """Returns the map or world of each bundled task, by the task's name."""
 
     @abstractmethod
     def open(self, spec: TaskFile, base: Path) -> tuple[str, Setting]:
-        """Name of the map or world, and the feasible task.
+        """Returns the name of the map or world, and the feasible task.
 
         Args:
             spec: Contents of the task file.
@@ -84,39 +79,42 @@ class Environment(ABC):
 
     @abstractmethod
     def small_env(self) -> JudgedEnv:
-        """An environment that is made quickly, for warm-ups."""
+        """Returns an environment for warm-ups that is quick to construct."""
 
     @abstractmethod
     def use_kernels(self) -> None:
-        """Calls every compiled function, so that all of them are compiled."""
+        """Calls every kernel, so that all of them get compiled."""
 
     @abstractmethod
     def pictures(self, setting: Setting) -> Pictures:
-        """Pictures of a task's episodes."""
+        """Returns an object that draws a task's episodes."""
 
     @abstractmethod
     def surroundings(self, task: Nominal) -> Surroundings:
-        """The map or world as a diagnosis asks about it."""
+        """Returns the map or world, with the queries that a diagnosis needs."""
 
     @abstractmethod
     def oracle(self) -> Oracle:
-        """Exact answers for the verification tests."""
+        """Returns the exact answers that the verification tests compare with."""
 
     @abstractmethod
     def reference_path(self, task: Nominal, x: float, y: float) -> list[Point]:
-        """The oracle's path from (x, y) to the goal, after shortcuts; ends included."""
+        """Returns the oracle's path from (x, y) to the goal, both included.
+
+        Points that a straight drive can skip are left out.
+        """
 
     @abstractmethod
     def privileged_facts(self, task: Nominal) -> dict[str, Any]:
-        """Names and values for `privileged.py.j2` in the folder.
+        """Returns the variables of the template `privileged.py.j2`.
 
         `largest` is the largest coordinate, which limits the precision of float32.
         """
 
     @abstractmethod
     def prompt_facts(self, task: Task) -> dict[str, Any]:
-        """Names and values for the prompt templates, beside those of all tasks."""
+        """Returns the environment's own variables for the prompt templates."""
 
     @abstractmethod
     def template(self, setting: Setting) -> Template[Any]:
-        """The parametrised controller of the provider `builtin`."""
+        """Returns the parametrised controller of the provider `builtin`."""

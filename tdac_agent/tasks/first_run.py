@@ -1,4 +1,4 @@
-"""What is done once on a machine, before anything else takes time."""
+"""Compilation of the kernels, once per machine."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from tdac_envs.core.code_cache import cache_folder, has_code
 
 
 def compile_first(environment: Environment) -> None:
-    """Compiles an environment's kernels on its first run, where progress is reported.
+    """Compiles an environment's kernels unless compiled code is cached.
 
-    Else the judge would compile most of them, and nothing would say why it takes long.
+    Compiling reports its progress. Without this call the judge would compile most
+    kernels, and the delay would go unexplained.
     """
     if not has_code(environment.kernels) and cache_folder() is not None:
         environment.use_kernels()

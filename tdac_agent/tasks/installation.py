@@ -1,8 +1,8 @@
-"""The secret of an installation: what an author of controllers cannot know.
+"""The installation secret, which authors of controllers do not know.
 
-The moved starts of a verification follow from it, and by it a run folder of one's own
-is told from others. It lies in the user's state folder, never in a run folder, a log or
-a sandbox.
+It determines the moved starts of a verification and marks the run folders that this
+installation created. It is stored in the user's state folder, never in a run folder, a
+log or a sandbox.
 """
 
 from __future__ import annotations
@@ -24,38 +24,40 @@ from tdac_envs.core.private import user_state
 
 SECRET_BYTES = 32
 SEED_BITS = 32
-"""Of a derived seed: short enough to be typed, and nobody can aim at it."""
+"""Length of a derived seed: short enough to type, and not predictable."""
 
 
 @functools.cache
 def lasting_secret() -> bytes | None:
-    """The secret that was made once; None where none can be kept, which is said."""
+    """Returns the stored secret, and creates it if needed.
+
+    Returns None, with a warning on stderr, if it cannot be stored.
+    """
     path = secret_file()
     if path is None:
-        _tell("there is no home")
+        _warn("there is no home folder")
         return None
-    if any(path.is_relative_to(shown) for shown in _shown()):
-        _tell(f"{path} is where controllers may read")
+    if any(path.is_relative_to(folder) for folder in _folders_in_sandboxes()):
+        _warn(f"controllers can read {path}")
         return None
     try:
         if not path.exists():
-            _make(path)
+            _create(path)
         return _read(path)
     except OSError as error:
-        _tell(f"{path}: {error.strerror}")
+        _warn(f"{path}: {error.strerror}")
         return None
 
 
 def secret_file() -> Path | None:
-    """Where the secret lies; None for a user without a home."""
+    """Returns the path of the secret; None for a user without a home folder."""
     folder = user_state()
     return None if folder is None else folder.resolve() / "tdac" / "secret"
 
 
-def _shown() -> tuple[str, ...]:
-    """Folders that every sandbox shows."""
-    seen = exposure()
-    return (*seen.system, *seen.packages)
+def _folders_in_sandboxes() -> tuple[str, ...]:
+    exposed = exposure()
+    return (*exposed.system, *exposed.packages)
 
 
 @functools.cache
@@ -64,27 +66,27 @@ def _drawn_secret() -> bytes:
 
 
 def seed_of(source: bytes, task: Task) -> int:
-    """Seed of the moved starts of a controller, where none is given.
+    """Returns the default seed of a controller's moved starts.
 
-    It follows from the bytes of the controller, from the task and from the secret: the
-    same file gets the same verdict on one machine, and no author can aim at it.
+    It depends on the controller's bytes, the task and the secret: on one machine the
+    same file gets the same verdict, and no author can predict the starts.
     """
     about = f"starts|{hashlib.sha256(source).hexdigest()}|{task.sha256()}"
     return int.from_bytes(keyed(about.encode())[: SEED_BITS // 8], "big")
 
 
 def drawn_seed() -> int:
-    """A seed for a run that no secret outlives."""
+    """Returns a random seed, for a run without a stored secret."""
     return secrets.randbits(SEED_BITS)
 
 
 def keyed(message: bytes) -> bytes:
-    """HMAC-SHA256 of a message with the secret."""
+    """Returns the HMAC-SHA256 of a message with the secret."""
     return hmac.digest(lasting_secret() or _drawn_secret(), message, "sha256")
 
 
 def _read(path: Path) -> bytes:
-    """A file that this user alone can have read or written."""
+    """Reads the secret, if only this user can have read or written the file."""
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     with os.fdopen(handle, "rb") as file:
         status, content = os.fstat(handle), b""
@@ -92,13 +94,14 @@ def _read(path: Path) -> bytes:
             content = file.read(SECRET_BYTES + 1)
     shared = status.st_mode & (stat.S_IRWXG | stat.S_IRWXO)
     if status.st_uid != os.geteuid() or shared or len(content) != SECRET_BYTES:
-        told = f"not a file of {SECRET_BYTES} bytes for its owner alone; remove it"
-        raise OSError(0, told)
+        raise OSError(
+            0, f"not a file of {SECRET_BYTES} bytes that only you can access; remove it"
+        )
     return content
 
 
-def _make(path: Path) -> None:
-    """Writes a new secret, unless another process was first."""
+def _create(path: Path) -> None:
+    """Writes a new secret, unless another process has written one."""
     path.parent.mkdir(0o700, parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:
@@ -112,6 +115,6 @@ def _make(path: Path) -> None:
         os.unlink(name)
 
 
-def _tell(reason: str) -> None:
-    told = "moved starts are drawn for this run alone; its report has their seed"
-    print(f"tdac: no secret can be kept ({reason}): {told}", file=sys.stderr)
+def _warn(reason: str) -> None:
+    effect = "moved starts are drawn for this run only; its report has their seed"
+    print(f"tdac: cannot store a secret ({reason}): {effect}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""What every report says of its origin: hashes, limits, versions."""
+"""Provenance of reports: hashes, limits and versions."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ VERSIONED = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-hea
 def origin(
     task: Task, source: bytes, workdir: Path, tier: str, limits: Limits
 ) -> dict[str, Any]:
-    """The fields that provenance of any kind begins with.
+    """Returns the provenance fields that all kinds of reports share.
 
     Args:
-        task: What the controller must do.
+        task: The controller's task.
         source: Bytes of `controller.py`.
-        workdir: Folder whose files it saw.
-        tier: Sandbox tier that held it.
-        limits: Of its processes.
+        workdir: Working folder of the controller.
+        tier: Sandbox tier that the controller ran in.
+        limits: Limits of its processes.
     """
     weak = "this sandbox tier cannot withhold the network and other files"
     return {
@@ -47,11 +47,11 @@ def origin(
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Of Python and of the packages that a verdict may depend on."""
+    """Returns the versions of Python and of the packages a verdict may depend on."""
     packages = {name: importlib.metadata.version(name) for name in VERSIONED}
     return {"python": platform.python_version(), **packages}
 
 
 def sha256_of(data: bytes) -> str:
-    """Hash of some bytes, in hexadecimal."""
+    """Returns the hexadecimal SHA-256 of some bytes."""
     return hashlib.sha256(data).hexdigest()

@@ -1,4 +1,4 @@
-"""The registry of environments, by Gymnasium id; each is loaded at first use."""
+"""Registry of environments by Gymnasium id; each is loaded at first use."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ OWN = {
 
 @functools.cache
 def environment(env_id: str) -> Environment:
-    """The environment with this Gymnasium id.
+    """Returns the environment with a Gymnasium id.
 
     Raises:
-        TaskError: There is none, or it cannot be loaded.
+        TaskError: The id is unknown, or the environment cannot be loaded.
     """
     if env_id in OWN:
         return _checked(resolve_name(OWN[env_id]), env_id)
@@ -43,12 +43,12 @@ def environment(env_id: str) -> Environment:
 
 
 def own_environments() -> list[Environment]:
-    """The environments of this package; others are loaded when a task names them."""
+    """Returns this package's environments; others load when a task names them."""
     return [environment(env_id) for env_id in OWN]
 
 
 def environment_with_key(key: str) -> Environment:
-    """The environment of this package that a key of a task file belongs to."""
+    """Returns the environment of this package that has a certain task file key."""
     return next(one for one in own_environments() if key in one.keys)
 
 

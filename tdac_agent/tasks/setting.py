@@ -1,4 +1,4 @@
-"""What the tasks of the two environments have in common, and where they differ."""
+"""Interfaces that the tasks of all environments implement."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Nominal(Protocol):
 
     @property
     def env_id(self) -> str:
-        """Gymnasium id of the environment, for the registry."""
+        """Gymnasium id of the environment."""
 
     @property
     def start(self) -> Pose:
@@ -29,11 +29,11 @@ class Nominal(Protocol):
 
     @property
     def goal(self) -> tuple[float, float]:
-        """Point (x, y)."""
+        """Goal (x, y)."""
 
     @property
     def goal_tolerance(self) -> float:
-        """How near to the goal is at the goal."""
+        """Distance at which the goal is reached."""
 
     @property
     def dt(self) -> float:
@@ -41,7 +41,7 @@ class Nominal(Protocol):
 
     @property
     def horizon(self) -> int:
-        """Steps before an episode is cut off."""
+        """Steps before an episode is truncated."""
 
     @property
     def shortest(self) -> float:
@@ -49,7 +49,7 @@ class Nominal(Protocol):
 
     @property
     def body_radius(self) -> float:
-        """Of the disc."""
+        """Radius of the robot's disc."""
 
     @property
     def axle_length(self) -> float:
@@ -57,13 +57,13 @@ class Nominal(Protocol):
 
     @property
     def full_step(self) -> float:
-        """Way of one step at full speed."""
+        """Distance driven in one step at full speed."""
 
     def path_from(self, start: Pose) -> Way:
-        """Shortest path for the body, shape (n, 2); empty where there is none."""
+        """Returns the body's shortest path to the goal, shape (n, 2); may be empty."""
 
     def jittered(self, random: np.random.Generator) -> Pose:
-        """A feasible start of the jitter variation."""
+        """Returns a random feasible start of the jitter variation."""
 
 
 class JudgedEnv(Protocol):
@@ -71,23 +71,23 @@ class JudgedEnv(Protocol):
 
     @property
     def observation_space(self) -> Space[Any]:
-        """Of a `Dict` of boxes."""
+        """A `Dict` of boxes."""
 
     @property
     def action_space(self) -> Space[Any]:
-        """A box for both wheels."""
+        """A box with one entry per wheel."""
 
     @property
     def readings(self) -> str:
-        """Key of the distance sensors in an observation."""
+        """Observation key of the distance sensors."""
 
     @property
     def nominal(self) -> Nominal:
-        """The task that it was made for."""
+        """The task of the environment."""
 
     @property
     def task(self) -> Nominal:
-        """The task of the episode: its start and goal as they were drawn."""
+        """The task of the current episode, with the start and goal drawn for it."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -97,10 +97,10 @@ class JudgedEnv(Protocol):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Steps once."""
+        """Advances the episode by one step."""
 
     def pose(self) -> NDArray[np.float64]:
-        """The true pose, shape (3,)."""
+        """Returns the true pose x, y, heading; shape (3,)."""
 
 
 class Params(Protocol):
@@ -108,17 +108,17 @@ class Params(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should look at."""
+        """Remarks that the user should check."""
 
     def model_dump_json(self, *, indent: int | None = None) -> str:
-        """The file's text."""
+        """Returns the file's text."""
 
 
 class Original(NamedTuple):
-    """What a task was made from, which a run folder keeps a copy of.
+    """The file a task was made from; a run folder keeps a copy.
 
     Attributes:
-        name: Of the copy.
+        name: File name of the copy.
         file: The original.
     """
 
@@ -127,10 +127,7 @@ class Original(NamedTuple):
 
 
 class Setting(Protocol):
-    """Environment, world and start of a task: `Map2DSetting` or `EPuckSetting`.
-
-    Whatever depends on the environment is asked of it, or of its type.
-    """
+    """Map or world, start, goal and robot: `Map2DSetting` or `EPuckSetting`."""
 
     @property
     def nominal(self) -> Nominal:
@@ -142,39 +139,39 @@ class Setting(Protocol):
 
     @property
     def original(self) -> Original | None:
-        """Map image or world, where there is a file."""
+        """Map image or world file; None if there is no file."""
 
     @property
     def units(self) -> Units:
-        """Of places and lengths."""
+        """Units of places and lengths."""
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Nodes that may be solid and are ignored, in words."""
+        """Descriptions of the ignored nodes that may be solid."""
 
     def remarks(self) -> list[str]:
-        """How map or world was read, in lines."""
+        """Returns lines that describe how the map or world was read."""
 
     def env_kwargs(self) -> dict[str, Any]:
-        """Arguments that make the environment."""
+        """Returns the constructor arguments of the environment."""
 
     def make_env(self, **options: Any) -> JudgedEnv:
-        """The environment; options as for its class."""
+        """Constructs the environment; `options` override its constructor arguments."""
 
     def noise(self, relative: float) -> dict[str, float]:
-        """Option of the environment for a relative noise of its distance sensors."""
+        """Returns the environment's option for relative distance sensor noise."""
 
     def facts(self) -> dict[str, Any]:
-        """What decides an episode, as JSON; map or world by its hash."""
+        """Returns all that determines an episode, the map or world by its hash."""
 
     def world_sha256(self) -> str:
-        """Hash of map or world."""
+        """Returns the hash of the map or world."""
 
     def write_files(self, folder: Path) -> None:
-        """Writes what a controller may read, but for `sensors.py`."""
+        """Writes the files that a controller may read, except `sensors.py`."""
 
     def preview(self) -> Image:
-        """How map or world was read, as a picture for people, uint8 RGB."""
+        """Draws the map or world as it was read, uint8 RGB."""
 
     def portable(self) -> dict[str, Any]:
-        """Keys of a `task.yaml` beside these files that say the same."""
+        """Returns the `task.yaml` keys that refer to the files of `write_files`."""

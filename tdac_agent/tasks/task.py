@@ -1,4 +1,4 @@
-"""The feasible task that a `task.yaml` stands for, and the files it comes with."""
+"""Feasible tasks: loading, hashing and writing them for the judge."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ MIN_PROGRESS_STEPS = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """A task that was checked and found feasible.
+    """A task that has been checked and is feasible.
 
     Attributes:
-        name: For people.
-        spec: The file's contents.
-        setting: Environment, world, start and goal.
-        suite: Folder with further test files, where there is one.
-        trusted: Whether its tests may run: they are not in the sandbox.
-        folder: Of its file, where it has one.
+        name: Display name.
+        spec: Contents of the task file.
+        setting: Map or world, start, goal and robot.
+        suite: Folder with additional test files, or None.
+        trusted: Whether these tests may run; they run outside the sandbox.
+        folder: Folder of the task file, or None.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Task:
 
     @property
     def environment(self) -> Environment:
-        """The registry's entry of the task's environment."""
+        """Registry entry of the task's environment."""
         return environment(self.spec.env)
 
     @property
     def params(self) -> Params:
-        """Contents of `params.json`, start, goal and robot filled in."""
+        """Contents of `params.json`, with start, goal and robot."""
         return self.setting.params
 
     @property
@@ -68,28 +68,28 @@ class Task:
 
     @property
     def progress_steps(self) -> int:
-        """Steps within which the progress test wants its progress."""
+        """Step limit of the progress test."""
         default = max(MIN_PROGRESS_STEPS, math.ceil(0.16 * self.nominal.horizon))
         return self.spec.progress.steps or default
 
     def env_kwargs(self) -> dict[str, Any]:
-        """Arguments that make this task's environment; see its class."""
+        """Returns the constructor arguments of this task's environment."""
         return self.setting.env_kwargs()
 
     def make_env(self, **options: Any) -> JudgedEnv:
-        """The environment of this task; options as for its class."""
+        """Constructs this task's environment; `options` override its arguments."""
         return self.setting.make_env(**options)
 
     def disturbed_env(
         self, disturbance: Disturbance, variation: str = "jitter"
     ) -> JudgedEnv:
-        """The environment of this task, disturbed; `variation` as it has it."""
+        """Constructs this task's environment with a disturbance."""
         options = {**disturbance.env_options(), "variation": variation}
         noise = self.setting.noise(options.pop("range_noise"))
         return self.make_env(**options, **noise)
 
     def sha256(self) -> str:
-        """Hash of everything that decides an episode."""
+        """Returns the hash of all that determines an episode and the progress test."""
         facts = {**self.setting.facts(), "progress": self.spec.progress.model_dump()}
         text = json.dumps(facts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
@@ -101,12 +101,12 @@ def load_task(
     """Reads and checks a task.
 
     Args:
-        source: Name of a bundled task, path of a `task.yaml`, folder that holds
+        source: Name of a bundled task, path of a `task.yaml`, folder that contains
             one, or its contents.
-        base: Folder that relative paths in the contents refer to; the file's own
-            by default.
-        trust: Whether tests that a file brings may run, whoever wrote it; those of a
-            run that was begun here may.
+        base: Folder that relative paths in the contents refer to. Default: the task
+            file's folder.
+        trust: Whether the tests that a task file brings may run. Those of a run that
+            this installation created may always run.
 
     Raises:
         TaskError: The file or the task cannot be used; the message says what to do.
@@ -129,8 +129,8 @@ def load_task(
 
 
 def _is_of_own_run(folder: Path, suite: Path) -> bool:
-    """Whether a task is that of a run which was begun here, with these tests."""
-    from tdac_agent.runs.ownership import is_own  # what it loads takes a while
+    """Whether a folder is a run that this installation created with these tests."""
+    from tdac_agent.runs.ownership import is_own  # slow to import
     from tdac_agent.runs.records import load_run
 
     try:
@@ -146,16 +146,15 @@ def _resolve(name: str | None, spec: TaskFile, base: Path) -> Task:
 
 
 def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:
-    """Name and setting of a task."""
-    about = environment(spec.env)
-    compile_first(about)
-    return about.open(spec, base)
+    entry = environment(spec.env)
+    compile_first(entry)
+    return entry.open(spec, base)
 
 
 def called(task: Task) -> str:
-    """A task in words: a bundled one by its name, others with what they are about.
+    """Describes a task: a bundled one by its name, others also by map hash and goal.
 
-    Anybody's map may have the name of a bundled one, and its goal may be anywhere.
+    A name alone does not identify a task: any map may have a bundled map's name.
     """
     name, setting = task.name, task.setting
     if name in bundled_tasks():
@@ -174,10 +173,10 @@ def _bundled(name: str) -> Task:
 
 
 def write_workdir(folder: Path, task: Task) -> None:
-    """Fills the folder a controller works in.
+    """Fills a controller's working folder with everything but the controller.
 
-    Writes `params.json` and `sensors.py`, and `occupancy.npy`, `occupancy.png` and
-    `robot.png`, or `world.wbt`; the controller itself comes beside them.
+    Writes `params.json` and `sensors.py`, and either `occupancy.npy`, `occupancy.png`
+    and `robot.png`, or `world.wbt`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     task.setting.write_files(folder)
@@ -185,18 +184,18 @@ def write_workdir(folder: Path, task: Task) -> None:
 
 
 def lay_out(task: Task, folder: Path) -> Path:
-    """Writes a task for the judge, with all that a controller may read; its folder."""
+    """Writes `task.yaml` and the files a controller may read; returns the folder."""
     write_workdir(folder, task)
     (folder / TASK_FILE).write_text(portable_task_file(task), encoding="utf-8")
     return folder
 
 
 def portable_task_file(task: Task, own_suite: str | None = None) -> str:
-    """`task.yaml` for a run folder: the map or the world is the folder's own.
+    """Returns a `task.yaml` for a run folder, with the map or world in that folder.
 
     Args:
-        task: Any.
-        own_suite: Name of the subfolder that holds the task's suite, if it has one.
+        task: The task.
+        own_suite: Name of the subfolder with the task's suite, if it has one.
     """
     nominal = task.nominal
     own_keys = (key for one in own_environments() for key in one.keys)

@@ -1,4 +1,4 @@
-"""`task.yaml`: what is asked for, in the user's words."""
+"""Schema and reading of `task.yaml`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.mapping.params import MOST_RAYS, Length, Place
 
 TASK_FILE = "task.yaml"
-"""Its name in the folder of a task or a run."""
+"""File name in the folder of a task or a run."""
 
 Profile = Literal["policy", "paper"]
 Steps = Annotated[int, Field(gt=0, le=MOST_STEPS)]
@@ -23,7 +23,7 @@ Name = Annotated[str, Field(min_length=1, max_length=200)]
 
 def _names_a_file(name: str) -> str:
     if not name.isprintable() or "/" in name:
-        raise ValueError("expected characters that can be shown, and no /")
+        raise ValueError("expected printable characters only, and no /")
     return name
 
 
@@ -32,7 +32,7 @@ class _Strict(BaseModel):
 
 
 class RobotSpec(_Strict):
-    """The robot's body, where it differs from the default."""
+    """Properties of the robot that differ from the default."""
 
     radius: Length | None = Field(None, description="px")
     axle: Length | None = Field(None, description="px; default 2 x radius")
@@ -40,11 +40,11 @@ class RobotSpec(_Strict):
     n_rays: int | None = Field(None, ge=1, le=MOST_RAYS)
     field_of_view: float | None = Field(None, gt=0, le=360, description="degrees")
     range_max: Length | None = Field(None, description="px")
-    image: Path | None = Field(None, description="Picture of the robot, nose to +x.")
+    image: Path | None = Field(None, description="Picture of the robot, facing +x.")
 
 
 class ProgressSpec(_Strict):
-    """The progress test: d_min <= fraction * d0 within so many steps."""
+    """The progress test: d_min <= fraction * d0 within `steps` steps."""
 
     fraction: float = Field(0.7, gt=0, lt=1)
     steps: Steps | None = Field(None, description="Default max(400, 0.16 horizon).")
@@ -56,21 +56,21 @@ class TaskFile(_Strict):
 
     schema_version: Literal[1] = Field(1, alias="schema")
     name: Annotated[Name, AfterValidator(_names_a_file)] | None = Field(
-        None, description="For people; names files, too."
+        None, description="Display name; also used in file names."
     )
     env: Name = DEFAULT
-    map: str = Field("maze", description="Bundled name, or a path beside this file.")
-    world: str = Field("arena", description="The same of a Webots world.")
+    map: str = Field("maze", description="Bundled map, or path relative to this file.")
+    world: str = Field("arena", description="Bundled Webots world, or path as above.")
     ignore: tuple[Name, ...] = Field(
-        (), description="Nodes of the world that may be solid and are left out."
+        (), description="Nodes of the world to ignore, although they may be solid."
     )
     left_out: tuple[Name, ...] = Field(
-        (), description="Nodes that were left out when the world was written."
+        (), description="Nodes that were ignored when this world file was written."
     )
     robot: RobotSpec = RobotSpec()
     start: Annotated[tuple[Place, ...] | None, Field(min_length=2, max_length=3)] = None
     goal: tuple[Place, Place] | None = None
-    snap: bool = Field(False, description="Move start and goal to a free place.")
+    snap: bool = Field(False, description="Move start and goal to free places.")
     polarity: Literal["dark", "light"] | None = Field(
         None, description="Which pixels of the map image are obstacles."
     )
@@ -79,27 +79,27 @@ class TaskFile(_Strict):
     )
     tolerance: Length | None = Field(None, description="px; e-puck: m")
     dt: Length | None = Field(
-        None, description="s; default 0.05, e-puck: the world's basicTimeStep."
+        None, description="s; default 0.05, or the world's basicTimeStep."
     )
     horizon: Steps | None = Field(None, description="steps")
     progress: ProgressSpec = ProgressSpec()
     variation: Literal["nominal", "jitter", "random"] = "jitter"
-    suite: Path | None = Field(None, description="Folder with further test files.")
+    suite: Path | None = Field(None, description="Folder with additional test files.")
     profile: Profile = "paper"
-    instructions: str = Field("", description="The user's own text to the model.")
+    instructions: str = Field("", description="Additional text for the prompt.")
 
     model_config = ConfigDict(populate_by_name=True)
 
 
 def read_task_file(path: Path, asked: object) -> TaskFile:
-    """Contents of a task file.
+    """Reads a task file.
 
     Args:
         path: The file.
-        asked: What the user called it, for messages.
+        asked: The user's name for it, for messages.
 
     Raises:
-        TaskError: It cannot be read, or has a wrong or unknown key.
+        TaskError: The file cannot be read, or has an invalid or unknown key.
     """
     try:
         data = parse_yaml(read_file(path, TEXT_BYTES))
@@ -117,14 +117,14 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
 
 
 def checked(data: dict[str, Any], source: str) -> TaskFile:
-    """Contents of a task file.
+    """Validates the parsed contents of a task file.
 
     Args:
-        data: By key.
-        source: Where they come from, for messages.
+        data: Values by key.
+        source: Their source, for messages.
 
     Raises:
-        TaskError: A key is wrong or unknown; the message names it.
+        TaskError: A key is invalid or unknown; the message names it.
     """
     try:
         spec = TaskFile.model_validate(data)
@@ -136,23 +136,23 @@ def checked(data: dict[str, Any], source: str) -> TaskFile:
         raise TaskError(f"{source}: env: {error}") from error
     for other in own_environments():
         for key in spec.model_fields_set.intersection(other.keys).difference(own):
-            raise TaskError(f"{source}: {key}: only with env: {other.id}")
+            raise TaskError(f"{source}: {key}: only valid with env: {other.id}")
     return spec
 
 
 def bundled_tasks() -> tuple[str, ...]:
-    """Names of the bundled tasks: the maps, then the e-puck's worlds."""
+    """Returns the names of the bundled tasks: the maps, then the e-puck's worlds."""
     return tuple(name for one in own_environments() for name in one.bundled())
 
 
 def bundled_task(name: str) -> TaskFile | None:
-    """Contents of a bundled task, or None if there is none of that name.
+    """Returns the contents of a bundled task, or None if no task has that name.
 
-    A map's task is called as the map; `epuck` is the world `arena`, `epuck-maze` the
+    A map's task has the map's name; `epuck` is the world `arena`, `epuck-maze` the
     world `maze`.
     """
     for one in own_environments():
-        about = one.bundled().get(name)
-        if about is not None:
-            return TaskFile.model_validate({"env": one.id, one.keys[0]: about})
+        place = one.bundled().get(name)
+        if place is not None:
+            return TaskFile.model_validate({"env": one.id, one.keys[0]: place})
     return None

@@ -1,8 +1,8 @@
-"""What a folder or a file of somebody else's may not do by itself: run, or reach out.
+"""Permissions for folders and files that this installation did not create.
 
-A run folder, a task, a campaign is data. What of it runs on this machine outside the
-sandbox, spends money or is sent something is used only where this installation began
-the folder, where the same flag is given, or with `--trust`.
+Run folders, tasks and campaigns are data. A part of them that runs outside the sandbox,
+spends money or sends data elsewhere is used only if this installation created the
+folder, or if the user gives the same flag or `--trust`.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 MOST_FILES, MOST_BYTES = 2000, 64 << 20
-"""Of a suite."""
+"""Limits of a suite."""
 LONGEST_LINE = 2000
 SHORT = 12
-"""Digits of a hash that are shown."""
+"""Number of printed digits of a hash."""
 
 
 class NotTrustedError(TdacError):
-    """Somebody else's file wants what only the user may allow; a line for each."""
+    """A file needs permissions that the user has not given; one line for each."""
 
     def __init__(self, lines: Iterable[str]) -> None:
         self.lines = tuple(lines)
@@ -37,12 +37,12 @@ class NotTrustedError(TdacError):
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """One thing that a folder or a file wants.
+    """A permission that a folder or a file needs.
 
     Attributes:
-        what: In words, as in `run the tests in DIR`.
-        flag: Words of the command line that allow it; none but `--trust` where empty.
-        sha256: Of the files that would run.
+        what: Description, such as `run the tests in DIR`.
+        flag: Command-line words that give it; if empty, only `--trust` does.
+        sha256: Hash of the files that would run, or an empty string.
     """
 
     what: str
@@ -56,49 +56,52 @@ class Wish:
 
 
 def permit(whose: str | Path, wishes: Iterable[Wish], *, trust: bool) -> None:
-    """Lists what is allowed by `--trust`, or refuses.
+    """Prints the permissions that `--trust` gives, or refuses.
 
     Args:
         whose: Folder or file.
-        wishes: What it wants and was not given by a flag.
-        trust: Whether the user trusts it, this time.
+        wishes: Permissions that it needs and that no flag gives.
+        trust: Whether the user gave `--trust`.
 
     Raises:
-        NotTrustedError: With a line for each wish.
+        NotTrustedError: It needs permissions, and `trust` is false.
     """
-    asked = list(wishes)
-    if asked and not trust:
+    needed = list(wishes)
+    if needed and not trust:
         raise NotTrustedError(
-            _line(f"{whose}, which was not begun here, wants to {wish}: {_ways(wish)}")
-            for wish in asked
+            _line(
+                f"{whose} was not created by this installation and wants to {wish}: "
+                f"{_how_to_allow(wish)}"
+            )
+            for wish in needed
         )
-    for wish in asked:
-        told = _line(f"trusted for this once: {whose} may {wish}")
-        print(told, file=sys.stderr)
+    for wish in needed:
+        line = _line(f"trusted for this command only: {whose} may {wish}")
+        print(line, file=sys.stderr)
 
 
 def _line(text: str) -> str:
-    """Words of somebody else's, which may hold anything, to be shown."""
-    from tdac_agent.storage.secrets import one_line  # seldom needed, slow to load
+    """Makes text from an untrusted file safe to print."""
+    from tdac_agent.storage.secrets import one_line  # rarely needed, slow to import
 
     return one_line(text, LONGEST_LINE)
 
 
-def _ways(wish: Wish) -> str:
-    given = f"{shlex.join(wish.flag)}, or with " if wish.flag else ""
-    return f"allow it with {given}--trust"
+def _how_to_allow(wish: Wish) -> str:
+    flag = f"{shlex.join(wish.flag)}, or with " if wish.flag else ""
+    return f"allow it with {flag}--trust"
 
 
 def allowed(task: Task, suite: Path | None, *, trust: bool) -> Task:
-    """A task with the tests that the user wants, or trusts.
+    """Returns the task with tests that the user gave or trusts.
 
     Args:
-        task: As its file tells.
-        suite: Folder of the flag `--suite`, in the place of the task's own tests.
-        trust: Whether the user trusts the file, this time.
+        task: The task as its file states it.
+        suite: Folder of the flag `--suite`; replaces the task's own tests.
+        trust: Whether the user gave `--trust`.
 
     Raises:
-        NotTrustedError: It brings tests, and nothing allows them.
+        NotTrustedError: The task brings tests that are not permitted.
     """
     if suite is not None:
         return replace(task, suite=suite, trusted=True)
@@ -108,13 +111,13 @@ def allowed(task: Task, suite: Path | None, *, trust: bool) -> Task:
 
 
 def suite_wish(suite: Path) -> Wish:
-    """To run the tests of a folder, which are not in the sandbox."""
+    """Returns the permission to run a folder's tests outside the sandbox."""
     digest = tree_sha256(suite)
     return Wish(f"run the tests in {suite}", ("--suite", str(suite)), digest or "")
 
 
 def asking(role: str, name: str) -> str:
-    """What a model is wanted for, in words."""
+    """Describes the use of a model as a wish."""
     kind, _, words = name.partition(":")
     if kind == "command":
         return f"run the program `{words}` as its {role}"
@@ -122,14 +125,14 @@ def asking(role: str, name: str) -> str:
 
 
 def file_sha256(path: Path) -> str:
-    """Hash of a file."""
+    """Returns the SHA-256 of a file."""
     return hashlib.sha256(read_file(path, RECORD_BYTES)).hexdigest()
 
 
 def tree_sha256(folder: Path) -> str | None:
-    """Hash of all files below a folder, byte code left out; it is never used.
+    """Returns the hash of all files below a folder, except byte code, which never runs.
 
-    None where there are links, things that are no files, or far too many.
+    Returns None if the folder contains links, special files or too much data.
     """
     paths = list(itertools.islice(folder.rglob("*"), MOST_FILES + 1))
     if len(paths) > MOST_FILES:

@@ -20,7 +20,7 @@ HOMES = (
     *("MPLCONFIGDIR", "TDAC_PRICES"),
 )
 
-NO_SECRET = "tdac: no secret can be kept (there is no home)"
+NO_SECRET = "tdac: cannot store a secret (there is no home folder)"
 
 
 def call(way, *words, **options):
@@ -68,7 +68,7 @@ def test_prices_are_the_shipped_ones(homeless):
 
 @pytest.mark.slow
 def test_a_run_is_made_verified_and_reported(homeless, place):
-    """Nothing is asked of a home; said of it is that no secret can be kept there."""
+    """Nothing is asked of a home; said of it is that no secret can be stored there."""
     place.chmod(0o777)
     for words, told, secrets in (
         (["synth"], "verified in iteration", 1),

@@ -208,10 +208,13 @@ def test_the_hash_tells_tasks_apart(tmp_path, changes):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"env": EPUCK.id, "map": "maze"}, "map: only with env: TDAC-Map2D-v0"),
-        ({"env": EPUCK.id, "snap": True}, "snap: only with env: TDAC-Map2D-v0"),
-        ({"world": "arena"}, "world: only with env: TDAC-EPuck-v0"),
-        ({"map": "maze", "ignore": ["x"]}, "ignore: only with env: TDAC-EPuck-v0"),
+        ({"env": EPUCK.id, "map": "maze"}, "map: only valid with env: TDAC-Map2D-v0"),
+        ({"env": EPUCK.id, "snap": True}, "snap: only valid with env: TDAC-Map2D-v0"),
+        ({"world": "arena"}, "world: only valid with env: TDAC-EPuck-v0"),
+        (
+            {"map": "maze", "ignore": ["x"]},
+            "ignore: only valid with env: TDAC-EPuck-v0",
+        ),
         ({"env": "TDAC-Car-v0"}, "env: unknown environment .*known: TDAC-Map2D"),
         ({"env": EPUCK.id, "world": "arena", "ignore": ["x"]}, "no node called 'x'"),
         ({"env": EPUCK.id, "world": "nothing.wbt"}, "no such file"),

@@ -80,7 +80,7 @@ def test_a_permission_holds_once(tdac, run):
         in (refused[2])
     )
     code, _, err = tdac("verify", run, "--trust")
-    assert (code, err) == (0, f"trusted for this once: {run} may {wish}\n")
+    assert (code, err) == (0, f"trusted for this command only: {run} may {wish}\n")
     assert tdac("verify", run, "--suite", run / "suite")[0] == 0
     assert tdac("verify", run) == refused
     assert {p: p.read_bytes() for p in run.rglob("*.*") if p.is_file()} == before

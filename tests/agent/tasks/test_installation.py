@@ -17,8 +17,8 @@ from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_agent.verification.verify import verify
 
 KEYED = "from tdac_agent.tasks.installation import keyed; print(keyed(b'x').hex())"
-LINE = "tdac: no secret can be kept ("
-END = ": moved starts are drawn for this run alone; its report has their seed"
+LINE = "tdac: cannot store a secret ("
+END = ": moved starts are drawn for this run only; its report has their seed"
 VERIFY = """
 import sys
 from tdac_agent.tasks.task import load_task
@@ -61,7 +61,7 @@ def test_a_secret_is_made_once(tmp_path):
 
 
 def spoiled_by(kind, file):
-    """Makes a place that no secret can be kept in, or that has a bad one."""
+    """Makes a place where no secret can be stored, or that has a bad one."""
     file.parent.mkdir(parents=True)
     if kind == "not a folder":
         file.parent.rmdir()
@@ -97,7 +97,7 @@ def test_a_secret_is_kept_from_the_sandbox(shown):
     """A folder that controllers can read is no place for it: said, not made."""
     state = Path(shown) / "state"
     _, err = said(python(state, "-c", KEYED))
-    assert err == f"{LINE}{state}/tdac/secret is where controllers may read){END}\n"
+    assert err == f"{LINE}controllers can read {state}/tdac/secret){END}\n"
     assert not state.exists()
 
 

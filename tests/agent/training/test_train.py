@@ -182,13 +182,16 @@ def test_a_foreign_checkpoint_is_not_loaded(tmp_path, small, config, name, tdac)
             file.writestr("data", json.dumps({"x": {":serialized:": evil}}))
     words = ("train", "--resume", out, "--steps", 128)
     code, _, err = tdac(*words)
-    line = f"error: {out}, which was not begun here, wants to load {out / name}, which"
+    line = (
+        f"error: {out} was not created by this installation and wants to load "
+        f"{out / name}, which"
+    )
     assert code == 2
     assert [part.startswith(line) for part in err.splitlines()] == [True]
     assert err.endswith("allow it with --trust\n")
     assert not canary.exists()
     code, _, err = tdac(*words, "--trust")
-    assert "trusted for this once" in err
+    assert "trusted for this command only" in err
     assert canary.exists()
 
 
