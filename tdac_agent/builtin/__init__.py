@@ -1,1 +1,1 @@
-"""The provider `builtin`: no language model, a template tuned by what failed."""
+"""Providers without a language model: `builtin` and `scripted`."""

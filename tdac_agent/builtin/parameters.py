@@ -1,4 +1,4 @@
-"""What of the templates can be tuned, and the way out of a controller again."""
+"""Tunable parameters of controller templates, and reading them from a controller."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 class Tuned(Protocol):
-    """Values of the tuning constants of a template; the defaults are neutral.
+    """Parameters of a template; the defaults are neutral.
 
-    The constants in the file have the same names, in capitals. `remedies` says which
-    of them answer which failure.
+    The constants in the controller have the same names, in capitals. `remedies` maps
+    causes of failures to parameter changes.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -23,7 +23,7 @@ class Tuned(Protocol):
 
     @property
     def inflation_margin(self) -> float:
-        """Room wanted beside the body."""
+        """Desired clearance around the body."""
 
 
 P = TypeVar("P", bound=Tuned)
@@ -38,15 +38,15 @@ def tunable(
     *,
     step: float = 0.0,
 ) -> float:
-    """A field with its bounds, as metadata, for the templates and the repair table.
+    """Returns a dataclass field whose metadata has bounds, unit and meaning.
 
     Args:
-        neutral: First value.
-        low: Least value.
-        high: Greatest value.
-        unit: Empty for a plain number.
-        meaning: For the template's comment.
-        step: In which the repair searches for a better value.
+        neutral: Default value.
+        low: Smallest value.
+        high: Largest value.
+        unit: Unit; empty for a dimensionless number.
+        meaning: Comment in the controller.
+        step: Step of the repair's search for a better value.
     """
     known = {"low": low, "high": high, "unit": unit, "meaning": meaning, "step": step}
     value: float = field(default=neutral, metadata=known)
@@ -54,7 +54,7 @@ def tunable(
 
 
 def changed(parameters: P, values: Mapping[str, float]) -> P:
-    """A copy with some values replaced, each moved into its bounds."""
+    """Returns a copy with some values replaced, each clipped to its bounds."""
     bounded: dict[str, Any] = {
         item.name: _bounded(values[item.name], item.metadata)
         for item in fields(parameters)
@@ -64,10 +64,10 @@ def changed(parameters: P, values: Mapping[str, float]) -> P:
 
 
 def check(parameters: Tuned) -> None:
-    """Refuses values outside their bounds.
+    """Checks that all values are within their bounds.
 
     Raises:
-        ValueError: A value is.
+        ValueError: A value is out of bounds.
     """
     for item in fields(parameters):
         value = getattr(parameters, item.name)
@@ -84,17 +84,17 @@ def _bounded(value: float, known: Mapping[str, Any]) -> float:
 
 
 def names_of(kind: type[Tuned]) -> tuple[str, ...]:
-    """Names of the parameters, in their order."""
+    """Returns the names of the parameters, in order."""
     return tuple(item.name for item in fields(kind))
 
 
 def about(kind: type[Tuned], name: str) -> Mapping[str, Any]:
-    """What is known of a parameter: `low`, `high`, `unit`, `meaning`, `step`."""
+    """Returns the metadata of a parameter: `low`, `high`, `unit`, `meaning`, `step`."""
     return next(item.metadata for item in fields(kind) if item.name == name)
 
 
 def read_parameters(source: str, kind: type[P]) -> P | None:
-    """The parameters of a controller made from a template; None of another one."""
+    """Returns the parameters in a template's controller; None for other controllers."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):

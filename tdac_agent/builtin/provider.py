@@ -1,4 +1,4 @@
-"""`builtin`: no language model; a template is tuned by what failed."""
+"""Provider `builtin`: tunes a template after failures, without a language model."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from tdac_agent.tasks.setting import Setting
 
 
 def make_builtin(words: str, options: Options) -> Builtin[Any]:
-    """The template that is tuned by what failed.
+    """Returns the provider for a task.
 
     Raises:
-        ProviderError: It was given words, and takes none.
+        ProviderError: `words` is not empty.
     """
     if words:
-        raise ProviderError(f"'builtin' has no models; got 'builtin:{words}'")
+        raise ProviderError(f"'builtin' takes no model name; got 'builtin:{words}'")
     return Builtin(template_of(options.setting))
 
 
 def template_of(setting: Setting) -> Template[Any]:
-    """The parametrised controller for a task's setting."""
+    """Returns the controller template for a task's setting."""
     return environment(setting.nominal.env_id).template(setting)
 
 
 class Builtin(Generic[P]):
-    """Learner and optimizer that fill in and tune a parametrised controller.
+    """Learner and optimizer that tune the parameters of a controller template.
 
-    It sees what a model sees: the question, the rules, the controller and the
-    report. Everything it learns passes through the rules.
+    Like a model, it sees only the prompt, the rules, the controller and the report.
+    Between iterations, only the rules carry what it has learned.
 
     Args:
-        template: The controller.
+        template: The controller template.
     """
 
     name = "builtin"
@@ -62,9 +62,9 @@ class Builtin(Generic[P]):
         parameters, changes = repair(failed, request.report, bounds, 100 * k + j)
         notes = [str(change) for change in changes]
         if known is None:
-            notes.insert(0, "the controller is not from the template: replaced by it")
+            notes.insert(0, "replaced the controller: it is not from the template")
         if not changes:
-            notes.append("no parameter answers these failures")
+            notes.append("no parameter addresses these failures")
         if request.kind == "summarise":
             rules = write_rules(parameters, changes, bounds, k)
             return Reply(_operations(rules), notes=tuple(notes))
@@ -75,7 +75,7 @@ class Builtin(Generic[P]):
 
 
 def _operations(rules: list[str]) -> str:
-    """The answer of an optimizer that adds rules for this task."""
+    """Returns an optimizer's answer that adds rules for this task."""
     operations = [{"op": "add", "scope": "task", "text": rule} for rule in rules]
     return f"```json\n{json.dumps(operations, indent=1)}\n```\n"
 

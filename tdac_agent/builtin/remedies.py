@@ -1,4 +1,4 @@
-"""Remedies: how the parameters of a template answer a cause of failure."""
+"""Remedies: how the parameters of a template change after a failure."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tdac_agent.builtin.parameters import P, about, changed
 from tdac_agent.verification.diagnosis.report import Cause
 
 MARGIN = "inflation_margin"
-# The search for a margin ends within this share of its step.
+# The search for a margin ends when its interval is this fraction of the step.
 _RESOLUTION = 0.125
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Margins that failed: too small ones and too large ones."""
+    """Open interval of inflation margins that are not yet known to fail."""
 
     above: float = 0.0
     below: float = math.inf
@@ -25,13 +25,13 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """How one cause of failure changes the parameters.
+    """Parameter changes for one cause of failure; mappings are by parameter name.
 
     Attributes:
-        margin: The way in which to search for a better inflation margin.
-        add: Amount added to a parameter.
-        scale: Factor of a parameter; one that is off (0) stays off.
-        switch_on: Value of a parameter that was off.
+        margin: Direction of the search for a better inflation margin.
+        add: Values to add.
+        scale: Factors; a parameter that is off (0) stays off.
+        switch_on: New values of parameters that are off.
     """
 
     margin: Literal["wider", "narrower"] | None = None
@@ -40,7 +40,7 @@ class Remedy:
     switch_on: Mapping[str, float] = field(default_factory=dict)
 
     def apply(self, parameters: P, bounds: Bounds) -> P:
-        """The parameters after this remedy, within their limits."""
+        """Returns the changed parameters, clipped to their bounds."""
         values = {n: getattr(parameters, n) * f for n, f in self.scale.items()}
         values |= {n: getattr(parameters, n) + d for n, d in self.add.items()}
         off = {n: v for n, v in self.switch_on.items() if not getattr(parameters, n)}
@@ -66,4 +66,4 @@ def _narrower(margin: float, bounds: Bounds, step: float) -> float:
 
 
 Remedies = Mapping[Cause, Remedy]
-"""Most telling cause first: of two that want the same parameter the first wins."""
+"""Remedies by cause; if two change the same parameter, the first one applies."""

@@ -1,4 +1,4 @@
-"""Repair: failures change parameters, and rules remember what they were."""
+"""Repair: changes parameters after failures and stores them in rules."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tdac_agent.verification.diagnosis.report import Cause, Report
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One parameter that a failing test changed."""
+    """A parameter change, with the failed test that led to it."""
 
     test: str
     cause: Cause
@@ -29,7 +29,7 @@ class Change:
         return f"{self.test} -> {self.name} {self.before:g} -> {self.after:g}"
 
 
-_MEANING: Mapping[str, Cause] = {
+_CAUSES_BY_TEST: Mapping[str, Cause] = {
     "test_progress": "too slow",
     "test_policy_is_fast_enough": "time-out",
 }
@@ -38,15 +38,15 @@ _MEANING: Mapping[str, Cause] = {
 def repair(
     parameters: P, report: Report, bounds: Bounds, attempt: int
 ) -> tuple[P, list[Change]]:
-    """The parameters changed as the failures ask for.
+    """Applies the remedies for all failures; returns the parameters and the changes.
 
-    Where no failure asks for a change that is still possible, a seeded random step
-    is made, so that no candidate is tried for ever.
+    If no remedy can change anything, a seeded random step is taken, so that the loop
+    does not repeat one candidate forever.
 
     Args:
-        parameters: Those that failed.
-        report: What failed.
-        bounds: Margins known to fail.
+        parameters: Parameters of the failed controller.
+        report: Its report.
+        bounds: Margins not yet known to fail.
         attempt: Seed of the random step.
     """
     changes: dict[str, Change] = {}
@@ -72,23 +72,23 @@ def _compare(parameters: P, wanted: P, test: str, cause: Cause) -> list[Change]:
 
 
 def first_tests(report: Report) -> dict[Cause, str]:
-    """Each cause in a report with a test that showed it, the plainest one.
+    """Returns a failed test for each cause, `test_no_collisions` if possible.
 
-    An episode that arrived has no diagnosis; then the test itself says what is wrong.
+    Without a diagnosis (the episode reached the goal), the test implies the cause.
     """
     tests: dict[Cause, str] = {}
-    plainest = "::test_no_collisions"
-    for failure in sorted(report.failures, key=lambda f: plainest not in f.test):
+    preferred = "::test_no_collisions"
+    for failure in sorted(report.failures, key=lambda f: preferred not in f.test):
         name = failure.test.rpartition("::")[2]
         if failure.diagnosis is not None:
             tests.setdefault(failure.diagnosis.cause, failure.test)
-        elif name in _MEANING:
-            tests.setdefault(_MEANING[name], failure.test)
+        elif name in _CAUSES_BY_TEST:
+            tests.setdefault(_CAUSES_BY_TEST[name], failure.test)
     return tests
 
 
 def _random_step(parameters: P, seed: int) -> P:
-    """Half-way to a random point within the limits."""
+    """Moves halfway to a random point within the bounds."""
     random = np.random.default_rng(seed)
     values = {
         item.name: 0.5 * getattr(parameters, item.name)
@@ -101,45 +101,47 @@ def _random_step(parameters: P, seed: int) -> P:
 def write_rules(
     parameters: Tuned, changes: Iterable[Change], bounds: Bounds, iteration: int
 ) -> list[str]:
-    """Rules that lead to these parameters, for a person and for `read_rules`.
+    """Returns rules that state the parameters, for people and for `read_rules`.
 
-    They read `set LOOKAHEAD = 60 px; keep INFLATION_MARGIN > 2 px (k = 1: collision)`.
-    All that is not neutral is said again, so that older rules may be forgotten.
+    Example: `set LOOKAHEAD = 60 px; keep INFLATION_MARGIN > 2 px (k = 1: collision)`.
+    All parameters that are not neutral are repeated, so older rules may be dropped.
 
     Args:
-        parameters: What the next controller shall have.
-        changes: Why; other parameters are said to be kept.
-        bounds: Margins known to fail.
-        iteration: k, which also keeps a rule from being taken for an older one.
+        parameters: Parameters of the next controller.
+        changes: The changes that led to them.
+        bounds: Margins not yet known to fail.
+        iteration: k; also makes the text differ from that of older rules.
     """
     causes = {change.name: change.cause for change in changes}
     kind = type(parameters)
-    neutral, said = kind(), list[str]()
+    neutral, clauses = kind(), list[str]()
     for name in names_of(kind):
         value = getattr(parameters, name)
         if value != getattr(neutral, name) or name in causes:
-            said.append(_say(kind, "set", name, "=", value))
+            clauses.append(_clause(kind, "set", name, "=", value))
     if bounds.above > 0.0:
-        said.append(_say(kind, "keep", MARGIN, ">", bounds.above))
+        clauses.append(_clause(kind, "keep", MARGIN, ">", bounds.above))
     if bounds.below < math.inf:
-        said.append(_say(kind, "keep", MARGIN, "<", bounds.below))
+        clauses.append(_clause(kind, "keep", MARGIN, "<", bounds.below))
     why = ", ".join(dict.fromkeys(causes.values())) or "as before"
-    return _packed(said, f" (k = {iteration}: {why})")
+    return _packed(clauses, f" (k = {iteration}: {why})")
 
 
-def _packed(said: list[str], ending: str) -> list[str]:
-    """As few rules as hold these words, each with the same ending."""
+def _packed(clauses: list[str], ending: str) -> list[str]:
+    """Joins clauses to as few rules as possible, each with the same ending."""
     rules: list[str] = []
-    for words in said:
-        longer = f"{rules[-1]}; {words}" if rules else ""
+    for clause in clauses:
+        longer = f"{rules[-1]}; {clause}" if rules else ""
         if rules and len(longer + ending) <= MAX_RULE_CHARS:
             rules[-1] = longer
         else:
-            rules.append(words)
+            rules.append(clause)
     return [rule + ending for rule in rules]
 
 
-def _say(kind: type[Tuned], verb: str, name: str, relation: str, value: float) -> str:
+def _clause(
+    kind: type[Tuned], verb: str, name: str, relation: str, value: float
+) -> str:
     unit = about(kind, name)["unit"]
     number = f"{value:.5f}".rstrip("0").rstrip(".")
     return f"{verb} {name.upper()} {relation} {number} {unit}".rstrip()
@@ -149,11 +151,14 @@ _RULE = re.compile(r"^(set|keep) ([A-Z_]+) ([=<>]) (\d+(?:\.\d+)?)\b")
 
 
 def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, Bounds]:
-    """What `write_rules` wrote, the latest rule winning; other rules are skipped."""
+    """Reads parameters and margins from rules of `write_rules`; skips other rules.
+
+    Later rules override earlier ones.
+    """
     values: dict[str, float] = {}
     above, below = 0.0, math.inf
-    for words in (part for rule in rules for part in rule.split(";")):
-        match = _RULE.match(words.strip())
+    for clause in (part for rule in rules for part in rule.split(";")):
+        match = _RULE.match(clause.strip())
         if match is None or match[2].lower() not in names_of(kind):
             continue
         name, value = match[2].lower(), float(match[4])
@@ -167,7 +172,7 @@ def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, Bounds]:
 
 
 def learn_bounds(bounds: Bounds, parameters: Tuned, report: Report) -> Bounds:
-    """The margins known to fail after one more report."""
+    """Returns the margins not yet known to fail after another report."""
     causes, margin = first_tests(report), parameters.inflation_margin
     above, below = bounds.above, bounds.below
     if "collision" in causes:

@@ -1,8 +1,8 @@
-"""`scripted:SCRIPT`: a stand-in for a model that draws from prepared controllers.
+"""Provider `scripted:SCRIPT`: draws prepared controllers instead of asking a model.
 
-No model is asked. It is for rehearsals and simulations of the loop: how often its
-controllers are right is known beforehand. What it answers depends on the script's seed,
-the task, and on which question of which run it is, and on nothing else.
+It is for dry runs and simulations of the loop: the success rate of its controllers is
+known in advance. An answer depends only on the script's seed, the task, the run and the
+position of the question in the run.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ class _Strict(BaseModel):
 
 
 class Choice(_Strict):
-    """One controller of a script: the template of `builtin`, or a file."""
+    """A controller of a script: the template of `builtin`, or a file."""
 
-    weight: float = Field(1.0, gt=0, description="Where it is drawn.")
-    file: Path | None = Field(None, description="Relative to the script.")
-    parameters: dict[str, float] = Field({}, description="Of the template.")
+    weight: float = Field(1.0, gt=0, description="Relative probability of a draw.")
+    file: Path | None = Field(None, description="Path relative to the script.")
+    parameters: dict[str, float] = Field({}, description="Template parameters.")
 
     @model_validator(mode="after")
     def _one_source(self) -> Choice:
         if self.file is not None and self.parameters:
-            raise ValueError("expected a file, or parameters of the template")
+            raise ValueError("expected a file or template parameters, not both")
         return self
 
 
@@ -53,16 +53,16 @@ class Script(_Strict):
 
     schema_version: Literal[1] = Field(1, alias="schema")
     about: str = ""
-    seed: int = Field(0, ge=0, description="Of the draws.")
+    seed: int = Field(0, ge=0, description="Seed of the draws.")
     drawn: bool = Field(
-        True, description="Else the k-th is for iteration k, the last one for the rest."
+        True, description="If false, iteration k uses the k-th choice, or the last one."
     )
     generate: tuple[Choice, ...] = Field(min_length=1)
     edit: tuple[Choice, ...] = Field(min_length=1)
 
 
 def make(words: str, options: Options) -> Scripted:
-    """The provider for a script: a shipped one by its name, or a file.
+    """Returns the provider for a script: a shipped one by its name, or a file.
 
     Raises:
         ProviderError: The script cannot be used.
@@ -85,9 +85,9 @@ class Scripted:
     """A provider; see `Provider`.
 
     Args:
-        words: What the user calls the script.
+        words: Name or path of the script.
         script: Its contents.
-        sources: Of its controllers, by the kind of the question.
+        sources: Sources of its controllers, by kind of request.
     """
 
     paid = False
@@ -100,12 +100,12 @@ class Scripted:
         self._sources = sources
 
     def answers_sha256(self) -> str:
-        """Hash of all that it may answer, and of how it is drawn."""
+        """Returns the hash of all possible answers and of how they are drawn."""
         known = [self._script.model_dump(mode="json"), self._sources]
         return sha256_of(json.dumps(known, sort_keys=True).encode())
 
     def complete(self, request: Request) -> Reply:
-        """Answers one request; see `Provider`. It has no rules to give."""
+        """Answers one request; see `Provider`. Adds no rules."""
         if request.kind == "summarise":
             return Reply("```json\n[]\n```\n")
         number = self._number(request)
@@ -113,26 +113,26 @@ class Scripted:
         return Reply(f"```python\n{source}```\n", notes=(f"script: no. {number + 1}",))
 
     def _number(self, request: Request) -> int:
-        """Which of the controllers is given."""
+        """Returns the index of the controller that answers a request."""
         run, k, j = request.sample
         script = self._script
         choices = script.edit if request.kind == "edit" else script.generate
         if not script.drawn:
             return min(k, len(choices)) - 1
         kind = _KINDS.index(request.kind)
-        # Other tasks have other draws.
+        # Each task has its own draws.
         task = zlib.crc32(request.prompt[: request.stable].encode())
-        place = [script.seed, task, run, k, j, kind, request.turn]
-        random = np.random.default_rng(place)
+        seed = [script.seed, task, run, k, j, kind, request.turn]
+        random = np.random.default_rng(seed)
         weights = np.array([choice.weight for choice in choices])
         return int(random.choice(len(choices), p=weights / weights.sum()))
 
 
 def _source(choice: Choice, script: Path, setting: Setting) -> str:
-    """The source of a controller, with a line end at its end.
+    """Returns the source of a controller, ending in a newline.
 
     Raises:
-        ProviderError: There is no such file, or the template no such parameter.
+        ProviderError: The file cannot be read, or a parameter is unknown.
     """
     if choice.file is None:
         return _filled_in(choice.parameters, script, setting)
@@ -145,7 +145,6 @@ def _source(choice: Choice, script: Path, setting: Setting) -> str:
 
 
 def _filled_in(values: dict[str, float], script: Path, setting: Setting) -> str:
-    """The template of `builtin` with some parameters."""
     template = template_of(setting)
     known = names_of(template.kind)
     for name in set(values) - set(known):

@@ -1,4 +1,4 @@
-"""A parametrised controller, filled in."""
+"""Controller templates with tunable parameters."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tdac_agent.builtin.parameters import P
 
 @dataclass(frozen=True, slots=True)
 class Template(Generic[P]):
-    """A controller with tuning constants.
+    """A controller template.
 
     Attributes:
-        kind: Class of the parameters; its defaults are the first values.
+        kind: Class of the parameters, with neutral defaults.
         file: Jinja2 template of the source.
-        facts: Names and values that the template needs beside the parameters.
+        facts: Template variables besides the parameters.
     """
 
     kind: type[P]
@@ -26,7 +26,7 @@ class Template(Generic[P]):
     facts: dict[str, Any]
 
     def render(self, parameters: P) -> str:
-        """Source of the controller with these parameters."""
+        """Returns the source of the controller with these parameters."""
         template = jinja2.Environment(
             undefined=jinja2.StrictUndefined, keep_trailing_newline=True
         ).from_string(self.file.read_text(encoding="utf-8"))

@@ -226,7 +226,7 @@ def test_a_miss_is_an_error(policy_task, recorded, tmp_path, small_task, warm):
         ("gpt", "unknown model 'gpt'; known: builtin, anthropic:MODEL"),
         ("antropic:x", r"unknown model 'antropic:x' \(did you mean 'anthropic'\?\)"),
         ("", "unknown model ''"),
-        ("builtin:x", "'builtin' has no models"),
+        ("builtin:x", "'builtin' takes no model name"),
         ("anthropic:", "anthropic: needs a model, as in anthropic:claude"),
         ("openai", "openai: needs a model, as in openai:gpt"),
         ("command:", "command: needs a program, as in"),
