@@ -1,1 +1,1 @@
-"""Judged episodes: who drives, what is recorded, how it is drawn."""
+"""Judged episodes: driving, recording and drawing."""

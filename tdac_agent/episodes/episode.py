@@ -1,4 +1,4 @@
-"""One judged episode: the environment steps, the controller only answers."""
+"""A judged episode: the judge steps the environment, the controller only answers."""
 
 from __future__ import annotations
 
@@ -24,37 +24,37 @@ from tdac_agent.tasks.setting import JudgedEnv
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
 
-# A policy is cut off when its mean call is this many times too slow.
+# An episode is stopped if the mean policy call takes longer than this many steps.
 SLOW_FACTOR = 2.0
 SLOW_AFTER_CALLS = 50
 LARGEST = 1e30
 
 
 class Driver(Protocol):
-    """What answers observations: a `Child`, or a policy of ours in this process."""
+    """A policy: a controller in a `Child`, or a trusted policy in this process."""
 
     def reset(self, observation: Observation) -> object:
-        """Take the first observation of an episode."""
+        """Receives the first observation of an episode."""
 
     def policy(self, observation: Observation) -> Any:
-        """Return what should be wheel speeds."""
+        """Returns an unchecked action, which should be two wheel speeds."""
 
     def waited(self) -> float:
-        """Return for how many seconds it has stood in line for a CPU so far."""
+        """Returns its total run-queue wait time, s."""
 
 
 @dataclass(slots=True)
 class Record:
-    """Steps an environment and writes down what happened.
+    """Steps an environment and records the episode.
 
     Attributes:
         env: The judge's environment.
-        start: Start pose; None for the one that the environment draws.
+        start: Start pose; None to let the environment draw it.
         max_steps: Steps after which the episode is stopped.
-        truncates: Whether the last step says `truncated`; else the controller has to
-            know its `max_steps`.
-        collisions_before: Collisions that are counted when the episode begins.
-        seed: Of the environment's random numbers.
+        truncates: Whether the last of these steps returns `truncated`; otherwise the
+            controller must stop after `max_steps` itself.
+        collisions_before: Initial value of the collision counter.
+        seed: Seed of the environment.
     """
 
     env: JudgedEnv
@@ -72,10 +72,10 @@ class Record:
     _collisions: int = 0
 
     def reset(self) -> tuple[Observation, dict[str, Any]]:
-        """Puts the robot on its start; a second reset is refused.
+        """Starts the episode.
 
         Raises:
-            EnvRefusalError: The episode is under way.
+            EnvRefusalError: It was called before.
         """
         if self._poses:
             raise EnvRefusalError("reset() is allowed once, at the beginning")
@@ -86,10 +86,11 @@ class Record:
     def step(
         self, action: Any
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Steps once.
+        """Advances the episode by one step.
 
         Raises:
-            EnvRefusalError: Before reset, after the end, or no two finite numbers.
+            EnvRefusalError: The episode has not started or has ended, or the action is
+                not two finite numbers.
         """
         if not self._poses:
             raise EnvRefusalError("step() before reset()")
@@ -113,7 +114,7 @@ class Record:
         return observation, reward, terminated, truncated, info
 
     def trajectory(self) -> Trajectory:
-        """What was recorded so far."""
+        """Returns the record so far."""
         return Trajectory(
             np.array(self._poses, np.float64).reshape(-1, 3),
             np.array(self._actions, np.float32).reshape(-1, 2).clip(-1.0, 1.0),
@@ -124,11 +125,11 @@ class Record:
         )
 
     def rooms(self) -> NDArray[np.float64]:
-        """Distance from the robot's centre to what is solid, as `Rollout` has it."""
+        """Returns the clearances so far; see `Rollout.rooms`."""
         return np.array(self._rooms, np.float64)
 
     def _note(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
-        """Writes a moment down; returns what the controller may know of it."""
+        """Records a moment; returns the `info` that the controller may see."""
         self._poses.append(self.env.pose())
         self._distances.append(info["path_distance"])
         self._ranges.append(observation[self.env.readings])
@@ -138,7 +139,7 @@ class Record:
 
 
 def as_wheels(action: Any) -> NDArray[np.float32] | None:
-    """An answer of `policy` as two finite numbers, or None where it is not that."""
+    """Returns an action as two finite numbers; None if it is something else."""
     if type(action) is tuple and len(action) == 2:
         left, right = action
         if type(left) is float and type(right) is float:
@@ -162,27 +163,27 @@ def as_wheels(action: Any) -> NDArray[np.float32] | None:
 
 
 def wrong_action(action: Any) -> str:
-    """Says what is wrong with an answer of `policy`, in bounded length."""
+    """Returns the error message for a wrong action, in bounded length."""
     return f"policy must return two finite numbers (left, right), got {shown(action)}"
 
 
 def run_policy(
     child: Driver, record: Record, name: str, *, held_out: bool, deadline: float
 ) -> Rollout:
-    """Drives an episode by `policy(obs)`.
+    """Drives an episode with `policy(obs)`.
 
     Args:
-        child: With the controller imported, or a policy of ours.
-        record: Steps the environment.
-        name: Of the episode.
-        held_out: Whether feedback may tell only pass or fail of it.
-        deadline: When to stop at the latest, by `time.monotonic`.
+        child: Child with the controller imported, or a trusted policy.
+        record: Record that steps the environment.
+        name: Name of the episode.
+        held_out: Whether feedback may reveal only pass or fail.
+        deadline: Latest time to stop, on the clock `time.monotonic`.
     """
     calls: list[float] = []
     own = Line("thread-self")
 
-    def kept_waiting() -> float:
-        # On a starved machine this process, too, gets a CPU long after an answer.
+    def wait_time() -> float:
+        # On a busy machine this process, too, waits for a CPU after an answer.
         return child.waited() + own.waited()
 
     waited = 0.0
@@ -190,20 +191,20 @@ def run_policy(
     try:
         observation, _ = record.reset()
         child.reset(observation)
-        waited = kept_waiting()
+        waited = wait_time()
         while record.outcome is None:
             began = time.perf_counter()
             action = child.policy(observation)
             calls.append(time.perf_counter() - began)
             observation = record.step(action)[0]
-            error = _too_slow(calls, record.env.nominal.dt, kept_waiting, waited)
+            error = _too_slow(calls, record.env.nominal.dt, wait_time, waited)
             if time.monotonic() > deadline:
                 error = "stopped: the verification as a whole took too long"
             if error is not None:
                 break
     except (ControllerFault, EnvRefusalError) as fault:
         error = fault
-    mean = _mean_call(calls, kept_waiting, waited)
+    mean = _mean_call(calls, wait_time, waited)
     return _rollout(record, name, held_out, error, calls, mean)
 
 
@@ -212,14 +213,14 @@ def run_own_loop(
 ) -> Rollout:
     """Lets the controller's `run_episode` step the judge's environment.
 
-    Its `max_steps` is out of reach where the environment itself truncates.
+    If the environment truncates, `max_steps` is too large to be reached.
 
     Args:
-        child: With the controller imported.
-        record: Steps the environment.
-        name: Of the episode.
-        timeout: Seconds that the controller itself may take.
-        deadline: When to stop at the latest, by `time.monotonic`.
+        child: Child with the controller imported.
+        record: Record that steps the environment.
+        name: Name of the episode.
+        timeout: Time limit of the controller itself, s.
+        deadline: Latest time to stop, on the clock `time.monotonic`.
     """
     max_steps = 2 * record.max_steps if record.truncates else record.max_steps
     error: str | ControllerFault | None = None
@@ -234,7 +235,7 @@ def run_own_loop(
 
 
 def not_driven(record: Record, name: str, fault: ControllerFault) -> Rollout:
-    """The episode of a controller that cannot be imported."""
+    """Returns the episode of a controller that cannot be imported."""
     record.reset()
     return _rollout(record, name, False, fault)
 
@@ -248,34 +249,34 @@ def _ended_early(record: Record, max_steps: int) -> str:
 
 
 def _too_slow(
-    calls: list[float], dt: float, kept_waiting: Callable[[], float], waited: float
+    calls: list[float], dt: float, wait_time: Callable[[], float], waited: float
 ) -> str | None:
     if len(calls) < SLOW_AFTER_CALLS or len(calls) % SLOW_AFTER_CALLS:
         return None
     if math.fsum(calls) <= SLOW_FACTOR * dt * len(calls):
         return None
-    mean = _mean_call(calls, kept_waiting, waited)
+    mean = _mean_call(calls, wait_time, waited)
     if mean <= SLOW_FACTOR * dt:
         return None
     return f"policy takes {1000 * mean:.0f} ms a call, {1000 * dt:.0f} ms are allowed"
 
 
 def _mean_call(
-    calls: list[float], kept_waiting: Callable[[], float], waited: float
+    calls: list[float], wait_time: Callable[[], float], waited: float
 ) -> float:
-    """Seconds of a call, without what was stood in line for a CPU.
+    """Returns the mean duration of a call without run-queue wait time, s.
 
     Args:
-        calls: Seconds of each.
-        kept_waiting: Seconds that policy and judge have stood in line so far.
-        waited: The same before the first call.
+        calls: Duration of each call, s.
+        wait_time: Returns the total run-queue wait time of policy and judge, s.
+        waited: The same before the first call, s.
     """
-    line = max(0.0, kept_waiting() - waited)
-    return max(0.0, math.fsum(calls) - line) / max(1, len(calls))
+    in_queue = max(0.0, wait_time() - waited)
+    return max(0.0, math.fsum(calls) - in_queue) / max(1, len(calls))
 
 
 def late(times: NDArray[np.float64]) -> float:
-    """99th percentile; `np.percentile` loads more than all else here takes."""
+    """Returns the 99th percentile, without the slow imports of `np.percentile`."""
     last = len(times) - 1
     return float(np.interp(0.99 * last, np.arange(last + 1), np.sort(times)))
 

@@ -1,8 +1,8 @@
-"""Policies of stable-baselines3: what a saved one is, and how it drives an episode.
+"""Driving with saved stable-baselines3 policies.
 
-A saved model is a zip file that holds pickled Python, which would run whatever its
-author wanted. Of it only the weights are read, as plain numbers, and the settings that
-are plain JSON; the network around them is made anew.
+A saved model is a zip file with pickled Python objects, which could run any code. Only
+the weights, as plain numbers, and the settings in plain JSON are read from it; the
+network is constructed anew.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ _NETWORKS = {
     "stable_baselines3.sac.policies": "SACPolicy",
     "stable_baselines3.td3.policies": "TD3Policy",
 }
-"""By the module of the saved policy's class, the class for observations in a Box."""
+"""Policy class for observations in a Box, by the module of the saved class."""
 _WITHOUT_SDE = "stable_baselines3.td3.policies"
 _ACTIVATIONS = {"ReLU", "Tanh", "ELU", "LeakyReLU", "GELU", "SiLU", "Sigmoid", "SELU"}
 
 
 class Learned:
-    """A saved policy that drives one episode, always by its most likely action.
+    """A saved policy that drives one episode with its deterministic action.
 
     Args:
-        file: Saved by stable-baselines3.
-        wrappers: Names of those that it was trained with.
-        env: Of the episode.
+        file: Model file of stable-baselines3.
+        wrappers: Names of the wrappers it was trained with, innermost first.
+        env: Environment of the episode.
 
     Raises:
-        ControllerFault: It cannot be used in this environment.
+        ControllerFault: The policy cannot be used in this environment.
     """
 
     def __init__(self, file: Path, wrappers: tuple[str, ...], env: JudgedEnv) -> None:
@@ -61,36 +61,37 @@ class Learned:
         except TaskError as error:
             raise ControllerFault(str(error), "import") from error
         space, actions = self._env.observation_space, env.action_space
-        self._network = _network(file, _Spaces(space, actions, f"{space} {actions}"))
+        text = f"{space} {actions}"
+        self._network = _load_network(file, _Spaces(space, actions, text))
 
     def reset(self, observation: Observation) -> None:
-        """A policy without a memory has nothing to do."""
+        """Does nothing, as the policy has no memory."""
 
     def policy(self, observation: Observation) -> NDArray[np.float32]:
-        """The action, shape (2,), float32."""
-        seen = self._seen(self._env, observation)
+        """Returns the action, shape (2,), float32."""
+        wrapped = self._wrapped(self._env, observation)
         try:
-            action, _ = self._network.predict(seen, deterministic=True)
-        # Of weights that no training makes, whatever torch makes of them.
+            action, _ = self._network.predict(wrapped, deterministic=True)
+        # Manipulated weights can cause various errors of torch.
         except (ValueError, RuntimeError) as error:
-            told = f"the policy's network: {one_line(error)}"
-            raise ControllerFault(told, "policy") from error
+            message = f"the policy's network: {one_line(error)}"
+            raise ControllerFault(message, "policy") from error
         return np.asarray(action, np.float32)
 
     def waited(self) -> float:
-        """It waits for nothing."""
+        """Returns 0."""
         return 0.0
 
-    def _seen(self, env: Any, observation: Any) -> Any:
-        """What the wrappers make of an observation, the innermost first."""
+    def _wrapped(self, env: Any, observation: Any) -> Any:
+        """Applies the wrappers to an observation, the innermost first."""
         if env is env.unwrapped:
             return observation
-        return env.observation(self._seen(env.env, observation))
+        return env.observation(self._wrapped(env.env, observation))
 
 
 @dataclass(frozen=True, slots=True)
 class _Spaces:
-    """Of observations and actions; compared by what they are in words."""
+    """Observation and action space; compared by text, as keys of a cache."""
 
     observation: Space[Any]
     action: Space[Any]
@@ -104,11 +105,11 @@ class _Spaces:
 
 
 @lru_cache(maxsize=4)
-def _network(file: Path, fit: _Spaces) -> Any:
-    """The network of a saved policy for some spaces, with its weights.
+def _load_network(file: Path, fit: _Spaces) -> Any:
+    """Returns the network of a saved policy for some spaces, with its weights.
 
     Raises:
-        ControllerFault: It does not fit them, or is of a kind that is not known.
+        ControllerFault: The policy does not fit the spaces or is of an unknown kind.
     """
     try:
         saved = read_policy(file)
@@ -118,12 +119,12 @@ def _network(file: Path, fit: _Spaces) -> Any:
     import torch
 
     torch.set_num_threads(1)
-    network = _made(saved, fit.observation, fit.action)
+    network = _build(saved, fit.observation, fit.action)
     try:
         network.load_state_dict(weights)
     except RuntimeError as error:
         raise ControllerFault(
-            "the policy was trained on other observations than its wrappers give on "
+            "the policy was trained on other observations than its wrappers produce on "
             f"this task: {one_line(error)[:160]}",
             "import",
         ) from error
@@ -132,49 +133,49 @@ def _network(file: Path, fit: _Spaces) -> Any:
 
 
 def check_kind(saved: SavedNetwork) -> None:
-    """Refuses a policy of which no network can be made.
+    """Checks that a network can be built from a saved policy.
 
     Raises:
-        ControllerFileError: It is of a kind that is not known, its settings do not
-            fit its class, or an extra is not installed.
+        ControllerFileError: The policy is of an unknown kind, its settings do not fit
+            its class, or an extra is not installed.
     """
     try:
-        _made(saved, spaces.Box(-1.0, 1.0, (4,)), spaces.Box(-1.0, 1.0, (2,)))
+        _build(saved, spaces.Box(-1.0, 1.0, (4,)), spaces.Box(-1.0, 1.0, (2,)))
     except ControllerFault as fault:
         raise ControllerFileError(str(fault)) from fault
 
 
-def _made(saved: SavedNetwork, observation: Space[Any], action: Space[Any]) -> Any:
-    """A network without its weights.
+def _build(saved: SavedNetwork, observation: Space[Any], action: Space[Any]) -> Any:
+    """Builds a network without its weights.
 
     Raises:
-        ControllerFault: It is of a kind that is not known, or its settings do not fit
+        ControllerFault: The policy is of an unknown kind, or its settings do not fit
             its class.
     """
-    kind = _class(saved.module, isinstance(observation, spaces.Dict))
+    kind = _policy_class(saved.module, isinstance(observation, spaces.Dict))
     try:
-        given = {**_kwargs(saved), "optimizer_class": _NoOptimizer}
-        return kind(observation, action, lambda _: 0.0, **given)
-    # What does not fit a class has errors of all kinds.
+        kwargs = {**_policy_kwargs(saved), "optimizer_class": _NoOptimizer}
+        return kind(observation, action, lambda _: 0.0, **kwargs)
+    # Unsuitable settings can cause various errors.
     except (TypeError, ValueError, KeyError, AssertionError, RuntimeError) as error:
-        told = f"the policy's settings do not fit its class: {one_line(error)}"
-        raise ControllerFault(told, "import") from error
+        message = f"the policy's settings do not fit its class: {one_line(error)}"
+        raise ControllerFault(message, "import") from error
 
 
 class _NoOptimizer:
-    """Stands where training has one; torch's own load its compiler, and leave files."""
+    """Replaces torch's optimizers, which import its compiler and leave files behind."""
 
     def __init__(self, *_: Any, **__: Any) -> None:
         pass
 
 
-def _class(module: str, several: bool) -> Any:
-    """The class of the network; `several` for observations in a Dict."""
+def _policy_class(module: str, dict_observation: bool) -> Any:
+    """Returns the class of the network."""
     try:
         from importlib import import_module
 
         name = _NETWORKS[module]
-        if several:
+        if dict_observation:
             actor_critic = name == "ActorCriticPolicy"
             name = "MultiInputActorCriticPolicy" if actor_critic else "MultiInputPolicy"
         return getattr(import_module(module), name)
@@ -183,14 +184,14 @@ def _class(module: str, several: bool) -> Any:
         raise ControllerFault(needed, "import") from error
     except KeyError as error:
         raise ControllerFault(
-            f"a policy of {module[:80]} cannot be evaluated, but of PPO, A2C, SAC and "
-            "TD3",
+            f"a policy from {module[:80]} cannot be evaluated; expected one of PPO, "
+            "A2C, SAC or TD3",
             "import",
         ) from error
 
 
-def _kwargs(saved: SavedNetwork) -> dict[str, Any]:
-    """Arguments of the network's class."""
+def _policy_kwargs(saved: SavedNetwork) -> dict[str, Any]:
+    """Returns the constructor arguments of the network's class."""
     from torch import nn
 
     kwargs = saved.settings.model_dump(exclude_unset=True)
@@ -198,7 +199,7 @@ def _kwargs(saved: SavedNetwork) -> dict[str, Any]:
     if found is not None:
         kwargs["activation_fn"] = getattr(nn, found[1], None)
         if found[1] not in _ACTIVATIONS:
-            raise ControllerFault(f"no activation {found[1][:80]} is known", "import")
+            raise ControllerFault(f"unknown activation {found[1][:80]}", "import")
     if saved.module == _WITHOUT_SDE:
         kwargs.pop("use_sde")
     return kwargs

@@ -1,4 +1,4 @@
-"""Pictures of episodes, whatever their environment."""
+"""Pictures of episodes in any environment."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from tdac_envs.drawing.canvas import Image
 
 
 class Pictures(Protocol):
-    """How the episodes of a task are drawn."""
+    """Draws the episodes of a task."""
 
     def backdrop(self) -> Backdrop:
-        """What the pictures of failed episodes have in common."""
+        """Returns the background of the pictures of failed episodes."""
 
     def trajectories(
         self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
     ) -> Image:
-        """Poses of episodes, each of shape (T + 1, 3), in one picture."""
+        """Draws the poses of episodes, each of shape (T + 1, 3), in one picture."""
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
-        """A frame for every so many steps, and the last one."""
+        """Draws every `stride`-th step and the last one."""
 
 
 def pictures_of(setting: Setting) -> Pictures:
-    """The pictures of a setting."""
+    """Returns an object that draws a task's episodes."""
     return environment(setting.nominal.env_id).pictures(setting)

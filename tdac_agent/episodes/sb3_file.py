@@ -1,7 +1,7 @@
-"""A policy saved by stable-baselines3: what is in its file, checked before it is used.
+"""Files of stable-baselines3 policies, checked before use.
 
-Nothing in it is run. Sizes are known before anything is unpacked, settings and weights
-before anything is made of them.
+No code in a file runs. Sizes are checked before unpacking, settings and weights before
+a network is built.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ METADATA = "tdac.json"
 WEIGHTS = "policy.pth"
 DATA = "data"
 MOST_BYTES = 128_000_000
-"""Of the file, and of its parts when they are unpacked."""
+"""Largest size of the file, and of its unpacked parts together."""
 
-# All that a saved network is made of; others could fill the memory from a few bytes.
+# All names that a saved network needs; others could fill the memory from a few bytes.
 _NAMES = {
     "collections OrderedDict",
     "torch._utils _rebuild_tensor_v2",
@@ -49,16 +49,16 @@ class SavedPolicy(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     schema_version: Literal[1] = 1
-    algo: str = Field(description="ppo, sac, …")
-    tasks: tuple[str, ...] = Field((), description="That it was trained on.")
+    algo: str = Field(description="Training algorithm: ppo, sac, …")
+    tasks: tuple[str, ...] = Field((), description="Tasks of the training.")
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
-    variation: str = Field("jitter", description="Of the starts in training.")
-    steps: int | None = Field(None, description="Of training.")
+    variation: str = Field("jitter", description="Variation of the training.")
+    steps: int | None = Field(None, description="Steps of the training.")
     seed: int | None = None
 
 
 class Settings(BaseModel):
-    """`policy_kwargs`: how a network is built, without what only training needs."""
+    """`policy_kwargs` that define the network, without those only training needs."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -79,13 +79,13 @@ class Settings(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class SavedNetwork:
-    """What a policy's file says of its network.
+    """Contents of a policy file.
 
     Attributes:
-        saved: What it says about itself, where it does.
-        module: Of the class of the network.
-        settings: Arguments of that class, those that the file has.
-        weights: Bytes of a file of torch.
+        saved: Metadata, or None.
+        module: Module of the network's class.
+        settings: Arguments of that class that the file states.
+        weights: Bytes of a torch file.
     """
 
     saved: SavedPolicy | None
@@ -95,42 +95,42 @@ class SavedNetwork:
 
 
 def read_policy(file: Path) -> SavedNetwork:
-    """The parts of a policy's file.
+    """Reads a policy file.
 
     Raises:
-        ControllerFileError: It is no policy of stable-baselines3, or says nonsense.
+        ControllerFileError: It is not a stable-baselines3 policy, or is invalid.
     """
     try:
         parts = read_zip(
             read_file(file, MOST_BYTES), MOST_BYTES, {DATA, WEIGHTS, METADATA}
         )
         if not {DATA, WEIGHTS} <= parts.keys():
-            raise ValueError(f"it holds no `{DATA}` and no `{WEIGHTS}`")
+            raise ValueError(f"it has no `{DATA}` or no `{WEIGHTS}`")
     except (OSError, ValueError) as error:
         raise ControllerFileError(
-            f"{str(file)!r} is no policy of stable-baselines3: {why(error)}"
+            f"{str(file)!r} is not a stable-baselines3 policy: {why(error)}"
         ) from error
     saved = _metadata(file, parts.get(METADATA))
     try:
         module, settings = _network(parts[DATA])
         _check_weights(parts[WEIGHTS])
     except ValueError as error:
-        told = f"the policy {str(file)!r} cannot be used: {why(error)}"
-        raise ControllerFileError(told) from error
+        message = f"the policy {str(file)!r} cannot be used: {why(error)}"
+        raise ControllerFileError(message) from error
     return SavedNetwork(saved, module, settings, parts[WEIGHTS])
 
 
 def read_metadata(file: Path) -> SavedPolicy | None:
-    """What a policy's file says about itself; None where it says nothing.
+    """Reads the metadata of a policy file; None if it has none.
 
     Raises:
-        ControllerFileError: It is no policy of stable-baselines3, or says nonsense.
+        ControllerFileError: It is not a stable-baselines3 policy, or is invalid.
     """
     return read_policy(file).saved
 
 
 def write_metadata(file: Path, saved: SavedPolicy) -> None:
-    """Puts what is to be known about a policy into its file, in the place of older."""
+    """Writes metadata into a policy file, replacing any older metadata."""
     content = io.BytesIO()
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(content, "w") as new:
         for item in old.infolist():
@@ -141,7 +141,7 @@ def write_metadata(file: Path, saved: SavedPolicy) -> None:
 
 
 def load_weights(weights: bytes) -> Any:
-    """The tensors of a saved network by their names.
+    """Returns the tensors of a saved network by name.
 
     Raises:
         ControllerFileError: They cannot be read, or torch is not installed.
@@ -160,17 +160,17 @@ def load_weights(weights: bytes) -> Any:
             and bool(torch.isfinite(tensor).all())
             for name, tensor in found.items()
         )
-    # torch has no one error for what is not its own.
+    # torch raises various errors for invalid files.
     except Exception as error:
-        told = f"the policy's weights cannot be read: {one_line(error)}"
-        raise ControllerFileError(told) from error
+        message = f"the policy's weights cannot be read: {one_line(error)}"
+        raise ControllerFileError(message) from error
     if not usable:
         raise ControllerFileError("the policy's weights are not all finite numbers")
     return found
 
 
 def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
-    """What is written about a policy in its file, or in one beside it."""
+    """Returns a policy's metadata from its file, or from the JSON file beside it."""
     beside = file.with_suffix(".json")
     try:
         text = inside
@@ -178,15 +178,14 @@ def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
             text = read_file(beside, TEXT_BYTES)
         return None if text is None else SavedPolicy.model_validate(parse_json(text))
     except (OSError, ValueError) as error:
-        told = f"{METADATA} of {file}: {why(error)}"
-        raise ControllerFileError(told) from error
+        raise ControllerFileError(f"{METADATA} of {file}: {why(error)}") from error
 
 
 def _network(data: bytes) -> tuple[str, Settings]:
-    """Module of the network's class, and its settings.
+    """Returns the module of the network's class, and its settings.
 
     Raises:
-        ValueError: They are not as stable-baselines3 writes them.
+        ValueError: The data are not in the format of stable-baselines3.
     """
     try:
         found = json.loads(data.decode("utf-8"))
@@ -202,7 +201,7 @@ def _network(data: bytes) -> tuple[str, Settings]:
     }
     for key, value in kept.items():
         if isinstance(value, str) and key != "activation_fn":
-            raise ValueError(f"its {key} is code, {value[:80]}, which is not run")
+            raise ValueError(f"its {key} is code, which is not run: {value[:80]}")
     try:
         return module, Settings.model_validate(kept)
     except ValidationError as error:
@@ -210,10 +209,10 @@ def _network(data: bytes) -> tuple[str, Settings]:
 
 
 def _check_weights(weights: bytes) -> None:
-    """Looks at the pickle of a file of torch, which is itself a zip file.
+    """Checks the pickle in a torch file, which is itself a zip file.
 
     Raises:
-        ValueError: It is another file, or names what no saved network needs.
+        ValueError: The file is damaged, or the pickle names anything but tensors.
     """
     try:
         parts = read_zip(weights, MOST_BYTES)
@@ -223,7 +222,7 @@ def _check_weights(weights: bytes) -> None:
             for operation, argument, _ in pickletools.genops(pickled)
             if operation.name in _NAMING
         }
-    # The reader of pickles has errors of all kinds for what is none.
+    # `pickletools` raises various errors for invalid pickles.
     except Exception as error:
         raise ValueError(f"its `{WEIGHTS}` is damaged: {one_line(error)}") from None
     more = sorted(named - _NAMES)

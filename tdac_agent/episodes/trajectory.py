@@ -1,4 +1,4 @@
-"""What one judged episode did: the judge's own record, never the controller's."""
+"""The judge's record of an episode; nothing in it comes from the controller."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ class Trajectory:
     Attributes:
         poses: Shape (T + 1, 3), float64: x, y (px or m), heading (rad), start included.
         actions: Shape (T, 2), float32: left and right wheel, fractions as applied.
-        path_distances: Shape (T + 1,), float64: shortest free path left, px or m.
-        ranges: Shape (T + 1, n), float32: what the distance sensors read, as the
-            controller saw it; px, or the readings of ps0 to ps7.
+        path_distances: Shape (T + 1,), float64: shortest free path to the goal, px or
+            m.
+        ranges: Shape (T + 1, n), float32: observed readings of the distance sensors,
+            px, or the raw readings of ps0 to ps7.
         collisions: Number of steps with a contact.
         dt: Duration of a step, s.
     """
@@ -45,7 +46,7 @@ class Trajectory:
         return len(self.actions)
 
     def every(self, stride: int) -> list[int]:
-        """Every so many steps from the start on, and the last one."""
+        """Returns every `stride`-th step from the start, and the last one."""
         return [*range(0, self.steps, stride), self.steps]
 
     def save(self, path: Path) -> None:
@@ -63,10 +64,10 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: Path) -> Trajectory:
-        """Reads what `save` wrote.
+        """Reads a file of `save`.
 
         Raises:
-            RunError: The file is missing, damaged or something else.
+            RunError: The file is missing, damaged or of another kind.
         """
         try:
             data = _arrays(read_file(path, MOST_BYTES))
@@ -82,23 +83,23 @@ class Trajectory:
             )
             _check_shapes(loaded)
         except (OSError, ValueError, TypeError, LookupError, OverflowError) as error:
-            raise RunError(f"{path} is no trajectory: {why(error)}") from error
+            raise RunError(f"{path} is not a trajectory: {why(error)}") from error
         return loaded
 
 
 def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
-    """The arrays of an `.npz` file; raises ValueError where it is something else."""
+    """Returns the arrays of an `.npz` file; raises ValueError for other files."""
     parts = read_zip(content, MOST_BYTES)
     return {name.removesuffix(".npy"): read_array(part) for name, part in parts.items()}
 
 
 def nominal_first(path: Path) -> tuple[bool, str]:
-    """Sorts the files of episodes: the nominal one first."""
+    """Sort key for episode files: the nominal one first."""
     return path.stem != "nominal", path.stem
 
 
 def _check_shapes(trajectory: Trajectory) -> None:
-    """Refuses arrays that do not belong together."""
+    """Raises ValueError if the arrays do not fit together."""
     length = len(trajectory.poses)
     for name, shape in (
         ("poses", (length, 3)),
@@ -118,23 +119,22 @@ class Rollout:
 
     Attributes:
         name: `nominal`, `jitter 1` ….
-        held_out: Whether feedback may tell only pass or fail of it.
-        outcome: How it ended; `error` where the controller failed, `stopped` where
-            it ran for fewer steps than the horizon on purpose, `not run` where an
-            earlier failure made it pointless.
+        held_out: Whether feedback may reveal only pass or fail.
+        outcome: How it ended: `error` if the controller failed, `stopped` at a step
+            limit below the horizon, `not run` if an earlier failure made it pointless.
         trajectory: The judge's record.
         goal: (x, y), px or m.
         radius: Body radius, px or m.
         tolerance: Goal tolerance, px or m.
-        error: What the controller did wrong, in one line, for `error` and `not run`.
-        call_ms: Mean of the time of a policy call without what its process stood in
-            line for a CPU, and 99th percentile with it, ms.
-        returned: What `run_episode` returned, for an episode driven by it.
+        error: The controller's error in one line, for `error` and `not run`.
+        call_ms: Duration of a policy call, ms: the mean without run-queue wait time,
+            and the 99th percentile including it.
+        returned: Return value of `run_episode`, if it drove the episode.
         timed_out: Whether the controller was too slow, in one call or on average.
-        may_pass: Whether that may have been the machine's doing, and is worth a retry.
-        rooms: Shape (T + 1,): distance from the robot's centre to what is solid, px (of
-            the pixel's centre) or m; empty where it was not recorded.
-        calls: Shape (T,): seconds that each policy call took; empty likewise.
+        may_pass: Whether a busy machine may be the reason, so that a retry may pass.
+        rooms: Shape (T + 1,): distance from the robot's centre to the nearest obstacle,
+            px (for the centre of its pixel) or m; empty if not recorded.
+        calls: Shape (T,): duration of each policy call, s; empty if not recorded.
     """
 
     name: str
@@ -163,7 +163,7 @@ class Rollout:
         return self.trajectory.collisions
 
     def distances(self, kind: str = "geodesic") -> NDArray[np.float64]:
-        """Distance to the goal before each step and at the end, px or m.
+        """Returns the distance to the goal before each step and at the end, px or m.
 
         Args:
             kind: `geodesic` (shortest free path) or `euclidean`.

@@ -66,7 +66,7 @@ def check(trajectory, whole, folder, data):
         assert same(loaded, trajectory)
         return
     assert "\n" not in reason
-    assert reason.startswith(f"{path} is no trajectory: ")
+    assert reason.startswith(f"{path} is not a trajectory: ")
     assert not reason.endswith(": ")
 
 
@@ -119,7 +119,7 @@ def test_arrays_that_do_not_belong_together(whole, tmp_path, changes):
     path.write_bytes(repacked(whole))
     Trajectory.load(path)
     path.write_bytes(repacked(whole, **changes))
-    with pytest.raises(RunError, match=r"a\.npz is no trajectory: ") as caught:
+    with pytest.raises(RunError, match=r"a\.npz is not a trajectory: ") as caught:
         Trajectory.load(path)
     assert "\n" not in str(caught.value)
 
@@ -131,5 +131,5 @@ def test_what_is_no_archive(tmp_path):
     with zipfile.ZipFile(tmp_path / "other.npz", "w") as archive:
         archive.writestr("poses.npy", b"\x93NUMPY\x01\x00\xff\xff{")
     for name in ("missing", "array.npy", "folder", "other.npz"):
-        with pytest.raises(RunError, match="is no trajectory: "):
+        with pytest.raises(RunError, match="is not a trajectory: "):
             Trajectory.load(tmp_path / name)

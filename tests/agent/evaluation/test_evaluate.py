@@ -444,7 +444,7 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
             ["world"],
             "world was written for TDAC-EPuck-v0; the task 'maze' is of TDAC-M",
         ),
-        (["text.zip"], "'text.zip' is no policy of stable-baselines3"),
+        (["text.zip"], "'text.zip' is not a stable-baselines3 policy"),
         (["plain.zip"], "does not say which observations .* --wrapper NAME"),
         (["random", "--wrapper", "flat"], "unknown wrapper 'flat'; expected some of"),
         (["random", "--wrapper", "none", "--wrapper", "flatten"], "cannot be combined"),
