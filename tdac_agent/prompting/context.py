@@ -1,4 +1,4 @@
-"""What the prompt templates may tell of a task, by name."""
+"""Variables of the prompt templates."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from tdac_agent.verification.suite.hygiene import (
 
 
 def context_of(task: Task) -> dict[str, Any]:
-    """Names and values for the templates of a task's environment.
+    """Returns the template variables of a task.
 
-    They hold the nominal task alone: nothing of the moved starts, and no test.
+    They describe the nominal task only, not the moved starts or the tests.
     """
     return {**_of_any(task), **task.environment.prompt_facts(task)}
 
 
 def _of_any(task: Task) -> dict[str, Any]:
-    """What the prompts of both environments tell."""
+    """Returns the variables that are independent of the environment."""
     nominal, progress = task.nominal, task.spec.progress
     interface, limits = interface_of(task.make_env()), Limits()
     return {

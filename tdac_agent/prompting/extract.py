@@ -1,4 +1,4 @@
-"""The controller's source in a model's answer."""
+"""Extraction of the controller's source from a model's answer."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import NamedTuple
 MAX_INNER_FENCES = 20
 PYTHON = frozenset({"python", "py", "python3"})
 MARKDOWN = frozenset({"markdown", "md"})
-# Some of it is valid Python, but never the file.
+# Text in these languages may parse as Python, but is never the file.
 OTHER = frozenset({"bash", "console", "diff", "json", "output", "sh", "shell", "text"})
 OTHER |= frozenset({"csv", "html", "ini", "js", "toml", "txt", "xml", "yaml", "yml"})
 
 
 class _Fence(NamedTuple):
-    """A line of three or more backticks or tildes, and what stands after them."""
+    """A line of three or more backticks or tildes, with the text after them."""
 
     line: int
     run: str
@@ -28,16 +28,16 @@ class _Fence(NamedTuple):
 
     @property
     def may_wrap(self) -> bool:
-        """Whether it may stand around a whole answer, fences and all."""
+        """Whether it may enclose a whole answer, including other fences."""
         return self.language in MARKDOWN or (len(self.run) > 3 and not self.info)
 
     def closes(self, opening: _Fence) -> bool:
-        """Stands alone on its line, and is as long as the opening one at least."""
+        """Whether it is alone on its line and at least as long as the opening fence."""
         return not self.info and self.run.startswith(opening.run)
 
 
 class _Block(NamedTuple):
-    """Lines between two fences; the source is None where they are no Python."""
+    """Lines between two fences; `source` is None if they are not Python."""
 
     opening: _Fence
     length: int
@@ -45,29 +45,28 @@ class _Block(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """The file in an answer, or what is wrong with the answer, for its writer."""
+    """The file in an answer, or a description of the problem for the model."""
 
     source: str | None
     problem: str = ""
 
 
 def extract_source(text: str) -> str | None:
-    """The fenced block of Python with the largest syntax tree, or None.
+    """Returns the fenced Python block with the largest syntax tree, or None.
 
-    A fence inside a string of the file does not cut it as long as the longer reading
-    still parses. Of a truncated or broken file nothing is used, nor an example that
-    stands in it or beside it: such an answer is to be asked for again. So is one with
-    two files, of which nobody says which is meant.
+    A fence inside a string does not end a block if the longer block parses. Returns
+    None if the file appears to be truncated or broken, even if an example in or beside
+    it parses, and if two blocks may be the file: the model must be asked again.
     """
     return read_answer(text).source
 
 
 def read_answer(text: str, must_define: str | None = None) -> Answer:
-    """The file in an answer; see `extract_source`.
+    """Returns the file in an answer; see `extract_source`.
 
     Args:
         text: The answer.
-        must_define: Name of a function without which a block is not the whole file.
+        must_define: Name of a function that the file must define.
     """
     lines = text.replace("\r\n", "\n").split("\n")
     fences = _fences(lines)
@@ -75,18 +74,18 @@ def read_answer(text: str, must_define: str | None = None) -> Answer:
     sizes = {block: _tree_size(block.source) for block in blocks if block.source}
     best = max(sizes, key=lambda block: (sizes[block], block.length), default=None)
     if best is None or any(_overshadows(block, best) for block in blocks):
-        return Answer(None, _what_is_wrong(lines, fences, blocks))
+        return Answer(None, _problem(lines, fences, blocks))
     if any(_rivals(block, best, sizes) for block in sizes):
         return Answer(None, "it has two blocks that may be the file; give only one")
     source = best.source or ""
     if must_define is not None and must_define not in _functions(source):
-        wanted = f"has no `def {must_define}` at its top level, so it is not the file"
-        return Answer(None, f"its block of Python {wanted}")
+        lacks = f"has no `def {must_define}` at its top level, so it is not the file"
+        return Answer(None, f"its block of Python {lacks}")
     return Answer(source)
 
 
 def same_code(one: str, other: str) -> bool:
-    """Whether two texts are the same program: comments and layout do not count."""
+    """Whether two texts are the same program, apart from comments and layout."""
     try:
         with warnings.catch_warnings(action="ignore"):
             return ast.dump(ast.parse(one)) == ast.dump(ast.parse(other))
@@ -95,7 +94,7 @@ def same_code(one: str, other: str) -> bool:
 
 
 def fenced_blocks(text: str, languages: frozenset[str]) -> list[str]:
-    """Texts of the fenced blocks in some languages, up to the next closing fence."""
+    """Returns the fenced blocks in some languages; the first closing fence ends one."""
     lines = text.replace("\r\n", "\n").split("\n")
     found: list[str] = []
     opening: _Fence | None = None
@@ -110,30 +109,30 @@ def fenced_blocks(text: str, languages: frozenset[str]) -> list[str]:
 
 
 def _tree_size(source: str) -> int:
-    """Nodes of a syntax tree."""
+    """Returns the number of nodes of the syntax tree."""
     with warnings.catch_warnings(action="ignore"):
         return sum(1 for _ in ast.walk(ast.parse(source)))
 
 
 def _functions(source: str) -> set[str]:
-    """Names of the functions at the top level."""
+    """Returns the names of the functions at the top level."""
     with warnings.catch_warnings(action="ignore"):
         body = ast.parse(source).body
     return {node.name for node in body if isinstance(node, ast.FunctionDef)}
 
 
 def _rivals(block: _Block, best: _Block, sizes: dict[_Block, int]) -> bool:
-    """Whether another block may as well be the file: as much of one, and `policy`.
+    """Whether another block may equally be the file: comparable size, and `policy`.
 
-    The longer of two files is as often the one that was taken back.
+    The longer of two files may be one that the model discarded.
     """
     if block is best or block.source == best.source or 2 * sizes[block] < sizes[best]:
         return False
     return "policy" in _functions(block.source or "") & _functions(best.source or "")
 
 
-def _what_is_wrong(lines: list[str], fences: list[_Fence], blocks: list[_Block]) -> str:
-    """Why an answer without a whole file is none."""
+def _problem(lines: list[str], fences: list[_Fence], blocks: list[_Block]) -> str:
+    """Returns why an answer has no usable file."""
     if not fences:
         return "it has no fenced block"
     broken = [b for b in blocks if b.source is None and b.opening.language not in OTHER]
@@ -148,7 +147,7 @@ def _what_is_wrong(lines: list[str], fences: list[_Fence], blocks: list[_Block])
 
 
 def _why_broken(source: str) -> str:
-    """What Python says of a text that it cannot parse, with the line."""
+    """Returns Python's error message for a text, with the line."""
     try:
         with warnings.catch_warnings(action="ignore"):
             ast.parse(source)
@@ -161,10 +160,10 @@ def _why_broken(source: str) -> str:
 
 
 def _overshadows(broken: _Block, best: _Block) -> bool:
-    """Whether a block that is no Python was more likely meant to be the file.
+    """Whether a block that does not parse is more likely the file than the best one.
 
-    One before the best may reach to that, which then stands in one of its strings; and
-    who calls that one Python calls the file so, too.
+    A broken block before the best one may contain it inside a string. If the best block
+    has a language label, the file would have one, too.
     """
     if broken.source is not None or broken.opening.language in OTHER:
         return False
@@ -178,7 +177,7 @@ def _overshadows(broken: _Block, best: _Block) -> bool:
 
 
 def _fences(lines: list[str]) -> list[_Fence]:
-    """The lines that are fences, by plain scanning: an answer may be garbage."""
+    """Returns the fences, in linear time for any answer."""
     found = []
     for number, line in enumerate(lines):
         text = line.lstrip(" \t")
@@ -192,7 +191,7 @@ def _fences(lines: list[str]) -> list[_Fence]:
 
 
 def _blocks(lines: list[str], fences: list[_Fence]) -> list[_Block]:
-    """Blocks one after the other; none where the last one has no end."""
+    """Returns consecutive blocks; none if the last one is not closed."""
     blocks = []
     wrapped = after_code = False
     index = 0
@@ -200,8 +199,8 @@ def _blocks(lines: list[str], fences: list[_Fence]) -> list[_Block]:
         opening = fences[index]
         closings = _closings(fences, index)
         if not closings:
-            # One closing fence too many is the end of an answer in a fence of its own,
-            # or a slip of the pen; all else is the beginning of a block.
+            # An extra fence after code ends a fence around the whole answer, or is a
+            # stray fence; any other one opens a block that is not closed.
             at_end = wrapped or not any(map(str.strip, lines[opening.line + 1 :]))
             if opening.info or not after_code or not at_end:
                 return []
@@ -222,7 +221,7 @@ def _blocks(lines: list[str], fences: list[_Fence]) -> list[_Block]:
 
 
 def _closings(fences: list[_Fence], index: int) -> list[int]:
-    """The next fences that may close one; the first of them however far it is."""
+    """Returns the nearby fences that may close a fence, or the first one beyond."""
     near = index + 2 + MAX_INNER_FENCES
     found: list[int] = []
     for number in range(index + 1, len(fences)):
@@ -236,12 +235,15 @@ def _closings(fences: list[_Fence], index: int) -> list[int]:
 def _longest(
     lines: list[str], fences: list[_Fence], index: int, closings: list[int]
 ) -> tuple[int, str | None]:
-    """The last closing fence that makes a block Python; else the first, and None."""
+    """Returns the last closing fence for which the block parses, and its source.
+
+    If there is none, returns the first closing fence and None.
+    """
     first = fences[index].line + 1
     broken = sys.maxsize
     for closing in reversed(closings):
         last = fences[closing].line
-        # A shorter reading that holds the error of a longer one fails on it, too.
+        # A shorter block that contains the error of a longer one fails, too.
         if broken > last - first:
             source = _source(lines[first:last])
             broken = _broken_line(source)
@@ -251,14 +253,14 @@ def _longest(
 
 
 def _source(lines: list[str]) -> str:
-    """Lines without the indentation of the first of them that has text."""
+    """Joins lines, without the indentation of the first one that is not blank."""
     text = next((line for line in lines if line.strip()), "")
     margin = text[: len(text) - len(text.lstrip(" \t"))]
     return "".join(f"{line.removeprefix(margin)}\n" for line in lines)
 
 
 def _broken_line(source: str) -> int:
-    """Line where a text ceases to be Python; 0 where it is Python to its end."""
+    """Returns the line of the first syntax error; 0 if the text parses."""
     try:
         with warnings.catch_warnings(action="ignore"):
             return 0 if ast.parse(source).body else sys.maxsize

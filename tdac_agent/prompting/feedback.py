@@ -1,4 +1,4 @@
-"""A failed report in words, for the one who repairs."""
+"""Feedback: a failed report as text for the model that repairs the controller."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ MAX_GROUPS = 3
 MAX_NAMES = 6
 MAX_MESSAGES = 4
 MAX_LINES = 9
-"""Of causes that are told in a line each."""
+"""Number of causes that get a line of their own."""
 LINE_CHARS = 200
 MAX_CHARS = 1500
-"""Of one message, or of one account of an episode."""
+"""Length of a message, or of the description of an episode."""
 
 _NOT_RUN = "not run, since"
 _ERROR = re.compile(r"\b([A-Z]\w+) at [^:]*?(?: \(line \d+\))?: (.*)", re.DOTALL)
@@ -25,11 +25,11 @@ _SYNTAX = "the source does not parse"
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Failures with one root cause.
+    """Failures with the same root cause.
 
     Attributes:
-        cause: What they have in common.
-        members: In the order of the suite.
+        cause: The root cause.
+        members: The failures, in the order of the suite.
     """
 
     cause: str
@@ -37,34 +37,34 @@ class Group:
 
     @property
     def held_out(self) -> bool:
-        """Whether nothing more may be told of it."""
+        """Whether its details must not be revealed."""
         return any(_is_held_out(failure) for failure in self.members)
 
     @property
     def happened(self) -> list[str]:
-        """What happened in its episodes, the first ones, each bounded."""
+        """Descriptions of its first episodes, of bounded length."""
         return _first([f.diagnosis.text for f in self.members if f.diagnosis])
 
     @property
     def messages(self) -> list[str]:
-        """What its tests say that no diagnosis quotes, likewise."""
+        """First messages of its tests that no diagnosis quotes, of bounded length."""
         if self.held_out:
             return []
         quoted = "\n".join(f.diagnosis.text for f in self.members if f.diagnosis)
-        told = (f.message for f in self.members)
-        return _first([m for m in told if plain(m) not in quoted])
+        messages = (f.message for f in self.members)
+        return _first([m for m in messages if plain(m) not in quoted])
 
 
 def render_feedback(report: Report) -> str:
-    """The failures by root cause: three in full, the others in a line each.
+    """Describes the failures by root cause: three in full, the others in a line each.
 
-    Where several parts of the suite failed, each part has its say first. Episodes that
-    are held out appear with pass or fail only.
+    The three cover as many parts of the suite as possible. For held-out episodes only
+    pass or fail is stated.
     """
     groups, not_run = group_failures(report)
     chosen = choose(groups)
     parts = [f"{len(report.failures)} of {report.verdict.expected} tests failed."]
-    parts += [f"{n}. {_tell(group)}" for n, group in enumerate(chosen, 1)]
+    parts += [f"{n}. {_describe(group)}" for n, group in enumerate(chosen, 1)]
     others = [group for group in groups if group not in chosen]
     if others:
         parts.append("\n".join(["Also failed:", *_lines(others, report)]))
@@ -74,7 +74,7 @@ def render_feedback(report: Report) -> str:
 
 
 def group_failures(report: Report) -> tuple[list[Group], list[Failure]]:
-    """Failures by root cause in the order of the suite; those of tests not run."""
+    """Returns failures by root cause, in suite order, and those of tests not run."""
     members: dict[str, list[Failure]] = {}
     not_run = []
     for failure in report.failures:
@@ -87,7 +87,7 @@ def group_failures(report: Report) -> tuple[list[Group], list[Failure]]:
 
 
 def choose(groups: list[Group]) -> list[Group]:
-    """Those to be told in full: the first of each part, then the next ones."""
+    """Returns the groups to describe in full: the first of each part, then others."""
     heads = {group.members[0].group: group for group in reversed(groups)}
     firsts = [group for group in groups if heads[group.members[0].group] is group]
     others = [group for group in groups if group not in firsts]
@@ -96,7 +96,7 @@ def choose(groups: list[Group]) -> list[Group]:
 
 
 def tell_attempt(k: int, j: int, report: Report) -> str:
-    """A failed attempt in one line: how many tests, which causes, which figures."""
+    """Describes a failed attempt in one line: number of tests, causes, figures."""
     groups, _ = group_failures(report)
     causes = "; ".join(_short(g, report.provenance.unit) for g in choose(groups))
     count = f"{len(report.failures)} of {report.verdict.expected} tests failed"
@@ -104,7 +104,7 @@ def tell_attempt(k: int, j: int, report: Report) -> str:
 
 
 def cut(text: str, limit: int = MAX_CHARS) -> str:
-    """Head and tail of a long text, with what was left out counted."""
+    """Shortens a long text to its head and tail, and states the omitted length."""
     if len(text) <= limit:
         return text
     half = limit // 2
@@ -113,31 +113,31 @@ def cut(text: str, limit: int = MAX_CHARS) -> str:
 
 
 def _root(failure: Failure) -> str:
-    """What failures with one root cause have in common."""
+    """Returns the root cause of a failure; failures that share it form a group."""
     diagnosis, message = failure.diagnosis, failure.message
     if diagnosis is not None and diagnosis.cause not in ("error", "contract"):
         return diagnosis.cause
-    told = message if diagnosis is None else diagnosis.text
-    error = _ERROR.search(told)
-    if _SYNTAX in told or (error is not None and error[1] == "SyntaxError"):
+    text = message if diagnosis is None else diagnosis.text
+    error = _ERROR.search(text)
+    if _SYNTAX in text or (error is not None and error[1] == "SyntaxError"):
         return "syntax"
-    if _ABSENT.match(told) or "module 'controller' has no attribute" in told:
-        return "names that are not there"
+    if _ABSENT.match(text) or "module 'controller' has no attribute" in text:
+        return "missing names"
     if error is not None:
         return f"{error[1]}: {error[2].rstrip('.')}"
-    called = re.match(r"(\w+)\(", told)
-    return called[1] if called else told
+    called = re.match(r"(\w+)\(", text)
+    return called[1] if called else text
 
 
-def _tell(group: Group) -> str:
-    """Failures with one cause: names, messages, and what happened."""
+def _describe(group: Group) -> str:
+    """Describes a group: tests, messages, and what happened in the episodes."""
     lines = [_names(list(group.members)), *group.messages]
     lines += [f"What happened: {line}" for line in group.happened]
     return "\n   ".join(lines)
 
 
 def _lines(groups: list[Group], report: Report) -> list[str]:
-    """A line for each cause: tests, and what is wrong; the last ones by name only."""
+    """Returns a line for each cause: tests and error; the last ones by name only."""
     unit = report.provenance.unit
     lines = [
         f"- {_names(list(group.members))}: {_short(group, unit, LINE_CHARS)}"
@@ -150,7 +150,7 @@ def _lines(groups: list[Group], report: Report) -> list[str]:
 
 
 def _first(texts: list[str]) -> list[str]:
-    """The first of the texts that differ, each bounded, and how many more there are."""
+    """Returns the first different texts, shortened, and the number of others."""
     texts = list(dict.fromkeys(texts))
     more = len(texts) - MAX_MESSAGES
     return [cut(text) for text in texts[:MAX_MESSAGES]] + (
@@ -165,12 +165,12 @@ def _names(failures: list[Failure]) -> str:
 
 
 def _short(group: Group, unit: str, limit: int = 100) -> str:
-    """A root cause with its figures, in some words."""
+    """Describes a root cause briefly, with its figures."""
     first = group.members[0]
     if first.diagnosis is None or first.diagnosis.cause in ("error", "contract"):
         return cut(first.message, limit)
     if group.held_out:
-        return f"{len(group.members)} of the starts that are held out"
+        return f"{len(group.members)} of the held-out starts"
     return _figures(first.diagnosis, unit)
 
 

@@ -1,4 +1,4 @@
-"""An environment's interface in words: from its own spaces and its manual page."""
+"""Description of an environment's interface, from its spaces and its docstring."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ _ROW = re.compile(r"^\| `(\w+)` \|(.*)\|$")
 
 
 class ManualError(ValueError):
-    """A manual page and a space contradict each other."""
+    """An environment's docstring contradicts its spaces."""
 
 
 class Interface(NamedTuple):
-    """What a prompt tells of an environment.
+    """Texts for the prompt about an environment.
 
     Attributes:
-        description: Of the world and the motion.
-        observation: A table of the keys, and what is to be known beside it.
-        action: The space, and what it means.
+        description: World and motion.
+        observation: Table of the keys, and remarks.
+        action: Action space and its meaning.
     """
 
     description: str
@@ -33,10 +33,9 @@ class Interface(NamedTuple):
 
 
 def interface_of(env: JudgedEnv) -> Interface:
-    """The interface of an environment as it was made, options and all.
+    """Describes the interface of an environment with its options.
 
-    Shapes and limits are those of its spaces; units and meanings those of its
-    docstring.
+    Shapes and limits are taken from its spaces, units and meanings from its docstring.
 
     Raises:
         ManualError: They contradict each other.
@@ -50,7 +49,7 @@ def interface_of(env: JudgedEnv) -> Interface:
 
 
 def _sections(env: type) -> dict[str, str]:
-    """The `##` sections of a docstring."""
+    """Returns the `##` sections of a docstring by title."""
     text = inspect.cleandoc(env.__doc__ or "")
     parts = re.split(r"^## (.+)$", text, flags=re.MULTILINE)
     return {
@@ -60,18 +59,18 @@ def _sections(env: type) -> dict[str, str]:
 
 
 def _observation(space: spaces.Space[Any], text: str) -> str:
-    """The rows of the manual for the keys that there are, with shape and range.
+    """Returns the docstring's rows for the keys of the space, with shape and range.
 
     Raises:
-        ManualError: A key has no row, or no box.
+        ManualError: A key has no row.
     """
     assert isinstance(space, spaces.Dict)
-    told = dict(_rows(text))
-    unknown = [key for key in space if key not in told]
+    documented = dict(_rows(text))
+    unknown = [key for key in space if key not in documented]
     if unknown:
-        raise ManualError(f"the manual page has no row for {', '.join(unknown)}")
+        raise ManualError(f"the docstring has no row for {', '.join(unknown)}")
     rows = ["| key | shape | range | unit | content |", "|---|---|---|---|---|"]
-    for key, (_, unit, content) in told.items():
+    for key, (_, unit, content) in documented.items():
         if key in space.keys():  # noqa: SIM118 - a Dict space has no `in`
             box = space[key]
             assert isinstance(box, spaces.Box)
@@ -83,7 +82,7 @@ def _observation(space: spaces.Space[Any], text: str) -> str:
 
 
 def _rows(text: str) -> Iterator[tuple[str, list[str]]]:
-    """Key and the other cells of each row of the manual's table."""
+    """Yields the key and the other cells of each row of the docstring's table."""
     for line in text.splitlines():
         match = _ROW.match(line)
         if match:
@@ -91,7 +90,7 @@ def _rows(text: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def _limits(box: spaces.Box) -> str:
-    """`0 to 220`, or `(-0.5, -3.142) to (99.5, 3.142)` where the numbers differ."""
+    """Formats limits: `0 to 220`, or `(-0.5, -3.142) to (99.5, 3.142)`."""
     ends = (box.low, box.high)
     flat = [[f"{v:.4g}" for v in end.ravel().tolist()] for end in ends]
     if all(len(set(numbers)) == 1 for numbers in flat):
@@ -100,14 +99,14 @@ def _limits(box: spaces.Box) -> str:
 
 
 def _action(space: spaces.Space[Any], text: str) -> str:
-    """The manual's words for the action.
+    """Returns the docstring's text about the action.
 
     Raises:
-        ManualError: They begin with another space.
+        ManualError: It begins with a different space.
     """
     assert isinstance(space, spaces.Box)
     limits = _limits(space).replace(" to ", ", ")
     real = f"`Box({limits}, {space.shape}, {space.dtype})`"
     if not text.startswith(real):
-        raise ManualError(f"the manual page must begin its action space with {real}")
+        raise ManualError(f"the section Action Space must begin with {real}")
     return text

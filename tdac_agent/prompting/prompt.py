@@ -1,7 +1,7 @@
-"""The prompts: what stays the same first, then the repair rules, then what failed.
+"""Prompts: first the constant part, then the repair rules, then the failures.
 
-A prompt begins with everything that no iteration changes, so that a provider can keep
-that part in its cache. That reaches up to the marker `AUTO_REPAIR_RULES_BEGIN`.
+The part before the marker `AUTO_REPAIR_RULES_BEGIN` is the same in all iterations, so
+that a provider can cache it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class PromptError(TdacError):
 
 @dataclass(frozen=True, slots=True)
 class PromptTemplate:
-    """The question for a new controller, as a Jinja2 template.
+    """Jinja2 template of the prompt for a new controller.
 
     Attributes:
         name: `full`, `underspecified`, or the file's path.
@@ -48,10 +48,10 @@ FULL = PromptTemplate()
 
 
 def load_template(given: str) -> PromptTemplate:
-    """A shipped variant by its name, or a file.
+    """Returns a shipped variant by its name, or the template in a file.
 
-    A file may use all names of `prompt_context` and `{% include %}` the shipped
-    templates; it must hold `{{ rules_block }}` once.
+    A file may use all variables of `context_of` and `{% include %}` the shipped
+    templates; it must contain `{{ rules_block }}` once.
 
     Raises:
         PromptError: There is no such variant or file.
@@ -70,11 +70,11 @@ def load_template(given: str) -> PromptTemplate:
 
 @functools.cache
 def _templates(env_id: str | None = None) -> jinja2.Environment:
-    """The shipped templates, with those of an environment."""
+    """Returns the shipped templates, with those of an environment."""
     folders = [Path(__file__).with_name("templates")]
     if env_id is not None:
         folders.append(environment(env_id).folder / "prompts")
-    # A template of the user's own is text to be filled in, and no program.
+    # A user's template must not be able to run code.
     return ImmutableSandboxedEnvironment(
         loader=jinja2.FileSystemLoader(folders),
         undefined=jinja2.StrictUndefined,
@@ -88,23 +88,23 @@ def _templates(env_id: str | None = None) -> jinja2.Environment:
 def generate_prompt(
     task: Task, rules: tuple[RepairRule, ...], template: PromptTemplate = FULL
 ) -> str:
-    """The question for a new controller (Listings 1 and 2, for `policy(obs)`).
+    """Returns the prompt for a new controller (Listings 1 and 2 of the paper).
 
     Args:
-        task: What the controller must do.
-        rules: Those in force.
-        template: What to fill in.
+        task: The controller's task.
+        rules: The rules in force.
+        template: The template.
 
     Raises:
-        PromptError: The template is broken, asks for an unknown name, or has no block
-            of rules.
+        PromptError: The template is broken, uses an unknown variable, or does not
+            contain the rules exactly once.
     """
     context = {**context_of(task), "rules_block": render_block(rules)}
     text = _render(template, task.spec.env, context)
     if text.count(context["rules_block"]) != 1:
         raise PromptError(
-            f"the prompt {template.name} must hold {{{{ rules_block }}}} once: the "
-            "rules that are learnt from failures go there"
+            f"the prompt {template.name} must contain {{{{ rules_block }}}} once: the "
+            "repair rules are inserted there"
         )
     return text
 
@@ -122,13 +122,13 @@ def _render(template: PromptTemplate, env_id: str, context: dict[str, Any]) -> s
         ) from error
     except jinja2.TemplateNotFound as error:
         raise PromptError(
-            f"the prompt {template.name} includes {error.name!r}, which is not there"
+            f"the prompt {template.name} includes {error.name!r}, which does not exist"
         ) from error
     except jinja2.TemplateSyntaxError as error:
         raise PromptError(
             f"the prompt {template.name}, line {error.lineno}: {error.message}"
         ) from error
-    # A template computes: what goes wrong in it may be any error.
+    # Expressions in a template may raise any error.
     except Exception as error:
         if template.text is None:
             raise
@@ -145,16 +145,16 @@ def repair_prompt(
     rules: tuple[RepairRule, ...] = (),
     unchanged: bool = False,
 ) -> str:
-    """The question to `edit` a controller, or to `summarise` its failures as rules.
+    """Returns the prompt to edit a controller or to summarise its failures as rules.
 
     Args:
-        kind: Which of the two.
-        prompt: The question that it answered, rules of today.
-        controller: Its source.
-        report: What failed.
-        earlier: The attempts before this one, a line each.
-        rules: Those in force, with what came of them.
-        unchanged: Whether the last edit gave the same code again.
+        kind: `edit` or `summarise`.
+        prompt: The prompt for a new controller, with the current rules.
+        controller: Source of the failed controller.
+        report: Its report.
+        earlier: Earlier attempts, one line each.
+        rules: The rules in force, with their effects.
+        unchanged: Whether the last edit returned the same code.
     """
     return (
         _templates()

@@ -1,4 +1,4 @@
-"""An optimizer's answer about the rules: at most three operations, strictly read."""
+"""An optimizer's answer about the rules: at most three operations, strictly parsed."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _FOREIGN = re.compile(r"```|~~~|https?://")
 
 
 def _checked(text: str) -> str:
-    """A clean text of a rule.
+    """Returns the clean text of a rule.
 
     Raises:
-        ValueError: It is empty, too long, or holds what no rule may hold.
+        ValueError: It has no words, is too long, or contains a code block or a URL.
     """
     tidy = clean(text)
     if not re.search(r"\w", tidy):
@@ -41,7 +41,7 @@ def _checked(text: str) -> str:
     if len(tidy) > MAX_RULE_CHARS:
         raise ValueError(f"{len(tidy)} characters, at most {MAX_RULE_CHARS}")
     if _FOREIGN.search(tidy):
-        raise ValueError("a rule holds no code block and no address")
+        raise ValueError("a rule must not contain a code block or a URL")
     return tidy
 
 
@@ -61,7 +61,7 @@ class Add(_Strict):
 
 
 class Edit(_Strict):
-    """Another text for a rule in force."""
+    """A new text for a rule in force."""
 
     op: Literal["edit"]
     id: str
@@ -69,7 +69,7 @@ class Edit(_Strict):
 
 
 class Drop(_Strict):
-    """An end to a rule in force, for good."""
+    """Permanent removal of a rule in force."""
 
     op: Literal["drop"]
     id: str
@@ -83,21 +83,21 @@ _Operations: TypeAdapter[list[Operation]] = TypeAdapter(
 
 
 class RuleAnswerError(ValueError):
-    """An answer that cannot be used; the message says to a model what is wrong."""
+    """An answer cannot be used; the message explains the problem to the model."""
 
 
 class Applied(NamedTuple):
-    """The rules after an answer, and what became of each operation, a line each."""
+    """The rules after an answer, and a line about each operation's result."""
 
     book: RuleBook
     notes: tuple[str, ...]
 
 
 def parse_operations(reply: str) -> list[Add | Edit | Drop]:
-    """The operations in an answer: one fenced block of JSON, or the answer itself.
+    """Returns the operations in an answer: one fenced JSON block, or only JSON.
 
     Raises:
-        RuleAnswerError: There is no such block, or it holds anything else.
+        RuleAnswerError: There is no such block, or its contents are invalid.
     """
     blocks = fenced_blocks(reply, frozenset({"json", ""}))
     if not blocks and reply.lstrip().startswith("["):
@@ -120,13 +120,13 @@ def apply(
     k: int,
     evidence: tuple[str, ...],
 ) -> Applied:
-    """The rules after some operations; one that is not possible changes nothing.
+    """Applies operations to the rules; an impossible operation changes nothing.
 
     Args:
         book: The rules before.
-        operations: What is wanted.
+        operations: The operations.
         k: Iteration.
-        evidence: Tests that had failed.
+        evidence: Failed tests.
     """
     notes = []
     for operation in operations:
@@ -145,7 +145,7 @@ def _add(
 ) -> tuple[RuleBook, str]:
     double = book.double_of(wanted.text)
     if double is not None:
-        return book, f"not added: {_says(double)}"
+        return book, f"not added: {_repeats(double)}"
     book = book.add(wanted.text, wanted.scope, k, evidence)
     return book, f"added {book.rules[-1].id}: {wanted.text}"
 
@@ -155,10 +155,10 @@ def _edit(book: RuleBook, wanted: Edit, k: int) -> tuple[RuleBook, str]:
     if rule is None:
         return book, f"not edited: no rule {wanted.id} in force"
     if double is not None:
-        return book, f"not edited: {_says(double)}"
+        return book, f"not edited: {_repeats(double)}"
     edits = (*rule.edits, f"k={k}: was {rule.text!r}")
-    anew = {"tried": 0, "cured": 0, "passes": (), "worse": 0}
-    book = book.change(rule.id, text=wanted.text, edits=edits, **anew)
+    counters = {"tried": 0, "cured": 0, "passes": (), "worse": 0}
+    book = book.change(rule.id, text=wanted.text, edits=edits, **counters)
     return book, f"edited {rule.id}: {wanted.text}"
 
 
@@ -171,6 +171,6 @@ def _drop(book: RuleBook, wanted: Drop, k: int) -> tuple[RuleBook, str]:
     return book, f"dropped {rule.id}: {reason or 'no reason given'}"
 
 
-def _says(rule: RepairRule) -> str:
+def _repeats(rule: RepairRule) -> str:
     ended = "" if rule.in_force else f", which was ended in k={rule.ended}"
-    return f"it says what {rule.id} says{ended}"
+    return f"it repeats {rule.id}{ended}"

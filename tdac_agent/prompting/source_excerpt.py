@@ -5,11 +5,11 @@ from __future__ import annotations
 import ast
 
 FOR_PEOPLE = ("Graphics", "show")
-"""What `sensors.py` has to show a drive: names and documentation are enough."""
+"""Names in `sensors.py` that only draw; a signature and docstring are enough."""
 
 
 def needed_part(source: str) -> str:
-    """The part of `sensors.py` that a controller may use, as it stands in the file."""
+    """Returns the part of `sensors.py` that a controller may use, verbatim."""
     lines, kept = source.splitlines(), []
     module = ast.parse(source)
     for node in module.body:

@@ -102,7 +102,7 @@ def test_every_cause_is_told(small_task, warm):
 
 
 SAME = {
-    "names that are not there": [
+    "missing names": [
         "missing constants: LOOKAHEAD",
         "missing at the top level: plan_path",
         "no `def main()` at the top level",

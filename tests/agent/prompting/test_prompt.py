@@ -108,7 +108,7 @@ def test_a_manual_that_has_drifted_is_refused(small_task):
         interface_of(env)
     env.observation_space = keys
     env.action_space = spaces.Box(-2, 2, (2,), np.float32)
-    with pytest.raises(ManualError, match=r"begin its action space with `Box\(-2, 2"):
+    with pytest.raises(ManualError, match=r"Action Space must begin with `Box\(-2, 2"):
         interface_of(env)
 
 
@@ -311,9 +311,9 @@ def test_a_template_of_ones_own(small_task, tmp_path):
     [
         ("{{ horizonn }} {{ rules_block }}", "'horizonn' is undefined; known names: "),
         ("a\n{% if %}", "line 2: Expected an expression"),
-        ("{% include 'x.j2' %}", "includes 'x.j2', which is not there"),
-        ("Drive!", "must hold {{ rules_block }} once"),
-        ("{{ rules_block }}{{ rules_block }}", "must hold {{ rules_block }} once"),
+        ("{% include 'x.j2' %}", "includes 'x.j2', which does not exist"),
+        ("Drive!", "must contain {{ rules_block }} once"),
+        ("{{ rules_block }}{{ rules_block }}", "must contain {{ rules_block }} once"),
         ("{{ horizon / 0 }}{{ rules_block }}", "division by zero"),
     ],
 )

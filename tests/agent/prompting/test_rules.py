@@ -157,7 +157,7 @@ def test_the_operations_of_an_answer():
         (answer({**GOOD, "text": 5}), "valid string"),
         (answer({**GOOD, "text": " \n"}), "needs words"),
         (answer({**GOOD, "text": "x" * 201}), "201 characters, at most 200"),
-        (answer({**GOOD, "text": "see http://x.y"}), "no address"),
+        (answer({**GOOD, "text": "see http://x.y"}), "or a URL"),
         (answer({"op": "edit", "text": "x"}), "id"),
     ],
 )
@@ -179,7 +179,7 @@ def test_doubles_are_not_added():
     """The same words in other spelling are the same rule; other numbers are not."""
     book, notes = after([add(SLOW)], [add(clean(SLOW_2)), add("Slow down near walls")])
     assert [rule.text for rule in book.rules] == [SLOW]
-    assert notes[1:] == ["not added: it says what R1 says"] * 2
+    assert notes[1:] == ["not added: it repeats R1"] * 2
     book, _ = after([add("set X = 1.5"), add("set X = 15"), add("set X = 1.5 !")])
     assert [rule.text for rule in book.rules] == ["set X = 1.5", "set X = 15"]
 
@@ -193,8 +193,8 @@ def test_what_was_dropped_does_not_come_back():
     )
     assert [rule.id for rule in book.in_force] == ["R2"]
     assert notes[-2:] == [
-        "not added: it says what R1 says, which was ended in k=2",
-        "not edited: it says what R1 says, which was ended in k=2",
+        "not added: it repeats R1, which was ended in k=2",
+        "not edited: it repeats R1, which was ended in k=2",
     ]
     gone = book.rules[0]
     assert (gone.status, gone.ended, gone.reason) == ("dropped", 2, "too slow")

@@ -115,8 +115,8 @@ def check_life(folder):
     assert (second.status, second.ended) == ("dropped", 2)
     lines = (folder / "journal.jsonl").read_text().splitlines()
     notes = [r["notes"] for r in map(json.loads, lines) if r["event"] == "rules"]
-    assert notes[0][2] == "not added: it says what R2 says"
-    assert "not added: it says what R2 says, which was ended in k=2" in notes[2]
+    assert notes[0][2] == "not added: it repeats R2"
+    assert "not added: it repeats R2, which was ended in k=2" in notes[2]
 
 
 @pytest.mark.slow
