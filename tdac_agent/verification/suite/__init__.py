@@ -1,1 +1,1 @@
-"""What a suite tests with: contract, oracles, references."""
+"""Parts of the verification suites: contract, oracles and references."""

@@ -1,4 +1,4 @@
-"""What a controller file may import and must define, read from its syntax tree."""
+"""Imports and definitions of a controller file, read from its syntax tree."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ALLOWED_IMPORTS = frozenset(
         "__future__",
     ]
 )
-# What allowed modules have imported themselves.
+# Modules that allowed modules import, and that can be reached through them.
 _HIDDEN_MODULES = frozenset(
     [
         *("builtins", "codecs", "ctypes", "ctypeslib", "f2py", "gc", "importlib"),
@@ -37,13 +37,13 @@ MAX_SOURCE_BYTES = 200_000
 
 
 def time_step(dt: float) -> int | float:
-    """The constant `TIME_STEP`: a duration in ms, an int where it is a whole number."""
+    """Returns the constant `TIME_STEP`: `dt` (s) in ms, as an int if it is whole."""
     milliseconds = round(1e3 * dt, 6)
     return int(milliseconds) if milliseconds.is_integer() else milliseconds
 
 
 def top_level_names(tree: ast.Module) -> dict[str, ast.stmt]:
-    """Names that importing the module binds, with the statement that does."""
+    """Returns the names that importing the module binds, with their statements."""
     return dict(_bindings(tree.body))
 
 
@@ -75,7 +75,7 @@ def _target_names(target: ast.expr) -> list[str]:
 
 
 def import_problems(tree: ast.Module) -> list[str]:
-    """Imports of modules that are not allowed, or anywhere but at the top."""
+    """Describes imports that are not allowed or not at the top level."""
     top = set(tree.body)
     problems = []
     for node in nodes_of(tree):
@@ -105,26 +105,26 @@ def _is_hidden(name: str) -> bool:
 
 
 def _reached_modules(tree: ast.Module) -> Iterator[str]:
-    """Modules that are reached through an imported one, such as `random._os`."""
+    """Describes uses of a module through an imported one, such as `random._os`."""
     imports = [n for n in nodes_of(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
     bound = {name for name, _ in _bindings([*imports])}
     inner: set[ast.expr] = set()
-    for node in nodes_of(tree):  # the longest form of a name comes first
+    for node in nodes_of(tree):  # the longest dotted name comes first
         if isinstance(node, ast.Attribute) and node not in inner:
-            root, hidden = _taken_apart(node, inner)
+            root, hidden = _root_and_hidden(node, inner)
             if hidden is not None and isinstance(root, ast.Name) and root.id in bound:
                 between = "." if hidden.value is root else "…"
                 yield f"line {node.lineno}: use of {root.id}{between}{hidden.attr}"
 
 
-def _taken_apart(
+def _root_and_hidden(
     node: ast.Attribute, inner: set[ast.expr]
 ) -> tuple[ast.expr, ast.Attribute | None]:
-    """What a name with dots begins with, and the first hidden module in it.
+    """Returns the root of a dotted name, and the first hidden module in it.
 
     Args:
-        node: The name.
-        inner: Gets its parts, which are names with dots, too.
+        node: The dotted name.
+        inner: Set to which its parts are added, which are dotted names as well.
     """
     root: ast.expr = node
     hidden = None
@@ -137,7 +137,7 @@ def _taken_apart(
 
 
 def calls_in(*nodes: ast.AST) -> set[str]:
-    """Last names of everything called inside some nodes."""
+    """Returns the last names of everything called inside some nodes."""
     return {call_name(call) for node in nodes for call in calls(node)}
 
 
@@ -161,7 +161,7 @@ def _is_main_test(test: ast.expr) -> bool:
 
 
 def positional_arity(function: ast.FunctionDef) -> tuple[int, int]:
-    """Least and most positional arguments a function takes."""
+    """Returns the least and greatest number of positional arguments."""
     arguments = function.args
     total = len(arguments.posonlyargs) + len(arguments.args)
     return total - len(arguments.defaults), 99 if arguments.vararg else total
@@ -169,12 +169,9 @@ def positional_arity(function: ast.FunctionDef) -> tuple[int, int]:
 
 @functools.lru_cache(maxsize=8)
 def nodes_of(node: ast.AST) -> tuple[ast.AST, ...]:
-    """A node and all below it, as `ast.walk` has them, in half of its time.
-
-    A module is asked for many times.
-    """
+    """Returns a node and all nodes below it, in the order of `ast.walk`, but faster."""
     nodes = [node]
-    for parent in nodes:  # grows meanwhile
+    for parent in nodes:  # the list grows meanwhile
         for value in parent.__dict__.values():
             if isinstance(value, ast.AST):
                 nodes.append(value)
@@ -184,17 +181,17 @@ def nodes_of(node: ast.AST) -> tuple[ast.AST, ...]:
 
 
 def calls(node: ast.AST) -> Iterator[ast.Call]:
-    """Every call inside a node."""
+    """Yields every call inside a node."""
     return (child for child in nodes_of(node) if isinstance(child, ast.Call))
 
 
 def call_name(call: ast.Call) -> str:
-    """Last name of what is called: `sleep` of `time.sleep(1)`."""
+    """Returns the last name of the called function: `sleep` for `time.sleep(1)`."""
     return last_name(call.func)
 
 
 def last_name(node: ast.expr) -> str:
-    """The name itself, or that of the attribute; else an empty text."""
+    """Returns the name, or the name of the attribute; otherwise an empty string."""
     if isinstance(node, ast.Name):
         return node.id
     return node.attr if isinstance(node, ast.Attribute) else ""

@@ -1,4 +1,4 @@
-"""Tests that the shipped suites have in common, whatever the environment."""
+"""Tests that the shipped suites of all environments share."""
 
 import ast
 import math
@@ -13,7 +13,7 @@ SCHEMA_STEPS = 50
 
 
 def test_source_parses(controller):
-    """One Python file of at most 200 kB that parses."""
+    """The source parses and has at most 200 kB."""
     assert isinstance(controller.tree, ast.Module)
 
 
@@ -21,13 +21,15 @@ def test_imports(controller):
     """Only allowed modules are imported, and only at the top level."""
     problems = contract.import_problems(controller.tree)
     allowed = " ".join(sorted(contract.ALLOWED_IMPORTS - {"__future__"}))
-    assert not problems, f"{'; '.join(problems)}; allowed at the top: {allowed}"
+    assert not problems, f"{'; '.join(problems)}; allowed modules: {allowed}"
 
 
 def test_policy_is_defined(controller):
     """`policy` is a plain function that takes one observation."""
     function = contract.top_level_names(controller.tree).get("policy")
-    assert isinstance(function, ast.FunctionDef), "no `def policy(obs)` at the top"
+    assert isinstance(function, ast.FunctionDef), (
+        "no `def policy(obs)` at the top level"
+    )
     least, most = contract.positional_arity(function)
     taken = str(least) if least == most else f"{least} to {most}"
     assert least <= 1 <= most, f"policy takes {taken} arguments, not 1"
@@ -44,7 +46,7 @@ def test_constants(controller, task):
 
 @pytest.mark.paper
 def test_entry_points(controller, task):
-    """`run_episode`, `main` and the functions and classes of the contract are there."""
+    """The functions and classes of the contract are defined at the top level."""
     names = contract.top_level_names(controller.tree)
     wanted = task.environment.names
     missing = [
@@ -72,46 +74,54 @@ def test_main(controller):
 
 @pytest.mark.parametrize("pattern", hygiene.HYGIENE)
 def test_hygiene(controller, pattern):
-    """No unstable pattern: each is named with its line."""
+    """The source has no unstable pattern; the message names the lines."""
     found = list(hygiene.HYGIENE[pattern](controller.tree))
     assert not found, f"{pattern.replace('_', ' ')}: {'; '.join(found[:8])}"
 
 
 @pytest.mark.paper
 def test_run_episode_schema(rollout):
-    """`run_episode` returns the five entries, each of its type and length."""
+    """`run_episode` returns five entries of the right types and lengths."""
     episode = rollout("nominal", steps=SCHEMA_STEPS, drive="run_episode")
     assert episode.error is None, episode.error
     result, steps = episode.returned, episode.trajectory.steps
-    assert isinstance(result, dict), f"a {type(result).__name__}, not a dict"
+    assert isinstance(result, dict), (
+        f"run_episode returned a {type(result).__name__}, not a dict"
+    )
     missing = {"positions", "speeds", "collisions", "goal", "dt"} - set(result)
-    assert not missing, f"missing keys: {', '.join(sorted(missing))}"
-    assert type(result["collisions"]) is int, "collisions is not an int"
+    assert not missing, f"run_episode: missing keys: {', '.join(sorted(missing))}"
+    assert type(result["collisions"]) is int, "run_episode: collisions is not an int"
     counts = len(result["positions"]), len(result["speeds"])
     expected = steps + 1, steps
-    assert counts == expected, f"{counts} positions and speeds, expected {expected}"
+    assert counts == expected, (
+        f"run_episode: {counts} positions and speeds, expected {expected}"
+    )
 
 
 @pytest.mark.paper
 def test_run_episode_agrees_with_the_judge(rollout, task):
-    """What `run_episode` returns is what the environment recorded, however it ends."""
+    """`run_episode` returns what the environment recorded, however the episode ends."""
     check_claims(rollout("nominal", steps=SCHEMA_STEPS, drive="run_episode"), task)
     truncated = rollout("nominal", steps=20, drive="truncated run_episode")
-    check_claims(truncated, task, " in an episode that begins with two of them")
+    check_claims(truncated, task, " (the count starts at 2 in this episode)")
     if rollout("nominal").reached:
         whole = rollout("nominal", drive="run_episode")
         check_claims(whole, task)
         good = whole.reached and whole.collisions == 0
-        assert good, f"run_episode: {whole.outcome}, where policy reaches the goal"
+        assert good, (
+            f"run_episode: {whole.outcome}, although policy alone reaches the goal"
+        )
 
 
 def check_claims(episode, task, where=""):
-    """Every entry against the judge's record, and no step after the end."""
+    """Compares every entry of `run_episode` with the judge's record."""
     assert episode.error is None, episode.error
     result, record, units = episode.returned, episode.trajectory, task.setting.units
     slack, length = 0.01 / units.scale, units.length
     claimed = np.asarray([tuple(p)[:2] for p in result["positions"]], float)
-    assert claimed.shape == (record.steps + 1, 2), f"positions: shape {claimed.shape}"
+    assert claimed.shape == (record.steps + 1, 2), (
+        f"positions has the shape {claimed.shape}, not {(record.steps + 1, 2)}"
+    )
     worst = float(np.abs(claimed - record.poses[:, :2]).max())
     assert worst <= slack, (
         f"positions differ from the record by up to {worst * units.scale:.2f} {length}"
@@ -120,7 +130,8 @@ def check_claims(episode, task, where=""):
     forward = record.actions.mean(axis=1) * full_speed
     speeds = np.asarray(result["speeds"], float)
     assert speeds.shape == forward.shape, (
-        f"speeds: shape {speeds.shape}, one forward speed a step is {forward.shape}"
+        f"speeds has the shape {speeds.shape}, not {forward.shape}: one forward speed "
+        "per step"
     )
     worst = float(np.abs(speeds - forward).max(initial=0.0))
     assert worst <= slack, (
@@ -128,63 +139,69 @@ def check_claims(episode, task, where=""):
         f"{length}/s"
     )
     assert result["collisions"] == record.collisions, (
-        f"collisions is {shown(result['collisions'])}, on record are "
-        f"{record.collisions}{where}"
+        f"collisions is {shown(result['collisions'])}, not {record.collisions} as "
+        f"recorded{where}"
     )
-    assert math.isclose(result["dt"], record.dt), f"dt is {shown(result['dt'])}"
+    assert math.isclose(result["dt"], record.dt), (
+        f"dt is {shown(result['dt'])}, not {record.dt:g}"
+    )
     goal = tuple(float(v) for v in result["goal"])
-    assert np.allclose(goal, task.nominal.goal), f"goal is {shown(goal)}"
+    assert np.allclose(goal, task.nominal.goal), (
+        f"goal is {shown(goal)}, not {task.nominal.goal}"
+    )
 
 
 @pytest.mark.parametrize("steps", [10, 50])
 def test_short_rollout_is_stable(rollout, steps):
-    """The first steps raise nothing and return two finite numbers each."""
+    """The first calls of `policy` return two finite numbers each."""
     episode = rollout("nominal")
     failed_early = episode.error and episode.trajectory.steps < steps
     assert not failed_early, episode.error
 
 
 def test_policy_is_fast_enough(rollout, task):
-    """The mean policy call takes no longer than a step."""
+    """The mean call of `policy` takes at most one step's duration."""
     episode = rollout("nominal")
     assert episode.error is None, episode.error
     mean, p99 = episode.call_ms
     limit = 1000 * task.nominal.dt
     assert mean <= limit, (
-        f"mean call {mean:.1f} ms (p99 {p99:.1f}), limit {limit:.0f} ms"
+        f"the mean call of policy takes {mean:.1f} ms (99th percentile {p99:.1f} ms); "
+        f"the limit is {limit:.0f} ms"
     )
 
 
 def test_progress(rollout, task):
-    """d_min <= 0.7 d0 within max(400, 0.16 horizon) steps."""
+    """d_min <= 0.7 d0 within max(400, 0.16 horizon) steps, by default."""
     episode, spec, units = rollout("nominal"), task.spec.progress, task.setting.units
-    assert episode.trajectory.steps > 0, episode.error or "the episode has no step"
+    assert episode.trajectory.steps > 0, episode.error or "the episode has no steps"
     distances = episode.distances(spec.distance)[: task.progress_steps + 1]
     d0, d_min = (float(d) * units.scale for d in (distances[0], distances.min()))
     assert d_min <= spec.fraction * d0, (
-        f"d_min {d_min:.1f} {units.length} > {spec.fraction:g} x d0 {d0:.1f} "
-        f"{units.length} ({spec.distance}) within {task.progress_steps} steps"
+        f"d_min {d_min:.1f} {units.length} > {spec.fraction:g} x d0 = "
+        f"{spec.fraction * d0:.1f} {units.length} (smallest {spec.distance} distance "
+        f"to the goal in {task.progress_steps} steps)"
     )
 
 
 def test_no_collisions(rollout):
-    """The body touches nothing on the whole way."""
+    """The body touches nothing during the whole episode."""
     episode = rollout("nominal")
     assert episode.error is None, episode.error
-    assert episode.trajectory.steps > 0, "the episode has no step"
+    assert episode.trajectory.steps > 0, "the episode has no steps"
     assert episode.collisions == 0, f"{episode.collisions} collision(s)"
 
 
 def test_reaches_goal(rollout):
     """The goal is reached within the horizon."""
     episode = rollout("nominal")
-    assert episode.reached, episode.error or f"ended: {episode.outcome}"
+    assert episode.reached, episode.error or f"the episode ended: {episode.outcome}"
 
 
 @pytest.mark.jitter
 @pytest.mark.parametrize("number", [1, 2, 3, 4, 5])
 def test_jittered_start(rollout, number):
-    """From a start moved by up to one radius and turned by up to 0.5 rad."""
+    """Reaches the goal from a start moved by <= 1 radius and turned by <= 0.5 rad."""
     episode = rollout(f"jitter {number}")
     figures = not episode.held_out or episode.outcome == "not run"
     ending = episode.error or episode.outcome if figures else "failed"
@@ -193,25 +210,36 @@ def test_jittered_start(rollout, number):
 
 
 def check_path(oracle, case, path, is_point):
-    """A path from start to goal, or [] where there is none: free, joined, short.
+    """Checks a planned path: free, connected, and at most 1.1 x the shortest length.
 
     Args:
         oracle: The fixture.
         case: One of `oracle.plan_cases()`.
-        path: What the controller returned.
-        is_point: Whether a value is a pair of whole numbers.
+        path: The controller's answer; must be [] if there is no path.
+        is_point: Returns whether a value is a pair of whole numbers.
     """
-    assert isinstance(path, list), f"{case.name}: a {type(path).__name__}, not a list"
+    assert isinstance(path, list), (
+        f"{case.name}: returned a {type(path).__name__}, not a list"
+    )
     if math.isinf(case.length):
-        assert path == [], f"{case.name}: {len(path)} points, expected []"
+        assert path == [], (
+            f"{case.name}: returned {len(path)} points, but there is no path: "
+            "expected []"
+        )
         return
-    assert path, f"{case.name}: [], but a path of {case.length:.1f} px exists"
+    assert path, (
+        f"{case.name}: returned [], but there is a path of {case.length:.1f} px"
+    )
     assert all(map(is_point, path)), f"{case.name}: points must be (int, int)"
     ends = (path[0], path[-1])
-    assert ends == (case.start, case.goal), f"{case.name}: runs {shown(ends)}"
+    assert ends == (case.start, case.goal), (
+        f"{case.name}: the ends of the path are {shown(ends)}, not start and goal "
+        f"{(case.start, case.goal)}"
+    )
     error = oracle.path_error(case.occ, path)
     assert error is None, f"{case.name}: {error}"
     length = oracle.path_length(path)
     assert length <= 1.1 * case.length + 1e-6, (
-        f"{case.name}: {length:.1f} px long, the shortest is {case.length:.1f} px"
+        f"{case.name}: the path has {length:.1f} px, more than 1.1 x the shortest "
+        f"({case.length:.1f} px)"
     )

@@ -1,4 +1,4 @@
-"""Unstable patterns in a controller's source, each found by name with its line."""
+"""Unstable patterns in a controller's source, found by name and line."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ SAVERS = frozenset(
         *("dump", "open_memmap", "write_text", "write_bytes"),
     ]
 )
-# A longer name is no module that draws random numbers, and may take long to spell.
+# Longer names are not modules of random numbers, and may be expensive to build.
 MOST_DOTS = 3
 SURFACES = frozenset({"surface", "screen", "window", "map_img", "display"})
 
 
 def forbidden_calls(tree: ast.Module) -> Iterator[str]:
-    """Calls and names that run or reach code a reader cannot see."""
+    """Finds names that run code or give access to the interpreter."""
     for node in nodes_of(tree):
         if (
             isinstance(node, ast.Name)
@@ -41,7 +41,7 @@ def forbidden_calls(tree: ast.Module) -> Iterator[str]:
 
 
 def file_writes(tree: ast.Module) -> Iterator[str]:
-    """Calls of `open` that may write, and functions that save."""
+    """Finds calls of `open` that may write, and functions that save files."""
     for node in calls(tree):
         name = call_name(node)
         if name == "open" and not _reads_only(node):
@@ -55,7 +55,7 @@ def file_writes(tree: ast.Module) -> Iterator[str]:
 
 
 def _reads_only(call: ast.Call) -> bool:
-    # `path.open(mode)` has no first argument for the file.
+    # The first argument of `path.open(mode)` is the mode.
     place = 1 if isinstance(call.func, ast.Name) else 0
     mode: ast.expr | None = call.args[place] if len(call.args) > place else None
     for keyword in call.keywords:
@@ -67,7 +67,7 @@ def _reads_only(call: ast.Call) -> bool:
 
 
 def sleeps(tree: ast.Module) -> Iterator[str]:
-    """Calls of `sleep`."""
+    """Finds calls and imports of `sleep`."""
     for node in calls(tree):
         if call_name(node) == "sleep":
             yield f"line {node.lineno}: sleep()"
@@ -80,7 +80,7 @@ def sleeps(tree: ast.Module) -> Iterator[str]:
 
 
 def swallowed_errors(tree: ast.Module) -> Iterator[str]:
-    """Bare `except`, and handlers that do nothing."""
+    """Finds `except` clauses that catch everything or do nothing."""
     for node in nodes_of(tree):
         if not isinstance(node, ast.ExceptHandler):
             continue
@@ -99,7 +99,7 @@ def _does_nothing(node: ast.stmt) -> bool:
 
 
 def runtime_errors(tree: ast.Module) -> Iterator[str]:
-    """`raise RuntimeError`."""
+    """Finds `raise RuntimeError`."""
     for node in nodes_of(tree):
         if isinstance(node, ast.Raise) and node.exc is not None:
             raised = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
@@ -108,7 +108,7 @@ def runtime_errors(tree: ast.Module) -> Iterator[str]:
 
 
 def surface_indexing(tree: ast.Module) -> Iterator[str]:
-    """Subscripts of a drawing surface, which is not an array."""
+    """Finds subscripts of drawing surfaces, which are not arrays."""
     for node in nodes_of(tree):
         if isinstance(node, ast.Subscript):
             name = last_name(node.value)
@@ -117,7 +117,7 @@ def surface_indexing(tree: ast.Module) -> Iterator[str]:
 
 
 def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
-    """Random numbers that differ from run to run."""
+    """Finds random numbers without a seed."""
     modules = _random_modules(tree)
     for node in calls(tree):
         function = node.func
@@ -143,7 +143,7 @@ def _is_none(node: ast.expr) -> bool:
 
 
 def _spelled(node: ast.expr) -> str:
-    """A name with up to three dots, such as `np.random`; else an empty text."""
+    """Returns a name with up to three dots, such as `np.random`; otherwise ''."""
     names: list[str] = []
     while isinstance(node, ast.Attribute) and len(names) < MOST_DOTS:
         names.append(node.attr)
@@ -154,7 +154,7 @@ def _spelled(node: ast.expr) -> str:
 
 
 def _random_modules(tree: ast.Module) -> set[str]:
-    """How this file spells the modules (and functions) that draw random numbers."""
+    """Returns the names of random number modules and functions in this file."""
     names = set()
     for node in nodes_of(tree):
         if isinstance(node, ast.Import):
@@ -183,4 +183,4 @@ HYGIENE: dict[str, Callable[[ast.Module], Iterator[str]]] = {
     "surface_indexing": surface_indexing,
     "unseeded_randomness": unseeded_randomness,
 }
-"""The unstable patterns, each by name."""
+"""Finders of unstable patterns, by name."""

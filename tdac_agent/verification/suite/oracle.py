@@ -1,4 +1,4 @@
-"""Answers that suites compare a controller's own functions with."""
+"""Exact answers with which suites compare a controller's own functions."""
 
 from __future__ import annotations
 
@@ -15,14 +15,12 @@ from tdac_envs.grid.plan import path_length, plan_path
 
 Point = tuple[int, int]
 
-# Of `walks`: how many, from how many starts at most, and the legs of each.
+# Number of walks, number of starts to try, and number of legs of a walk.
 WALKS, MOST_STARTS, LEGS = 3, 200, 5
 
-# Random grids on which a search whose heuristic counts a diagonal step as two finds a
-# path that is more than 1.15 times the shortest.
+# Seeds of random grids on which wrong heuristics give paths longer than 1.15 times the
+# shortest: a diagonal step counted as two, or 2 to 20 times the distance.
 DEAR_DIAGONALS = (2119, 2260)
-# The same of one that hurries towards the goal, by a heuristic of 2 to 20 times the
-# distance.
 DETOURS = (561, 702, 877, 1184, 1310, *DEAR_DIAGONALS)
 
 
@@ -31,11 +29,11 @@ class PlanCase:
     """A planning question with its answer.
 
     Attributes:
-        name: For messages.
+        name: Name for messages.
         occ: Shape (height, width), bool `[y, x]`, True = occupied.
         start: Pixel (x, y).
         goal: Pixel (x, y).
-        length: Octile length of the shortest path, px; inf where there is none.
+        length: Octile length of the shortest path, px; inf if there is no path.
     """
 
     name: str
@@ -49,7 +47,7 @@ class Oracle:
     """Shortest paths, reachability and nearest free pixels, by exact search."""
 
     def shortest_length(self, occ: BoolGrid, start: Point, goal: Point) -> float:
-        """Octile length of the shortest 8-connected path without corner cutting, px.
+        """Returns the octile length of the shortest 8-connected path, px.
 
         Args:
             occ: Shape (height, width), bool `[y, x]`, True = occupied.
@@ -57,13 +55,14 @@ class Oracle:
             goal: Pixel (x, y).
 
         Returns:
-            inf where an end is occupied or no path joins them.
+            Length without corner cutting; inf if an end is occupied or there is no
+            path.
         """
         path = plan_path(~occ, start, goal)
         return path_length(path) if len(path) else math.inf
 
     def path_error(self, occ: BoolGrid, path: list[Point], cell: int = 1) -> str | None:
-        """What is wrong with a path of pixels, or None.
+        """Returns the first error in a path of pixels, or None.
 
         Args:
             occ: Shape (height, width), bool `[y, x]`, True = occupied.
@@ -85,11 +84,11 @@ class Oracle:
         return None
 
     def path_length(self, path: list[Point]) -> float:
-        """Euclidean length of a polyline, px."""
+        """Returns the Euclidean length of a polyline, px."""
         return sum(math.dist(a, b) for a, b in pairwise(path))
 
     def nearest_free_distance(self, occ: BoolGrid, x: int, y: int) -> float:
-        """Euclidean distance from (x, y) to the nearest free pixel, px."""
+        """Returns the Euclidean distance from (x, y) to the nearest free pixel, px."""
         rows, columns = np.nonzero(~occ)
         if rows.size == 0:
             return math.inf
@@ -98,19 +97,19 @@ class Oracle:
     def grid(
         self, seed: int, width: int = 40, height: int = 30, density: float = 0.25
     ) -> BoolGrid:
-        """A seeded random grid."""
+        """Returns a seeded random grid."""
         random = np.random.default_rng(seed)
         return np.asarray(random.random((height, width)) < density)
 
     def walks(
         self, occ: BoolGrid, cell: int, random: np.random.Generator
     ) -> Iterator[tuple[Point, Point]]:
-        """Pairs of free pixels that some steps of `cell` px join, not far apart.
+        """Yields random pairs of nearby free pixels that steps of `cell` px connect.
 
         Args:
             occ: Shape (height, width), bool `[y, x]`, True = occupied.
             cell: Length of a straight step, px.
-            random: Draws them.
+            random: Random number generator.
         """
         height, width = occ.shape
         found = 0
@@ -126,21 +125,21 @@ class Oracle:
     def _walk(
         self, occ: BoolGrid, start: Point, cell: int, random: np.random.Generator
     ) -> Point:
-        """Where some legs in any of the eight directions end; the start if nowhere."""
+        """Returns the end of a random walk; the start if no step is possible."""
         here = start
         for dx, dy, steps in random.integers((-1, -1, 1), (2, 2, 7), (LEGS, 3)):
             for _ in range(steps):
-                way = [
+                step = [
                     (here[0] + k * int(dx), here[1] + k * int(dy))
                     for k in range(cell + 1)
                 ]
-                if self.path_error(occ, way) is not None:
+                if self.path_error(occ, step) is not None:
                     break
-                here = way[-1]
+                here = step[-1]
         return here
 
     def plan_cases(self) -> list[PlanCase]:
-        """Fixed grids with traps, and seeded random ones."""
+        """Returns fixed grids with traps, and seeded random grids."""
         cases = [self._case(*question) for question in _fixed_grids()]
         for seed in range(12):
             occ = self.grid(seed, 44, 31, 0.1 + 0.03 * seed)

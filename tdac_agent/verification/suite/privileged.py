@@ -1,7 +1,7 @@
-"""Controllers that put a suite to the proof: one that must pass, others that must not.
+"""Controllers that check a suite: the reference must pass, the others must fail.
 
-All are one file that knows the oracle's path for the starts of one task and seed, and
-differ in their `policy` alone.
+All are the same file, which contains the oracle's paths for the starts of one task and
+seed; only `policy` differs.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ REFERENCE, DO_NOTHING, SLOW = "reference", "do-nothing", "slow"
 POLICIES = {
     REFERENCE: '''\
 def policy(obs):
-    """Follows the way."""
+    """Follows the path."""
     return steer(obs)''',
     DO_NOTHING: '''\
 def policy(obs):
@@ -28,40 +28,40 @@ def policy(obs):
     return 0.0, 0.0''',
     "constant": '''\
 def policy(obs):
-    """Drives straight on, whatever comes."""
+    """Always drives straight on."""
     return 1.0, 1.0''',
     "random": '''\
 DICE = random.Random(0)
 
 
 def policy(obs):
-    """Rolls the dice."""
+    """Returns random wheel speeds."""
     return DICE.uniform(-1.0, 1.0), DICE.uniform(-1.0, 1.0)''',
     "raising": '''\
 def policy(obs):
-    """Gives up."""
+    """Raises an error."""
     raise ValueError("this controller always raises")''',
     SLOW: '''\
 def policy(obs):
-    """Follows the way, but computes for longer than a call may."""
+    """Follows the path, but computes for longer than the limit."""
     end = time.process_time() + 2.2 * DT
     while time.process_time() < end:
         math.sqrt(end)
     return steer(obs)''',
 }
-"""Definition of `policy` in each controller, by the controller's name."""
+"""Source of `policy` by the name of the controller."""
 BAD = tuple(name for name in POLICIES if name != REFERENCE)
 
 
 def privileged_controller(
     task: Nominal, paths: Sequence[Sequence[Point]], name: str = REFERENCE
 ) -> str:
-    """Source of a controller that knows the oracle's path from each start of a test.
+    """Returns the source of a controller that knows the oracle's path from each start.
 
     Args:
-        task: What it must do, or fail to do.
-        paths: From `reference_paths`.
-        name: One of `POLICIES`.
+        task: The controller's task.
+        paths: Paths from `reference_paths`.
+        name: Key of `POLICIES`.
     """
     about = environment(task.env_id)
     facts = about.privileged_facts(task)
@@ -82,7 +82,7 @@ def privileged_controller(
 
 
 def reference_paths(task: Nominal, seed: int) -> list[list[Point]]:
-    """The points to drive to from each start of a verification with this seed."""
+    """Returns the reference path from each start of a verification with this seed."""
     starts = (task.start, *spread_starts(task, seed, JITTERS))
     find = environment(task.env_id).reference_path
     return [find(task, start.x, start.y) for start in starts]

@@ -1,7 +1,7 @@
-"""What it says about a suite that the reference and bad controllers fared as they did.
+"""Verdict on a suite, from the results of the reference and of bad controllers.
 
-What the reference fails cannot be done, or is not in the contract; a suite that a bad
-controller passes does not test what it is for.
+A test that the reference fails is infeasible or not part of the contract. A suite that
+a bad controller passes does not test enough.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ class _Record(PrintableRecord):
 
 
 class Row(_Record):
-    """What came of one controller."""
+    """Results of one controller."""
 
     controller: str
-    repeats: int = Field(description="Its verifications.")
-    passed: int = Field(description="How many of them it passed.")
-    failures: dict[str, str] = Field(description="Message of each test that failed.")
-    disagreements: tuple[str, ...] = Field(description="Of the repeats.")
+    repeats: int = Field(description="Number of verifications.")
+    passed: int = Field(description="Number of verifications that passed.")
+    failures: dict[str, str] = Field(description="Message of each failed test.")
+    disagreements: tuple[str, ...] = Field(description="Differences of the repeats.")
     seconds: float
 
 
 class SuiteCheck(_Record):
-    """Whether a suite proved itself on a task, with one seed, in one profile."""
+    """Verdict on a suite, for one task, seed and profile."""
 
     schema_version: Literal[1] = 1
     proven: bool
@@ -45,15 +45,15 @@ class SuiteCheck(_Record):
     suite_sha256: str
     profile: Profile
     seed: int
-    sandbox: str = Field(description="Tier that held the controllers.")
+    sandbox: str = Field(description="Sandbox tier of the controllers.")
     rows: tuple[Row, ...]
-    problems: tuple[str, ...] = Field(description="What does not hold.")
-    notes: tuple[str, ...] = Field(description="What a person should look at.")
+    problems: tuple[str, ...] = Field(description="Reasons why it is not proven.")
+    notes: tuple[str, ...] = Field(description="Remarks that the user should check.")
     seconds: float
 
 
 def row_of(name: str, reports: Sequence[Report]) -> Row:
-    """What came of one controller's verifications."""
+    """Summarises one controller's verifications."""
     failures: dict[str, str] = {}
     for report in reports:
         for failure in report.failures:
@@ -69,13 +69,13 @@ def row_of(name: str, reports: Sequence[Report]) -> Row:
 
 
 def disagreements(reports: Iterable[Report]) -> Iterator[str]:
-    """Outcomes of tests and figures of episodes that are not the same in all reports.
+    """Describes test outcomes and episode figures that differ between reports.
 
-    What the clock has a say in is left out.
+    Figures that depend on the clock are left out.
     """
     facts = [_facts(report) for report in reports]
     for key in dict.fromkeys(key for known in facts for key in known):
-        values = [known.get(key, "not there") for known in facts]
+        values = [known.get(key, "missing") for known in facts]
         if len(set(values)) > 1:
             yield f"{key} is {', '.join(values)}"
 
@@ -89,13 +89,13 @@ def _facts(report: Report) -> dict[str, str]:
 
 
 def problems_of(row: Row) -> Iterator[str]:
-    """What one controller shows to be wrong with a suite or a task."""
+    """Describes the problems of suite and task that one controller's results show."""
     if row.controller == REFERENCE and row.passed < row.repeats:
         for test, message in row.failures.items():
             yield f"the reference fails {test}: {message}"
     if row.controller != REFERENCE and row.passed:
         times = "" if row.repeats == 1 else f" in {row.passed} of {row.repeats} repeats"
-        yield f"{row.controller} passes{times}: nothing that is tested needs more"
+        yield f"{row.controller} passes{times}: the tests require no more than it does"
     for difference in row.disagreements:
         yield f"the repeats of {row.controller} disagree: {difference}"
 
@@ -103,12 +103,12 @@ def problems_of(row: Row) -> Iterator[str]:
 def verdict_on_suite(
     reference: Report, rows: Sequence[Row], seconds: float
 ) -> SuiteCheck:
-    """Reads the rows.
+    """Returns the verdict on a suite.
 
     Args:
-        reference: A report on the reference: what was checked, and its tests.
-        rows: One of each controller.
-        seconds: How long it took.
+        reference: A report on the reference; states suite, task and tests.
+        rows: One row per controller.
+        seconds: Duration of the check, s.
     """
     about = reference.provenance
     problems = [problem for row in rows for problem in problems_of(row)]

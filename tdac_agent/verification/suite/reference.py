@@ -1,4 +1,4 @@
-"""How a privileged reference drives: turns in place, straight drives, shortcuts."""
+"""Driving of the privileged references: turns in place, straight drives, shortcuts."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _ALIGNED = 1e-6  # rad
 def steer(
     pose: tuple[float, float, float], point: Point, step: float, axle: float
 ) -> tuple[float, float]:
-    """Wheel fractions (left, right) of a turn in place, or of a straight drive.
+    """Returns wheel fractions (left, right): a turn in place or a straight drive.
 
     Args:
-        pose: x, y (down) and heading, rad.
-        point: Where to.
-        step: Way of one step at full speed.
-        axle: Distance of the wheels.
+        pose: x, y and heading, rad; y points down, headings are clockwise.
+        point: Target (x, y).
+        step: Distance driven in one step at full speed.
+        axle: Distance between the wheels.
     """
     dx, dy = point[0] - pose[0], point[1] - pose[1]
     error = float(wrap_angle(float(math.atan2(dy, dx) - pose[2])))
@@ -35,14 +35,14 @@ def steer(
 
 
 def taut(path: Path, is_free: Callable[[Point, Point], bool]) -> list[Point]:
-    """Corners of a path after every shortcut.
+    """Returns the corners of a path after all shortcuts.
 
-    A shortcut is looked for by doubling and halving the number of path points that
-    it skips, so a long path costs n log n contact tests.
+    The search doubles and halves the number of skipped points, so a path of n points
+    needs O(n log n) contact tests.
 
     Args:
         path: Shape (n, 2).
-        is_free: Whether a shortcut may lead straight from one point to another.
+        is_free: Returns whether the body can drive straight between two points.
     """
     points = [(float(x), float(y)) for x, y in path]
     corners, at = points[:1], 0
@@ -64,7 +64,7 @@ def taut(path: Path, is_free: Callable[[Point, Point], bool]) -> list[Point]:
 
 
 def without_flat_points(points: Sequence[Point]) -> list[Point]:
-    """A polyline without the points at which it goes straight on."""
+    """Returns a polyline without the points at which it does not turn."""
     kept = list(points[:1])
     for here, after in pairwise(points[1:]):
         (x0, y0), (x1, y1), (x2, y2) = kept[-1], here, after

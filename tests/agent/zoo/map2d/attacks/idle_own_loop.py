@@ -2,7 +2,7 @@
 # profile: paper
 # onto: good/astar_pursuit.py
 # fails: only test_run_episode_agrees_with_the_judge
-# error: where policy reaches the goal
+# error: although policy alone reaches the goal
 # why: it is what a user would run, and has to arrive as policy does
 
 def run_episode(env, max_steps):
