@@ -1,1 +1,1 @@
-"""What differs between the environments: a room for each."""
+"""Packages for everything that differs between the environments."""

@@ -1,4 +1,4 @@
-"""Calls of the kernels that every environment has."""
+"""Calls of the kernels that all environments share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 
 
 def use_robot(env_id: str, **options: Any) -> Any:
-    """Drives a robot, the reference and a batch for a step; returns the environment."""
+    """Drives a robot, the reference and a batch one step; returns the environment."""
     env: Any = gym.make(env_id, variation="jitter", **options).unwrapped
     env.reset(seed=0)
     env.step(env.action_space.sample())

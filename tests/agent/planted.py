@@ -121,7 +121,7 @@ COLLISIONS = (
         side="rear",
         at=(421.5, 100.0, 0.1),
         step=(42, 0),
-        says=("No ray looks there: 180°",),
+        says=("No ray points there: it is 180°",),
     ),
     Plant(
         "drifts to the left",

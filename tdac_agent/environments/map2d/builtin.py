@@ -1,4 +1,4 @@
-"""The parametrised controller for maps, and how failures change it."""
+"""Parameters of the controller template for maps, and their remedies."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Parameters:
         0.0,
         12.0,
         "px",
-        "room wanted beside the body where the map has it",
+        "desired clearance around the body where the map allows it",
         step=2.0,
     )
     lookahead: float = tunable(
@@ -67,37 +67,37 @@ class Parameters:
         20.0,
         240.0,
         "px",
-        "length of way in which a point to aim at is looked for",
+        "distance along the path within which the aim is chosen",
     )
     cruise_speed: float = tunable(
-        1.0, 0.25, 1.0, "", "share of the wheel limit on a free way"
+        1.0, 0.25, 1.0, "", "fraction of the wheel limit on a free path"
     )
     slow_dist: float = tunable(
-        0.0, 0.0, 80.0, "px", "free length ahead below which it slows down"
+        0.0, 0.0, 80.0, "px", "free distance ahead below which it slows down"
     )
     stop_dist: float = tunable(
-        0.0, 0.0, 40.0, "px", "free length ahead below which it lines up before driving"
+        0.0, 0.0, 40.0, "px", "free distance ahead below which it aligns before driving"
     )
     turn_gain: float = tunable(
-        0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
+        0.3, 0.1, 1.0, "", "fraction of the heading error corrected in a step"
     )
     turn_in_place: float = tunable(
         0.8, 0.05, 1.2, "rad", "heading error above which it turns in place"
     )
     unstick_after: float = tunable(
-        0.0, 0.0, 400.0, "steps", "without progress until an unstick manoeuvre; 0: none"
+        0.0, 0.0, 400.0, "steps", "without progress before it drives carefully; 0: off"
     )
 
     def __post_init__(self) -> None:
         check(self)
 
     def changed(self, **values: float) -> Parameters:
-        """A copy with some values replaced, each moved into its bounds."""
+        """Returns a copy with some values replaced, each clipped to its bounds."""
         return changed(self, values)
 
 
 def template_for(robot: RobotParams, dt: float) -> Template[Parameters]:
-    """The controller of a robot.
+    """Returns the template for a robot.
 
     Args:
         robot: Values of the robot's constants.
@@ -108,5 +108,5 @@ def template_for(robot: RobotParams, dt: float) -> Template[Parameters]:
 
 
 def render_controller(parameters: Parameters, robot: RobotParams, dt: float) -> str:
-    """Source of the controller with these parameters; see `template_for`."""
+    """Returns the source of the controller with these parameters."""
     return template_for(robot, dt).render(parameters)

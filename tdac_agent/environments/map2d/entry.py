@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Map2D(Environment):
-    """A disc-shaped robot with range rays on a map; px. See `Environment`."""
+    """Disc-shaped robots with range rays on maps, in px. See `Environment`."""
 
     id = "TDAC-Map2D-v0"
     folder = Path(__file__).parent
@@ -38,7 +38,7 @@ class Map2D(Environment):
     kernels = "tdac_envs.map2d"
 
     def bundled(self) -> dict[str, str]:
-        """The bundled maps; a task has the name of its map."""
+        """Returns the bundled maps; a task has the name of its map."""
         from tdac_envs.mapping.bundled import bundled_maps
 
         return {name: name for name in bundled_maps()}
@@ -50,7 +50,7 @@ class Map2D(Environment):
         return open_map_task(spec, base)
 
     def small_env(self) -> Map2DEnv:
-        """An empty map of 60 x 40 px."""
+        """Returns an environment with an empty map of 60 x 40 px."""
         import numpy as np
 
         from tdac_envs.map2d.env import Map2DEnv
@@ -59,20 +59,20 @@ class Map2D(Environment):
         return Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
 
     def use_kernels(self) -> None:
-        """Reads a small map, and drives on it."""
+        """Reads a small map and drives on it."""
         from tdac_agent.environments.map2d.kernels_used import use_kernels
 
         use_kernels()
 
     def pictures(self, setting: Setting) -> MapPictures:
-        """The map, with what was driven."""
+        """Returns an object that draws episodes on the map."""
         from tdac_agent.environments.map2d.pictures import MapPictures
         from tdac_agent.environments.map2d.setting import map_setting
 
         return MapPictures(map_setting(setting))
 
     def surroundings(self, task: Nominal) -> MapSurroundings:
-        """The map's walls."""
+        """Returns the map with the queries of a diagnosis."""
         from tdac_agent.environments.map2d.surroundings import MapSurroundings
         from tdac_envs.map2d.task import Map2DTask
 
@@ -80,7 +80,7 @@ class Map2D(Environment):
         return MapSurroundings(task)
 
     def oracle(self) -> Oracle:
-        """It knows about grids alone."""
+        """Returns an oracle for grids."""
         from tdac_agent.verification.suite.oracle import Oracle
 
         return Oracle()

@@ -1,4 +1,4 @@
-"""Calls of every kernel that a map needs, so that all of them are compiled."""
+"""Calls of all kernels for maps, so that they get compiled."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tdac_envs.map2d import rays
 
 
 def use_kernels() -> None:
-    """Calls each kernel by the function that calls it in use, on a small map."""
+    """Calls each kernel through the function that normally uses it, on a small map."""
     image = np.full((60, 90), 255, np.uint8)
     image[25:35, 30:] = 0
     start, goal, radius = (12.0, 12.0), (80.0, 50.0), 5.0

@@ -21,13 +21,13 @@ class MapPictures:
     setting: Map2DSetting
 
     def backdrop(self) -> Background:
-        """The map."""
+        """Returns the map as a background."""
         return Background.of(self.setting.nominal)
 
     def trajectories(
         self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
     ) -> Image:
-        """The map with each trajectory."""
+        """Draws the map with all trajectories."""
         nominal = self.setting.nominal
         return trajectory_picture(
             nominal.terrain.grid.cells,
@@ -42,7 +42,7 @@ class MapPictures:
         )
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
-        """Frames of the robot with its rays."""
+        """Draws frames of the robot with its rays."""
         nominal, trajectory = self.setting.nominal, rollout.trajectory
         scene = Scene(
             nominal.terrain.grid.cells,

@@ -1,4 +1,4 @@
-"""What the prompts of a task on a map say."""
+"""Prompt variables of tasks on maps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HOW_THE_MAP_WAS_MADE = {
 
 
 def facts_of(task: Task) -> dict[str, Any]:
-    """Names and values for the templates of a task on a map."""
+    """Returns the template variables of a task on a map."""
     setting = map_setting(task.setting)
     nominal = setting.nominal
     terrain, grid = nominal.terrain, nominal.terrain.grid

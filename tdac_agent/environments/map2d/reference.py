@@ -1,8 +1,8 @@
-"""The privileged reference: drives the oracle's path on the true pose.
+"""The privileged reference for maps: follows the oracle's path using the true pose.
 
-It shows that a task and its suite can be passed at all, so it may know what no
-controller knows. It turns in place and drives straight, and both end with an exact
-fractional step; nothing of it is shared with `builtin`.
+It shows that a task and its suite can be passed, so it may use information that
+controllers lack. It turns in place and drives straight, and ends both with an exact
+fractional step. It shares no code with `builtin`.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from tdac_envs.grid.plan import Path, descend, distance_field
 from tdac_envs.map2d.straight import gets_straight
 from tdac_envs.map2d.task import Map2DTask
 
-# Room beyond the body that is tried for the path, px, widest first. The last but one
-# keeps a float32 action clear of a corner that the path would graze at exactly 0.
+# Clearances beyond the body that are tried for the path, px, widest first. With the
+# last but one, float32 actions cannot touch a corner that a path with 0 would graze.
 MARGINS = (4.0, 2.0, 1.0, 0.5, 0.05, 0.0)
 _ARRIVED = 1e-4  # px
 _SAFE = 1e-3  # px kept beyond the body on a shortcut
-# The same in the files of privileged controllers: many times what float32 rounds away.
+# The same in privileged controllers: much larger than the rounding errors of float32.
 _SAFE_IN_FLOAT32 = 0.02
 
 
 class Reference:
-    """Solves a feasible task without contact.
+    """Policy that solves a feasible task without contact.
 
     Args:
-        task: The task; its start is not used, any pose may be given to `act`.
+        task: The task; its start is not used.
     """
 
     def __init__(self, task: Map2DTask) -> None:
@@ -51,7 +51,7 @@ class Reference:
         self._waypoints = pull(self.task, path)[1:]
 
     def act(self, pose: Sequence[float]) -> tuple[float, float]:
-        """Wheel fractions (left, right) for the next step at the true pose."""
+        """Returns wheel fractions (left, right) for the next step at the true pose."""
         x, y, heading = (float(value) for value in pose)
         while self._waypoints and math.dist((x, y), self._waypoints[0]) < _ARRIVED:
             self._waypoints.pop(0)
@@ -62,10 +62,10 @@ class Reference:
 
 
 def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
-    """Path from (x, y) to the goal at the widest margin that still connects them.
+    """Returns the path from (x, y) to the goal with the widest possible margin.
 
     Returns:
-        Shape (n, 2), px; both ends included; only the ends where nothing connects.
+        Shape (n, 2), px, both ends included; only the ends if there is no path.
     """
     ends = np.array([[x, y], task.goal])
     for margin in MARGINS:
@@ -81,30 +81,30 @@ def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
 
 
 def reference_path(task: Map2DTask, x: float, y: float) -> list[Point]:
-    """The oracle's path from (x, y) to the goal, after shortcuts; ends included."""
+    """Returns the oracle's path to the goal after shortcuts; both ends included."""
     return without_flat_points(pull(task, oracle_path(task, x, y), _SAFE_IN_FLOAT32))
 
 
 def pull(task: Map2DTask, path: Path, safe: float = _SAFE) -> list[Point]:
-    """Corners of the path after every shortcut that keeps the disc clear.
+    """Returns the corners of the path after all shortcuts without contact.
 
     Args:
-        task: Gives the map and the body.
+        task: The task, for its map and body.
         path: Shape (n, 2), px.
-        safe: Room that a shortcut keeps beyond the body, px.
+        safe: Clearance of a shortcut beyond the body, px.
     """
     return taut(path, lambda begin, end: _free(task, begin, end, safe))
 
 
 def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
-    """Whether the body, grown by `safe` px, gets straight from one point to another."""
+    """Whether the body, grown by `safe` px, can drive straight between two points."""
     clear = task.terrain.padded_clear
     numbers = (*begin, *end, task.robot.radius + safe)
     return gets_straight(constant(clear), *map(float, numbers))
 
 
 def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:
-    """Pixels with room for the body and `margin` px, less of it near both ends."""
+    """Returns pixels with room for the body and `margin` px; less near both ends."""
     clear, radius = task.terrain.clear, task.robot.radius
     free = body_free(clear, radius + margin)
     if margin == 0.0:
@@ -121,7 +121,7 @@ def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:
 
 
 def _near(x: float, y: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """The pixels (i, j) within 3 px of a point, nearest first."""
+    """Returns the pixels (i, j) around a point, up to 3 px away, nearest first."""
     column, row = math.floor(x + 0.5), math.floor(y + 0.5)
     pixels = [
         (i, j)
@@ -142,7 +142,7 @@ def _nearest(free: BoolGrid, x: float, y: float) -> tuple[int, int] | None:
 def _entry(
     task: Map2DTask, field: NDArray[np.float64], x: float, y: float
 ) -> tuple[int, int] | None:
-    """The nearest pixel with a way to the goal that the body can hop to."""
+    """Returns the nearest pixel on a path to the goal that the body can drive to."""
     for i, j in _near(x, y, field.shape):
         if np.isfinite(field[j, i]) and _free(task, (x, y), (i, j), 0.0):
             return int(i), int(j)

@@ -1,4 +1,4 @@
-"""Tasks on maps: what is theirs alone of a `task.yaml` and of a working folder."""
+"""Tasks on maps: opening them, and their part of the working folder."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Map2DSetting:
     """A map with a start, a goal and a robot.
 
     Attributes:
-        params: Of the map, start, goal and robot filled in.
+        params: Contents of `params.json`, with start, goal and robot.
         nominal: The feasible task.
-        image: Map image, where there is one.
+        image: Map image, or None.
         robot_image: Picture of the robot.
     """
 
@@ -60,18 +60,18 @@ class Map2DSetting:
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Nothing: a map is all there is."""
+        """Empty: a map has no nodes."""
         return ()
 
     def remarks(self) -> list[str]:
-        """How the image was read."""
+        """Returns how the image was read."""
         params = self.params
         if params.method == "given":
             return []
         return [f"map: {params.polarity} obstacles, {params.method}"]
 
     def env_kwargs(self) -> dict[str, Any]:
-        """Arguments that make this task's environment; see `Map2DEnv`."""
+        """Returns the constructor arguments of this task's `Map2DEnv`."""
         nominal, robot = self.nominal, self.nominal.robot
         return {
             "map": nominal.terrain.grid.cells,
@@ -89,19 +89,19 @@ class Map2DSetting:
         }
 
     def make_env(self, **options: Any) -> Map2DEnv:
-        """The environment of this task; options as for `Map2DEnv`."""
+        """Constructs this task's environment; `options` override its arguments."""
         return Map2DEnv(**{**self.env_kwargs(), **options})
 
     def noise(self, relative: float) -> dict[str, float]:
-        """Each range has it."""
+        """Returns the option for this relative noise of each range."""
         return {"range_noise": relative}
 
     def facts(self) -> dict[str, Any]:
-        """The arguments, the map by its hash."""
+        """Returns the environment's arguments, with the map's hash."""
         return {**self.env_kwargs(), "map": self.world_sha256()}
 
     def world_sha256(self) -> str:
-        """Hash of the grid."""
+        """Returns the hash of the grid."""
         return self.nominal.terrain.grid.sha256()
 
     def write_files(self, folder: Path) -> None:
@@ -110,13 +110,13 @@ class Map2DSetting:
         (folder / "robot.png").write_bytes(read_bytes(self.robot_image))
 
     def preview(self) -> Image:
-        """The map image, what of it is free, start, goal and the way."""
+        """Draws the map image with free space, start, goal and path."""
         grid = self.nominal.terrain.grid
         shown = grid.cells if self.image is None else self.image
         return preview_of(as_image(shown).colour, grid, self.params)
 
     def portable(self) -> dict[str, Any]:
-        """The map is the folder's own grid."""
+        """Returns the keys for the grid and robot picture in the folder."""
         robot = self.nominal.robot
         return {
             "map": ".",
@@ -133,14 +133,14 @@ class Map2DSetting:
 
 
 def map_setting(setting: Setting) -> Map2DSetting:
-    """The setting, which must be a map's."""
+    """Returns the setting, which must be a `Map2DSetting`."""
     if not isinstance(setting, Map2DSetting):
         raise TypeError(f"expected a Map2DSetting, got {type(setting).__name__}")
     return setting
 
 
 def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
-    """The map's name, and the feasible task on it.
+    """Returns the map's name, and the feasible task on it.
 
     Args:
         spec: Contents of the task file.
@@ -148,7 +148,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
 
     Raises:
         MapError: The map cannot be used.
-        TaskError: The task cannot be done, or the robot's picture is none.
+        TaskError: The task is infeasible, or the robot's picture cannot be used.
     """
     bundled = spec.map in bundled_maps()
     prepared = prepare(
@@ -171,10 +171,10 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
 
 
 def _check_robot_image(file: Path) -> None:
-    """Refuses a picture that cannot be drawn, or is too large for that.
+    """Checks that the robot's picture can be drawn.
 
     Raises:
-        TaskError: It is one.
+        TaskError: The file is not an image, or is too large.
     """
     try:
         width, height = picture_size(read_bytes(file, ROBOT_IMAGE_BYTES), file.name)

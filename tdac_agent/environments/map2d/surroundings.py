@@ -1,4 +1,4 @@
-"""A map as a diagnosis asks about it; px."""
+"""Queries of a diagnosis about a map, in px."""
 
 from __future__ import annotations
 
@@ -35,45 +35,45 @@ class MapSurroundings:
 
     @property
     def radius(self) -> float:
-        """Of the body."""
+        """Radius of the body, px."""
         return self.task.robot.radius
 
     @property
     def full_speed(self) -> float:
-        """Of the body, px/s."""
+        """Full speed of the body, px/s."""
         return self.task.robot.max_wheel_speed
 
     def touch(self, pose: Pose, reach: float) -> Touch | None:
-        """The nearest wall."""
+        """Returns the nearest wall within `reach`."""
         return nearest_touch(self.task, pose, reach)
 
     def seen(self, touch: Touch, trajectory: Trajectory) -> str:
-        """Whether a ray of the fan looks there."""
+        """Describes whether a ray points at the touched wall."""
         half = self.task.robot.field_of_view_deg / 2.0
         off = abs(math.degrees(touch.bearing))
         if off > half:
             digits = 1 if off < half + 1.0 else 0
             return (
-                f"No ray looks there: {off:.{digits}f}° off the heading, the fan has "
-                f"±{half:g}°."
+                f"No ray points there: it is {off:.{digits}f}° off the heading; the fan "
+                f"covers ±{half:g}°."
             )
         earlier = min(trajectory.steps, 10)
         shortest = float(trajectory.ranges[trajectory.steps - earlier].min())
         return (
-            f"{earlier} steps earlier the shortest ray read {shortest:.1f} px from the "
-            "centre."
+            f"{earlier} steps earlier the shortest ray read {shortest:.1f} px (from "
+            "the centre of the body)."
         )
 
     def path_from(self, pose: Pose) -> Path:
-        """Shortest path to the goal."""
+        """Returns the shortest path to the goal."""
         return self.task.path_from(pose)
 
     def pull(self, path: Path) -> list[Point]:
-        """Corners of a path."""
+        """Returns the corners of a path after all shortcuts."""
         return pull(self.task, path)
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
-        """Where the shortest path from each place first is so far away, or ends."""
+        """Yields the path's first point `far` away from each place, or its end."""
         task = self.task
         free = body_free(task.terrain.clear, task.robot.radius)
         field = np.asarray(task.field, np.float64)
@@ -85,7 +85,7 @@ class MapSurroundings:
             yield first_beyond(descend(free, field, first), x, y, far)
 
     def mistaken_goals(self) -> dict[str, Point]:
-        """X and y swapped, or counted from the other side."""
+        """Returns where typical coordinate mistakes put the goal, by description."""
         grid, (x, y) = self.task.terrain.grid, self.task.goal
         return {
             "x and y swapped": (y, x),

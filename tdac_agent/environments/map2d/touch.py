@@ -1,4 +1,4 @@
-"""The wall that is nearest to the body on a map, and its corners."""
+"""The wall nearest to the body on a map, and its corners."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from tdac_agent.verification.diagnosis.touch import Point, Touch
 from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.task import Map2DTask
 
-# A wall's outline may be this far from its polygon: hand-drawn walls are rough, and
-# what is rounded by less than half a radius is a corner to the body.
+# Largest distance of a wall's outline from its polygon: hand-drawn walls are rough, and
+# a corner rounded by less than half a radius is still a corner to the body.
 _ROUGHNESS, _ROUGHNESS_RADII = 1.5, 0.15
-# Area over that of a circle of the same circumference: a post has no corners.
+# Area relative to a circle of the same circumference; rounder posts have no corners.
 _ROUND = 0.83
 _SHARPEST_STRAIGHT = math.radians(135.0)
-# Below this angle the outline turns back: the end of a thin wall.
+# Below this angle, the outline turns back at the end of a thin wall.
 _WALL_END = math.radians(20.0)
 
 
 def nearest_touch(task: Map2DTask, pose: Pose, reach: float) -> Touch | None:
-    """What the body touches, or would touch first; None with no wall within `reach`.
+    """Returns what the body touches or would touch first; None if nothing is in reach.
 
     Args:
-        task: Map and body.
-        pose: Of the body.
-        reach: From the centre of the body, px.
+        task: The task, for its map and body.
+        pose: Pose of the body.
+        reach: Largest distance from the centre of the body, px.
     """
     found = _nearest_square(task, pose.x, pose.y, reach)
     if found is None:
@@ -47,14 +47,14 @@ def nearest_touch(task: Map2DTask, pose: Pose, reach: float) -> Touch | None:
 
 
 def nearest_corner(task: Map2DTask, point: Point, reach: float) -> Point | None:
-    """The outer corner or end of a wall that is nearest to a point of its outline.
+    """Returns the nearest outer corner or end of a wall to a point of its outline.
 
     Args:
-        task: The map.
+        task: The task, for its map.
         point: (x, y), px.
-        reach: How far off it may be, px.
+        reach: Largest distance from the point, px.
     """
-    # The window's own edge makes corners, which lie beyond the reach.
+    # The edge of the window adds corners, which are beyond the reach.
     cells, left, top = _window(task, *point, 2.0 * reach + 8.0)
     outlines, _ = cv2.findContours(
         cells.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
@@ -70,7 +70,7 @@ def nearest_corner(task: Map2DTask, point: Point, reach: float) -> Point | None:
 
 
 def _outer_corners(outline: NDArray[Any], rough: float) -> NDArray[np.float64]:
-    """Outer corners of a wall, from the pixels along its outline, shape (n, 2)."""
+    """Returns the outer corners of a wall from its outline pixels, shape (n, 2)."""
     vertices = np.asarray(cv2.approxPolyDP(outline, rough, True), float).reshape(-1, 2)
     around = cv2.arcLength(outline, True)
     if len(vertices) < 2 or 4 * math.pi * cv2.contourArea(outline) > _ROUND * around**2:
@@ -78,12 +78,11 @@ def _outer_corners(outline: NDArray[Any], rough: float) -> NDArray[np.float64]:
     back = _unit(np.roll(vertices, 1, axis=0) - vertices)
     ahead = _unit(np.roll(vertices, -1, axis=0) - vertices)
     angle = np.arccos(np.clip((back * ahead).sum(axis=1), -1.0, 1.0))
-    # OpenCV goes around walls, and around the rooms in them, with the wall on the
-    # same hand.
+    # OpenCV traces outlines, also those of holes, with the wall on the same side.
     outer = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0] > 0.0
     chosen = (angle <= _WALL_END) | (outer & (angle < _SHARPEST_STRAIGHT))
     outward = -(back + ahead)[chosen]
-    # Outlines run through the middle of pixels; corners are half a pixel farther out.
+    # Outlines connect the centres of pixels; corners are half a pixel farther out.
     return np.asarray(vertices[chosen] + 0.5 * np.sign(np.round(outward, 1)))
 
 
@@ -94,7 +93,7 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 def _nearest_square(
     task: Map2DTask, x: float, y: float, reach: float
 ) -> tuple[Point, bool] | None:
-    """The nearest point of the occupied squares, and whether it is the border."""
+    """Returns the nearest point of an occupied square, and whether it is the border."""
     cells, left, top = _window(task, x, y, reach)
     rows, columns = np.nonzero(cells)
     if rows.size == 0:
@@ -112,9 +111,9 @@ def _nearest_square(
 def _window(
     task: Map2DTask, x: float, y: float, reach: float
 ) -> tuple[NDArray[np.bool_], int, int]:
-    """The cells around a point, and the pixel (x, y) of the first of them.
+    """Returns the cells around a point, and the pixel (x, y) of the first cell.
 
-    One pixel beyond the border of the map, occupied, belongs to it.
+    They include a border of one occupied pixel around the map.
     """
     clear = task.terrain.padded_clear
     height, width = clear.shape

@@ -43,21 +43,21 @@ def test_robot_constants(controller, task):
         found = controller.constant(name)
         assert isinstance(found, int | float), f"{name} is {shown(found)}, not a number"
         assert math.isclose(found, value, rel_tol=1e-6), (
-            f"{name} = {shown(found)}, not {value}"
+            f"{name} = {shown(found)}, not {value} as in params.json"
         )
 
 
 @pytest.mark.parametrize("name", ["LOOKAHEAD", "STOP_DIST", "SLOW_DIST"])
 def test_tuning_constants(controller, name):
-    """The tuning constants are numbers that are not negative."""
+    """The tuning constants are finite numbers that are not negative."""
     value = controller.constant(name)
     good = isinstance(value, int | float) and math.isfinite(value) and value >= 0
-    assert good, f"{name} is {shown(value)}, not a number of at least 0"
+    assert good, f"{name} is {shown(value)}, not a finite number >= 0"
 
 
 @pytest.mark.parametrize("name", ["MAP_IMG", "PARAMS_JSON", "ROBOT_IMG"])
 def test_file_constants(controller, name):
-    """The file constants name a file of the working folder."""
+    """The file constants name files of the working folder."""
     known = {"occupancy.png", "occupancy.npy", "params.json", "robot.png"}
     value = controller.constant(name)
     assert isinstance(value, str), f"{name} is {shown(value)}, not a file name"
@@ -73,9 +73,9 @@ def this_map(controller, task):
 
 
 def test_is_occupied_inside(small_map, this_map, generator):
-    """Every pixel of a small map is answered as it is, indexed [y, x].
+    """`is_occupied` is right for every pixel of a small map, indexed [y, x].
 
-    So are pixels, rows and columns of the task's own map that are drawn.
+    It is also right for random pixels, rows and columns of the task's map.
     """
     occ, own = small_map
     check_pixels(occ, own, [(x, y) for y, x in np.ndindex(occ.shape)])
@@ -90,9 +90,11 @@ def test_is_occupied_inside(small_map, this_map, generator):
 
 
 def check_pixels(occ, own, pixels):
-    """What the controller's map says of pixels (x, y)."""
+    """Compares the controller's map with the grid at pixels (x, y)."""
     answers = own.call_each("is_occupied", pixels)
-    assert len(answers) == len(pixels), f"{len(answers)} answers to {len(pixels)}"
+    assert len(answers) == len(pixels), (
+        f"is_occupied gave {len(answers)} answers for {len(pixels)} pixels"
+    )
     for (x, y), found in zip(pixels, answers, strict=True):
         assert found == occ[y, x], (
             f"is_occupied({x}, {y}) is {shown(found)}, not {occ[y, x]}"
@@ -100,7 +102,7 @@ def check_pixels(occ, own, pixels):
 
 
 def test_is_occupied_returns_bool(small_map):
-    """The answer is a Python bool, inside and outside."""
+    """`is_occupied` returns a Python bool, inside and outside the map."""
     _, own = small_map
     for x, y in ((0, 0), (5, 4), (36, 22), (-1, 3), (999, 999)):
         found = own.call("is_occupied", x, y)
@@ -113,13 +115,16 @@ def test_is_occupied_outside(small_map):
     _, own = small_map
     for x, y in ((-1, 0), (0, -1), (37, 0), (0, 23), (-37, -23), (22, 36), (10**6, 3)):
         found = own.call("is_occupied", x, y)
-        assert found, f"is_occupied({x}, {y}) outside a 37 x 23 map is {shown(found)}"
+        assert found, (
+            f"is_occupied({x}, {y}) is {shown(found)}, but the pixel is outside a map "
+            "of 37 x 23 px"
+        )
 
 
 def test_nearest_free_of_a_free_pixel(controller, small_map, this_map, generator):
-    """A free pixel is its own nearest free pixel, as Python ints.
+    """The nearest free pixel of a free pixel is itself, as Python ints.
 
-    On a small map, and on the task's own map where pixels are drawn.
+    Tested on a small map, and at random pixels of the task's map.
     """
     occ, own = small_map
     check_free_pixels(controller, own, np.argwhere(~occ)[::40].tolist())
@@ -130,18 +135,20 @@ def test_nearest_free_of_a_free_pixel(controller, small_map, this_map, generator
 
 
 def check_free_pixels(controller, own, pixels):
-    """Free pixels [y, x], which are their own nearest ones."""
+    """Checks that free pixels [y, x] are their own nearest free pixels."""
     for y, x in pixels:
         for reach in (10, 0):
             found = controller.call("nearest_free", own, x, y, reach)
             assert is_int_pair(found), f"nearest_free is {shown(found)}, not (int, int)"
-            assert found == (x, y), f"nearest_free({x}, {y}, {reach}) is {found}: free"
+            assert found == (x, y), (
+                f"nearest_free({x}, {y}, {reach}) is {found}, but ({x}, {y}) is free"
+            )
 
 
 def test_nearest_free_is_nearest(controller, oracle, this_map, generator):
-    """From an occupied pixel: free, and as near as any, up to max_rad itself.
+    """From an occupied pixel, the result is the nearest free one, up to max_rad away.
 
-    The same on the task's own map, from pixels that are drawn.
+    Tested on a small map, and at random pixels of the task's map.
     """
     occ = oracle.grid(seed=11, width=40, height=30, density=0.85)
     own = controller.call("OccMap2D", occ)
@@ -159,21 +166,23 @@ def test_nearest_free_is_nearest(controller, oracle, this_map, generator):
 
 
 def check_nearest_free(controller, occ, own, pixel, best):
-    """The pixel that is free and nearest, which is `best` px away."""
+    """Checks that the result is free and `best` px away."""
     asked = f"nearest_free({pixel[0]}, {pixel[1]})"
     found = controller.call("nearest_free", own, *pixel, math.ceil(best))
     assert is_int_pair(found), f"{asked} is {shown(found)}, not (int, int)"
     x, y = found
     height, width = occ.shape
     inside = 0 <= x < width and 0 <= y < height
-    assert inside, f"{asked} is {found}: outside the map"
-    assert not occ[y, x], f"{asked} is {found}: occupied"
+    assert inside, f"{asked} is {found}, which is outside the map"
+    assert not occ[y, x], f"{asked} is {found}, which is occupied"
     got = math.dist(pixel, found)
-    assert got <= best + 1e-9, f"{asked} is {found}, {got:.2f} px away, not {best:.2f}"
+    assert got <= best + 1e-9, (
+        f"{asked} is {found}, {got:.2f} px away; the nearest is {best:.2f} px away"
+    )
 
 
 def test_nearest_free_at_the_end_of_its_reach(controller):
-    """The only free pixel is found on every side, exactly max_rad away."""
+    """The only free pixel is found in any direction, exactly max_rad away."""
     for dx, dy in ((5, 0), (-5, 0), (0, 5), (0, -5), (3, -4), (-4, 3)):
         occ = np.ones((21, 31), np.bool_)
         occ[10 + dy, 15 + dx] = False
@@ -184,12 +193,12 @@ def test_nearest_free_at_the_end_of_its_reach(controller):
 
 
 def test_nearest_free_raises(controller):
-    """ValueError where there is no free pixel within max_rad."""
+    """ValueError if there is no free pixel within max_rad."""
     occ = np.ones((21, 31), np.bool_)
     occ[2, 2] = False
     own = controller.call("OccMap2D", occ)
-    message = "nearest_free without a free pixel in reach"
-    # The second is 5 px away, though no more than 4 px in x and in y.
+    message = "nearest_free without a free pixel within max_rad"
+    # The free pixel of the second case is 5 px away, but at most 4 px in x and in y.
     for x, y, max_rad in ((25, 15, 5), (5, 6, 4)):
         error = controller.error_of("nearest_free", own, x, y, max_rad)
         assert error is not None, f"{message} returned instead of raising ValueError"
@@ -197,9 +206,9 @@ def test_nearest_free_raises(controller):
 
 
 def test_plan_path(controller, oracle, task, this_map, generator):
-    """Int pixels, both ends, free, connected; cell 1: <= 1.1 x optimum, or [].
+    """Paths are ints, complete, free, connected; with cell 1 <= 1.1 x optimum, or [].
 
-    On fixed and random grids, and on the task's own map between pixels that are drawn.
+    Tested on fixed and random grids, and between random pixels of the task's map.
     """
     for case in oracle.plan_cases():
         own = controller.call("OccMap2D", case.occ)
@@ -211,7 +220,7 @@ def test_plan_path(controller, oracle, task, this_map, generator):
 
 
 def check_larger_steps(controller, oracle, cell):
-    """Steps of `cell` px to a goal that is a whole number of them away."""
+    """Checks steps of `cell` px to a goal that is a whole number of steps away."""
     occ = np.zeros((40, 60), np.bool_)
     occ[12:, 28:32] = True
     occ[6:9, 20] = occ[13, 40:44] = True
@@ -220,10 +229,10 @@ def check_larger_steps(controller, oracle, cell):
 
 
 def check_walks(controller, oracle, task, this_map, random):
-    """Paths on the task's own map, between pixels that are drawn."""
+    """Checks paths between random pixels of the task's map."""
     occ, _ = this_map
-    # A search over all pixels of a large map may take longer than a call. Only steps
-    # of one pixel have to be found wherever there is room for a point.
+    # A search over all pixels of a large map may exceed the time limit of a call, so
+    # larger steps are used; these must only be found where there is more room.
     room = task.nominal.terrain.clear
     cell = math.ceil(math.sqrt(occ.size / MOST_PIXELS))
     while cell > 1 and room.max() <= 2 * cell:
@@ -234,23 +243,25 @@ def check_walks(controller, oracle, task, this_map, random):
         best = oracle.shortest_length(occ, start, goal) if cell == 1 else math.inf
         length = oracle.path_length(path)
         assert length <= 1.1 * best + 1e-6, (
-            f"{start} to {goal}: {length:.1f} px long, the shortest is {best:.1f} px"
+            f"the path from {start} to {goal} has {length:.1f} px, more than 1.1 x the "
+            f"shortest ({best:.1f} px)"
         )
 
 
 def check_steps(controller, oracle, map_and_own, start, goal, cell):
-    """A path from start to goal in steps of `cell` px; returns it."""
+    """Checks a path from start to goal in steps of `cell` px, and returns it."""
     occ, own = map_and_own
     path = controller.call("plan_path", own, start, goal, cell)
-    assert isinstance(path, list), f"cell {cell}: a {type(path).__name__}, not a list"
-    assert path, f"cell {cell}: [], but there is a path from {start} to {goal}"
-    assert all(map(is_int_pair, path)), f"cell {cell}: points must be (int, int)"
+    about = f"plan_path with cell {cell}"
+    assert isinstance(path, list), f"{about}: a {type(path).__name__}, not a list"
+    assert path, f"{about}: [], but there is a path from {start} to {goal}"
+    assert all(map(is_int_pair, path)), f"{about}: points must be (int, int)"
     ends = (path[0], path[-1])
-    assert ends == (start, goal), f"cell {cell}: runs {ends}"
+    assert ends == (start, goal), f"{about}: ends {ends}, not {(start, goal)}"
     for (x0, y0), (x1, y1) in pairwise(path):
-        step = f"cell {cell}: ({x0}, {y0}) -> ({x1}, {y1})"
+        step = f"{about}: ({x0}, {y0}) -> ({x1}, {y1})"
         sizes = {abs(x1 - x0), abs(y1 - y0)}
-        assert sizes in ({cell}, {0, cell}), f"{step} has another length"
+        assert sizes in ({cell}, {0, cell}), f"{step} is not one step of {cell} px"
         dx, dy = (x1 - x0) // cell, (y1 - y0) // cell
         passed = [(x0 + k * dx, y0 + k * dy) for k in range(cell + 1)]
         error = oracle.path_error(occ, passed)
