@@ -54,8 +54,8 @@ class MapSurroundings:
         if off > half:
             digits = 1 if off < half + 1.0 else 0
             return (
-                f"No ray points there: it is {off:.{digits}f}° off the heading; the fan "
-                f"covers ±{half:g}°."
+                f"No ray points there: it is {off:.{digits}f}° off the heading; the "
+                f"fan covers ±{half:g}°."
             )
         earlier = min(trajectory.steps, 10)
         shortest = float(trajectory.ranges[trajectory.steps - earlier].min())

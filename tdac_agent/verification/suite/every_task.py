@@ -8,6 +8,7 @@ import pytest
 
 from tdac_agent.storage.plain import shown
 from tdac_agent.verification.suite import contract, hygiene
+from tdac_agent.verification.suite.several import Several
 
 SCHEMA_STEPS = 50
 
@@ -90,65 +91,83 @@ def test_run_episode_schema(rollout):
     )
     missing = {"positions", "speeds", "collisions", "goal", "dt"} - set(result)
     assert not missing, f"run_episode: missing keys: {', '.join(sorted(missing))}"
-    assert type(result["collisions"]) is int, "run_episode: collisions is not an int"
-    counts = len(result["positions"]), len(result["speeds"])
-    expected = steps + 1, steps
-    assert counts == expected, (
-        f"run_episode: {counts} positions and speeds, expected {expected}"
-    )
+    several = Several()
+    with several:
+        found = result["collisions"]
+        assert type(found) is int, f"run_episode: collisions is {shown(found)}, no int"
+    for name, expected in (("positions", steps + 1), ("speeds", steps)):
+        with several:
+            count = len(result[name])
+            assert count == expected, (
+                f"run_episode: {count} {name} after {steps} steps, not {expected}"
+            )
+    several.settle()
 
 
 @pytest.mark.paper
 def test_run_episode_agrees_with_the_judge(rollout, task):
     """`run_episode` returns what the environment recorded, however the episode ends."""
-    check_claims(rollout("nominal", steps=SCHEMA_STEPS, drive="run_episode"), task)
+    several = Several()
+    short = rollout("nominal", steps=SCHEMA_STEPS, drive="run_episode")
+    check_claims(several, short, task)
     truncated = rollout("nominal", steps=20, drive="truncated run_episode")
-    check_claims(truncated, task, " (the count starts at 2 in this episode)")
+    check_claims(several, truncated, task, " (the count starts at 2 in this episode)")
     if rollout("nominal").reached:
         whole = rollout("nominal", drive="run_episode")
-        check_claims(whole, task)
-        good = whole.reached and whole.collisions == 0
-        assert good, (
-            f"run_episode: {whole.outcome}, although policy alone reaches the goal"
-        )
+        check_claims(several, whole, task)
+        with several:
+            good = whole.reached and whole.collisions == 0
+            assert good, (
+                f"run_episode: {whole.outcome}, although policy alone reaches the goal"
+            )
+    several.settle()
 
 
-def check_claims(episode, task, where=""):
+def check_claims(several, episode, task, where=""):
     """Compares every entry of `run_episode` with the judge's record."""
-    assert episode.error is None, episode.error
+    with several:
+        assert episode.error is None, episode.error
+    if episode.error is not None:
+        return
     result, record, units = episode.returned, episode.trajectory, task.setting.units
     slack, length = 0.01 / units.scale, units.length
-    claimed = np.asarray([tuple(p)[:2] for p in result["positions"]], float)
-    assert claimed.shape == (record.steps + 1, 2), (
-        f"positions has the shape {claimed.shape}, not {(record.steps + 1, 2)}"
-    )
-    worst = float(np.abs(claimed - record.poses[:, :2]).max())
-    assert worst <= slack, (
-        f"positions differ from the record by up to {worst * units.scale:.2f} {length}"
-    )
-    full_speed = task.nominal.full_step / task.nominal.dt
-    forward = record.actions.mean(axis=1) * full_speed
-    speeds = np.asarray(result["speeds"], float)
-    assert speeds.shape == forward.shape, (
-        f"speeds has the shape {speeds.shape}, not {forward.shape}: one forward speed "
-        "per step"
-    )
-    worst = float(np.abs(speeds - forward).max(initial=0.0))
-    assert worst <= slack, (
-        f"speeds differ from the applied ones by up to {worst * units.scale:.2f} "
-        f"{length}/s"
-    )
-    assert result["collisions"] == record.collisions, (
-        f"collisions is {shown(result['collisions'])}, not {record.collisions} as "
-        f"recorded{where}"
-    )
-    assert math.isclose(result["dt"], record.dt), (
-        f"dt is {shown(result['dt'])}, not {record.dt:g}"
-    )
-    goal = tuple(float(v) for v in result["goal"])
-    assert np.allclose(goal, task.nominal.goal), (
-        f"goal is {shown(goal)}, not {task.nominal.goal}"
-    )
+    with several:
+        claimed = np.asarray([tuple(p)[:2] for p in result["positions"]], float)
+        assert claimed.shape == (record.steps + 1, 2), (
+            f"positions has the shape {claimed.shape}, not {(record.steps + 1, 2)}"
+        )
+        worst = float(np.abs(claimed - record.poses[:, :2]).max())
+        assert worst <= slack, (
+            f"positions differ from the record by up to {worst * units.scale:.2f} "
+            f'{length}: take x and y of obs["pose"], after reset and after each step'
+        )
+    with several:
+        full_speed = task.nominal.full_step / task.nominal.dt
+        forward = record.actions.mean(axis=1) * full_speed
+        speeds = np.asarray(result["speeds"], float)
+        assert speeds.shape == forward.shape, (
+            f"speeds has the shape {speeds.shape}, not {forward.shape}: one forward "
+            "speed per step"
+        )
+        worst = float(np.abs(speeds - forward).max(initial=0.0))
+        assert worst <= slack, (
+            f"speeds differ from the applied ones by up to {worst * units.scale:.2f} "
+            f'{length}/s: take them from obs["wheel_speeds"] after each step'
+        )
+    with several:
+        assert result["collisions"] == record.collisions, (
+            f"collisions is {shown(result['collisions'])}, not {record.collisions} as "
+            f'recorded{where}: return info["collisions"] of the last step'
+        )
+    with several:
+        assert math.isclose(result["dt"], record.dt), (
+            f"dt is {shown(result['dt'])}, not {record.dt:g}"
+        )
+    with several:
+        goal = tuple(float(v) for v in result["goal"])
+        assert np.allclose(goal, task.nominal.goal), (
+            f"goal is {shown(goal)}, not {task.nominal.goal}"
+        )
 
 
 @pytest.mark.parametrize("steps", [10, 50])

@@ -8,6 +8,7 @@ import pytest
 
 from tdac_agent.storage.plain import shown
 from tdac_agent.verification.suite.every_task import check_path
+from tdac_agent.verification.suite.several import Several
 
 pytestmark = pytest.mark.paper
 
@@ -39,12 +40,17 @@ def test_robot_constants(controller, task):
         "SENSOR_FOV_DEG": robot.field_of_view_deg,
         "N_RAYS": robot.n_rays,
     }
+    several = Several()
     for name, value in expected.items():
-        found = controller.constant(name)
-        assert isinstance(found, int | float), f"{name} is {shown(found)}, not a number"
-        assert math.isclose(found, value, rel_tol=1e-6), (
-            f"{name} = {shown(found)}, not {value} as in params.json"
-        )
+        with several:
+            found = controller.constant(name)
+            assert isinstance(found, int | float), (
+                f"{name} is {shown(found)}, not a number"
+            )
+            assert math.isclose(found, value, rel_tol=1e-6), (
+                f"{name} = {shown(found)}, not {value}"
+            )
+    several.settle()
 
 
 @pytest.mark.parametrize("name", ["LOOKAHEAD", "STOP_DIST", "SLOW_DIST"])
@@ -95,30 +101,39 @@ def check_pixels(occ, own, pixels):
     assert len(answers) == len(pixels), (
         f"is_occupied gave {len(answers)} answers for {len(pixels)} pixels"
     )
-    for (x, y), found in zip(pixels, answers, strict=True):
-        assert found == occ[y, x], (
-            f"is_occupied({x}, {y}) is {shown(found)}, not {occ[y, x]}"
+    pairs = zip(pixels, answers, strict=True)
+    wrong = [(x, y, found) for (x, y), found in pairs if found != occ[y, x]]
+    for x, y, found in wrong[:1]:
+        pytest.fail(
+            f"is_occupied({x}, {y}) is {shown(found)}, not {occ[y, x]}; it is wrong "
+            f"for {len(wrong)} of {len(pixels)} pixels [y, x] of this map"
         )
 
 
 def test_is_occupied_returns_bool(small_map):
     """`is_occupied` returns a Python bool, inside and outside the map."""
     _, own = small_map
+    several = Several()
     for x, y in ((0, 0), (5, 4), (36, 22), (-1, 3), (999, 999)):
         found = own.call("is_occupied", x, y)
         kind = f"{type(found).__module__}.{type(found).__name__}"
-        assert type(found) is bool, f"is_occupied({x}, {y}) is a {kind}, not a bool"
+        with several:
+            assert type(found) is bool, f"is_occupied({x}, {y}) is a {kind}, not a bool"
+    several.settle()
 
 
 def test_is_occupied_outside(small_map):
     """Everything outside the map is occupied; nothing wraps around."""
     _, own = small_map
+    several = Several()
     for x, y in ((-1, 0), (0, -1), (37, 0), (0, 23), (-37, -23), (22, 36), (10**6, 3)):
         found = own.call("is_occupied", x, y)
-        assert found, (
-            f"is_occupied({x}, {y}) is {shown(found)}, but the pixel is outside a map "
-            "of 37 x 23 px"
-        )
+        with several:
+            assert found, (
+                f"is_occupied({x}, {y}) is {shown(found)}, but the pixel is outside a "
+                "map of 37 x 23 px"
+            )
+    several.settle()
 
 
 def test_nearest_free_of_a_free_pixel(controller, small_map, this_map, generator):
@@ -183,13 +198,18 @@ def check_nearest_free(controller, occ, own, pixel, best):
 
 def test_nearest_free_at_the_end_of_its_reach(controller):
     """The only free pixel is found in any direction, exactly max_rad away."""
+    several = Several()
     for dx, dy in ((5, 0), (-5, 0), (0, 5), (0, -5), (3, -4), (-4, 3)):
         occ = np.ones((21, 31), np.bool_)
         occ[10 + dy, 15 + dx] = False
         own = controller.call("OccMap2D", occ)
         found = controller.call("nearest_free", own, 15, 10, 5)
         only = (15 + dx, 10 + dy)
-        assert found == only, f"nearest_free(15, 10, 5) is {shown(found)}, not {only}"
+        with several:
+            assert found == only, (
+                f"nearest_free(15, 10, 5) is {shown(found)}, not {only}"
+            )
+    several.settle()
 
 
 def test_nearest_free_raises(controller):
@@ -210,13 +230,18 @@ def test_plan_path(controller, oracle, task, this_map, generator):
 
     Tested on fixed and random grids, and between random pixels of the task's map.
     """
+    several = Several()
     for case in oracle.plan_cases():
         own = controller.call("OccMap2D", case.occ)
         path = controller.call("plan_path", own, case.start, case.goal, 1)
-        check_path(oracle, case, path, is_int_pair)
+        with several:
+            check_path(oracle, case, path, is_int_pair)
     for cell in (2, 3):
-        check_larger_steps(controller, oracle, cell)
-    check_walks(controller, oracle, task, this_map, generator("walks"))
+        with several:
+            check_larger_steps(controller, oracle, cell)
+    with several:
+        check_walks(controller, oracle, task, this_map, generator("walks"))
+    several.settle()
 
 
 def check_larger_steps(controller, oracle, cell):
