@@ -23,11 +23,13 @@ class Comparison:
         pairs: Number of pairs.
         first_only: Pairs that only the first kind solved within K iterations.
         second_only: Pairs that only the second kind solved within K iterations.
-        p_solved: Exact McNemar test of these two, two-sided p-value; 1 if both are 0.
+        p_solved: Two-sided p-value of McNemar's exact test of `first_only` against
+            `second_only`; 1 if both are 0.
         sooner: Pairs in which the first kind needed fewer iterations. A run without
             success counts as slower than any success.
         later: Pairs in which the first kind needed more iterations.
-        p_tau: Exact sign test of these two, two-sided p-value; 1 if both are 0.
+        p_tau: Two-sided p-value of the exact sign test of `sooner` against `later`; 1
+            if both are 0.
     """
 
     pairs: int
@@ -82,10 +84,10 @@ def compare_paired(
 
 
 def pass_at_n(tried: int, passed: int, n: int) -> float:
-    """Unbiased estimate of the probability that one of n one-shot candidates passes.
+    """Unbiased estimate of the probability that at least one of n candidates passes.
 
-    Computed from `tried` independent candidates, of which `passed` passed (Chen et al.
-    2021, eq. 1). NaN if n is greater than `tried`: no unbiased estimate exists.
+    Computed from `tried` independent one-shot candidates, `passed` of which passed
+    (Chen et al. 2021, eq. 1). NaN if n > `tried`: no unbiased estimate exists.
     """
     if n > tried:
         return math.nan
@@ -104,9 +106,11 @@ def best_of_n(frames: Frames, loop: Frames, within: int | None = None) -> pd.Dat
         within: Iterations of the loop to count; all by default.
 
     Returns:
-        A row per `measure` of cost known for both (`cost` in USD, `tokens`): mean cost
-        of a shot (`one_shot`) and of a loop run (`run`), number `n` of shots at the
-        cost of a run, their pass@n (`best_of_n`; NaN with fewer shots), CS (`cs`).
+        A row per `measure` of cost (`cost` in USD, `tokens`) that is known for both
+        kinds, with the columns `one_shot` (mean cost of a one-shot candidate), `run`
+        (mean cost of a loop run), `n` (number of candidates at the cost of a run),
+        `best_of_n` (their pass@n; NaN with fewer than n candidates), `cs` (the loop's
+        CS).
     """
     tried = frames.candidates
     first = tried[(tried["k"] == 1) & (tried["j"] == 0)]

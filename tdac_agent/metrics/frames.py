@@ -23,7 +23,7 @@ RUN_COLUMNS = {
     "seed": "Seed of the jittered starts if one was given, else the run's number.",
     "status": "Status in `run.json`.",
     "tau": "Iteration of the first success; missing if there was none.",
-    "done": "Number of iterations judged to their end, successful or not.",
+    "done": "Number of completed iterations, successful or not.",
     "censored": "Whether budget, time or a fault ended the run before success or K.",
     "tokens": "Tokens of all prompts and answers; missing if not counted.",
     "cost": "Cost, USD; missing if a price is unknown.",

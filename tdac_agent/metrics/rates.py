@@ -100,7 +100,7 @@ def first_pass(frames: Frames) -> Rate:
 
 
 def candidate_rate(frames: Frames, *, seed: int = 0) -> Rate:
-    """Fraction of the candidates (k, j) with a controller that passed."""
+    """Fraction of candidates (k, j) that passed, among those with a controller."""
     return _over_runs(frames.candidates[frames.candidates["valid"]], seed)
 
 

@@ -105,7 +105,7 @@ def plot_cumulative_success(
     Args:
         frames: The runs.
         by: Column of the runs that defines a curve.
-        most: Largest k; by default one more than the longest run has, at most K.
+        most: Largest k; by default one more than the longest run reached, at most K.
         heading: Title.
         provenance: Line below the title.
         bands: Whether to shade the 95 % intervals.
@@ -137,7 +137,7 @@ def plot_cumulative_panels(
     Args:
         frames: The runs.
         by: Column of the runs that defines a panel.
-        most: Largest k; by default one more than the longest run has, at most K.
+        most: Largest k; by default one more than the longest run reached, at most K.
         heading: Title of the figure.
         provenance: Line below the title.
     """
@@ -218,7 +218,7 @@ def _frame(axes: Axes, curves: dict[str, pd.DataFrame]) -> None:
 
 
 def _last_shown_k(runs: pd.DataFrame) -> int:
-    """Last iteration to show: one more than the longest run has, at most K."""
+    """Last iteration to show: one more than the longest run reached, at most K."""
     return min(int(runs["K"].max()), int(runs["done"].max()) + 1)
 
 

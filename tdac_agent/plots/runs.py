@@ -30,7 +30,7 @@ MOST_TESTS = 40
 CELL, NARROW = 0.36, 0.21
 """Width of a candidate's column, inches: with few and with many candidates."""
 MOST_LEVEL = 20
-"""Most candidates with horizontal labels."""
+"""With more candidates, the labels are vertical."""
 STEPS = {"generate": "writing", "edit": "editing", "summarise": "rules"}
 
 
@@ -85,7 +85,7 @@ def plot_failures(run: Run) -> Figure:
 
 
 def plot_breakdown(run: Run) -> Figure:
-    """Plots seconds and tokens of each candidate, by their use."""
+    """Plots the seconds and tokens of each candidate by use."""
     spent = _spent(journal_of(run))
     figure = new_plot(7.2 if run.tokens else 4.6, 3.2)
     panels = [

@@ -27,7 +27,7 @@ from tdac_agent.tasks.task import Task
 from tdac_envs.drawing.backdrop import Chart
 
 WIDTH = 7.0
-"""Width of the map, inches; less if its height is over 0.8 of its width."""
+"""Width of the map, inches; reduced if the map is higher than 0.8 of its width."""
 
 
 def plot_trajectories(
@@ -42,8 +42,8 @@ def plot_trajectories(
 
     Args:
         task: Task whose map or world is drawn.
-        ways: By name in the legend: trajectories as recorded by the judge, or poses of
-            shape (T + 1, 3), or positions of shape (T + 1, 2), in px or m.
+        ways: Trajectories by name in the legend, each as recorded by the judge, or as
+            poses of shape (T + 1, 3) or positions of shape (T + 1, 2), px or m.
         outcomes: Outcome of each trajectory, as in a report: `reached`, `collision` ….
         heading: Title; the task's name by default.
         provenance: Line below the title.
