@@ -28,7 +28,7 @@ RAD = 20.0
 """Distance that a heading error of one rad counts as, px."""
 MOST_POINTS = 400
 ALL_POINTS = 60_000
-"""Limit for all episodes of a run."""
+"""Maximum number of points of all episodes of a run together."""
 
 
 def animations(told: Told, task: Task, scene: Scene) -> list[dict[str, Any]]:

@@ -29,7 +29,7 @@ def highlighted(source: str) -> Markup:
 
 
 def shown_diff(diff: str, most: int) -> Markup:
-    """Formats at most `most` lines of a unified diff, without those of file names.
+    """Formats at most `most` lines of a unified diff, without the two file names.
 
     Added lines are in `<ins>`, removed lines in `<del>`.
     """

@@ -32,7 +32,7 @@ class Broken:
     Attributes:
         message: The message: expected and actual result.
         tests: Ids of the tests.
-        diagnoses: Diagnoses of their episodes, without those listed before.
+        diagnoses: Diagnoses of their episodes, except those that an earlier entry has.
     """
 
     message: str
@@ -94,9 +94,9 @@ def broken(report: Report) -> list[Broken]:
     seen: set[str] = set()
     rows = []
     for message, failures in found.items():
-        told = {f.diagnosis.text: f.diagnosis for f in failures if f.diagnosis}
-        fresh = tuple(told[text] for text in told if text not in seen)
-        seen.update(told)
+        by_text = {f.diagnosis.text: f.diagnosis for f in failures if f.diagnosis}
+        fresh = tuple(by_text[text] for text in by_text if text not in seen)
+        seen.update(by_text)
         rows.append(Broken(message, tuple(f.test for f in failures), fresh))
     return rows
 
