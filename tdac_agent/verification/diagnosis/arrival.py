@@ -26,7 +26,7 @@ from tdac_agent.verification.diagnosis.stall import (
 )
 from tdac_agent.verification.diagnosis.surroundings import Surroundings
 
-# Share of the episode without progress from which a robot is not merely too slow.
+# Share of the episode without progress above which a robot is stalled, not too slow.
 _STALLED = 0.2
 
 
@@ -48,7 +48,7 @@ def why_no_arrival(rollout: Rollout, around: Surroundings) -> Finding:
 
 
 def near_goal(rollout: Rollout) -> float:
-    """Path left below which a robot counts as having come near its goal."""
+    """Remaining path below which a robot counts as having come near its goal."""
     d0 = float(rollout.trajectory.path_distances[0])
     near = 3.0 * max(rollout.tolerance, rollout.radius)
     return min(near, max(0.25 * d0, 1.5 * rollout.tolerance))
@@ -138,7 +138,7 @@ def _after_the_goal(
         text = f"it stood still from step {rest} to the end at {place}, "
         return rest, f"{text}{straight[-1]:.1f} {unit} from the goal"
     if away > 2.0 * rollout.radius:
-        text = "it then passed by and moved away: its path left grew by"
+        text = "it then passed by and moved away: its remaining path grew by"
         return best, f"{text} {away:.1f} {unit}"
     return None
 

@@ -15,7 +15,7 @@ from tdac_envs.grid.plan import Path
 _PATH_AHEAD = 400
 _LAST_POSES = 20
 _SAMPLES = 40
-# Wheel speeds that differ by less than this are no turn.
+# Wheel speeds that differ by less than this do not count as a turn.
 _TURNING = 0.04
 # A heading error below this needs no turn, rad.
 _ALIGNED = 0.2
@@ -48,7 +48,7 @@ def way_from(around: Surroundings, trajectory: Trajectory, step: int) -> Path | 
 def _paths_until(
     around: Surroundings, trajectory: Trajectory, step: int
 ) -> Iterator[Path]:
-    """Shortest paths from a pose and those before it; a pose at a wall has none."""
+    """Shortest paths from a pose and earlier ones; a pose at a wall has none."""
     first = max(step - _LAST_POSES + 1, 0)
     for x, y, heading in trajectory.poses[first : step + 1][::-1].tolist():
         path = around.path_from(Pose(x, y, heading))

@@ -48,10 +48,10 @@ def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
         text = "A held-out start failed; its details are not disclosed."
         return Diagnosis(cause="held out", text=text)
     around = surroundings_of(task)
-    return _on_screen(rollout_on_screen(rollout, around.units), around)
+    return _diagnose(rollout_on_screen(rollout, around.units), around)
 
 
-def _on_screen(rollout: Rollout, around: Surroundings) -> Diagnosis:
+def _diagnose(rollout: Rollout, around: Surroundings) -> Diagnosis:
     if rollout.error is not None:
         return _error(rollout, around.units)
     if rollout.trajectory.steps == 0:
@@ -70,7 +70,7 @@ def _error(rollout: Rollout, units: Units) -> Diagnosis:
     elif _CONTRACT.search(message):
         cause = "contract"
     when = f"after {steps} steps" if steps else "before its first step"
-    # The message of a `run_episode` that returned already gives the number of steps.
+    # If `run_episode` returned, its message already contains the number of steps.
     failed = "" if _RETURNED in message else f"the controller failed {when}: "
     text = f"{cause}: {failed}{message}"
     return _diagnosis(rollout, units, cause, text, steps)

@@ -23,7 +23,7 @@ _DIGITS = 6
 class Measured(PrintableRecord):
     """Measures of one episode of an evaluation; lengths in px, for the e-puck in m.
 
-    The optional ones, of path and smoothness, are set for successful episodes only.
+    Measures of path and smoothness are None unless the episode succeeded.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -38,10 +38,10 @@ class Measured(PrintableRecord):
         None, description="Length of the shortest path, straightened."
     )
     path_ratio: float | None = Field(
-        None, description="Driven path plus the path left, over the shortest path."
+        None, description="Driven plus remaining path, relative to the shortest path."
     )
     time_ratio: float | None = Field(
-        None, description="Time over that of the shortest path at full speed."
+        None, description="Time relative to the shortest path at full speed."
     )
     smoothness: float | None = Field(
         None, description="Spectral arc length of the speed; 0 would be smoothest."
@@ -113,10 +113,10 @@ def spectral_arc_length(speeds: NDArray[np.float64], dt: float) -> float:
     """Smoothness of a movement (SPARC): minus the arc length of its speed's spectrum.
 
     S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet, "On the analysis
-    of movement smoothness", J. NeuroEng. Rehabil. 12:112, 2015, with its constants: 10
-    Hz, threshold 0.05, zero padding level 4. It does not depend on the size or the
-    duration of a movement. It is about -1.4 for a single stroke, and lower the more
-    often the robot slows down and speeds up again.
+    of movement smoothness", J. NeuroEng. Rehabil. 12:112, 2015, with the constants of
+    that paper: 10 Hz, threshold 0.05, zero padding level 4. It does not depend on the
+    size or the duration of a movement. It is about -1.4 for a single stroke, and lower
+    the more often the robot slows down and speeds up again.
 
     Args:
         speeds: Speeds at equal intervals, not negative, shape (T,).

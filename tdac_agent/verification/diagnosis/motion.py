@@ -53,7 +53,7 @@ def wheels_differ(trajectory: Trajectory) -> NDArray[np.bool_]:
 
 
 def flips(trajectory: Trajectory, since: int) -> float:
-    """The larger share of steps: that reversed the turn, or that reversed the drive."""
+    """Share of steps that reversed turning or driving direction, the larger one."""
     actions = trajectory.actions[since:]
     shares = [0.0]
     for signal in (actions[:, 0] - actions[:, 1], actions.sum(axis=1)):
@@ -71,7 +71,7 @@ def swing(trajectory: Trajectory, since: int) -> float:
 def rounds_about(
     trajectory: Trajectory, since: int, centre: tuple[float, float]
 ) -> float:
-    """Number of rounds about a point, positive if clockwise on the screen."""
+    """Number of revolutions about a point, positive if clockwise on the screen."""
     off = trajectory.poses[since:, :2] - np.asarray(centre)
     angles = np.unwrap(np.arctan2(off[:, 1], off[:, 0]))
     return float(angles[-1] - angles[0]) / (2.0 * math.pi)
@@ -99,8 +99,8 @@ def find_returns(trajectory: Trajectory, since: int, reach: float) -> Returns:
     Args:
         trajectory: Trajectory of the episode.
         since: First step to look at.
-        reach: Largest distance of two poses at the same position. In opposite
-            directions it may be twice as much, since the two lines seldom coincide.
+        reach: Largest distance between poses that count as the same position. For
+            opposite directions it is doubled, since the two lines seldom coincide.
     """
     steps = np.linspace(since, trajectory.steps - 1, _SAMPLES).astype(int)
     steps = np.unique(steps[steps >= since])

@@ -1,4 +1,4 @@
-"""`report.json`: what was verified, how, and what came out."""
+"""`report.json`: what was verified, how, and with which result."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ class Diagnosis(_Record):
     saturated: float | None = Field(
         None, description="Share of steps with a wheel at its limit."
     )
-    d0: float | None = Field(None, description="Path left at the start.")
-    d_min: float | None = Field(None, description="Path left at best.")
+    d0: float | None = Field(None, description="Remaining path at the start.")
+    d_min: float | None = Field(None, description="Least remaining path.")
 
 
 class Failure(_Record):
@@ -90,7 +90,7 @@ class Episode(_Record):
     d_min: float
     d0_euclidean: float
     d_min_euclidean: float
-    progress_passed: bool = Field(description="The progress test by path length.")
+    progress_passed: bool = Field(description="Progress test, by path length.")
     progress_passed_euclidean: bool
     call_ms_mean: float
     call_ms_p99: float
@@ -101,7 +101,7 @@ class Provenance(_Record):
     """What was verified, and under which conditions."""
 
     task: str
-    called: str = Field("", description="The task in words, beyond its name.")
+    called: str = Field("", description="Description of the task, beyond its name.")
     task_sha256: str
     unit: Place = Field("px", description="Unit of positions and lengths.")
     left_out: tuple[str, ...] = Field(

@@ -20,11 +20,11 @@ from tdac_agent.verification.diagnosis.motion import (
 )
 from tdac_agent.verification.diagnosis.report import Cause
 
-# Coming nearer by less, px or mm, is no progress: a turn in place drifts as much.
+# Coming nearer by less, px or mm, is no progress: even a turn in place drifts by that.
 PROGRESS = 1.0
 # Least share of reversals for oscillating: a period of at most 40 steps (2 s).
 FLIPS = 0.05
-# Least share of positions passed before, for driving over the own trail.
+# Least share of positions passed before, for driving over its own trail.
 _AGAIN = 0.6
 # Radius of the largest circle that counts as spinning, body radii.
 _CIRCLE = 4.0
@@ -32,11 +32,10 @@ _CIRCLE = 4.0
 _ROUNDS = 1.0
 # Mean wheel speed below which a robot is idle.
 _IDLE = 0.01
-# Steps between the last progress and the standstill that need no mention.
+# If a standstill follows the last progress by more steps, the text reports both.
 _AT_ONCE = 10
 
-
-Habit = tuple[Cause, str]
+Behaviour = tuple[Cause, str]
 
 
 class Finding(NamedTuple):
@@ -50,7 +49,7 @@ class Finding(NamedTuple):
 def why_stalled(
     trajectory: Trajectory, since: int, radius: float, units: Units
 ) -> Finding:
-    """Finds what a robot did that made no progress since a step."""
+    """Finds what a robot did after the step of its last progress."""
     rest = standing_since(trajectory)
     if trajectory.steps - rest >= 0.5 * (trajectory.steps - since):
         place = units.point(*trajectory.poses[-1, :2])
@@ -72,7 +71,7 @@ def why_stalled(
 
 def _spinning(
     trajectory: Trajectory, late: int, radius: float, units: Units
-) -> Habit | None:
+) -> Behaviour | None:
     turned = turns(trajectory)[late:]
     net, total = float(turned.sum()), float(np.abs(turned).sum())
     rounds, driven = abs(net) / math.tau, float(lengths(trajectory)[late:].sum())
@@ -91,7 +90,7 @@ def _spinning(
 
 def _jittering(
     trajectory: Trajectory, late: int, radius: float, units: Units
-) -> Habit | None:
+) -> Behaviour | None:
     turned, share = turns(trajectory)[late:], flips(trajectory, late)
     actions = np.abs(trajectory.actions[late:])
     if abs(turned.sum()) >= 0.3 * max(np.abs(turned).sum(), 1.0):
@@ -117,7 +116,7 @@ def _sweeping(trajectory: Trajectory, late: int, radius: float) -> bool:
 
 def _retracing(
     trajectory: Trajectory, since: int, late: int, radius: float, units: Units
-) -> Habit | None:
+) -> Behaviour | None:
     if _extent(trajectory, late) < 3.0 * radius:
         return None
     box = units.box(*_box(trajectory, since), less=1)
@@ -132,7 +131,7 @@ def _retracing(
     )
 
 
-def _wandering(trajectory: Trajectory, late: int, units: Units) -> Habit:
+def _wandering(trajectory: Trajectory, late: int, units: Units) -> Behaviour:
     box = units.box(*_box(trajectory, late))
     driven = float(lengths(trajectory)[late:].sum())
     return "stuck", (

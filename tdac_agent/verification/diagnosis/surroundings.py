@@ -30,7 +30,7 @@ class Surroundings(Protocol):
 
     @property
     def full_speed(self) -> float:
-        """Full speed of the body, lengths per second."""
+        """Full speed of the body, units of length per second."""
 
     def touch(self, pose: Pose, reach: float) -> Touch | None:
         """What the body touches, or would touch first, within `reach`."""
@@ -45,7 +45,10 @@ class Surroundings(Protocol):
         """Corners of a path after every shortcut that the body can take."""
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
-        """Where the shortest path from each position first is `far` away, or ends."""
+        """First point at least `far` away on each position's shortest path, or its end.
+
+        None for a position without a path.
+        """
 
     def mistaken_goals(self) -> dict[str, Point]:
         """Where the goal would be with mixed-up coordinates, by name of the mistake."""

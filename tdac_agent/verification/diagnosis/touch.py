@@ -23,12 +23,12 @@ _SIDES = (
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The wall nearest to the body.
+    """The wall nearest to the body, in units of the screen.
 
     Attributes:
-        wall: Its nearest point (x, y), px.
+        wall: Its nearest point (x, y).
         bearing: Angle from the heading to that point, rad, right positive.
-        gap: Gap between body and wall, px.
+        gap: Gap between body and wall.
         border: Whether it is the border of the map.
         corner: Nearest outer corner of the wall within a body radius of that point.
         thing: Its name.
