@@ -1,1 +1,1 @@
-"""Verification: a suite is run over a controller on a task, and gives a report."""
+"""Verification: runs a suite on a controller and reports the result."""

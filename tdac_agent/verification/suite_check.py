@@ -28,7 +28,7 @@ from tdac_agent.verification.suite.proof import SuiteCheck, row_of, verdict_on_s
 from tdac_agent.verification.verify import verify
 
 REPEATS = 5
-# Ends the slow controller where steps are so long that its speed alone does not.
+# If steps are long, the check of the mean call time would end the slow controller late.
 SLOW_LIMITS = Limits(cpu_seconds=30)
 FAULT_WIDTH = 300
 
@@ -57,7 +57,8 @@ def check_suite(
         seed: Seed of the jittered starts of all controllers; by default derived from
             the task and a secret of this installation.
         repeats: Number of verifications of each controller, which must agree. The slow
-            controller has only one, of the nominal episode, as the clock decides it.
+            controller, whose result depends on timing, has only one, of the nominal
+            episode.
         bad: Names of the bad controllers.
         judge: A warm judge to use; a new one by default.
         on_progress: Called with a short description of the current step.
@@ -82,10 +83,10 @@ def check_suite(
             seed=seed,
             judge=warm,
         )
-        ways = reference_paths(task.nominal, seed)
+        paths = reference_paths(task.nominal, seed)
         reports: dict[str, list[Report]] = {}
         for name in (REFERENCE, *bad):
-            source = privileged_controller(task.nominal, ways, name)
+            source = privileged_controller(task.nominal, paths, name)
             full = partial(ask, source, profile=profile)
             short = partial(
                 ask, source, profile="policy", paper=True, limits=SLOW_LIMITS
@@ -95,7 +96,7 @@ def check_suite(
             for number in range(1, times + 1):
                 on_progress(name if times == 1 else f"{name}, {number} of {times}")
                 reports[name].append(verified())
-    rows = [row_of(name, about_it) for name, about_it in reports.items()]
+    rows = [row_of(name, own) for name, own in reports.items()]
     return verdict_on_suite(reports[REFERENCE][0], rows, time.monotonic() - began)
 
 
@@ -131,5 +132,5 @@ def prove_suite(
         first, *more = check.problems
         others = f" ({len(more)} more: tdac check-suite)" if more else ""
         reason = textwrap.shorten(first, FAULT_WIDTH, placeholder=" …")
-        raise Fault(f"the suite did not prove itself: {reason}{others}")
+        raise Fault(f"the suite failed its check: {reason}{others}")
     return check

@@ -114,7 +114,7 @@ def verify(
 def kept_report(
     folder: Path, task: Task, source: str, seed: int | None
 ) -> Report | None:
-    """Loads the report in a folder if it is of this controller, otherwise None.
+    """Loads the report in a folder if it is about this controller, otherwise None.
 
     Controller, task, suite, seed and package versions must be the same. A seed of None
     is the one derived from the controller and this installation's secret, so that a
@@ -153,7 +153,7 @@ def suite_sha256(task: Task) -> str:
 def _suites(
     task: Task, suite: Path | None = None, shipped: Path | None = None
 ) -> dict[str, Path]:
-    """The folders of tests: the shipped suite, and an own one if there is any."""
+    """The folders of tests: the shipped suite and, if there is one, the user's own."""
     suites = {SHIPPED: _suite_folder(shipped or task.environment.suite)}
     extra = suite or task.suite
     if suite is None:
@@ -262,7 +262,7 @@ def _file_hashes(folder: Path) -> dict[str, str]:
 
 
 def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
-    """Writes report, trajectories and pictures in place of those of an earlier one."""
+    """Writes report, trajectories and pictures; replaces those of an earlier one."""
     folder = out / "trajectories"
     folder.mkdir(parents=True, exist_ok=True)
     for pattern in ("nominal.*", "jitter_*.*"):
@@ -276,6 +276,6 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
         )
 
         draw_failures(task, report, load_trajectories(folder), folder)
-    # It belongs to the controller that was verified here before.
+    # A robust report in this folder belongs to the controller verified earlier.
     (out / "robust.json").unlink(missing_ok=True)
     write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")

@@ -60,7 +60,8 @@ class Nursery:
             SandboxError: The tier does not work on this machine.
         """
         child = self._ready_child(tier, limits) or self._new_child(tier, limits)
-        with contextlib.suppress(OSError):  # has ended; its first call reports that
+        # If the child has ended, its first call reports that.
+        with contextlib.suppress(OSError):
             os.sched_setaffinity(child.controller_pid, os.sched_getaffinity(0))
         return child
 
@@ -97,7 +98,7 @@ class Nursery:
         return self._ready[number] if number < len(self._ready) else None
 
     def close(self) -> None:
-        """Ends unused ready children and, with their last child, the zygotes."""
+        """Ends unused ready children; each zygote ends with its last child."""
         if os.getpid() == self._owner:
             for child in self._ready[self._taken[0] :]:
                 child.close()
@@ -160,7 +161,7 @@ class Nursery:
         zygote.close()
 
     def _start_likely(self) -> None:
-        """Starts a zygote of the best tier in which one starts."""
+        """Starts a zygote of the best tier that can start one."""
         for tier in CONFINING:
             try:
                 self._zygotes.append(start_zygote(tier, Limits()))

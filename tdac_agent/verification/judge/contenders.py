@@ -24,7 +24,7 @@ Kind = Literal[
 # Duration of a random action, s: jittering wheels would not move the robot.
 HOLD = 1.0
 _ARRIVED = 1e-4  # distance at which a waypoint is reached, body radii
-# Bearing from which to turn on the spot, rad; wheel fraction per rad of bearing.
+# Bearing above which it turns on the spot, rad; gain, wheel fraction per rad.
 _ON_THE_SPOT, _GAIN = 0.7, 1.2
 
 
@@ -44,7 +44,7 @@ class Contender:
 
     @property
     def knows(self) -> str:
-        """What it may know: `sensors` (with pose and goal), and anything beyond."""
+        """Label of the information it may use; `sensors` includes pose and goal."""
         if self.kind == "controller":
             return "+ map"
         if self.kind == "follow-guidance" or "guidance" in self.wrappers:
@@ -88,7 +88,7 @@ class Reference:
 class Steered:
     """Drives straight at a target, whatever is in between.
 
-    The target is the goal, or the next way-point of the reference route if `guided`.
+    The target is the goal, or the next waypoint of the reference route if `guided`.
     """
 
     def __init__(self, env: JudgedEnv, *, guided: bool) -> None:
@@ -123,8 +123,8 @@ class Random:
     """Uniform wheel speeds, drawn anew every second."""
 
     def __init__(self, env: JudgedEnv, seed: int) -> None:
-        # A stream apart from the one that the environment draws its start from.
-        self._dice = np.random.default_rng([seed, 1])
+        # Independent of the generator with which the environment draws its start.
+        self._random = np.random.default_rng([seed, 1])
         self._hold = max(1, round(HOLD / env.nominal.dt))
         self._calls = 0
         self._wheels = (0.0, 0.0)
@@ -135,7 +135,7 @@ class Random:
     def policy(self, observation: Observation) -> tuple[float, float]:  # noqa: ARG002
         """The wheel speeds drawn last."""
         if self._calls % self._hold == 0:
-            left, right = self._dice.uniform(-1.0, 1.0, 2).tolist()
+            left, right = self._random.uniform(-1.0, 1.0, 2).tolist()
             self._wheels = left, right
         self._calls += 1
         return self._wheels

@@ -83,7 +83,7 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
     try:
         child.furnish(stage.workdir, source)
         child.load()
-        # Each call has a limit, and slow controllers are ended by their mean time.
+        # Single calls and their mean time are limited instead of the episode.
         rollout = run_policy(child, record, name, held_out=False, deadline=math.inf)
     except ControllerFault as fault:
         rollout = not_driven(record, name, fault)

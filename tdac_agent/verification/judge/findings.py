@@ -47,7 +47,7 @@ def findings_of(judge: Judge, expected: list[str]) -> Findings:
 def _named(key: Key, rollouts: Mapping[Key, Rollout]) -> Rollout:
     """Renames an episode of the controller's own loop to `run_episode`.
 
-    Not if `policy` failed with the same error, which is then reported once.
+    If `policy` failed with the same error, the name stays: it is then reported once.
     """
     rollout, nominal = rollouts[key], rollouts.get(NOMINAL)
     of_both = nominal is not None and rollout.error == nominal.error is not None

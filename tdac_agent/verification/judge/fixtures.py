@@ -41,7 +41,7 @@ class Controller:
             limit = f"at most {MAX_SOURCE_BYTES} are allowed"
             pytest.fail(f"the source has {size} bytes, {limit}", pytrace=False)
         try:
-            # Decoded as Python does, by the encoding that the file declares.
+            # Respects the encoding that the file declares, as Python does.
             return ast.parse(decode_source(self._judge.source))
         except SyntaxError as error:
             line = f" (line {error.lineno})" if error.lineno else ""
@@ -57,13 +57,13 @@ class Controller:
     def call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         """Calls a top-level function or class.
 
-        Exact Python types are kept. What cannot be sent as data comes back as a
-        `Remote`, with `call(method, ...)`, and may be passed on as an argument.
+        Exact Python types are kept. A result that is not plain data becomes a `Remote`
+        with `call(method, ...)`, which can be an argument of further calls.
         """
         return self._judge.unit().call(name, *args, **kwargs)
 
     def error_of(self, name: str, *args: Any, **kwargs: Any) -> ControllerError | None:
-        """The error that a call raises, or None where it returns."""
+        """The error that a call raises, or None if it returns."""
         try:
             self.call(name, *args, **kwargs)
         except ControllerError as error:
@@ -85,15 +85,15 @@ def controller(pytestconfig: pytest.Config) -> Controller:
 
 @pytest.fixture(scope="session")
 def oracle(task: Task) -> Oracle:
-    """Exact answers to planning questions, and to those of the task's environment."""
+    """Exact answers to questions about planning and the task's environment."""
     return task.environment.oracle()
 
 
 @pytest.fixture(scope="session")
 def generator(pytestconfig: pytest.Config) -> Callable[[str], np.random.Generator]:
-    """`generator(name)`: random numbers that follow from the run's seed and a name.
+    """`generator(name)`: a random generator seeded by the run's seed and the name.
 
-    A controller cannot memorise cases that are drawn from it.
+    It draws cases that a controller cannot have memorised.
     """
     seed = pytestconfig.stash[JUDGE].seed
     return lambda name: np.random.default_rng([seed, *name.encode()])

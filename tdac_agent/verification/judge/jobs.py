@@ -31,7 +31,7 @@ class Job(BaseModel):
     seed: int
     limits: Limits
     out: Path
-    trajectories: Path | None = Field(description="Folder for them; None: not kept.")
+    trajectories: Path | None = Field(description="Folder; None to discard them.")
 
 
 class Findings(PrintableRecord):

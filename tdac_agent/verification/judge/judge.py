@@ -38,7 +38,7 @@ from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_envs.drive.task import Pose
 
 NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))
-# Number in a suite: the nominal one, the jittered ones and three of `run_episode`.
+# Number of episodes in a suite: nominal, jittered, and three of `run_episode`.
 EPISODES = 1 + JITTERS + 3
 WALL_SECONDS = 600.0
 
@@ -139,7 +139,7 @@ class Judge:
     def call_may_pass(self) -> bool:
         """Whether the latest call timed out, maybe only because the machine is busy.
 
-        If so, it waits for the running episodes, so that a retry has the machine alone.
+        If so, it first waits for the running episodes, so that a retry runs alone.
         """
         fault = None if self._unit is None else self._unit.fault
         if fault is None or not fault.may_pass:
@@ -171,7 +171,8 @@ class Judge:
     def rollouts(self) -> dict[Key, Rollout]:
         """The episodes that tests asked for, by (name, steps, drive).
 
-        Without those that were only begun: which of them have ended depends on timing.
+        Episodes that only `begin` started are left out: which of them have ended
+        depends on timing.
         """
         return {
             key: future.result()

@@ -30,7 +30,7 @@ UNUSED_PLUGINS = (
     "faulthandler",
     "legacypath",
 )
-# Limit of calls in a traceback, of which only the end is reported.
+# Maximum depth of a traceback, which limits the time that pytest takes to format it.
 MOST_CALLS = 50
 
 
@@ -74,7 +74,7 @@ class JudgePlugin:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self) -> Generator[None]:
-        """Ends a test, or the making of its message, in the same case."""
+        """Ends a test, or the formatting of its message, in the same case."""
         with self._judge.time_limit():
             return (yield)
 
@@ -140,5 +140,5 @@ def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
         "--strict-markers",
         "-q",
     ]
-    # Given by name, pytest would search all installed packages for the plugin.
+    # For a plugin given by name, pytest would search all installed packages.
     pytest.main(arguments, plugins=[pytest_reportlog.plugin, *plugins])

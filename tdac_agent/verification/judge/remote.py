@@ -52,7 +52,8 @@ class Unit:
     Args:
         child: Child with the controller imported.
         deadline: Latest end of the last call, by `time.monotonic`.
-        ours: Context of each request; sees errors that the controller did not cause.
+        ours: Context of each request that turns errors which the controller did not
+            cause into faults.
 
     Attributes:
         fault: Why the process can no longer be used; None while it answers.

@@ -22,8 +22,9 @@ from tdac_agent.verification.judge.jobs import Findings
 
 PHASES = frozenset({"setup", "call", "teardown"})
 INTERNAL_ERROR = 3
-"""pytest's exit status after an internal error, and the prefix of its lines on it."""
+"""pytest's exit status after an internal error."""
 BREAKDOWN = "INTERNALERROR>"
+"""Prefix of the lines that pytest prints about an internal error."""
 NOT_RUN = "the test did not run to its end"
 TORN = "the report log is damaged or incomplete, so no test in it counts as passed"
 
@@ -123,7 +124,7 @@ def read_outcomes(
 ) -> tuple[dict[str, str], list[Failure]]:
     """Reads the outcome of each expected test; one that is not in the log has failed.
 
-    A test has passed if the log is complete and has each of its phases as passed.
+    A test has passed if the log is complete and each phase of the test passed.
 
     Args:
         path: The log.

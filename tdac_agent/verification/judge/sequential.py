@@ -39,20 +39,20 @@ class Characteristics:
 
 @dataclass(frozen=True, slots=True)
 class SequentialTest:
-    """A sequential probability ratio test (Wald 1945), cut off at a length.
+    """A sequential probability ratio test (Wald 1945) with a limit of episodes.
 
     After each episode it compares the likelihoods of the results under two success
     rates: `accept_at` and `refuse_at`. Wald's bounds keep both errors near or below
-    alpha and beta in a test without a limit. The cut-off can only lower the probability
+    alpha and beta in a test without a limit. The limit can only lower the probability
     of accepting; `characteristics` computes the exact probabilities.
 
     Attributes:
         accept_at: Success rate from which a controller should be accepted.
         limit: Maximum number of episodes.
-        margin: A rate lower than `accept_at` by this must not be accepted. In between,
-            either decision is right.
-        alpha: Wanted probability of accepting at `refuse_at`.
-        beta: Wanted probability of rejecting at `accept_at`.
+        margin: Difference between `accept_at` and `refuse_at`, the rate that must not
+            be accepted. In between, either decision is right.
+        alpha: Target probability of accepting at `refuse_at`.
+        beta: Target probability of rejecting at `accept_at`.
     """
 
     accept_at: float
@@ -104,7 +104,7 @@ class SequentialTest:
         return math.ceil(self.bounds[1] / self.steps[0])
 
     def decide(self, successes: int, failures: int) -> Decision:
-        """The decision after some episodes; `undecided` means to go on, if possible."""
+        """The decision after some episodes."""
         success, failure = self.steps
         ratio = successes * success + failures * failure
         low, high = self.bounds
@@ -115,7 +115,8 @@ class SequentialTest:
     def characteristics(self, rate: float) -> Characteristics:
         """How this test decides on a controller of known success rate.
 
-        Exact: sums the probabilities of each number of failures while undecided.
+        Exact: after each episode, sums the probabilities of all numbers of failures at
+        which the test decides, and keeps those at which it continues.
         """
         (success, failure), (low, high) = self.steps, self.bounds
         open_, failures = np.ones(1), np.zeros(1)

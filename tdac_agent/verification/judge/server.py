@@ -62,7 +62,7 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
     Args:
         nursery: Child pool of the first worker, whose job is due at once. By default
             the server makes one, and first loads everything that a job needs.
-        known: Folder of a task to read ahead in the latter case.
+        known: Folder of a task to read in advance; only used without `nursery`.
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
@@ -92,7 +92,10 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
 
 
 def _status_of(worker: int) -> int:
-    """Waits for a worker to end, and returns its status; kills it without a caller."""
+    """Waits for a worker to end, and returns its status.
+
+    Kills the worker if the caller has closed its end.
+    """
     ended, writer = os.pipe()
 
     def wait() -> None:
@@ -204,7 +207,7 @@ def _run_empty_suite() -> None:
 
 
 def _ready_crew(nursery: Nursery) -> SuiteCrew:
-    """A worker pool whose processes have already touched what an episode needs."""
+    """A worker pool whose processes have already driven some steps."""
     work = partial(drive_known, nursery)
     return Crew(work, nursery.close, first=_drive_some_steps)
 

@@ -60,7 +60,7 @@ class Order:
 
     @property
     def held_out(self) -> bool:
-        """Whether feedback may report only pass or fail of it."""
+        """Whether feedback may report only pass or fail for this episode."""
         return self.name != "nominal" and int(self.name.split()[1]) > SHOWN_JITTERS
 
 
@@ -132,7 +132,7 @@ def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
 
 
 def load_controller(child: Child, brief: Brief) -> None:
-    """Copies its files to a child, and imports the controller there.
+    """Copies the task's files and the controller to a child, and imports it there.
 
     Raises:
         ControllerFault: The controller cannot be imported.

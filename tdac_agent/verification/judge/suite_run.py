@@ -35,7 +35,7 @@ def judge_suite(
     from tdac_agent.verification.judge.plugin import JudgePlugin, run_tests
 
     if len(job.suites) > 1:
-        # Bytecode that lies beside a user's tests may not be theirs.
+        # Bytecode stored beside a user's tests may not match them.
         sys.pycache_prefix = str(job.out / "bytecode")
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
     run_tests(job.suites, job.out / "report.jsonl", plugin)

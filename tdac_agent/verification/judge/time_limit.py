@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 from tdac_agent.sandbox import ControllerFault
 
-# A test may catch the error, which is then raised again.
+# A test may catch the error, so it is raised again at this interval.
 AGAIN_SECONDS = 1.0
 
 
@@ -24,7 +24,7 @@ def time_limit(deadline: float, reason: str) -> Generator[None]:
         reason: Message of the error.
 
     Raises:
-        ControllerFault: At the deadline, or at once if it is over.
+        ControllerFault: At the deadline, or at once if it has passed.
     """
     left = deadline - time.monotonic()
     if left <= 0.0:

@@ -1,4 +1,4 @@
-"""Concurrent work, with exclusive work now and then."""
+"""A lock for shared and exclusive work."""
 
 from __future__ import annotations
 

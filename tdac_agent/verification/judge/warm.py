@@ -39,15 +39,16 @@ POLL_SECONDS = 0.2
 
 
 class WarmJudge:
-    """Runs jobs, each in a worker process that was started ahead. A context manager.
+    """Runs jobs, each in a worker process that was started in advance.
 
-    The constructor returns at once; the judge warms up while the caller goes on.
+    The constructor returns at once; the judge warms up in the background. Use it as a
+    context manager.
 
     Args:
         nursery: Child pool that the caller has started and will end. The server is then
             forked from this process, which should have a single thread, and shares its
             imports. By default the server is a new interpreter.
-        task: Task of most jobs, which a new interpreter reads ahead.
+        task: Task of most jobs, which a new interpreter reads in advance.
         turn: File that is locked during a job, so that judges that share it run one job
             at a time.
     """
@@ -180,7 +181,7 @@ class _Server:
 def _start_server(
     known: list[Path], environment: dict[str, str], folder: Path, log: int
 ) -> _Server:
-    """Starts a server in a new interpreter, which reads a known task ahead."""
+    """Starts a server in a new interpreter, which reads a known task in advance."""
     process = subprocess.Popen(
         [
             sys.executable,

@@ -30,8 +30,8 @@ class Crew(Generic[P, T]):
     """A worker pool, forked from this process, which should have a single thread then.
 
     While a process of the pool works, it and its children are pinned to one core that
-    no other one uses: judge and controller run in turns, and waking a process on
-    another core takes longer than most of their answers.
+    no other process of the pool uses: judge and controller alternate, and waking a
+    process on another core takes longer than most of their answers.
 
     Args:
         work: Called in a process for each request. Arguments and results are pickled;

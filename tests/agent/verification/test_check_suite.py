@@ -218,7 +218,7 @@ def test_the_short_form(task, suite_of, warm):
     assert [row.controller for row in proof.rows] == [REFERENCE, "do-nothing"]
     assert_proven(proof, 1)
     long = IMPOSSIBLE.replace("more", "more\\n" + "and more " * 100)
-    with pytest.raises(Fault, match="did not prove itself: the reference") as fault:
+    with pytest.raises(Fault, match="suite failed its check: the reference") as fault:
         prove_suite(task, suite=suite_of(long), judge=warm)
     assert "\n" not in str(fault.value)
     assert len(str(fault.value)) < 400
@@ -258,7 +258,7 @@ def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
     assert load_run(out).status == "fault"
     records = events(out)
     assert [r["event"] for r in records] == ["run.start", "prove.start", "run.end"]
-    assert "did not prove itself" in records[-1]["reason"]
+    assert "the suite failed its check" in records[-1]["reason"]
 
 
 @pytest.mark.slow
