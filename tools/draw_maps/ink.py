@@ -98,7 +98,7 @@ def arc(centre: Point, radius: float, first: float, last: float) -> list[Point]:
 
 
 def write(page: Image, text: str, middle: Point, size: float, colour: Colour) -> None:
-    """Writes a label of `size` px cap height about a point."""
+    """Writes a label of `size` px cap height, centred on a point."""
     font, scale = cv2.FONT_HERSHEY_DUPLEX, size * FINE / 22
     stroke = max(round(scale), 1)
     (width, height), _ = cv2.getTextSize(text, font, scale, stroke)

@@ -33,7 +33,7 @@ _MAZE = """
 
 
 def _runs(art: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """The straight walls of an ASCII maze, end to end, in lattice points."""
+    """The first and last lattice point of each straight wall of an ASCII maze."""
     rows = art.strip("\n").split("\n")
     runs = []
     for y, row in enumerate(rows[::2]):

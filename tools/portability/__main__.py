@@ -66,7 +66,7 @@ def _names(wanted: list[str]) -> list[str]:
 
 
 def _drawn() -> str:
-    """The row drawn by the hash of the last commit."""
+    """The row selected by the hash of the last commit."""
     command = ["git", "rev-parse", "HEAD"]
     commit = subprocess.check_output(command, cwd=ROOT, text=True).strip()
     name = drawn(commit)

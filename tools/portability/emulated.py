@@ -94,10 +94,10 @@ def _wheels(place: Place, version: str) -> Path:
 def _compared(
     place: Place, name: str, command: list[object], env: dict[str, str]
 ) -> str:
-    """Runs the rollout on this processor and on the other, and compares the numbers.
+    """Runs the rollout on this processor and the emulated one, and compares them.
 
     Raises:
-        RowFailed: They differ by more than rounding.
+        RowFailed: The numbers differ by more than rounding.
     """
     here, there = place.folder / "here.json", place.folder / f"{name}.json"
     if not here.exists():

@@ -88,13 +88,13 @@ def interpreter(version: str) -> str:
     folders = [Path(folder) for folder in os.get_exec_path()]
     folders += sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin"))
     for path in (folder / name for folder in folders):
-        if path.exists() and _is(path, version):
+        if path.exists() and _has_version(path, version):
             return str(path)
     raise CannotRun(f"{name} is neither on PATH nor among pyenv's versions")
 
 
-def _is(path: Path, version: str) -> bool:
-    """Whether it runs and is that version; a shim may do neither."""
+def _has_version(path: Path, version: str) -> bool:
+    """Whether an interpreter runs and has a version; a shim may fail at both."""
     code = "import sys; print('%d.%d' % sys.version_info[:2])"
     done = subprocess.run(
         [path, "-c", code], capture_output=True, text=True, check=False

@@ -21,8 +21,8 @@ class Row:
     Attributes:
         run: Runs the check and returns a summary.
         what: What it runs, in words.
-        drawn: Whether CI may draw it: not if it takes a quarter of an hour, or if CI
-            runs it anyway.
+        drawn: Whether CI may select it at random. False if it takes a quarter of an
+            hour, or if CI always runs it.
     """
 
     run: Callable[[Place], str]
@@ -55,7 +55,7 @@ ROWS = {
 
 
 def drawn(seed: str) -> str:
-    """The row that CI runs in addition to the fixed ones.
+    """The randomly selected row that CI runs in addition to the fixed ones.
 
     Args:
         seed: The commit's hash, so that rows vary and a run can be repeated.

@@ -44,10 +44,10 @@ def _without_and_with(place: Place, check: Check) -> str:
     try:
         env = shown(place)
     except CannotRun as reason:
-        return f"{summary}; not with it: {reason}"
+        return f"{summary}; with it: not run, {reason}"
     names = _working(place, env)
     if "bubblewrap" not in names:
-        return f"{summary}; it does not work on this machine"
+        return f"{summary}; with it: not run, it does not work on this machine"
     return f"{summary}; with it: {check(place, env, names)}"
 
 

@@ -13,7 +13,7 @@ PROGRAM = "bwrap"
 
 
 def hidden(place: Place) -> dict[str, str]:
-    """This environment, with a PATH without bubblewrap.
+    """This process's environment, with a PATH without bubblewrap.
 
     A folder of PATH that contains it is replaced by one with links to everything else.
     """
@@ -39,7 +39,7 @@ def _links_to_all_else(place: Place, number: int, folder: str) -> str:
 
 
 def shown(place: Place) -> dict[str, str]:
-    """This environment, with a PATH with bubblewrap.
+    """This process's environment, with a PATH with bubblewrap.
 
     Raises:
         CannotRun: It is not installed and cannot be fetched.
