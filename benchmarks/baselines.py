@@ -3,9 +3,9 @@
     python -m benchmarks.baselines [STAGE …] [--only ppo-maze-0 …] [--runs DIR]
 
 Stages: `train`; `evaluate`: all policies on the same episodes; `generalise`: learned
-policies on other maps and worlds; `collect`: tables and figures of the results. By
-default all. Each item has a separate folder in --runs: the command resumes interrupted
-items and skips finished ones.
+policies on other maps and worlds; `collect`: tables and figures of the results. All of
+them run by default. Each item has a separate folder in --runs: the command resumes
+interrupted items and skips finished ones.
 """
 
 from __future__ import annotations

@@ -9,9 +9,10 @@ time of one worker outside its `--runs` runs: starting, planning, dispatching, t
 
 With `--many N`, N scripted runs of one iteration are made with `keep: records`. They
 are as short as possible: about one in ten has an answer that is tested in the sandbox,
-and drives or makes a forbidden import; the answers of the others are no Python, and are
-requested three times. The bench prints the driver's memory over time, its CPU time and
-the number of files, and the same for a second call of the command, with nothing to do.
+a controller that drives or one with a forbidden import; the other answers are not
+Python, and are requested three times. The bench prints the driver's memory over time,
+its CPU time and the number of files, and the same for a second call of the command,
+which has nothing to do.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ class Made:
 
 
 def main() -> None:
-    """Measures and prints."""
+    """Prints the measurements."""
     options = _options()
     with _place() as folder:
         if options.many:

@@ -3,10 +3,10 @@
     python -m benchmarks env_step
 
 Cases: a single environment through `gym.make` in several situations; a batch on one
-thread, on two, and in two independent processes, which show what two cores are worth at
-that moment; and the growth with the area of the map and with the number of rays, with
-the memory of the map's arrays per pixel. The cases run in turns, in short bursts. The
-floor is an environment that does nothing: the cost of Gymnasium's wrappers.
+thread, on two, and in two independent processes, the upper bound for two cores at that
+moment; and the growth with the area of the map and with the number of rays, with the
+memory of the map's arrays per pixel. The cases run in turns, in short bursts. The floor
+is an environment that does nothing: the cost of Gymnasium's wrappers.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ ALONE, TOGETHER, APART = "1 thread", "2 threads", "2 processes"
 
 
 def scaled(title: str, bursts: dict[str, Burst], rounds: int) -> Bench:
-    """Like `raced`, with the speed-up of cases over the same on one thread."""
+    """Like `raced`; notes the speed-up of each case over the same on one thread."""
     times = in_turn({**yardsticks(), **bursts}, rounds)
     notes = {}
     for name, own in times.items():
@@ -179,7 +179,7 @@ def batch_envs(count: int, threads: int) -> Any:
 
 
 def burst_apart(count: int, processes: int = 2) -> Burst:
-    """Steps of batches in independent processes: the upper bound of the cores."""
+    """Steps of batches in independent processes, the upper bound for the cores."""
     context = multiprocessing.get_context("spawn")
     ends = []
     for _ in range(processes):

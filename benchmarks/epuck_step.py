@@ -100,7 +100,7 @@ def more_things(rounds: int) -> Bench:
 
 
 def batch(count: int, **options: Any) -> Burst:
-    """Steps of a batch with moved starts."""
+    """Steps of a batch with jittered starts."""
     options = {"variation": "jitter", **options}
     envs = gym.make_vec(NAME, count, "vector_entry_point", **options)
     envs.reset(seed=0)

@@ -42,7 +42,7 @@ class Ground:
 
     @property
     def failures_allowed(self) -> int:
-        """Failures at which at least 90 % of the starts still succeed."""
+        """Most failures with which at least 90 % of the starts succeed."""
         return self.seeds // 10
 
 

@@ -40,7 +40,7 @@ class Judgement:
 
 
 class IndependentJudge:
-    """Judges controllers on one ground.
+    """Judges controllers in one setup.
 
     Args:
         ground: The setup.

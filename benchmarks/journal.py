@@ -12,7 +12,7 @@ from typing import Any
 
 
 class Journal:
-    """Results by the text of their item, including those of an earlier run.
+    """Stored results, including those of an earlier run, by the text of their item.
 
     Args:
         path: File with one line per result, or None to keep none.

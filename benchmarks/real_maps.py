@@ -10,8 +10,8 @@ Columns: polarity with the task, and without start and goal; solvable; route: th
 shortest path on the chosen grid keeps half the radius from every truth obstacle and is
 within 10 % of the reference length; iou90: the free space connected to the start has
 an IoU of at least 0.9 with the truth's; verified: the builtin learner's controller is
-verified; refused: out of the tasks that the index calls infeasible and of copies that
-are closed by a wall in the obstacles' colour.
+verified; refused: number of refused tasks among those that the index calls infeasible
+and copies that are closed by walls in the obstacles' colour.
 """
 
 from __future__ import annotations

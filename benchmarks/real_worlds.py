@@ -351,7 +351,7 @@ def _raster_iou(one: Points, hole: Points | None, others: list[Points]) -> float
 
 
 def compare_markers(row: Row, world: World, theirs: list[Record]) -> None:
-    """Checks that we have their Solids without a boundingObject, as not solid."""
+    """Checks that we read their Solids without a boundingObject as not solid."""
     ours = [thing for thing in world.obstacles if not thing.solid]
     for mark in theirs:
         near = [
@@ -368,7 +368,7 @@ def compare_markers(row: Row, world: World, theirs: list[Record]) -> None:
 def account(
     row: Row, world: World, skipped: dict[str, int], extras: list[Obstacle]
 ) -> None:
-    """Checks that we model or list what they skip, and they skip our extras."""
+    """Checks that we model or list what they skip, and that they skip our extras."""
     listed = Counter(node.kind for node in world.unmodelled)
     listed += Counter(
         word for node in world.unmodelled for word in set(node.why.split())
