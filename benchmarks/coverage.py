@@ -66,10 +66,7 @@ def kaplan_meier_coverage(
     trials: int = 1000,
     seed: int = 0,
 ) -> float:
-    """Simulated coverage of CS(at)'s interval.
-
-    A run is censored after each iteration with the probability `stopped`.
-    """
+    """Simulated coverage of CS(at)'s interval; `stopped`: P(censored) per iteration."""
     random = np.random.default_rng(seed)
     true = 1 - (1 - probability) ** at
     held = 0

@@ -162,7 +162,6 @@ def _cave(seed: int) -> Drawing:
 
 
 def _pillars(seed: int) -> Drawing:
-    """A hall with pillars."""
     rng = np.random.default_rng(seed)
     image = np.zeros((460, 620), np.uint8)
     cv2.rectangle(image, (4, 4), (615, 455), 255, 8)

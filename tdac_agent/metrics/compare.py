@@ -106,11 +106,10 @@ def best_of_n(frames: Frames, loop: Frames, within: int | None = None) -> pd.Dat
         within: Iterations of the loop to count; all by default.
 
     Returns:
-        A row per `measure` of cost (`cost` in USD, `tokens`) that is known for both
-        kinds, with the columns `one_shot` (mean cost of a one-shot candidate), `run`
-        (mean cost of a loop run), `n` (number of candidates at the cost of a run),
-        `best_of_n` (their pass@n; NaN with fewer than n candidates), `cs` (the loop's
-        CS).
+        A row per `measure` of cost that is known for both (`cost` in USD, `tokens`):
+        `one_shot` and `run`, the mean costs of a candidate and of a loop run; `n`, the
+        number of candidates at the cost of a run; `best_of_n`, their pass@n (NaN with
+        fewer candidates); `cs`, CS of the loop.
     """
     tried = frames.candidates
     first = tried[(tried["k"] == 1) & (tried["j"] == 0)]

@@ -218,7 +218,6 @@ def _title(axes: Axes, text: str, below: str = "") -> None:
 
 
 def _legend(figure: Figure, panels: list[Axes]) -> None:
-    """One legend for all panels, above them."""
     entries = {}
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()

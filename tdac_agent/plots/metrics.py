@@ -70,7 +70,6 @@ def plot_success_rates(
 
 
 def _bar(axes: Axes, place: float, rate: Rate, width: float, colour: str) -> None:
-    """Draws a rate with its interval, if it has one, and its value above."""
     axes.bar(place, rate.value, width, color=colour)
     top = rate.value
     if not math.isnan(rate.low):

@@ -45,7 +45,6 @@ def plot_preprocessing(image: Source, grid: OccupancyGrid, params: MapParams) ->
 
 
 def _plot_threshold(axes: Axes, grey: np.ndarray, params: MapParams) -> None:
-    """Draws the histogram of the luminance, with the threshold."""
     counts = np.bincount(grey.ravel(), minlength=256)
     axes.bar(np.arange(256), np.maximum(counts, 0.5), width=1.0, color="#7A8494")
     axes.set_yscale("log")

@@ -105,7 +105,6 @@ def plot_breakdown(run: Run) -> Figure:
 
 
 def _iteration_starts(attempts: list[Attempt]) -> list[int]:
-    """Indices of the first candidate of each iteration."""
     return [n for n, a in enumerate(attempts) if n == 0 or attempts[n - 1].k != a.k]
 
 
@@ -115,7 +114,6 @@ def _label_tests(axes: Axes, shown: list[str]) -> None:
 
 
 def _label_candidates(axes: Axes, attempts: list[Attempt]) -> None:
-    """Labels each column with k.j and the number of failed tests."""
     many = len(attempts) > MOST_LEVEL
     between = "   " if many else "\n"
     counts = [str(len(a.failed_tests)) if a.valid else "–" for a in attempts]

@@ -91,7 +91,6 @@ def _draw(axes: Axes, entry: Entry, row: float, *, begins: bool) -> None:
 
 
 def _entries(told: Told, records: list[JournalRecord]) -> Iterator[Entry]:
-    """Entries in chronological order."""
     tried = {(one.k, one.j): one for one in told.tried}
     for record in records:
         event, k = record["event"], record.get("k")
@@ -146,7 +145,6 @@ def _cause(group: Group) -> str:
 
 
 def _wrapped(texts: Sequence[str], most: int = MOST_LINES) -> tuple[str, ...]:
-    """Wraps each text to at most `most` lines."""
     lines: list[str] = []
     for text in texts:
         rows = textwrap.wrap(text, COLUMNS, max_lines=most, placeholder=" …")

@@ -101,7 +101,6 @@ def _draw(
     label: str,
     outcome: str,
 ) -> None:
-    """Draws a line with light edges, and a marker at its end."""
     x, y = places.T
     axes.plot(x, y, color="w", linewidth=3.6, alpha=0.5, zorder=2)
     axes.plot(x, y, line, color=colour, linewidth=1.8, alpha=0.8, label=label, zorder=3)

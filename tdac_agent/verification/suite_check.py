@@ -57,8 +57,7 @@ def check_suite(
         seed: Seed of the jittered starts of all controllers; by default derived from
             the task and a secret of this installation.
         repeats: Number of verifications of each controller, which must agree. The slow
-            controller, whose result depends on timing, has only one, of the nominal
-            episode.
+            one, whose result depends on timing, has one, of the nominal episode.
         bad: Names of the bad controllers.
         judge: A warm judge to use; a new one by default.
         on_progress: Called with a short description of the current step.

@@ -215,7 +215,6 @@ def _suite_folder(path: Path) -> Path:
 def _run_judge(
     job: Job, folder: Path, judge: WarmJudge, meanwhile: Callable[[], None] | None
 ) -> str:
-    """Runs a job; returns the output of its process."""
     request = folder / "job.json"
     request.write_text(job.model_dump_json(), encoding="utf-8")
     judge.run(request, DEADLINE_SECONDS, meanwhile)

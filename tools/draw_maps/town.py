@@ -77,7 +77,6 @@ def _block(page: Image, rng: np.random.Generator, area: Area, depth: float) -> N
 
 
 def _tree(page: Image, rng: np.random.Generator, at: Point, radius: float) -> None:
-    """Draws a tree with a bumpy crown."""
     (x, y) = _turned([at])[0]
     disc(page, (x, y), radius, _TREES[int(rng.integers(len(_TREES)))])
     for _ in range(5):

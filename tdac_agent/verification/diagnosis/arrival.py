@@ -26,7 +26,7 @@ from tdac_agent.verification.diagnosis.stall import (
 )
 from tdac_agent.verification.diagnosis.surroundings import Surroundings
 
-# Share of the episode without progress above which a robot is stalled, not too slow.
+# Share of the episode without progress from which a robot is stalled, not too slow.
 _STALLED = 0.2
 
 

@@ -98,7 +98,7 @@ class Nursery:
         return self._ready[number] if number < len(self._ready) else None
 
     def close(self) -> None:
-        """Ends unused ready children; each zygote ends with its last child."""
+        """Ends unused ready children; the zygotes end with their last child."""
         if os.getpid() == self._owner:
             for child in self._ready[self._taken[0] :]:
                 child.close()
@@ -145,7 +145,6 @@ class Nursery:
         return child
 
     def _zygote(self, tier: Tier, limits: Limits) -> Zygote:
-        """A zygote with a free slot."""
         full = [zygote for zygote in self._zygotes if not zygote.slots]
         self._full = [zygote for zygote in self._full + full if not zygote.ended]
         self._zygotes = [zygote for zygote in self._zygotes if zygote.slots]

@@ -17,7 +17,7 @@ SUITE: Final = "suite"
 
 
 class Job(BaseModel):
-    """A suite to run over a controller; all paths are absolute."""
+    """A suite to run on a controller; all paths are absolute."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -171,8 +171,7 @@ class Judge:
     def rollouts(self) -> dict[Key, Rollout]:
         """The episodes that tests asked for, by (name, steps, drive).
 
-        Episodes that only `begin` started are left out: which of them have ended
-        depends on timing.
+        Others that `begin` started are left out: how many have ended depends on timing.
         """
         return {
             key: future.result()

@@ -125,7 +125,7 @@ def _marker_names(item: pytest.Item) -> set[str]:
 
 
 def run_tests(suites: list[Path], log: Path, *plugins: object) -> None:
-    """Runs pytest hermetically over sibling folders, with a report log."""
+    """Runs pytest hermetically on sibling folders, with a report log."""
     root = suites[0].parent
     arguments = [
         *(str(folder) for folder in suites),

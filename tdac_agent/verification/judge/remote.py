@@ -52,8 +52,7 @@ class Unit:
     Args:
         child: Child with the controller imported.
         deadline: Latest end of the last call, by `time.monotonic`.
-        ours: Context of each request that turns errors which the controller did not
-            cause into faults.
+        ours: Context of each request, which turns the judge's own errors into faults.
 
     Attributes:
         fault: Why the process can no longer be used; None while it answers.

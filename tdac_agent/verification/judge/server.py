@@ -1,7 +1,7 @@
 """The judge's server, which forks a worker for each job.
 
 Run by `tdac_agent.verification.judge.warm` as `python -m
-tdac_agent.verification.judge.server`. A worker runs pytest over a suite, isolated from
+tdac_agent.verification.judge.server`. A worker runs a suite with pytest, isolated from
 the caller. The controller's code runs only in sandboxed children.
 """
 
@@ -92,10 +92,7 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
 
 
 def _status_of(worker: int) -> int:
-    """Waits for a worker to end, and returns its status.
-
-    Kills the worker if the caller has closed its end.
-    """
+    """Waits for a worker to end, killing it if the caller ends; returns its status."""
     ended, writer = os.pipe()
 
     def wait() -> None:

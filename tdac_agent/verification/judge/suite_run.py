@@ -1,4 +1,4 @@
-"""Runs a suite over one controller with pytest, in the judge's process."""
+"""Runs a suite on one controller with pytest, in the judge's process."""
 
 from __future__ import annotations
 

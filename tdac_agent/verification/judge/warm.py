@@ -39,10 +39,9 @@ POLL_SECONDS = 0.2
 
 
 class WarmJudge:
-    """Runs jobs, each in a worker process that was started in advance.
+    """Context manager that runs jobs, each in a worker process started in advance.
 
-    The constructor returns at once; the judge warms up in the background. Use it as a
-    context manager.
+    The constructor returns at once; the judge warms up in the background.
 
     Args:
         nursery: Child pool that the caller has started and will end. The server is then
@@ -139,7 +138,6 @@ class WarmJudge:
     def _line(
         self, seconds: float, meanwhile: Callable[[], None] | None = None
     ) -> bytes:
-        """Reads the server's next line, without its end."""
         stream, deadline = self._server.answers, time.monotonic() + seconds
         line = b""
         while not line.endswith(b"\n"):
