@@ -45,7 +45,7 @@ class Surroundings(Protocol):
         """Corners of a path after every shortcut that the body can take."""
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
-        """First point `far` away on each position's shortest path, or the path's end."""
+        """First point `far` away on each position's shortest path, or its end."""
 
     def mistaken_goals(self) -> dict[str, Point]:
         """Where the goal would be with mixed-up coordinates, by name of the mistake."""
