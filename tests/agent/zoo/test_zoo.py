@@ -1,6 +1,8 @@
 """Every attack is refused and harms nothing; every good controller passes."""
 
+import re
 import signal
+from pathlib import Path
 
 import offers
 import pytest
@@ -8,6 +10,7 @@ from cases import all_cases, tiers_of, working_tiers
 from enclosure import Enclosure, differences
 from grounds import KINDS, zoo_task
 
+import tdac_agent
 from tdac_agent.verification.verify import verify
 
 CASES = all_cases()
@@ -130,3 +133,14 @@ def test_what_has_no_end_is_not_waited_for(offer):
 def test_the_offers(offer):
     """As a process: exit code, line, time and memory are as expected, nothing left."""
     assert offers.differences(offer, offers.take(offer)) == []
+
+
+def test_attacks_reach_for_files_that_exist():
+    """An attack on a file that has moved would prove nothing."""
+    package = Path(tdac_agent.__file__).parent
+    files = Path(__file__).parent.glob("*/attacks/*.py")
+    texts = [file.read_text("utf-8", "replace") for file in files]
+    named = re.findall(r'@PACKAGE@/([\w./]+)"', "\n".join(texts))
+    named += re.findall(r'"((?:verification|environments)/[\w./]+)"', "\n".join(texts))
+    assert len(named) >= 4
+    assert [name for name in named if not (package / name).exists()] == []

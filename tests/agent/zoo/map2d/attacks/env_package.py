@@ -18,4 +18,4 @@ def answer():
 
 
 attempt("reference", answer)
-attempt("suite", lambda: open("@PACKAGE@/verification/suite/shipped/map2d/test_static.py").read(40))
+attempt("suite", lambda: open("@PACKAGE@/environments/map2d/suite/test_static.py").read(40))

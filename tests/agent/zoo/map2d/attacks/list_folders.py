@@ -20,4 +20,4 @@ for path in ("/var", "/sys", "/proc", "/run", "/mnt", "/etc/ssl", "/dev/shm", "~
     attempt(path, entries, os.path.expanduser(path))
 attempt("target", entries, "@TARGET@")
 attempt("beside", entries, "@TARGET@/..")
-attempt("suites", entries, "@PACKAGE@/verification/suite/shipped")
+attempt("suites", entries, "@PACKAGE@/environments/map2d/suite")

@@ -17,7 +17,7 @@ def writable(path):
 
 
 FILES = [
-    "verification/suite/shipped/map2d/test_static.py",
+    "environments/map2d/suite/test_static.py",
     "verification/diagnosis/report.py",
     "sandbox/inner/serve.py",
 ]
