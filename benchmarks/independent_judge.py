@@ -19,7 +19,7 @@ from benchmarks.witness import Witness
 from tdac_agent.sandbox import Child, ControllerFault, Limits
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_agent.tasks.task import Task, write_workdir
-from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.child_pool import ChildPool
 
 Loop = dict[str, Any]
 
@@ -74,8 +74,8 @@ class IndependentJudge:
             return self._jittered(begin, all_seeds)
 
     def _child(self, workdir: Path, source: bytes) -> Child:
-        child = _nursery().take("auto", self.limits)
-        child.furnish(workdir, source)
+        child = _child_pool().take("auto", self.limits)
+        child.copy_files(workdir, source)
         return child
 
     def _jittered(self, begin: Any, all_seeds: bool) -> Judgement:
@@ -145,11 +145,11 @@ class IndependentJudge:
 
 
 @functools.cache
-def _nursery() -> Nursery:
+def _child_pool() -> ChildPool:
     """The child pool of this process; it ends with the process."""
-    nursery = Nursery()
-    Finalize(None, nursery.close, exitpriority=1)
-    return nursery
+    child_pool = ChildPool()
+    Finalize(None, child_pool.close, exitpriority=1)
+    return child_pool
 
 
 def _wheels(child: Child, observation: Any) -> Any:

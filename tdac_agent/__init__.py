@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tdac_agent.evaluation.policy import Policy, load_controller
     from tdac_agent.evaluation.robust import verify_robust
     from tdac_agent.runs.history import Told, gather_run
-    from tdac_agent.runs.records import Run, load_run
+    from tdac_agent.runs.run_record import Run, load_run
     from tdac_agent.synthesis.loop import synthesize
     from tdac_agent.tasks.disturbance import Disturbance
     from tdac_agent.tasks.task import Task, load_task

@@ -10,7 +10,7 @@ from tdac_agent.models.budget import (
     Budget,
     BudgetExhausted,
     Limit,
-    told_usd,
+    format_usd,
 )
 
 __all__ = [
@@ -20,5 +20,5 @@ __all__ = [
     "Budget",
     "BudgetExhausted",
     "Limit",
-    "told_usd",
+    "format_usd",
 ]

@@ -16,7 +16,7 @@ _RESOLUTION = 0.125
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class MarginBounds:
     """Open interval of inflation margins that are not yet known to fail."""
 
     above: float = 0.0
@@ -39,7 +39,7 @@ class Remedy:
     scale: Mapping[str, float] = field(default_factory=dict)
     switch_on: Mapping[str, float] = field(default_factory=dict)
 
-    def apply(self, parameters: P, bounds: Bounds) -> P:
+    def apply(self, parameters: P, bounds: MarginBounds) -> P:
         """Returns the changed parameters, clipped to their bounds."""
         values = {n: getattr(parameters, n) * f for n, f in self.scale.items()}
         values |= {n: getattr(parameters, n) + d for n, d in self.add.items()}
@@ -53,14 +53,14 @@ class Remedy:
         return changed(parameters, values | off)
 
 
-def _wider(margin: float, bounds: Bounds, step: float) -> float:
+def _wider(margin: float, bounds: MarginBounds, step: float) -> float:
     if bounds.below == math.inf:
         return margin + step
     gap = bounds.below - margin
     return margin + 0.5 * gap if gap > _RESOLUTION * step else margin
 
 
-def _narrower(margin: float, bounds: Bounds, step: float) -> float:
+def _narrower(margin: float, bounds: MarginBounds, step: float) -> float:
     gap = margin - bounds.above
     return margin - 0.5 * gap if gap > _RESOLUTION * step else margin
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tdac_agent.builtin.parameters import P, Tuned, about, changed, names_of
-from tdac_agent.builtin.remedies import MARGIN, Bounds
+from tdac_agent.builtin.remedies import MARGIN, MarginBounds
 from tdac_agent.prompting.rules import MAX_RULE_CHARS
 from tdac_agent.verification.diagnosis.report import Cause, Report
 
@@ -36,7 +36,7 @@ _CAUSES_BY_TEST: Mapping[str, Cause] = {
 
 
 def repair(
-    parameters: P, report: Report, bounds: Bounds, attempt: int
+    parameters: P, report: Report, bounds: MarginBounds, attempt: int
 ) -> tuple[P, list[Change]]:
     """Applies the remedies for all failures; returns the parameters and the changes.
 
@@ -99,7 +99,7 @@ def _random_step(parameters: P, seed: int) -> P:
 
 
 def write_rules(
-    parameters: Tuned, changes: Iterable[Change], bounds: Bounds, iteration: int
+    parameters: Tuned, changes: Iterable[Change], bounds: MarginBounds, iteration: int
 ) -> list[str]:
     """Returns rules that state the parameters, for people and for `read_rules`.
 
@@ -150,7 +150,7 @@ def _clause(
 _RULE = re.compile(r"^(set|keep) ([A-Z_]+) ([=<>]) (\d+(?:\.\d+)?)\b")
 
 
-def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, Bounds]:
+def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, MarginBounds]:
     """Reads parameters and margins from rules of `write_rules`; skips other rules.
 
     Later rules override earlier ones.
@@ -168,10 +168,12 @@ def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, Bounds]:
             above = max(above, value)
         else:
             below = min(below, value)
-    return changed(kind(), values), Bounds(above, below)
+    return changed(kind(), values), MarginBounds(above, below)
 
 
-def learn_bounds(bounds: Bounds, parameters: Tuned, report: Report) -> Bounds:
+def learn_bounds(
+    bounds: MarginBounds, parameters: Tuned, report: Report
+) -> MarginBounds:
     """Returns the margins not yet known to fail after another report."""
     causes, margin = first_tests(report), parameters.inflation_margin
     above, below = bounds.above, bounds.below
@@ -179,4 +181,4 @@ def learn_bounds(bounds: Bounds, parameters: Tuned, report: Report) -> Bounds:
         above = max(above, margin)
     if "no motion" in causes:
         below = min(below, margin)
-    return Bounds(above, below) if above < below else Bounds(above)
+    return MarginBounds(above, below) if above < below else MarginBounds(above)

@@ -10,7 +10,7 @@ import pandas as pd
 from tdac_agent.campaign.plan import Plan
 from tdac_agent.errors import RunError
 from tdac_agent.metrics import Frames, frames_of, summarise
-from tdac_agent.runs.records import RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import RUN_FILE, Run, load_run
 from tdac_agent.storage.files import write_atomic
 
 TABLES = ("runs.csv", "candidates.csv", "summary.csv")

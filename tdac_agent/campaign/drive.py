@@ -49,7 +49,9 @@ class _Queue:
             self.retries.append((update.planned, update.outcome))
 
 
-def look(plan: Plan, shard: Shard, runs: Path) -> tuple[Progress, list[PlannedRun]]:
+def read_progress(
+    plan: Plan, shard: Shard, runs: Path
+) -> tuple[Progress, list[PlannedRun]]:
     """Reads the progress and the remaining runs of a campaign from its folder."""
     progress, left = Progress.of(plan, shard), []
     for planned in plan.all(shard):
@@ -61,7 +63,7 @@ def look(plan: Plan, shard: Shard, runs: Path) -> tuple[Progress, list[PlannedRu
     return progress, left
 
 
-def carry_out(
+def run_all(
     progress: Progress,
     left: list[PlannedRun],
     terms: Terms,
@@ -117,7 +119,7 @@ def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
         yield
 
 
-def foreign(plan: Plan, runs: Path) -> list[str]:
+def unplanned_folders(plan: Plan, runs: Path) -> list[str]:
     """Run folders that are not in the plan, e.g. of a changed task or file."""
     known = {cell.folder for cell in plan.cells}
     return sorted(path.name for path in runs.iterdir() if path.name not in known)

@@ -22,7 +22,7 @@ class Begun:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class RecordReported:
     """A run has reported a journal record."""
 
     planned: PlannedRun
@@ -45,14 +45,14 @@ class Died:
     reason: str
 
 
-Update = Begun | Told | Ended | Died
+Update = Begun | RecordReported | Ended | Died
 Next = Callable[[], PlannedRun | None]
 """Returns the next run, or None; None is final if no run is under way."""
 Executor = Callable[[Terms, Next], Generator[Update]]
 
 
 @dataclass(slots=True)
-class Bereaved:
+class RetryQueue:
     """Hands out runs; those whose process has died come before all others.
 
     Attributes:

@@ -16,7 +16,14 @@ from pathlib import Path
 from typing import IO, Any
 
 from tdac_agent.campaign.cores import core_locks
-from tdac_agent.campaign.executor import Begun, Bereaved, Ended, Next, Told, Update
+from tdac_agent.campaign.executor import (
+    Begun,
+    Ended,
+    Next,
+    RecordReported,
+    RetryQueue,
+    Update,
+)
 from tdac_agent.campaign.perform import Outcome, Terms
 from tdac_agent.campaign.plan import PlannedRun
 
@@ -149,7 +156,7 @@ def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
         Fault: There is no private folder for the core locks.
     """
     core_locks()  # fails here once instead of in every worker
-    runs = Bereaved(next_run)
+    runs = RetryQueue(next_run)
     with (Path(terms.folder) / ERRORS).open("ab") as errors:
         pool = _Pool(terms, errors)
         try:
@@ -162,7 +169,7 @@ def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
             pool.close()
 
 
-def _hand_out(pool: _Pool, runs: Bereaved) -> Iterator[Update]:
+def _hand_out(pool: _Pool, runs: RetryQueue) -> Iterator[Update]:
     """Gives each idle worker a run, while there are runs."""
     while len(pool.busy) < pool.terms.workers:
         planned = runs.next()
@@ -173,7 +180,7 @@ def _hand_out(pool: _Pool, runs: Bereaved) -> Iterator[Update]:
         yield Begun(planned)
 
 
-def _receive(pool: _Pool, worker: _Worker, runs: Bereaved) -> Iterator[Update]:
+def _receive(pool: _Pool, worker: _Worker, runs: RetryQueue) -> Iterator[Update]:
     """The updates in a worker's messages, or its death."""
     planned, messages = worker.planned, worker.messages()
     if messages is None:
@@ -190,4 +197,4 @@ def _receive(pool: _Pool, worker: _Worker, runs: Bereaved) -> Iterator[Update]:
             worker.planned = None
             yield Ended(planned, Outcome(**message["outcome"]))
         else:
-            yield Told(planned, message["record"])
+            yield RecordReported(planned, message["record"])

@@ -12,7 +12,7 @@ from collections.abc import Generator
 from typing import Any
 
 from tdac_agent.campaign.cores import own_core
-from tdac_agent.campaign.executor import Begun, Bereaved, Ended, Next, Update
+from tdac_agent.campaign.executor import Begun, Ended, Next, RetryQueue, Update
 from tdac_agent.campaign.perform import Outcome, Terms, perform
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import Fault, ProviderError
@@ -36,9 +36,9 @@ def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
         Fault: Ray does not start, or cannot be reached.
     """
     ray = _start(terms.workers)
-    # No retries by Ray: `Bereaved` repeats a task whose process has died.
+    # No retries by Ray: `RetryQueue` repeats a task whose process has died.
     task = ray.remote(num_cpus=1, max_retries=0)(_in_task)
-    runs = Bereaved(next_run)
+    runs = RetryQueue(next_run)
     pending: dict[Any, PlannedRun] = {}
     try:
         while True:
@@ -59,7 +59,7 @@ def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
         ray.shutdown()
 
 
-def _update(ray: Any, reference: Any, planned: PlannedRun, runs: Bereaved) -> Update:
+def _update(ray: Any, reference: Any, planned: PlannedRun, runs: RetryQueue) -> Update:
     try:
         outcome: Outcome = ray.get(reference)
     except ray.exceptions.WorkerCrashedError as error:

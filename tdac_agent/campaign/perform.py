@@ -17,8 +17,8 @@ from tdac_agent.errors import Fault
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
-from tdac_agent.runs.records import JOURNAL, RUN_FILE, Run
-from tdac_agent.runs.resume import run_there
+from tdac_agent.runs.resume import existing_run
+from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task import Task, load_task
@@ -172,7 +172,7 @@ def _seed(planned: PlannedRun, task: Task, folder: Path) -> int:
     """
     if planned.seed is not None:
         return planned.seed
-    before = run_there(folder)
+    before = existing_run(folder)
     if before is not None and before.seed is not None:
         return before.seed
     return seed_of(f"run {planned.index}".encode(), task)

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
-from tdac_agent.campaign.wishes import wishes_of
+from tdac_agent.campaign.permissions import required_permissions
 from tdac_agent.models.choice import Options, answers_sha256
 from tdac_agent.models.prices import FREE
 from tdac_agent.prompting.prompt import VARIANTS, generate_prompt, load_template
-from tdac_agent.runs.records import Setting
+from tdac_agent.runs.run_record import Setting
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.tasks.task_file import bundled_task
 from tdac_agent.tasks.trust import permit
@@ -162,7 +162,7 @@ def make_plan(config: CampaignConfig, base: Path, *, trust: bool = False) -> Pla
     tasks = {
         name: (path := _task(name, base), load_task(path)) for name in config.tasks
     }
-    wishes = wishes_of(config, base, [task for _, task in tasks.values()])
+    wishes = required_permissions(config, base, [task for _, task in tasks.values()])
     permit(f"the campaign {config.name}", wishes, trust=trust)
     tasks = {n: (path, replace(t, trusted=True)) for n, (path, t) in tasks.items()}
     prompts = {name: _prompt(name, base) for name in config.prompts}

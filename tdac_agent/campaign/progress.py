@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from tdac_agent.campaign.executor import Begun, Died, Ended, Told, Update
+from tdac_agent.campaign.executor import Begun, Died, Ended, RecordReported, Update
 from tdac_agent.campaign.perform import Outcome
 from tdac_agent.campaign.plan import Cell, Plan, PlannedRun, Shard
 
@@ -138,7 +138,7 @@ class Progress:
         match update:
             case Begun():
                 self.doing[name] = Doing(update.planned, time.monotonic())
-            case Told() if name in self.doing:
+            case RecordReported() if name in self.doing:
                 self.doing[name].said = _activity(update.record)
             case Died():
                 self.deaths += 1

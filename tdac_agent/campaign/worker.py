@@ -18,7 +18,7 @@ from tdac_agent.campaign.cores import own_core
 from tdac_agent.campaign.perform import Terms, perform
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.judge.workers import end_with_parent
+from tdac_agent.verification.judge.worker_pool import end_with_parent
 
 REPORTED_EVENTS = frozenset({"call.intent", "call.fault", "verify.start"})
 REPORTED_KEYS = ("event", "kind", "k", "j", "fault")

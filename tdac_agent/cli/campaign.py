@@ -14,15 +14,20 @@ from typing import Any
 from rich.markup import escape
 
 from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
-from tdac_agent.campaign.drive import campaign_folder, carry_out, foreign, look
+from tdac_agent.campaign.drive import (
+    campaign_folder,
+    read_progress,
+    run_all,
+    unplanned_folders,
+)
 from tdac_agent.campaign.executor import Executor
 from tdac_agent.campaign.perform import Terms
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.cli.campaign_live import LiveView
-from tdac_agent.cli.campaign_table import make_console, told_counts
+from tdac_agent.cli.campaign_table import make_console, progress_line
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.provider import Provider
@@ -33,7 +38,7 @@ FOLDER = Path("campaigns")
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class CampaignCommand:
     """The settings of a `tdac campaign` command.
 
     Attributes:
@@ -74,7 +79,7 @@ class Wanted:
         return shlex.join(words)
 
 
-def run(wanted: Wanted, as_json: bool) -> int:
+def run(wanted: CampaignCommand, as_json: bool) -> int:
     """Runs a campaign and prints its progress and results; returns the exit code."""
     console = make_console(stderr=as_json)
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
@@ -91,7 +96,7 @@ def run(wanted: Wanted, as_json: bool) -> int:
             keep=config.keep,
             key_over_http=wanted.key_over_http,
         )
-        progress, remaining = look(plan, shard, terms.runs)
+        progress, remaining = read_progress(plan, shard, terms.runs)
         check_models(plan, remaining, config, key_over_http=wanted.key_over_http)
         _print_heading(console, config, progress, folder)
         _print_notes(console, plan, terms)
@@ -149,7 +154,7 @@ def _run_remaining(
     console: Console,
 ) -> None:
     with LiveView(console, progress, terms) as view:
-        carry_out(progress, remaining, terms, _executor(executor), view.saw)
+        run_all(progress, remaining, terms, _executor(executor), view.saw)
 
 
 def _executor(name: str) -> Executor:
@@ -179,20 +184,20 @@ def _print_heading(
 
 def _print_notes(console: Console, plan: Plan, terms: Terms) -> None:
     for line in model_warnings(models_of(plan.cells)):
-        tell(console, f"note: {line}", "yellow")
-    others = foreign(plan, terms.runs)
+        print_sentences(console, f"note: {line}", "yellow")
+    others = unplanned_folders(plan, terms.runs)
     if others:
         kinds = f"{len(others)} other kind{'' if len(others) == 1 else 's'} of run"
         note = f"ignoring {kinds} in {terms.runs}: of an earlier file, task, suite or"
-        tell(console, f"note: {note} version", "yellow")
+        print_sentences(console, f"note: {note} version", "yellow")
 
 
 def _print_ending(
-    console: Console, progress: Progress, folder: Path, wanted: Wanted
+    console: Console, progress: Progress, folder: Path, wanted: CampaignCommand
 ) -> None:
     for problem, count in progress.problems.most_common():
-        tell(console, f"{count} × {problem}", "yellow")
-    console.print(told_counts(progress), soft_wrap=True)
+        print_sentences(console, f"{count} × {problem}", "yellow")
+    console.print(progress_line(progress), soft_wrap=True)
     console.print(
         f"  tables: {folder}/runs.csv, candidates.csv, summary.csv\n"
         f"  HTML report: tdac report {shlex.quote(str(folder))}",

@@ -10,18 +10,18 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.campaign.config import find_config, read_config
-from tdac_agent.campaign.drive import look
+from tdac_agent.campaign.drive import read_progress
 from tdac_agent.campaign.perform import RUNS
 from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
-from tdac_agent.cli.campaign import Wanted, with_limits
+from tdac_agent.cli.campaign import CampaignCommand, with_limits
 from tdac_agent.cli.campaign_table import labels_of, make_console, make_table
-from tdac_agent.cli.sentences import tell
-from tdac_agent.models.budget import told_usd
+from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.models.budget import format_usd
 from tdac_agent.models.choice import check_name
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
-from tdac_agent.synthesis.outlook import Outlook, foresee
+from tdac_agent.synthesis.cost_forecast import CostForecast, predict_cost
 
 LEGEND = (
     "K: iterations; J: repairs per iteration; asked: questions of all runs if no "
@@ -31,7 +31,7 @@ LEGEND = (
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class PlanRow:
     """The maximum cost of one kind of run.
 
     Attributes:
@@ -53,7 +53,7 @@ class Row:
     cost_most: float | None
 
 
-def run(wanted: Wanted, as_json: bool) -> int:
+def run(wanted: CampaignCommand, as_json: bool) -> int:
     """Prints the plan and returns 0; asks no model, needs no key, writes nothing."""
     console = make_console(stderr=as_json)
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
@@ -63,7 +63,7 @@ def run(wanted: Wanted, as_json: bool) -> int:
     with console.status("reading the tasks …"):
         plan = make_plan(config, file.parent, trust=wanted.trust)
     prices, folder = load_prices(), wanted.folder(config)
-    progress, _ = look(plan, shard, folder / RUNS)
+    progress, _ = read_progress(plan, shard, folder / RUNS)
     rows = [
         _row(tally.cell, tally.planned, plan, prices)
         for tally in progress.tallies.values()
@@ -72,19 +72,19 @@ def run(wanted: Wanted, as_json: bool) -> int:
         sys.stdout.write(json.dumps([asdict(row) for row in rows], indent=2) + "\n")
         return 0
     console.print(_table([t.cell for t in progress.tallies.values()], rows))
-    tell(console, LEGEND, "dim")
+    print_sentences(console, LEGEND, "dim")
     if progress.before:
         done = f"{progress.before} of {progress.planned} runs in {folder} have already"
-        tell(console, f"{done} finished; they are counted above, too")
+        print_sentences(console, f"{done} finished; they are counted above, too")
     for line in _lines(rows, config.max_cost, config.max_tokens, prices):
-        tell(console, line)
+        print_sentences(console, line)
     for line in model_warnings(models_of(plan.cells)):
-        tell(console, f"note: {line}", "yellow")
+        print_sentences(console, f"note: {line}", "yellow")
     return 0
 
 
-def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> Row:
-    outlook: Outlook = foresee(
+def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
+    forecast: CostForecast = predict_cost(
         plan.tasks[cell.task],
         cell.learner,
         cell.optimizer,
@@ -96,19 +96,19 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> Row:
         base_url=cell.base_url,
         max_output=cell.max_output,
     )
-    once, most = outlook.cost_once, outlook.cost_most
-    return Row(
+    once, most = forecast.cost_once, forecast.cost_most
+    return PlanRow(
         cell.folder,
         runs,
         cell.iterations,
         cell.patience,
-        runs * outlook.questions,
+        runs * forecast.questions,
         None if once is None else runs * once,
         None if most is None else runs * most,
     )
 
 
-def _table(cells: list[Cell], rows: list[Row]) -> Table:
+def _table(cells: list[Cell], rows: list[PlanRow]) -> Table:
     labels = labels_of(cells)
     figures = ("runs", "K", "J", "asked", "USD at\nmost", "asked 3\ntimes")
     table = make_table(labels.names, figures)
@@ -123,7 +123,7 @@ def _table(cells: list[Cell], rows: list[Row]) -> Table:
 
 
 def _lines(
-    rows: list[Row],
+    rows: list[PlanRow],
     max_cost: float | None,
     max_tokens: int | None,
     prices: PriceList,
@@ -135,10 +135,10 @@ def _lines(
     if total or unknown:
         kinds = f", excluding {unknown} kinds of unknown price" if unknown else ""
         lines.append(
-            f"if no controller ever passes: at most {told_usd(total)}{kinds}; a run "
+            f"if no controller ever passes: at most {format_usd(total)}{kinds}; a run "
             "that is verified early costs a small part of that"
         )
-        bounds = [told_usd(max_cost)] if max_cost is not None else []
+        bounds = [format_usd(max_cost)] if max_cost is not None else []
         bounds += [f"{max_tokens} tokens"] if max_tokens is not None else []
         lines.append(f"limit of all runs together: {' and '.join(bounds) or 'none'}")
         lines.append(f"prices of {prices.dated}: {price_file()}")

@@ -91,7 +91,7 @@ def campaign(
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
     given = {name: value for name, value in limits.items() if value is not None}
     places = (executor, workers, shard, out)
-    wanted = command.Wanted(config, given, *places, trust, key_over_http)
+    wanted = command.CampaignCommand(config, given, *places, trust, key_over_http)
     if dry_run:
         from tdac_agent.cli import campaign_dry_run as dry
 

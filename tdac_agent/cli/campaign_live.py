@@ -17,13 +17,13 @@ from tdac_agent.campaign.perform import Outcome, Terms
 from tdac_agent.campaign.progress import Doing, Progress, Tally
 from tdac_agent.cli.campaign_table import (
     COLOURS,
+    format_duration,
     labels_of,
     make_table,
-    told_counts,
-    told_time,
+    progress_line,
 )
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 
 FRAME_LINES = 10
 """Screen lines outside the rows of the table."""
@@ -61,7 +61,9 @@ class LiveView:
         match update:
             case Died():
                 death = f"the process of {update.planned.name} died: {update.reason}"
-                tell(self._console, f"{death}; a new one continues its run", "yellow")
+                print_sentences(
+                    self._console, f"{death}; a new one continues its run", "yellow"
+                )
             case Ended() if not self._console.is_terminal:
                 self._console.print(self._line(update.outcome), soft_wrap=True)
             case Ended() if not update.outcome.finished:
@@ -72,7 +74,7 @@ class LiveView:
         why = f": {outcome.reason}" if outcome.reason else ""
         done = f"[{self._progress.finished}/{self._progress.planned}]"
         colour = COLOURS.get(outcome.status, "yellow")
-        status = f"{outcome.status}{at}, {told_time(outcome.seconds)}{why}"
+        status = f"{outcome.status}{at}, {format_duration(outcome.seconds)}{why}"
         return f"{escape(done)} {escape(outcome.name)} [{colour}]{escape(status)}[/]"
 
     def _render(self) -> RenderableType:
@@ -83,7 +85,7 @@ class LiveView:
         table = self._table(tally for tally in tallies if tally in shown)
         more = len(tallies) - len(shown)
         others = [f"[dim]and {more} more kinds of run[/]"] if more else []
-        counts = told_counts(self._progress, going=True)
+        counts = progress_line(self._progress, going=True)
         return Group(table, *others, self._current_runs(doing), self._bar(), counts)
 
     def _sort_key(self, tally: Tally) -> tuple[bool, bool, bool]:
@@ -112,7 +114,7 @@ class LiveView:
         for one in doing:
             labels = " ".join(self._labels.of(one.planned.cell))
             name = f"[cyan]▸[/] {escape(labels)} [dim]r{one.planned.index:04d}[/]"
-            grid.add_row(name, told_time(time.monotonic() - one.since), one.said)
+            grid.add_row(name, format_duration(time.monotonic() - one.since), one.said)
         return grid
 
     def _bar(self) -> Padding:

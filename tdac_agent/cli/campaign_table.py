@@ -12,7 +12,7 @@ from rich.table import Table
 from tdac_agent.campaign.plan import Cell
 from tdac_agent.campaign.progress import Progress
 from tdac_agent.cli.console import Console
-from tdac_agent.models.budget import told_usd
+from tdac_agent.models.budget import format_usd
 
 COLOURS = {"verified": "green", "not verified": "red"}
 LABEL_WIDTH = 6
@@ -71,26 +71,28 @@ def make_table(labels: Iterable[str], figures: Iterable[str]) -> Table:
     return table
 
 
-def told_counts(progress: Progress, *, going: bool = False) -> str:
+def progress_line(progress: Progress, *, going: bool = False) -> str:
     """The progress of a campaign in one line; `going` if it is still running."""
     parts = [f"[bold]{progress.finished} of {progress.planned}[/] runs have ended"]
     if going:
         parts.append(f"{len(progress.doing)} running")
-        parts.append(f"{told_time(progress.seconds)} elapsed")
+        parts.append(f"{format_duration(progress.seconds)} elapsed")
         left = progress.seconds_left
-        parts.append("" if left is None else f"about {told_time(left)} left")
+        parts.append("" if left is None else f"about {format_duration(left)} left")
     elif progress.now:
-        parts.append(f"{progress.now} of them now, in {told_time(progress.seconds)}")
+        parts.append(
+            f"{progress.now} of them now, in {format_duration(progress.seconds)}"
+        )
     if progress.deaths:
         parts.append(f"{progress.deaths} processes died and were replaced")
     if progress.tokens:
-        parts.append(f"{progress.tokens:,} tokens, {told_usd(progress.cost)}")
+        parts.append(f"{progress.tokens:,} tokens, {format_usd(progress.cost)}")
     if progress.exhausted:
         parts.append("[yellow]the budget is exhausted[/]")
     return ", ".join(part for part in parts if part)
 
 
-def told_time(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """A duration in readable form: `41 s`, `12:05 min`, `7:30 h`."""
     whole = round(seconds)
     if whole < 100:

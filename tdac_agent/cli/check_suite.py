@@ -10,13 +10,13 @@ from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import TaskFlags, check_tier
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.tasks.task import called
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite.privileged import REFERENCE
-from tdac_agent.verification.suite.proof import Row, SuiteCheck
+from tdac_agent.verification.suite.proof import ProofRow, SuiteCheck
 from tdac_agent.verification.suite_check import check_suite
 
 
@@ -55,9 +55,9 @@ def run(
 
 def _show(check: SuiteCheck, task: str, console: Console) -> None:
     for note in check.notes:
-        tell(console, f"note: {note}", "yellow")
+        print_sentences(console, f"note: {note}", "yellow")
     for problem in check.problems:
-        tell(console, problem, "red")
+        print_sentences(console, problem, "red")
     console.print(_table(check))
     colour, word = ("green", "proven") if check.proven else ("red", "not proven")
     console.print(
@@ -89,12 +89,12 @@ def _table(check: SuiteCheck) -> Table:
     return table
 
 
-def _result(row: Row) -> str:
+def _result(row: ProofRow) -> str:
     if 0 < row.passed < row.repeats:
         return f"pass {row.passed} of {row.repeats}"
     return "pass" if row.passed else "fail"
 
 
-def _failed_tests(row: Row) -> str:
+def _failed_tests(row: ProofRow) -> str:
     names = [test.partition("::")[2] for test in row.failures]
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")

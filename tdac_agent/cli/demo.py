@@ -6,8 +6,8 @@ from pathlib import Path
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.synth import next_folder, synthesise_and_show
-from tdac_agent.runs.records import load_run
 from tdac_agent.runs.replay import DEMO
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.tasks.task import load_task
 
 _ABOUT = (

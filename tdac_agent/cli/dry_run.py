@@ -7,13 +7,13 @@ from typing import Any
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import TaskFlags
-from tdac_agent.cli.sentences import tell
-from tdac_agent.models.budget import told_usd
-from tdac_agent.models.choice import Options, check_name, missing_before
+from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.models.budget import format_usd
+from tdac_agent.models.choice import Options, check_name, missing_for_name
 from tdac_agent.models.prices import SHIPPED, load_prices, price_file
 from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
 from tdac_agent.prompting.prompt import load_template
-from tdac_agent.synthesis.outlook import Outlook, foresee
+from tdac_agent.synthesis.cost_forecast import CostForecast, predict_cost
 
 
 def run(
@@ -33,7 +33,7 @@ def run(
         k: Iterations.
         j: Edits per iteration.
         refine: Whether failures become rules.
-        as_json: Whether to print the outlook as JSON.
+        as_json: Whether to print the forecast as JSON.
     """
     learner = models["learner"]
     optimizer = models["optimizer"] or learner
@@ -44,9 +44,9 @@ def run(
     over_http = models["key_over_http"]
     options = Options(task.setting, models["base_url"], over_http)
     missing = [
-        m for name in (learner, optimizer) for m in missing_before(name, options)
+        m for name in (learner, optimizer) for m in missing_for_name(name, options)
     ]
-    outlook = foresee(
+    forecast = predict_cost(
         task,
         learner,
         optimizer,
@@ -61,81 +61,81 @@ def run(
         max_tokens=models["max_tokens"],
     )
     if as_json:
-        sys.stdout.write(outlook.model_dump_json(indent=2) + "\n")
+        sys.stdout.write(forecast.model_dump_json(indent=2) + "\n")
         return 0
-    sys.stdout.write(outlook.prompt)
+    sys.stdout.write(forecast.prompt)
     sys.stdout.flush()
     console = Console(stderr=True, highlight=False)
-    unbounded = _unbounded(outlook) if models["base_url"] is None else []
-    for line in [*_estimates(outlook), *_still_needed([*missing, *unbounded])]:
-        tell(console, line)
+    unbounded = _unbounded(forecast) if models["base_url"] is None else []
+    for line in [*_estimates(forecast), *_still_needed([*missing, *unbounded])]:
+        print_sentences(console, line)
     return 0
 
 
-def _estimates(outlook: Outlook) -> list[str]:
-    k, j = outlook.iterations, outlook.patience
+def _estimates(forecast: CostForecast) -> list[str]:
+    k, j = forecast.iterations, forecast.patience
     lines = [
-        f"prompt: about {outlook.prompt_tokens} tokens (an estimate: a third of its "
+        f"prompt: about {forecast.prompt_tokens} tokens (an estimate: a third of its "
         "bytes; models count differently)",
-        f"answer: at most {outlook.answer_tokens} tokens",
+        f"answer: at most {forecast.answer_tokens} tokens",
     ]
-    if outlook.cost_most == 0.0:
+    if forecast.cost_most == 0.0:
         return [*lines, "cost: none; no model is asked"]
-    if outlook.first_cost is not None:
-        reserved = told_usd(outlook.first_cost)
+    if forecast.first_cost is not None:
+        reserved = format_usd(forecast.first_cost)
         lines.append(f"first question: at most {reserved}, reserved before it is asked")
-    whole = f"whole run: {outlook.questions} questions (K={k}, J={j})"
+    whole = f"whole run: {forecast.questions} questions (K={k}, J={j})"
     whole += " if no controller passes"
-    if outlook.cost_once is not None and outlook.cost_most is not None:
+    if forecast.cost_once is not None and forecast.cost_most is not None:
         whole += (
-            f": at most {told_usd(outlook.cost_once)}, or "
-            f"{told_usd(outlook.cost_most)} if each question is asked three times"
+            f": at most {format_usd(forecast.cost_once)}, or "
+            f"{format_usd(forecast.cost_most)} if each question is asked three times"
         )
-    return [*lines, whole, *_budget(outlook), *_prices(outlook)]
+    return [*lines, whole, *_budget(forecast), *_prices(forecast)]
 
 
-def _budget(outlook: Outlook) -> list[str]:
+def _budget(forecast: CostForecast) -> list[str]:
     """The limits of a run, and whether they cover its first question."""
     limits = []
-    if outlook.max_cost is not None:
-        default = ", by default" if outlook.max_cost == MAX_COST else ""
-        limits.append(f"{told_usd(outlook.max_cost)} (--max-cost{default})")
-    if outlook.max_tokens is not None:
-        limits.append(f"{outlook.max_tokens} tokens (--max-tokens)")
+    if forecast.max_cost is not None:
+        default = ", by default" if forecast.max_cost == MAX_COST else ""
+        limits.append(f"{format_usd(forecast.max_cost)} (--max-cost{default})")
+    if forecast.max_tokens is not None:
+        limits.append(f"{forecast.max_tokens} tokens (--max-tokens)")
     if not limits:
         return []
     verdict = "enough for the first question; the run stops before exceeding it"
-    if outlook.first_needs:
-        needs = outlook.first_needs
+    if forecast.first_needs:
+        needs = forecast.first_needs
         verdict = f"not enough for the first question: give {needs} or more"
     return [f"budget: {' and '.join(limits)}: {verdict}"]
 
 
-def _unbounded(outlook: Outlook) -> list[str]:
+def _unbounded(forecast: CostForecast) -> list[str]:
     """Flags needed for vendor models without a price; others have a token limit."""
-    if outlook.max_tokens is not None:
+    if forecast.max_tokens is not None:
         return []
     return [
         f"--max-tokens N, since no price of {name} is known to limit the run's cost"
-        for name in outlook.unknown_prices
+        for name in forecast.unknown_prices
         if name.partition(":")[0] in BY_VENDOR
     ]
 
 
-def _prices(outlook: Outlook) -> list[str]:
+def _prices(forecast: CostForecast) -> list[str]:
     """The source of the prices, and the models without one."""
     lines = []
-    if outlook.uncounted:
-        names = " and ".join(outlook.uncounted)
+    if forecast.uncounted:
+        names = " and ".join(forecast.uncounted)
         lines.append(f"cost of {names}: not counted; tdac cannot know it")
-    if outlook.unknown_prices:
-        names = " and ".join(outlook.unknown_prices)
+    if forecast.unknown_prices:
+        names = " and ".join(forecast.unknown_prices)
         lines.append(
             f"price of {names}: unknown; to see the cost, add it to a copy of "
             f"{SHIPPED} at ~/.config/tdac/prices.yaml (or at the path in $TDAC_PRICES)"
         )
-    if outlook.unknown_prices or outlook.first_cost is not None:
-        lines.append(f"prices of {outlook.prices_dated}: {price_file()}")
+    if forecast.unknown_prices or forecast.first_cost is not None:
+        lines.append(f"prices of {forecast.prices_dated}: {price_file()}")
     return lines
 
 

@@ -17,7 +17,7 @@ from tdac_agent.evaluation.entrants import entrants_of
 from tdac_agent.evaluation.evaluate import evaluate, load_tasks
 from tdac_agent.evaluation.evaluation_report import Evaluation
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError
 
@@ -62,9 +62,9 @@ def run(
         doing = escape(f"{task}: {policy}")
         bar.update(row, completed=count, successes=successes, doing=doing, refresh=True)
 
-    with Nursery() as nursery:
+    with ChildPool() as child_pool:
         loaded = load_tasks(tasks)
-        with WarmJudge(nursery) as judge, bar:
+        with WarmJudge(child_pool) as judge, bar:
             found = evaluate(
                 policies,
                 loaded,

@@ -9,12 +9,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.evaluation.evaluation_report import (
-    Comparison,
     EvaluatedTask,
     Evaluation,
-    Row,
+    PairedComparison,
+    PolicyRow,
     Timing,
 )
 from tdac_agent.tasks.units import UNITS
@@ -46,7 +46,7 @@ def show_evaluation(found: Evaluation, console: Console) -> None:
         console.print(_table(found, task, rows, timings))
         console.print()
         for line in _notes(rows):
-            tell(console, line, indent=2)
+            print_sentences(console, line, indent=2)
     console.print(LEGEND, style="dim", highlight=False)
     if found.comparisons:
         console.print()
@@ -57,7 +57,7 @@ def show_evaluation(found: Evaluation, console: Console) -> None:
 def _table(
     found: Evaluation,
     task: EvaluatedTask,
-    rows: Sequence[Row],
+    rows: Sequence[PolicyRow],
     timings: dict[tuple[str, str], Timing],
 ) -> Table:
     units = UNITS[task.unit]
@@ -108,7 +108,7 @@ def _plain_table(title: str) -> Table:
     )
 
 
-def _notes(rows: Sequence[Row]) -> list[str]:
+def _notes(rows: Sequence[PolicyRow]) -> list[str]:
     """Notes on the policies, and the reasons of their failures with counts."""
     lines = []
     for row in rows:
@@ -119,7 +119,7 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
-def comparison_table(pairs: Sequence[Comparison], *, several: bool) -> Table:
+def comparison_table(pairs: Sequence[PairedComparison], *, several: bool) -> Table:
     """One row per pair of policies; with a column for the task if `several`."""
     table = _plain_table("The same episodes, paired")
     for name in (*(("task",) if several else ()), "policies"):
@@ -138,20 +138,20 @@ def comparison_table(pairs: Sequence[Comparison], *, several: bool) -> Table:
     return table
 
 
-def _pair(pair: Comparison) -> str:
+def _pair(pair: PairedComparison) -> str:
     """The two names, joined by `>` if the difference is significant, else by `~`."""
     better, worse = _ordered(pair)
     return f"{better} {'>' if pair.p < SIGNIFICANT else '~'} {worse}"
 
 
-def _ordered(pair: Comparison) -> tuple[str, str]:
+def _ordered(pair: PairedComparison) -> tuple[str, str]:
     """The two names; the one that reaches the goal more often comes first."""
     if pair.only_other > pair.only_one:
         return pair.other, pair.one
     return pair.one, pair.other
 
 
-def _counts(pair: Comparison) -> str:
+def _counts(pair: PairedComparison) -> str:
     few, many = sorted((pair.only_one, pair.only_other))
     return f"{many}:{few}"
 

@@ -52,9 +52,9 @@ def map_command(
     Without start and goal, the preview has rulers to read off pixel coordinates.
     """
     from tdac_agent.cli import maps
-    from tdac_envs.mapping.params import Said
+    from tdac_envs.mapping.params import ReadingOptions
 
-    said = Said(polarity, threshold)
+    said = ReadingOptions(polarity, threshold)
     maps.run(image, start, goal, robot_radius, snap, metres, said, preset, out, as_json)
 
 

@@ -17,8 +17,8 @@ from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import Candidate, Preset
 from tdac_envs.mapping.image import load_image
 from tdac_envs.mapping.map_folder import write_map
-from tdac_envs.mapping.params import MapParams, RobotParams, Said
-from tdac_envs.mapping.preprocessing import examine
+from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
+from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 
 SHOWN, EXPLAINED = 8, 2
 Point = tuple[float, float]
@@ -31,7 +31,7 @@ def run(
     robot_radius: float | None,
     snap: bool,
     metres: bool,
-    said: Said,
+    said: ReadingOptions,
     preset: Preset,
     out: Path | None,
     as_json: bool,
@@ -54,7 +54,9 @@ def run(
     folder = out if out is not None else Path(f"{path.stem}-map")
     how: Any = {"preset": preset, "snap": snap, "heading": heading, "said": said}
     try:
-        grid, params, ranked = examine(source, start, goal, radius, **how)
+        grid, params, ranked = preprocess_with_candidates(
+            source, start, goal, radius, **how
+        )
     except PolarityError as error:
         error.folder = folder
         raise

@@ -24,7 +24,7 @@ _WRONG_FILE = {errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL, errno.EFBIG}
 def explain(error: Exception) -> NoReturn:
     """Ends the process with a one-line message; only a bug gets a traceback."""
     from tdac_agent.errors import Fault
-    from tdac_envs.core.errors import LONGEST, PolarityError, TdacError
+    from tdac_envs.core.errors import MAX_QUOTED, PolarityError, TdacError
 
     if hasattr(error, "format_message"):  # a usage error found by typer
         _explain_usage(error)
@@ -39,7 +39,7 @@ def explain(error: Exception) -> NoReturn:
         fail(f"infrastructure fault: {error}", 3)
     if isinstance(error, OSError) and error.filename:
         code = 2 if error.errno in _WRONG_FILE else 3
-        fail(f"error: {str(error.filename)[:LONGEST]}: {error.strerror}", code)
+        fail(f"error: {str(error.filename)[:MAX_QUOTED]}: {error.strerror}", code)
     traceback.print_exception(error)
     fail("internal error: please report the lines above", 3)
 

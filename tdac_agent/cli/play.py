@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tdac_agent.cli.display import has_display
 from tdac_agent.cli.flags import TaskFlags, check_tier
-from tdac_agent.cli.robust_flags import DisturbanceFlags, refuse_without
+from tdac_agent.cli.robust_flags import DisturbanceFlags, require_flag
 from tdac_agent.cli.verify import controller_and_task
 from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Rollout
@@ -17,9 +17,9 @@ from tdac_agent.storage.plain import one_line
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task import Task, write_workdir
-from tdac_agent.verification.judge.children import Nursery
-from tdac_agent.verification.judge.contenders import Contender
-from tdac_agent.verification.judge.driving import Driven, Stage, drive_seed
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.driving import EpisodeSetup, SeededResult, drive_seed
 from tdac_agent.verification.judge.judge import Judge
 from tdac_agent.verification.suite.starts import JITTERS
 from tdac_agent.verification.verify import read_source
@@ -43,7 +43,7 @@ def run(
     """Plays one episode; returns 0 if the goal was reached, else 1."""
     check_tier(tier)
     if seed is None:
-        refuse_without("--seed N", list(disturbed.given()))
+        require_flag("--seed N", list(disturbed.given()))
     elif episode is not None:
         raise TaskError("give --episode or --seed, not both")
     name, disturbance = _checked(episode), disturbed.disturbance()
@@ -87,21 +87,23 @@ def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
 
 def drive_disturbed(
     task: Task, source: bytes, seed: int, disturbance: Disturbance, tier: str
-) -> Driven:
+) -> SeededResult:
     """Runs the judged episode of a seed, as in a robust verification."""
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
-        work, nursery = Path(folder) / "work", Nursery(ahead=False)
+        work, child_pool = Path(folder) / "work", ChildPool(ahead=False)
         write_workdir(work, task)
         controller = Path(folder) / "controller.py"
         controller.write_bytes(source)
-        driver = Contender("controller", controller)
-        stage = Stage(task, driver, work, disturbance, tier, Limits(), nursery)
+        driver = PolicySpec("controller", controller)
+        stage = EpisodeSetup(
+            task, driver, work, disturbance, tier, Limits(), child_pool
+        )
         try:
             return drive_seed(stage, seed)
         except SandboxError as error:
             raise Fault(f"the sandbox failed: {error}") from error
         finally:
-            nursery.close()
+            child_pool.close()
 
 
 def _checked(episode: str | None) -> str:

@@ -10,8 +10,8 @@ from rich.spinner import Spinner
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.run_view import told_tests
-from tdac_agent.models.budget import told_usd
+from tdac_agent.cli.run_view import list_tests
+from tdac_agent.models.budget import format_usd
 
 _ANSWERS = (
     ("generate", "controller", "controllers"),
@@ -117,7 +117,7 @@ class Progress:
             self._say(f"= {at}", "same code as before", "yellow")
         else:
             failed = record["failed_tests"]
-            names = escape(told_tests(failed, 3))
+            names = escape(list_tests(failed, 3))
             self._say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
 
     def _say(self, place: str, text: str, style: str = "") -> None:
@@ -148,4 +148,4 @@ def _unanswered(record: dict[str, Any]) -> str:
         questions = "one question has" if number == 1 else f"{number} questions have"
         again = "is" if number == 1 else "are"
         text = f"; {questions} no recorded answer and {again} asked again"
-    return text + (f"; lost answers count as at most {told_usd(lost)}" * bool(lost))
+    return text + (f"; lost answers count as at most {format_usd(lost)}" * bool(lost))

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import RunError
 from tdac_agent.html_report import make_page
 from tdac_agent.storage.files import write_atomic
@@ -33,7 +33,7 @@ def run(place: Path, out: Path | None) -> int:
         raise RunError(f"cannot write {file}: {error.strerror}") from error
     console = Console()
     for line in page.unreadable:
-        tell(console, f"not readable: {line}", "yellow")
+        print_sentences(console, f"not readable: {line}", "yellow")
     runs = "1 run" if page.runs == 1 else f"{page.runs} runs"
     summary = f"{escape(str(file))}: {runs}, {page.verified} verified"
     console.print(f"{summary}; {len(page.html) / 1e6:.1f} MB", soft_wrap=True)

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.episodes.trajectory import nominal_first
 from tdac_agent.prompting.feedback import group_failures
 from tdac_agent.tasks.units import UNITS
@@ -44,12 +44,12 @@ def show_report(
     for group in groups:
         _show_failed(console, group.members)
         for message in group.messages:
-            tell(console, message, indent=2)
+            print_sentences(console, message, indent=2)
         for text in group.happened:
-            tell(console, f"what happened: {text}", indent=2)
+            print_sentences(console, f"what happened: {text}", indent=2)
     if not_run:
         _show_failed(console, not_run)
-        tell(console, not_run[0].message, indent=2)
+        print_sentences(console, not_run[0].message, indent=2)
     console.print(episode_table(report))
     if out is not None:
         _show_files(out, console)

@@ -59,17 +59,17 @@ class RobustFlags:
         own = {f.name for f in fields(self)} - {"robust", "disturbed"}
         given = [name for name in sorted(own) if getattr(self, name) is not None]
         if self.robust is None:
-            refuse_without("--robust N", [*given, *self.disturbed.given()])
+            require_flag("--robust N", [*given, *self.disturbed.given()])
             return
         if self.accept_at is None:
-            refuse_without("--accept-at RATE", [n for n in given if n == "margin"])
+            require_flag("--accept-at RATE", [n for n in given if n == "margin"])
         else:
             margin = MARGIN if self.margin is None else self.margin
             SequentialTest(self.accept_at, self.robust, margin)
         self.disturbed.disturbance()
 
 
-def refuse_without(needed: str, given: list[str]) -> None:
+def require_flag(needed: str, given: list[str]) -> None:
     """Refuses flags that have no effect without another one.
 
     Raises:

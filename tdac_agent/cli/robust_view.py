@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.evaluation.robust_report import Interval, RobustReport, SequentialResult
 from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.judge.seeded import SeededEpisode
@@ -26,7 +26,7 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
     say = partial(console.print, highlight=False)
     say(worst_table(report))
     for error in _errors(report):
-        tell(console, error, indent=2)
+        print_sentences(console, error, indent=2)
     replay = shlex.join([*play, "--seed", str(report.worst[0].seed)])
     # Not wrapped, so that it can be copied.
     line = f"  replay the first of them: [bold]{escape(replay)}[/]"

@@ -9,9 +9,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.run_view import told_tests
+from tdac_agent.cli.run_view import list_tests
 from tdac_agent.prompting.rules import RepairRule, RuleBook
-from tdac_agent.runs.records import Run, load_rules, load_run
+from tdac_agent.runs.run_record import Run, load_rules, load_run
 
 _COLOURS = {"in force": "green", "dropped": "red", "made room": "yellow"}
 
@@ -43,7 +43,7 @@ def _histories(book: RuleBook) -> Table:
             f"[bold]{escape(rule.text)}[/]",
             *(f"[dim]{escape(edit)}[/]" for edit in rule.edits),
             f"{state} · {rule.scope} · since k={rule.born}",
-            f"failed before: {escape(told_tests(rule.evidence, 4))}",
+            f"failed before: {escape(list_tests(rule.evidence, 4))}",
             f"effect: {escape(_effect(rule))}",
             "",
         ]
@@ -73,9 +73,9 @@ def _effect(rule: RepairRule) -> str:
     if not rule.tried or len(cured) == len(pairs):
         return effect
     if cured:
-        effect += f"; cured: {told_tests(cured, 4)}"
+        effect += f"; cured: {list_tests(cured, 4)}"
     if sometimes:
-        effect += f"; cured sometimes: {told_tests(sometimes, 4)}"
+        effect += f"; cured sometimes: {list_tests(sometimes, 4)}"
     return effect
 
 

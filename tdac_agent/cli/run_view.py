@@ -10,8 +10,8 @@ from rich.padding import Padding
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.models.budget import told_usd
-from tdac_agent.runs.records import Attempt, Run
+from tdac_agent.models.budget import format_usd
+from tdac_agent.runs.run_record import Attempt, Run
 
 
 def show_run(run: Run, console: Console) -> None:
@@ -33,7 +33,7 @@ def show_run(run: Run, console: Console) -> None:
         console.print(f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}")
         _print_indented(console, usage)
         _print_indented(console, run.outlook)
-        _print_unwrapped(console, f"to continue: {way_on(run)}")
+        _print_unwrapped(console, f"to continue: {resume_command(run)}")
     else:
         times = f"{run.iterations} iteration{'' if run.iterations == 1 else 's'}"
         ending = f"[bold red]not verified[/] after {times}; "
@@ -59,9 +59,9 @@ def _usage(run: Run) -> str:
         return ""
     cached = f" ({run.tokens_cached} from a cache)" if run.tokens_cached else ""
     tokens = f"{run.tokens_in} tokens in{cached}, {run.tokens_out} out"
-    cost = "cost unknown" if run.cost is None else told_usd(run.cost)
+    cost = "cost unknown" if run.cost is None else format_usd(run.cost)
     if run.cost_lost:
-        cost += f", and at most {told_usd(run.cost_lost)} for lost answers"
+        cost += f", and at most {format_usd(run.cost_lost)} for lost answers"
     if not run.tokens:
         tokens = "no tokens reported"
         if run.max_tokens is not None:
@@ -69,7 +69,7 @@ def _usage(run: Run) -> str:
     return f"{tokens}; {cost}"
 
 
-def way_on(run: Run) -> str:
+def resume_command(run: Run) -> str:
     """The command that continues a run; empty if the run has finished."""
     if run.finished:
         return ""
@@ -84,12 +84,12 @@ def _attempts(run: Run) -> Table:
     table.add_column("result")
     table.add_column("failed tests")
     for attempt in run.attempts:
-        failed = told_tests(attempt.failed_tests, 4) or _why_invalid(attempt)
+        failed = list_tests(attempt.failed_tests, 4) or _why_invalid(attempt)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 
 
-def told_tests(tests: Sequence[str], most: int) -> str:
+def list_tests(tests: Sequence[str], most: int) -> str:
     """The names of the first `most` tests, and the number of the others."""
     names = [name.rpartition("::")[2] for name in tests]
     more = len(names) - most

@@ -14,11 +14,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.run_view import way_on
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.run_view import resume_command
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import RunError
-from tdac_agent.models.budget import told_usd
-from tdac_agent.runs.records import JOURNAL, RUN_FILE, at_work, load_run, status_now
+from tdac_agent.models.budget import format_usd
+from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, at_work, load_run, status_now
 from tdac_agent.training.curve import PLAN_FILE, read_curve
 
 USUAL = Path("runs")
@@ -54,10 +54,10 @@ def run(folder: Path, as_json: bool) -> int:
         console.print(_table(rows, console.width))
         for row in rows:
             if row["status"] == "unreadable":
-                tell(console, f"{row['run']}: {row['reason']}", "red")
+                print_sentences(console, f"{row['run']}: {row['reason']}", "red")
                 continue
             if "steps" in row:
-                tell(console, _training_progress(row))
+                print_sentences(console, _training_progress(row))
             if row["go_on"]:
                 console.print(f"to continue: {escape(row['go_on'])}", soft_wrap=True)
     else:
@@ -138,7 +138,7 @@ def _row(folder: Path) -> dict[str, Any]:
         "seconds": run.seconds,
         "censored": run.censored,
         "reason": run.reason,
-        "go_on": "" if status == "running" else way_on(run),
+        "go_on": "" if status == "running" else resume_command(run),
     }
 
 
@@ -193,7 +193,7 @@ def _figures_of(row: dict[str, Any]) -> tuple[str, str, str]:
     if "k" not in row:
         return "", "", ""
     tokens = row["tokens_in"] + row["tokens_out"]
-    cost = "unknown" if row["cost"] is None else told_usd(row["cost"])
+    cost = "unknown" if row["cost"] is None else format_usd(row["cost"])
     asked = tokens or row["cost"] != 0.0
     return (
         f"{row['k']}/{row['iterations']}",

@@ -8,7 +8,9 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.mistakes import folded
 
 
-def tell(console: Console, words: str, style: str = "", *, indent: int = 0) -> None:
+def print_sentences(
+    console: Console, words: str, style: str = "", *, indent: int = 0
+) -> None:
     """Prints sentences without breaking words or paths.
 
     Args:

@@ -14,8 +14,8 @@ from tdac_agent.cli.flags import TaskFlags
 from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault
-from tdac_agent.runs.records import Run, load_run
-from tdac_agent.runs.resume import asked_for, check_own, run_there
+from tdac_agent.runs.resume import check_own, existing_run, resume_arguments
+from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import Task, called
 from tdac_agent.tasks.task_file import TASK_FILE
@@ -76,7 +76,7 @@ def resume(
         check_own(before)
         return _show(before, console, before=before)
     with console.status("preparing the task …"):
-        wanted = asked_for(folder, {**given, **limits}, trust=trust)
+        wanted = resume_arguments(folder, {**given, **limits}, trust=trust)
     return synthesise_and_show(wanted, console)
 
 
@@ -91,7 +91,7 @@ def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:
     task, folder = wanted["task"], wanted["out"]
     optimizer = wanted["optimizer"]
     heading = _heading(task, wanted["learner"], optimizer)
-    before = run_there(folder)
+    before = existing_run(folder)
     try:
         with Progress(console, heading) as progress:
             result = synthesize(**wanted, on_event=progress)

@@ -44,7 +44,7 @@ def attempt(name: str) -> tuple[bool, str]:
     except subprocess.TimeoutExpired:
         return False, f"did not finish within {SECONDS:g} s"
     if done.returncode < 0:
-        return False, died(-done.returncode)
+        return False, describe_signal(-done.returncode)
     if done.returncode == 0:
         return True, _last_line(done.stdout)
     reason = _last_line(done.stderr) or f"ended with exit code {done.returncode}"
@@ -56,7 +56,7 @@ def _last_line(output: bytes) -> str:
     return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
 
-def died(number: int) -> str:
+def describe_signal(number: int) -> str:
     """Names the signal that ended a process, and what to do."""
     try:
         name = signal.Signals(number).name

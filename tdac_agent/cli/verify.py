@@ -18,7 +18,7 @@ from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.report import Report
-from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def run(
     out: Path | None,
     as_json: bool,
     robust: RobustFlags,
-    nursery: Nursery,
+    child_pool: ChildPool,
 ) -> int:
     """Verifies a controller and prints the report; returns the exit code."""
     check_tier(tier)
@@ -49,7 +49,7 @@ def run(
     task = allowed(task, suite, trust=trust)
     gc.freeze()
     gc.enable()
-    with WarmJudge(nursery) as judge:
+    with WarmJudge(child_pool) as judge:
         # Imported while the judge starts.
         from tdac_agent.verification.verify import verify
 
@@ -160,7 +160,7 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
 
 def _without_controller(folder: Path) -> str:
     """Why a folder has no controller, and what to do."""
-    from tdac_agent.runs.records import RUN_FILE  # slow to import
+    from tdac_agent.runs.run_record import RUN_FILE  # slow to import
 
     if (folder / RUN_FILE).is_file():
         command = f"tdac synth --resume {shlex.quote(str(folder))}"

@@ -101,10 +101,10 @@ def verify(
     """Test a controller in the sandbox; exit 0 only if all tests pass."""
     # Imported objects live until exit: collecting them is a waste of time.
     gc.disable()
-    from tdac_agent.verification.judge.children import Nursery
+    from tdac_agent.verification.judge.child_pool import ChildPool
 
     # Its first process starts during the imports below.
-    with Nursery() as nursery:
+    with ChildPool() as child_pool:
         from tdac_agent.cli import verify as command
         from tdac_agent.cli.robust_flags import DisturbanceFlags, RobustFlags
 
@@ -123,6 +123,6 @@ def verify(
             out,
             as_json,
             wanted,
-            nursery,
+            child_pool,
         )
     raise typer.Exit(code)

@@ -18,7 +18,7 @@ from tdac_agent.sandbox import (
     ControllerTimeout,
     EnvRefusalError,
 )
-from tdac_agent.sandbox.waiting import Line
+from tdac_agent.sandbox.waiting import RunQueue
 from tdac_agent.storage.plain import shown
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_envs.drive.env import Observation
@@ -180,7 +180,7 @@ def run_policy(
         deadline: Latest time to stop, on the clock `time.monotonic`.
     """
     calls: list[float] = []
-    own = Line("thread-self")
+    own = RunQueue("thread-self")
 
     def wait_time() -> float:
         # On a busy machine this process, too, waits for a CPU after an answer.
@@ -307,5 +307,6 @@ def _rollout(
         rooms=record.rooms(),
         calls=np.array(calls, np.float64),
         timed_out=isinstance(error, ControllerTimeout) or slow,
-        may_pass=slow or (isinstance(error, ControllerFault) and error.may_pass),
+        is_retryable=slow
+        or (isinstance(error, ControllerFault) and error.is_retryable),
     )

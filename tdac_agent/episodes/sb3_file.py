@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.storage.files import write_atomic
-from tdac_envs.core.errors import first_problem, why
+from tdac_envs.core.errors import first_problem, one_line_reason
 from tdac_envs.core.extras import install_command
 from tdac_envs.core.intake import TEXT_BYTES, one_line, parse_json, read_file, read_zip
 
@@ -108,14 +108,14 @@ def read_policy(file: Path) -> SavedNetwork:
             raise ValueError(f"it has no `{DATA}` or no `{WEIGHTS}`")
     except (OSError, ValueError) as error:
         raise ControllerFileError(
-            f"{str(file)!r} is not a stable-baselines3 policy: {why(error)}"
+            f"{str(file)!r} is not a stable-baselines3 policy: {one_line_reason(error)}"
         ) from error
     saved = _metadata(file, parts.get(METADATA))
     try:
         module, settings = _network(parts[DATA])
         _check_weights(parts[WEIGHTS])
     except ValueError as error:
-        message = f"the policy {str(file)!r} cannot be used: {why(error)}"
+        message = f"the policy {str(file)!r} cannot be used: {one_line_reason(error)}"
         raise ControllerFileError(message) from error
     return SavedNetwork(saved, module, settings, parts[WEIGHTS])
 
@@ -178,7 +178,9 @@ def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
             text = read_file(beside, TEXT_BYTES)
         return None if text is None else SavedPolicy.model_validate(parse_json(text))
     except (OSError, ValueError) as error:
-        raise ControllerFileError(f"{METADATA} of {file}: {why(error)}") from error
+        raise ControllerFileError(
+            f"{METADATA} of {file}: {one_line_reason(error)}"
+        ) from error
 
 
 def _network(data: bytes) -> tuple[str, Settings]:

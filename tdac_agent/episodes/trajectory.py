@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.errors import RunError
-from tdac_envs.core.errors import why
+from tdac_envs.core.errors import one_line_reason
 from tdac_envs.core.intake import read_array, read_file, read_zip
 
 SCHEMA_VERSION = 1
@@ -83,7 +83,9 @@ class Trajectory:
             )
             _check_shapes(loaded)
         except (OSError, ValueError, TypeError, LookupError, OverflowError) as error:
-            raise RunError(f"{path} is not a trajectory: {why(error)}") from error
+            raise RunError(
+                f"{path} is not a trajectory: {one_line_reason(error)}"
+            ) from error
         return loaded
 
 
@@ -131,7 +133,7 @@ class Rollout:
             and the 99th percentile including it.
         returned: Return value of `run_episode`, if it drove the episode.
         timed_out: Whether the controller was too slow, in one call or on average.
-        may_pass: Whether a busy machine may be the reason, so that a retry may pass.
+        is_retryable: Whether a busy machine may be the reason, so that a retry may pass.
         rooms: Shape (T + 1,): distance from the robot's centre to the nearest obstacle,
             px (for the centre of its pixel) or m; empty if not recorded.
         calls: Shape (T,): duration of each policy call, s; empty if not recorded.
@@ -148,7 +150,7 @@ class Rollout:
     call_ms: tuple[float, float] = (0.0, 0.0)
     returned: Any = None
     timed_out: bool = False
-    may_pass: bool = False
+    is_retryable: bool = False
     rooms: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     calls: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 

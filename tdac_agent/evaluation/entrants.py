@@ -14,7 +14,7 @@ from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TASK_FILE, read_task_file
-from tdac_agent.verification.judge.contenders import Contender, Kind
+from tdac_agent.verification.judge.drivers import Kind, PolicySpec
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import read_file
@@ -37,7 +37,7 @@ class Entrant:
     """
 
     name: str
-    contender: Contender
+    contender: PolicySpec
     sha256: str | None = None
     env: str | None = None
 
@@ -77,9 +77,9 @@ def entrants_of(
 
 def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
     if given in OURS:
-        return Entrant(given, Contender(given))
+        return Entrant(given, PolicySpec(given))
     if given == BUILTIN:
-        return Entrant(given, Contender("controller"))
+        return Entrant(given, PolicySpec("controller"))
     path = Path(given)
     if path.is_dir():
         return replace(_controller(given, path / "controller.py"), env=_env_of(path))
@@ -99,7 +99,7 @@ def _controller(name: str, file: Path) -> Entrant:
     if not file.is_file():
         raise ControllerFileError(f"no controller.py in {name!r}")
     sha256 = sha256_of(read_source(file))
-    return Entrant(name, Contender("controller", file.resolve()), sha256)
+    return Entrant(name, PolicySpec("controller", file.resolve()), sha256)
 
 
 def _env_of(run_folder: Path) -> str | None:
@@ -127,7 +127,7 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     check_kind(found)
     load_weights(found.weights)
     sha256 = sha256_of(read_file(file, MOST_BYTES))
-    return Entrant(name, Contender("sb3", file.resolve(), names), sha256)
+    return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256)
 
 
 def write_builtin(task: Task) -> tuple[bytes, bool]:

@@ -18,7 +18,7 @@ from tdac_agent.metrics.exact import sign_test
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.units import Place
 from tdac_agent.verification.diagnosis.measures import Measured
-from tdac_agent.verification.judge.contenders import Kind
+from tdac_agent.verification.judge.drivers import Kind
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,7 +52,7 @@ class EvaluatedPolicy(_Record):
     sha256: str | None = Field(None, description="Hash of its file, if any.")
 
 
-class Row(_Record):
+class PolicyRow(_Record):
     """One policy on one task. Medians over successes are None without a success."""
 
     task: str
@@ -84,7 +84,7 @@ class Row(_Record):
     note: str | None = None
 
 
-class Comparison(_Record):
+class PairedComparison(_Record):
     """Two policies on the same seeds of a task: exact McNemar test, two-sided.
 
     Under the null hypothesis, either policy wins half of the episodes in which exactly
@@ -138,8 +138,8 @@ class Evaluation(_Record):
     episodes: int = Field(description="Episodes of each policy on each task.")
     tasks: tuple[EvaluatedTask, ...]
     policies: tuple[EvaluatedPolicy, ...]
-    rows: tuple[Row, ...]
-    comparisons: tuple[Comparison, ...]
+    rows: tuple[PolicyRow, ...]
+    comparisons: tuple[PairedComparison, ...]
     versions: dict[str, str]
     results: tuple[Result, ...] = Field(exclude=True)
     timings: tuple[Timing, ...] = Field(exclude=True)
@@ -172,13 +172,13 @@ class Evaluation(_Record):
         return pd.DataFrame([timing.model_dump() for timing in self.timings])
 
 
-def row_of(result: Result) -> Row:
+def row_of(result: Result) -> PolicyRow:
     """The row for one policy on one task."""
     episodes = result.episodes
     successes = [episode for episode in episodes if episode.success]
     reasons = Counter(e.error for e in episodes if e.error is not None)
     count = len(episodes)
-    return Row(
+    return PolicyRow(
         task=result.task,
         policy=result.policy,
         knows=result.knows,
@@ -208,7 +208,7 @@ def _median(values: Iterable[float | None]) -> float | None:
     return round(median(known), _DIGITS) if known else None
 
 
-def comparisons_of(results: Sequence[Result]) -> tuple[Comparison, ...]:
+def comparisons_of(results: Sequence[Result]) -> tuple[PairedComparison, ...]:
     """Compares all pairs of policies on each task; those of equal information first."""
     pairs = [
         compare(one, other)
@@ -218,7 +218,7 @@ def comparisons_of(results: Sequence[Result]) -> tuple[Comparison, ...]:
     return tuple(sorted(pairs, key=lambda pair: pair.equal_information is None))
 
 
-def compare(one: Result, other: Result) -> Comparison:
+def compare(one: Result, other: Result) -> PairedComparison:
     """Compares two policies.
 
     Raises:
@@ -231,7 +231,7 @@ def compare(one: Result, other: Result) -> Comparison:
     theirs = [episode.success for episode in other.episodes]
     table = Counter(zip(ours, theirs, strict=True))
     first, second = table[True, False], table[False, True]
-    return Comparison(
+    return PairedComparison(
         task=one.task,
         one=one.policy,
         other=other.policy,

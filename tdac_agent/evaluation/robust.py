@@ -19,7 +19,7 @@ from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.provenance import origin
 from tdac_agent.tasks.task import Task, lay_out
-from tdac_agent.verification.judge.contenders import Contender
+from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.seeded import SeededEpisode, SeededJob
 from tdac_agent.verification.judge.sequential import (
     MARGIN,
@@ -88,7 +88,7 @@ def verify_robust(
         write_atomic(controller_file, source)
         job = SeededJob(
             task=lay_out(task, folder / "work"),
-            contender=Contender("controller", controller_file),
+            contender=PolicySpec("controller", controller_file),
             disturbance=disturbance or Disturbance(),
             variation="jitter",
             seeds=tuple(range(first, first + episodes)),

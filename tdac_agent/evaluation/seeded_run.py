@@ -16,7 +16,7 @@ from tdac_agent.verification.diagnosis.measures import Measured
 from tdac_agent.verification.judge.seeded import (
     ENDING_FILE,
     EPISODES_FILE,
-    Ending,
+    JobEnding,
     SeededEpisode,
     SeededJob,
 )
@@ -34,7 +34,7 @@ def run_seeds(
     kind: type[E],
     judge: WarmJudge | None = None,
     watch: Callable[[int, int], None] | None = None,
-) -> tuple[list[E], Ending]:
+) -> tuple[list[E], JobEnding]:
     """Runs a job; returns its episodes and its ending.
 
     Args:
@@ -59,9 +59,9 @@ def run_seeds(
     return tail.episodes, _ending(job.out / ENDING_FILE, request.parent / "output.txt")
 
 
-def _ending(path: Path, output: Path) -> Ending:
+def _ending(path: Path, output: Path) -> JobEnding:
     try:
-        ending = Ending.model_validate_json(path.read_text(encoding="utf-8"))
+        ending = JobEnding.model_validate_json(path.read_text(encoding="utf-8"))
     except (OSError, ValidationError) as error:
         printed = output.read_text("utf-8", "replace") if output.is_file() else ""
         lines = [line.strip() for line in printed.splitlines() if line.strip()]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.html_report.scene import Scene
-from tdac_agent.runs.history import Told, Tried
+from tdac_agent.html_report.scene import TaskPicture
+from tdac_agent.runs.history import CandidateHistory, Told
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import contact_of
 from tdac_agent.verification.diagnosis.report import Episode
@@ -31,7 +31,7 @@ ALL_POINTS = 60_000
 """Maximum number of points of all episodes of a run together."""
 
 
-def animations(told: Told, task: Task, scene: Scene) -> list[dict[str, Any]]:
+def animations(told: Told, task: Task, scene: TaskPicture) -> list[dict[str, Any]]:
     """Encodes the recorded episodes of all candidates of a run.
 
     Returns:
@@ -43,7 +43,7 @@ def animations(told: Told, task: Task, scene: Scene) -> list[dict[str, Any]]:
     return [_encoded(task, scene, most, *each) for each in found]
 
 
-def _episodes(one: Tried) -> Iterator[tuple[Episode, Trajectory]]:
+def _episodes(one: CandidateHistory) -> Iterator[tuple[Episode, Trajectory]]:
     """The episodes of a candidate that have a stored trajectory."""
     if one.report is None:
         return
@@ -57,9 +57,9 @@ def _episodes(one: Tried) -> Iterator[tuple[Episode, Trajectory]]:
 
 def _encoded(
     task: Task,
-    scene: Scene,
+    scene: TaskPicture,
     most: int,
-    one: Tried,
+    one: CandidateHistory,
     episode: Episode,
     trajectory: Trajectory,
 ) -> dict[str, Any]:

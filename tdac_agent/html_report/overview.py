@@ -111,7 +111,7 @@ def drawn(figure: Figure) -> str:
     return data_address(figure_bytes(figure), "image/svg+xml")
 
 
-def told_seconds(seconds: float) -> str:
+def format_seconds(seconds: float) -> str:
     """Formats a duration, such as `2 min 05 s`."""
     if not math.isfinite(seconds):
         return "–"

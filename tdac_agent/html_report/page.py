@@ -14,10 +14,10 @@ from markupsafe import Markup
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
-from tdac_agent.html_report.overview import overview_of, told_seconds
-from tdac_agent.html_report.scene import Scene, scene_of
-from tdac_agent.html_report.section import broken, section_of
-from tdac_agent.models.budget import told_usd
+from tdac_agent.html_report.overview import format_seconds, overview_of
+from tdac_agent.html_report.scene import TaskPicture, scene_of
+from tdac_agent.html_report.section import grouped_failures, section_of
+from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import Told, gather_run, learner_named, run_folders
 
 MOST_BYTES = 24 << 20
@@ -86,10 +86,12 @@ def make_page(place: Path) -> Page:
     )
 
 
-def _details(runs: list[tuple[str, Told]]) -> tuple[list[Markup], dict[str, Scene]]:
+def _details(
+    runs: list[tuple[str, Told]],
+) -> tuple[list[Markup], dict[str, TaskPicture]]:
     """Renders the sections of as many runs as fit, and their scenes."""
     template = _environment().get_template("run.html.j2")
-    scenes: dict[str, Scene] = {}
+    scenes: dict[str, TaskPicture] = {}
     details: list[Markup] = []
     size = 0
     for number, (name, told) in enumerate(runs, 1):
@@ -102,7 +104,9 @@ def _details(runs: list[tuple[str, Told]]) -> tuple[list[Markup], dict[str, Scen
     return details, scenes
 
 
-def _scene(told: Told, scenes: dict[str, Scene]) -> tuple[str, Scene] | None:
+def _scene(
+    told: Told, scenes: dict[str, TaskPicture]
+) -> tuple[str, TaskPicture] | None:
     """The scene of a run's task; runs of the same task share it."""
     if told.task is None:
         return None
@@ -112,7 +116,7 @@ def _scene(told: Told, scenes: dict[str, Scene]) -> tuple[str, Scene] | None:
     return key, scenes[key]
 
 
-def _for_player(scene: Scene) -> dict[str, Any]:
+def _for_player(scene: TaskPicture) -> dict[str, Any]:
     return {
         "picture": scene.picture,
         "width": scene.width,
@@ -131,15 +135,15 @@ def _environment() -> jinja2.Environment:
         autoescape=True,
     )
     environment.filters |= {
-        "broken": broken,
+        "broken": grouped_failures,
         "changes": count_changes,
         "diff": shown_diff,
-        "duration": told_seconds,
+        "duration": format_seconds,
         "learner": learner_named,
         "python": highlighted,
         "shortened": shortened,
         "test": short_test,
-        "usd": told_usd,
+        "usd": format_usd,
     }
     return environment
 

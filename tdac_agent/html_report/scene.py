@@ -20,7 +20,7 @@ COLOURS = 48
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class TaskPicture:
     """A picture of a task, and the mapping of poses to it.
 
     Attributes:
@@ -53,14 +53,14 @@ class Scene:
         return np.column_stack([places, turn * np.unwrap(poses[:, 2])])
 
 
-def scene_of(task: Task) -> Scene:
+def scene_of(task: Task) -> TaskPicture:
     """Draws the map or world with start, goal and shortest path."""
     backdrop = pictures_of(task.setting).backdrop()
     chart = backdrop.whole()
     drawn = chart.canvas.image[: chart.canvas.strip_top]
     zoom = min(1.0, LARGEST / max(drawn.shape[:2]))
     height, width = (max(1, round(zoom * side)) for side in drawn.shape[:2])
-    return Scene(
+    return TaskPicture(
         data_address(_png(drawn, width, height), "image/png"),
         width,
         height,

@@ -10,12 +10,12 @@ from typing import Any
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.animation import animations
-from tdac_agent.html_report.overview import drawn, told_seconds
-from tdac_agent.html_report.scene import Scene
-from tdac_agent.models.budget import told_usd
+from tdac_agent.html_report.overview import drawn, format_seconds
+from tdac_agent.html_report.scene import TaskPicture
+from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
-from tdac_agent.runs.history import Told, Tried, learner_named
-from tdac_agent.runs.records import GIVEN_FILE, PROMPT_FILE
+from tdac_agent.runs.history import CandidateHistory, Told, learner_named
+from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 
@@ -26,7 +26,7 @@ MOST_ROWS = 60
 
 
 @dataclass(frozen=True, slots=True)
-class Broken:
+class FailureGroup:
     """Tests that failed with the same message.
 
     Attributes:
@@ -41,7 +41,7 @@ class Broken:
 
 
 def section_of(
-    told: Told, number: int, name: str, scene: tuple[str, Scene] | None
+    told: Told, number: int, name: str, scene: tuple[str, TaskPicture] | None
 ) -> dict[str, Any]:
     """Collects the values for the template of a run.
 
@@ -68,7 +68,7 @@ def section_of(
         "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
         "most_lines": max(least, min(most, ALL_DIFF_LINES // max(1, len(told.tried)))),
         "breakdown": _breakdown(told),
-        "seconds": told_seconds(told.run.seconds),
+        "seconds": format_seconds(told.run.seconds),
         "spent": spent(told),
         "origin": list(_origin(told)),
         "commands": list(_commands(told, name)),
@@ -86,7 +86,7 @@ def _breakdown(told: Told) -> str | None:
         return None
 
 
-def broken(report: Report) -> list[Broken]:
+def grouped_failures(report: Report) -> list[FailureGroup]:
     """Groups the failures of a report by message."""
     found: dict[str, list[Any]] = {}
     for failure in report.failures:
@@ -97,7 +97,7 @@ def broken(report: Report) -> list[Broken]:
         by_text = {f.diagnosis.text: f.diagnosis for f in failures if f.diagnosis}
         fresh = tuple(by_text[text] for text in by_text if text not in seen)
         seen.update(by_text)
-        rows.append(Broken(message, tuple(f.test for f in failures), fresh))
+        rows.append(FailureGroup(message, tuple(f.test for f in failures), fresh))
     return rows
 
 
@@ -106,13 +106,13 @@ def spent(told: Told) -> str:
     run = told.run
     if not run.tokens:
         return "not counted"
-    cost = "cost unknown" if run.cost is None else told_usd(run.cost)
+    cost = "cost unknown" if run.cost is None else format_usd(run.cost)
     if run.cost_lost:
-        cost += f", and at most {told_usd(run.cost_lost)} for lost answers"
+        cost += f", and at most {format_usd(run.cost_lost)} for lost answers"
     return f"{run.tokens_in:,} in, {run.tokens_out:,} out; {cost}"
 
 
-def _iterations(told: Told) -> list[tuple[int, list[Tried]]]:
+def _iterations(told: Told) -> list[tuple[int, list[CandidateHistory]]]:
     groups = itertools.groupby(told.tried, key=lambda one: one.k)
     return [(k, list(group)) for k, group in groups]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from tdac_agent.errors import RunError
-from tdac_agent.runs.records import Attempt, Run, load_run
+from tdac_agent.runs.run_record import Attempt, Run, load_run
 
 RUN_COLUMNS = {
     "run": "Run folder, or another unique name.",
@@ -19,7 +19,7 @@ RUN_COLUMNS = {
     "prompt": "Template of the first prompt.",
     "K": "Maximum number of iterations.",
     "J": "Maximum number of edits per iteration.",
-    "setting": "Parts of the loop in use; see `tdac_agent.runs.records.Setting`.",
+    "setting": "Parts of the loop in use; see `tdac_agent.runs.run_record.Setting`.",
     "seed": "Seed of the jittered starts if one was given, else the run's number.",
     "status": "Status in `run.json`.",
     "tau": "Iteration of the first success; missing if there was none.",

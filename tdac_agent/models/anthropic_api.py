@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tdac_agent.models.faults import as_faults
-from tdac_agent.models.gathered import Gathered, Stop, count
 from tdac_agent.models.provider import Reply, Request
+from tdac_agent.models.streamed import Stop, StreamedAnswer, count
 from tdac_agent.models.vendor import Vendor, VendorModel
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class AnthropicModel(VendorModel["anthropic.Anthropic"]):
         import anthropic
         import httpx2
 
-        gathered = Gathered(STOPS)
+        gathered = StreamedAnswer(STOPS)
         with as_faults((anthropic.AnthropicError, httpx2.HTTPError)):
             with client.messages.create(
                 model=self._model,
@@ -66,7 +66,7 @@ def _content(request: Request) -> list[TextBlockParam]:
     return blocks
 
 
-def _add_event(gathered: Gathered, event: RawMessageStreamEvent) -> None:
+def _add_event(gathered: StreamedAnswer, event: RawMessageStreamEvent) -> None:
     if event.type == "message_start":
         gathered.model = event.message.model
         _count(gathered, event.message.usage)
@@ -82,7 +82,8 @@ def _add_event(gathered: Gathered, event: RawMessageStreamEvent) -> None:
 
 
 def _count(
-    gathered: Gathered, usage: anthropic.types.Usage | anthropic.types.MessageDeltaUsage
+    gathered: StreamedAnswer,
+    usage: anthropic.types.Usage | anthropic.types.MessageDeltaUsage,
 ) -> None:
     """Stores the reported token counts, which cover the whole answer so far."""
     if usage.input_tokens is not None:

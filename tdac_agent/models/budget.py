@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from tdac_agent.errors import RunError
-from tdac_agent.storage.journal import append_record, read_on
+from tdac_agent.storage.journal import append_record, read_records_from
 from tdac_agent.storage.locks import wait_for
 
 ROUNDING = 1e-9
@@ -162,8 +162,8 @@ class Budget:
         both, cost, tokens = taken.plus(worst), self.max_cost, self.max_tokens
         if cost is not None and worst.usd and both.usd > cost + ROUNDING:
             raise BudgetExhausted(
-                f"{told_usd(taken.usd)} of {told_usd(cost)} are spent or reserved, and "
-                f"the next question may cost {told_usd(worst.usd)}",
+                f"{format_usd(taken.usd)} of {format_usd(cost)} are spent or reserved, "
+                f"and the next question may cost {format_usd(worst.usd)}",
                 "--max-cost",
                 taken,
             )
@@ -203,7 +203,7 @@ class Budget:
         self._read_to = read_to
 
 
-def told_usd(amount: float) -> str:
+def format_usd(amount: float) -> str:
     """Formats USD, with four decimals below 0.10 USD."""
     return f"{amount:.2f} USD" if amount >= 0.1 or amount == 0 else f"{amount:.4f} USD"
 
@@ -215,7 +215,7 @@ def _read(ledger: Path, offset: int) -> tuple[list[tuple[str, Amount]], int]:
         RunError: The file is not a budget ledger.
     """
     try:
-        records, end = read_on(ledger, offset)
+        records, end = read_records_from(ledger, offset)
         calls = [(one["call"], Amount(one["tokens"], one["usd"])) for one in records]
     except (KeyError, TypeError, ValueError) as error:
         raise RunError(f"{ledger} is not a budget ledger: {error}") from error

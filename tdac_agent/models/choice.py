@@ -103,7 +103,7 @@ def choose_model(name: str, options: Options) -> Provider:
     return _load(others[kind])(words, options)
 
 
-def missing_before(name: str, options: Options) -> tuple[str, ...]:
+def missing_for_name(name: str, options: Options) -> tuple[str, ...]:
     """Returns what a run with a model still needs; creates no folder, asks no model.
 
     Raises:

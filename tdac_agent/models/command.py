@@ -11,8 +11,8 @@ from contextlib import suppress
 
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
-from tdac_agent.models.gathered import MAX_CHARS
 from tdac_agent.models.provider import ProviderFault, Reply, Request
+from tdac_agent.models.streamed import MAX_CHARS
 from tdac_agent.storage.secrets import one_line, without_secrets
 
 AFTER_KILL_SECONDS = 5.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tdac_agent.models.faults import as_faults
-from tdac_agent.models.gathered import Gathered, Stop, count
 from tdac_agent.models.provider import Reply, Request
+from tdac_agent.models.streamed import Stop, StreamedAnswer, count
 from tdac_agent.models.vendor import Vendor, VendorModel
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
 
         # Local servers know only the older name of the limit; OpenAI needs the newer.
         is_openai = self._base_url is None
-        gathered = Gathered(STOPS)
+        gathered = StreamedAnswer(STOPS)
         with as_faults((openai.OpenAIError, httpx2.HTTPError)):
             with client.chat.completions.create(
                 model=self._model,
@@ -59,7 +59,7 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
             return gathered.reply()
 
 
-def _add_chunk(gathered: Gathered, chunk: ChatCompletionChunk) -> None:
+def _add_chunk(gathered: StreamedAnswer, chunk: ChatCompletionChunk) -> None:
     gathered.model = chunk.model or gathered.model
     for choice in chunk.choices or ():
         if choice.delta and choice.delta.content:

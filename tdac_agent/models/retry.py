@@ -40,7 +40,7 @@ class RetryPolicy:
             raise ValueError(f"a retry policy must have no negative numbers: {self}")
 
 
-class Missed(NamedTuple):
+class FailedCall(NamedTuple):
     """A failed call: attempt number from 1, fault, and wait before the next call, s.
 
     The wait is None if the question is given up.
@@ -55,7 +55,7 @@ def answer(
     complete: Callable[[Request], Reply],
     request: Request,
     policy: RetryPolicy,
-    on_fault: Callable[[Missed], None],
+    on_fault: Callable[[FailedCall], None],
     sleep: Callable[[float], None] = time.sleep,
 ) -> Reply:
     """Returns a model's answer, asking again after faults.
@@ -79,7 +79,7 @@ def answer(
             return complete(replace(request, seconds=min(request.seconds, left)))
         except ProviderFault as fault:
             wait = _wait(fault, attempt, policy, end - time.monotonic())
-            on_fault(Missed(attempt, fault, wait))
+            on_fault(FailedCall(attempt, fault, wait))
             if wait is None:
                 raise
             sleep(wait)

@@ -22,7 +22,7 @@ MAX_COST = 2.0
 """Default limit of a run, USD."""
 UNPRICED_TOKENS = 1_000_000
 """Default token limit of a run with a model of unknown price."""
-OWN_MATTER = frozenset({"command", "manual"})
+UNKNOWN_COST = frozenset({"command", "manual"})
 """Providers whose cost cannot be known."""
 BY_VENDOR = frozenset({"anthropic", "openai"})
 
@@ -62,7 +62,7 @@ class Tariff:
         return spent.usd if self.free or self.price is not None else None
 
 
-class Bounds(NamedTuple):
+class CostBounds(NamedTuple):
     """Limits of a run, and notes on them for the user."""
 
     max_cost: float | None
@@ -90,7 +90,7 @@ def bounds_of(
     tariffs: Mapping[str, Tariff],
     max_cost: float | None,
     max_tokens: int | None,
-) -> Bounds:
+) -> CostBounds:
     """Returns the limits of a run.
 
     Args:
@@ -111,7 +111,7 @@ def bounds_of(
         problems += missing_for(model)
         kind = model.name.partition(":")[0]
         tariff = tariffs[model.name]
-        if tariff.free or tariff.price is not None or kind in OWN_MATTER:
+        if tariff.free or tariff.price is not None or kind in UNKNOWN_COST:
             continue
         address = served_at(model)
         if max_tokens is None and address is None and kind in BY_VENDOR:
@@ -128,4 +128,4 @@ def bounds_of(
         )
     if problems:
         raise ProviderError("; and ".join(dict.fromkeys(problems)))
-    return Bounds(cost, max_tokens, tuple(notes))
+    return CostBounds(cost, max_tokens, tuple(notes))

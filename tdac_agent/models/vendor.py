@@ -11,11 +11,11 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
-from tdac_agent.models.patience import CONNECT_SECONDS, STALL_SECONDS, within
 from tdac_agent.models.provider import PermanentFault, Reply, Request
+from tdac_agent.models.timeout import CONNECT_SECONDS, STALL_SECONDS, run_with_timeout
 from tdac_agent.storage.secrets import (
     NO_KEY,
-    keeps_secrets,
+    is_safe_for_keys,
     one_line,
     public_url,
     read_key,
@@ -114,7 +114,7 @@ class VendorModel(ABC, Generic[C]):
             http_client=package.DefaultHttpxClient(follow_redirects=False),
         )
         with client:
-            return within(
+            return run_with_timeout(
                 request.seconds, lambda: self._ask(client, request), client.close
             )
 
@@ -136,7 +136,7 @@ class VendorModel(ABC, Generic[C]):
         vendor = self.vendor
         url = self._base_url
         key = read_key(vendor.key, vendor.company, needed=url is None)
-        if key != NO_KEY and not (self._key_over_http or keeps_secrets(url)):
+        if key != NO_KEY and not (self._key_over_http or is_safe_for_keys(url)):
             raise ProviderError(
                 f"the key in {vendor.key} would go unencrypted to {self.served_at}: "
                 "use https, unset the variable, or allow it with --key-over-http"

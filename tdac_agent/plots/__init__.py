@@ -14,7 +14,7 @@ from tdac_agent.plots.preprocessing import plot_preprocessing
 from tdac_agent.plots.runs import plot_breakdown, plot_failures
 from tdac_agent.plots.style import figure_bytes, save_figure
 from tdac_agent.plots.timeline import plot_timeline
-from tdac_agent.plots.ways import plot_trajectories
+from tdac_agent.plots.trajectories import plot_trajectories
 
 __all__ = [
     "figure_bytes",

@@ -17,8 +17,8 @@ from tdac_agent.plots.style import (
     LINES,
     MARKERS,
     TEXT,
+    apply_style,
     colours_of,
-    dress,
     new_plot,
 )
 
@@ -198,7 +198,7 @@ def _panels(
     left = 1.6 if shared else 0.3
     figure = new_plot(left + width * columns, 0.7 + height * rows)
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
-    panels = [dress(axes) for axes in grid.flat]
+    panels = [apply_style(axes) for axes in grid.flat]
     for axes in panels[count:]:
         axes.set_visible(False)
     return figure, panels

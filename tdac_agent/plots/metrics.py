@@ -16,8 +16,8 @@ from tdac_agent.plots.style import (
     LINES,
     MARKERS,
     TEXT,
+    apply_style,
     colours_of,
-    dress,
     legend,
     new_figure,
     new_plot,
@@ -151,7 +151,7 @@ def plot_cumulative_panels(
         if number >= columns:
             grid.flat[number - columns].tick_params(labelbottom=True)
     for number, (name, curve) in enumerate(curves.items()):
-        axes, colour = dress(grid.flat[number]), COLOURS[number % len(COLOURS)]
+        axes, colour = apply_style(grid.flat[number]), COLOURS[number % len(COLOURS)]
         for other in curves.values():
             axes.step(other["k"], other["cs"], "-", where="post", color=BEHIND, lw=1)
         _band(axes, curve, colour)

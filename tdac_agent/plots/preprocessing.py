@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, dress, new_plot
+from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, apply_style, new_plot
 from tdac_envs.grid.grid import BoolGrid, OccupancyGrid, body_free, clearance
 from tdac_envs.mapping.image import luminance
 from tdac_envs.mapping.map_folder import shortest_path
@@ -34,7 +34,7 @@ def plot_preprocessing(image: Source, grid: OccupancyGrid, params: MapParams) ->
     first, second, third, last = figure.subplots(2, 2).flat
     first.imshow(source.colour, interpolation="antialiased")
     _title(first, "1  the image", f"{source.name}, {grid.width} × {grid.height} px")
-    _plot_threshold(dress(second), luminance(source.colour), params)
+    _plot_threshold(apply_style(second), luminance(source.colour), params)
     _plot_grid(third, grid.cells, luminance(source.colour), params)
     _plot_room(last, grid, params)
     for axes in (first, third, last):

@@ -16,14 +16,14 @@ from tdac_agent.plots.style import (
     NOTHING,
     PALE,
     TEXT,
-    dress,
+    apply_style,
     legend,
     new_figure,
     new_plot,
     title,
 )
 from tdac_agent.runs.history import learner_named
-from tdac_agent.runs.records import JOURNAL, Attempt, Run
+from tdac_agent.runs.run_record import JOURNAL, Attempt, Run
 from tdac_agent.storage.journal import JournalRecord, read_records
 
 MOST_TESTS = 40
@@ -89,7 +89,7 @@ def plot_breakdown(run: Run) -> Figure:
     spent = _spent(journal_of(run))
     figure = new_plot(7.2 if run.tokens else 4.6, 3.2)
     panels = [
-        dress(axes)
+        apply_style(axes)
         for axes in figure.subplots(1, 2 if run.tokens else 1, squeeze=False).flat
     ]
     _stack(panels[0], spent, ("writing", "editing", "rules", "testing"), "seconds")

@@ -34,7 +34,7 @@ class Plot(Figure):
 def new_figure(width: float, height: float) -> tuple[Plot, Axes]:
     """A figure with one pair of axes, sizes in inches."""
     figure = new_plot(width, height)
-    return figure, dress(figure.add_subplot())
+    return figure, apply_style(figure.add_subplot())
 
 
 def new_plot(width: float, height: float) -> Plot:
@@ -42,7 +42,7 @@ def new_plot(width: float, height: float) -> Plot:
     return Plot(figsize=(width, height), layout="constrained")
 
 
-def dress(axes: Axes) -> Axes:
+def apply_style(axes: Axes) -> Axes:
     """Applies the common style to axes, and returns them."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color("#999999")

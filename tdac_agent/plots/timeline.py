@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from tdac_agent.plots.runs import journal_of, short_name
 from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, new_figure, title
 from tdac_agent.prompting.feedback import Group, group_failures
-from tdac_agent.runs.history import Told, Tried, gather_run, learner_named
-from tdac_agent.runs.records import Run
+from tdac_agent.runs.history import CandidateHistory, Told, gather_run, learner_named
+from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.journal import JournalRecord
 
 COLUMNS, MOST_LINES, MOST_CAUSES = 106, 3, 4
@@ -106,7 +106,7 @@ def _entries(told: Told, records: list[JournalRecord]) -> Iterator[Entry]:
             yield Entry(None, record["status"], _wrapped(reason), FAILED, "X")
 
 
-def _verdict(record: JournalRecord, tried: Tried | None) -> Entry:
+def _verdict(record: JournalRecord, tried: CandidateHistory | None) -> Entry:
     k, at, notes = record["k"], f"j = {record['j']}", record["notes"][:3]
     if record["passed"]:
         lines = _wrapped(["all tests passed", *notes])
@@ -119,7 +119,7 @@ def _verdict(record: JournalRecord, tried: Tried | None) -> Entry:
     return Entry(k, head, (*_causes(record, tried), *_wrapped(notes)), FAILED)
 
 
-def _causes(record: JournalRecord, tried: Tried | None) -> tuple[str, ...]:
+def _causes(record: JournalRecord, tried: CandidateHistory | None) -> tuple[str, ...]:
     """Root causes of the failures, or test names if there is no report."""
     if tried is None or tried.report is None:
         names = map(short_name, record["failed_tests"])

@@ -10,8 +10,8 @@ from typing import Literal, TypeVar
 from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.rules import RuleBook
-from tdac_agent.runs.learnt import Learnt, what_was_learnt
-from tdac_agent.runs.records import (
+from tdac_agent.runs.rule_history import RuleChanges, rule_changes
+from tdac_agent.runs.run_record import (
     JOURNAL,
     RUN_FILE,
     Attempt,
@@ -33,7 +33,7 @@ State = Literal["passed", "failed", "no code", "unfinished"]
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class CandidateHistory:
     """A candidate (k, j) and its result.
 
     Attributes:
@@ -56,7 +56,7 @@ class Tried:
     report: Report | None
     source: str | None
     diff: str
-    learnt: Learnt
+    learnt: RuleChanges
 
     @property
     def failed(self) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ class Told:
     run: Run
     status: str
     task: Task | None
-    tried: tuple[Tried, ...]
+    tried: tuple[CandidateHistory, ...]
     report: Report | None
     source: str | None
     book: RuleBook
@@ -160,16 +160,16 @@ def read_text(path: Path, most: int = MOST_BYTES) -> str | None:
         return None
 
 
-def _candidates(run: Run, problems: list[str]) -> Iterator[Tried]:
+def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
     """Yields the candidates on record, and those with a folder but no result."""
-    learnt = what_was_learnt(read_records(run.folder / JOURNAL))
+    learnt = rule_changes(read_records(run.folder / JOURNAL))
     judged = {(attempt.k, attempt.j): attempt for attempt in run.attempts}
     begun = {_numbers(path) for path in (run.folder / "iterations").glob("k*/j*")}
     for k, j in sorted({*judged, *begun} - {(0, 0)}):
         attempt = judged.get((k, j))
         folder = run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
         has_report = attempt is not None and attempt.valid and not attempt.unchanged
-        yield Tried(
+        yield CandidateHistory(
             k,
             j,
             folder,
@@ -178,7 +178,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[Tried]:
             _report(folder / "report.json", problems) if has_report else None,
             read_text(folder / "controller.py"),
             read_text(folder / "controller.diff") or "",
-            learnt.get((k, j), Learnt()),
+            learnt.get((k, j), RuleChanges()),
         )
 
 

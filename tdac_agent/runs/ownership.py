@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tdac_agent.models.tariff import MAX_COST
 from tdac_agent.prompting.prompt import VARIANTS
-from tdac_agent.runs.records import PROMPT_FILE, Run
+from tdac_agent.runs.run_record import PROMPT_FILE, Run
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish, tree_sha256

@@ -13,12 +13,12 @@ from typing import Any
 
 from tdac_agent.models.budget import Amount
 from tdac_agent.models.provider import Reply, Request
-from tdac_agent.models.retry import Missed
+from tdac_agent.models.retry import FailedCall
 from tdac_agent.prompting.prompt import PromptTemplate
 from tdac_agent.prompting.rules import RuleBook
+from tdac_agent.runs.journal_state import REPEATED, JournalState, reply_of
 from tdac_agent.runs.ownership import OWN_SUITE, sign
-from tdac_agent.runs.past import REPEATED, Past, reply_of
-from tdac_agent.runs.records import (
+from tdac_agent.runs.run_record import (
     GIVEN_FILE,
     JOURNAL,
     PROMPT_FILE,
@@ -29,7 +29,7 @@ from tdac_agent.runs.records import (
     Status,
 )
 from tdac_agent.storage.blobs import Blobs
-from tdac_agent.storage.files import keep, write_atomic
+from tdac_agent.storage.files import write_atomic, write_if_changed
 from tdac_agent.storage.journal import append_record
 from tdac_agent.tasks.task import Task, portable_task_file, write_workdir
 from tdac_agent.tasks.task_file import TASK_FILE
@@ -57,7 +57,7 @@ class Recorder:
     """
 
     run: Run
-    past: Past = field(default_factory=Past)
+    past: JournalState = field(default_factory=JournalState)
     on_event: Event | None = None
     _clock: float = field(default_factory=time.monotonic)
     _previous: str = ""
@@ -144,7 +144,7 @@ class Recorder:
 
     def asked(self, request: Request, model: str, key: str, reserved: Amount) -> None:
         """Records a prompt before it is sent to a model."""
-        keep(self._call_file(request, "prompt"), request.prompt)
+        write_if_changed(self._call_file(request, "prompt"), request.prompt)
         self.event(
             "call.intent",
             **_about(request, key),
@@ -154,7 +154,9 @@ class Recorder:
             reserved=asdict(reserved),
         )
 
-    def missed(self, request: Request, key: str, miss: Missed, worst: Amount) -> None:
+    def missed(
+        self, request: Request, key: str, miss: FailedCall, worst: Amount
+    ) -> None:
         """Records a fault, and the wait before the next attempt, if any."""
         wait = None if miss.wait is None else round(miss.wait, 3)
         self.event(
@@ -200,13 +202,13 @@ class Recorder:
         text = self._blobs.get(str(record.get("blob")))
         reply = None if text is None else reply_of(record, text)
         if reply is not None:
-            keep(self._call_file(request, "prompt"), request.prompt)
+            write_if_changed(self._call_file(request, "prompt"), request.prompt)
             self._count(request, reply, record.get("cost"))
             self.tell(record)
         return reply
 
     def _count(self, request: Request, reply: Reply, cost: float | None) -> None:
-        keep(self._call_file(request, "reply"), reply.text)
+        write_if_changed(self._call_file(request, "reply"), reply.text)
         run = self.run
         run.tokens_in += reply.tokens_in
         run.tokens_out += reply.tokens_out
@@ -218,8 +220,8 @@ class Recorder:
     def candidate(self, k: int, j: int, source: str) -> Path:
         """Writes a candidate's source and its diff; returns the folder."""
         folder = self._folder(k, j)
-        keep(folder / "controller.py", source)
-        keep(folder / "controller.diff", difference(self._previous, source))
+        write_if_changed(folder / "controller.py", source)
+        write_if_changed(folder / "controller.diff", difference(self._previous, source))
         self._previous = source
         return folder
 
@@ -261,7 +263,9 @@ class Recorder:
     def rules(self, k: int, book: RuleBook, notes: tuple[str, ...] = ()) -> None:
         """Records the rules of the run, and how iteration k changed them."""
         rules = [rule.model_dump(mode="json") for rule in book.in_force]
-        keep(self.run.folder / RULES_FILE, book.model_dump_json(indent=2) + "\n")
+        write_if_changed(
+            self.run.folder / RULES_FILE, book.model_dump_json(indent=2) + "\n"
+        )
         self.event("rules", k=k, rules=rules, notes=list(notes))
 
     def finish(self, status: Status, **facts: Any) -> None:

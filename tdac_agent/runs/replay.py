@@ -15,9 +15,9 @@ from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import PermanentFault, Reply, Request
 from tdac_agent.prompting.rules import BEGIN
+from tdac_agent.runs.journal_state import reply_of
 from tdac_agent.runs.ownership import is_own_folder
-from tdac_agent.runs.past import reply_of
-from tdac_agent.runs.records import JOURNAL, load_run
+from tdac_agent.runs.run_record import JOURNAL, load_run
 from tdac_agent.storage.journal import JournalRecord, read_records
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.intake import RECORD_BYTES, read_file

@@ -10,13 +10,13 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.ownership import is_own, is_own_folder, wishes_of
-from tdac_agent.runs.records import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
 from tdac_agent.storage.files import UNFINISHED
 from tdac_agent.storage.locks import LOCK_FILE
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.tasks.trust import permit
-from tdac_envs.core.errors import why
+from tdac_envs.core.errors import one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
 # Fields that determine the questions of a run and the use of the answers, as named in
@@ -40,7 +40,7 @@ CONFIGURATION = {
 }
 
 
-def run_there(folder: Path) -> Run | None:
+def existing_run(folder: Path) -> Run | None:
     """The run in a folder; None if the folder is empty or missing.
 
     Raises:
@@ -100,7 +100,7 @@ def _difference(words: str, before: object, now: object) -> str:
     return f"different {words}"
 
 
-def asked_for(
+def resume_arguments(
     folder: Path, given: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> dict[str, Any]:
     """The arguments of `synthesize` that resume a run.
@@ -157,7 +157,7 @@ def _text(file: Path) -> str:
     try:
         return read_file(file, TEXT_BYTES).decode("utf-8")
     except (OSError, ValueError) as error:
-        raise RunError(f"cannot read {file}: {why(error)}") from error
+        raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error
 
 
 def _task(folder: Path) -> Task:
@@ -174,5 +174,7 @@ def _task(folder: Path) -> Task:
         raw = read_file(folder / "params.json", TEXT_BYTES)
         params = type(setting.params).model_validate(parse_json(raw))
     except (OSError, ValueError) as error:
-        raise RunError(f"cannot resume {folder}: params.json: {why(error)}") from error
+        raise RunError(
+            f"cannot resume {folder}: params.json: {one_line_reason(error)}"
+        ) from error
     return replace(task, setting=replace(setting, params=params))

@@ -21,7 +21,7 @@ from tdac_agent.sandbox.launch import (
     best_tier,
     find_tier,
     fork_child,
-    nothing_confines,
+    no_confining_tier_error,
     start,
     start_zygote,
 )
@@ -55,7 +55,7 @@ __all__ = [
     "best_tier",
     "find_tier",
     "fork_child",
-    "nothing_confines",
+    "no_confining_tier_error",
     "start",
     "start_zygote",
 ]

@@ -9,7 +9,7 @@ import select
 import time
 
 from tdac_agent.sandbox.inner.wire import HEADER
-from tdac_agent.sandbox.waiting import Line
+from tdac_agent.sandbox.waiting import RunQueue
 
 CHUNK = 1 << 16
 # Most answers are short, and a large buffer costs more than the whole round trip.
@@ -66,7 +66,7 @@ class Channel:
         output: int,
         frame_bytes: int,
         output_bytes: int,
-        line: Line,
+        line: RunQueue,
     ) -> None:
         self._line = line
         # Last reading of the run-queue statistics: when, values, for which deadline.

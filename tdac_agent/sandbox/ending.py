@@ -36,7 +36,7 @@ class ChildUsage:
     status: int
 
 
-class Ending:
+class ProcessEnd:
     """Ends one child, once; every call returns its usage.
 
     Args:

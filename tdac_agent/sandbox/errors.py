@@ -17,10 +17,10 @@ class ControllerFault(Exception):
         phase: What the controller was doing: "import", "reset", "policy", ...
 
     Attributes:
-        may_pass: Whether the machine may have caused it, so that a retry may pass.
+        is_retryable: Whether the machine may have caused it, so that a retry may pass.
     """
 
-    may_pass = False
+    is_retryable = False
 
     def __init__(self, message: str, phase: str) -> None:
         super().__init__(message)
@@ -75,7 +75,7 @@ class ControllerTimeout(ControllerFault):
     def __init__(self, phase: str, seconds: float, *, busy: bool = False) -> None:
         super().__init__(f"{phase} did not end within {seconds:g} s", phase)
         self.seconds = seconds
-        self.may_pass = not busy
+        self.is_retryable = not busy
 
 
 class ControllerDied(ControllerFault):

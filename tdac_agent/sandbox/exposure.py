@@ -109,7 +109,7 @@ def _foreign(folders: list[str]) -> list[str]:
 
 
 @functools.cache
-def entries_but_hidden(seen: Exposure) -> tuple[list[str], list[str]]:
+def visible_entries(seen: Exposure) -> tuple[list[str], list[str]]:
     """Return `system` without `hidden`, for a sandbox that cannot mask a folder.
 
     Returns:

@@ -33,7 +33,7 @@ class PrivateFolder:
         for folder in (self.root, self.work, self.scratch):
             folder.mkdir(mode=0o700)
 
-    def furnish(self, workdir: Path | None, source: bytes) -> None:
+    def copy_files(self, workdir: Path | None, source: bytes) -> None:
         """Copy the files of `workdir` to `work` and write the controller.
 
         Raises:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.sandbox.errors import ControllerFault, SandboxError
-from tdac_agent.sandbox.exposure import entries_but_hidden, exposure
+from tdac_agent.sandbox.exposure import exposure, visible_entries
 from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.limits import Limits
 from tdac_agent.sandbox.process import Child
@@ -30,7 +30,7 @@ def start(
 
     Args:
         workdir: Folder whose files the controller may read; ignored without a source.
-        controller_source: Text of `controller.py`; None to call `Child.furnish` later.
+        controller_source: Text of `controller.py`; None to call `Child.copy_files` later.
         tier: Name of a tier, or "auto" for the best one that works on this machine.
         limits: Resource limits of the child.
 
@@ -42,7 +42,7 @@ def start(
     child = start_blank(find_tier(tier), limits)
     try:
         if controller_source is not None:
-            child.furnish(workdir, controller_source)
+            child.copy_files(workdir, controller_source)
     except BaseException:
         child.close()
         raise
@@ -120,10 +120,10 @@ def best_tier() -> Tier:
         if status.works:
             return tier
         reasons.append(status.reason)
-    raise nothing_confines(reasons)
+    raise no_confining_tier_error(reasons)
 
 
-def nothing_confines(reasons: list[str]) -> SandboxError:
+def no_confining_tier_error(reasons: list[str]) -> SandboxError:
     """Return the error for a machine on which no tier with promises works.
 
     Args:
@@ -166,7 +166,7 @@ def _setup(
     seen = exposure()
     # Where mounts mask the hidden folders, no path needs to be left out.
     masked = "hides_names" in tier.promises
-    readable, listable = (list(seen.system), []) if masked else entries_but_hidden(seen)
+    readable, listable = (list(seen.system), []) if masked else visible_entries(seen)
     return {
         "steps": list(tier.steps),
         "links": list(seen.links),

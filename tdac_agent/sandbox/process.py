@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Protocol
 
 from tdac_agent.sandbox.conversation import Conversation
-from tdac_agent.sandbox.ending import ChildUsage, Ending
+from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
 from tdac_agent.sandbox.inner.wire import Handle, Kind, is_name
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
@@ -78,7 +78,7 @@ class Child:
         self.pid = forked.pid
         self.controller_pid = forked.pid
         self._line = forked.line
-        end, root = Ending(forked), forked.folder.root
+        end, root = ProcessEnd(forked), forked.folder.root
         channel, lifeline = forked.channel, forked.lifeline
         self._talk = Conversation(channel, lifeline, limits, root, end)
         weakref.finalize(self, end)
@@ -109,7 +109,7 @@ class Child:
         self.controller_pid = self._line.pid = facts.pop("pid", self.pid)
         return facts
 
-    def furnish(self, workdir: Path | None, controller_source: str | bytes) -> None:
+    def copy_files(self, workdir: Path | None, controller_source: str | bytes) -> None:
         """Copy a working folder and a controller into a child that has none yet.
 
         Args:
@@ -125,7 +125,7 @@ class Child:
         if len(controller_source) > MAX_SOURCE_BYTES:
             text = f"{len(controller_source)} bytes (limit {MAX_SOURCE_BYTES})"
             raise ControllerError("SourceTooLarge", text, 0, "", "import")
-        self.folder.furnish(workdir, controller_source)
+        self.folder.copy_files(workdir, controller_source)
 
     def load(self, timeout: float | None = None) -> dict[str, str]:
         """Import the controller; return the type name of each public name."""

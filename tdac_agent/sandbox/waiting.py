@@ -15,7 +15,7 @@ TICKS_SECONDS = 0.025
 
 
 @dataclass(slots=True)
-class Line:
+class RunQueue:
     """Run-queue statistics of a process; time asleep does not count.
 
     Attributes:

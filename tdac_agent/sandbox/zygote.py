@@ -33,7 +33,7 @@ from tdac_agent.sandbox.folder import PrivateFolder
 from tdac_agent.sandbox.inner import landlock
 from tdac_agent.sandbox.inner.zygote import FORK, REAP, REPLY, REQUEST
 from tdac_agent.sandbox.limits import Limits
-from tdac_agent.sandbox.waiting import Line
+from tdac_agent.sandbox.waiting import RunQueue
 
 BOOT = (
     "import sys; *fds, code, site = sys.argv[1:]; "
@@ -68,7 +68,7 @@ class Forked:
     pid: int
     folder: PrivateFolder
     channel: Channel
-    line: Line
+    line: RunQueue
     lifeline: int
     reap: Callable[[], Reaped]
 
@@ -148,7 +148,7 @@ class Zygote:
             self._counts[GIVEN] += 1
             self._counts[ALIVE] += 1
         write, read, printed, lifeline = outer
-        frame, output, line = limits.frame_bytes, limits.output_bytes, Line(pid)
+        frame, output, line = limits.frame_bytes, limits.output_bytes, RunQueue(pid)
         channel = Channel(write, read, printed, frame, output, line)
         return Forked(pid, folder, channel, line, lifeline, lambda: self._reap(number))
 

@@ -46,7 +46,7 @@ def _write(path: Path, raw: bytes, lasting: bool) -> None:
         raise
 
 
-def keep(path: Path, text: str) -> None:
+def write_if_changed(path: Path, text: str) -> None:
     """Writes a file unless it already contains this text."""
     raw = text.encode("utf-8", "surrogatepass")
     if not path.is_file() or path.read_bytes() != raw:

@@ -59,7 +59,7 @@ def read_records(path: Path) -> list[JournalRecord]:
     return _records(raw)
 
 
-def read_on(path: Path, offset: int) -> tuple[list[JournalRecord], int]:
+def read_records_from(path: Path, offset: int) -> tuple[list[JournalRecord], int]:
     """Returns the records after an offset and the end offset; repairs a torn end.
 
     Args:
@@ -68,7 +68,7 @@ def read_on(path: Path, offset: int) -> tuple[list[JournalRecord], int]:
     """
     raw = _read_after(path, offset)
     if raw and not raw.endswith(b"\n"):
-        mend(path)
+        repair_end(path)
         raw = _read_after(path, offset)
     return _records(raw), offset + len(raw)
 
@@ -82,7 +82,7 @@ def _records(raw: bytes) -> list[JournalRecord]:
     return [record for record in records if record is not None]
 
 
-def mend(path: Path) -> None:
+def repair_end(path: Path) -> None:
     """Repairs the end of the file by cutting off a torn last line.
 
     A valid last line without a line end is completed, since `read_records` counts it.

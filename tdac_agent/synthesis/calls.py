@@ -20,9 +20,9 @@ from tdac_agent.models.provider import (
     Reply,
     Request,
 )
-from tdac_agent.models.retry import Missed, RetryPolicy, answer
+from tdac_agent.models.retry import FailedCall, RetryPolicy, answer
 from tdac_agent.models.tariff import Tariff
-from tdac_agent.runs.past import call_key
+from tdac_agent.runs.journal_state import call_key
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.synthesis.workload import Rest, rest_of
 
@@ -94,7 +94,7 @@ class Calls:
             reply = self.recorder.recall(variant, call_key(model, variant))
             if reply is not None:
                 return reply
-        missed: list[Missed] = []
+        missed: list[FailedCall] = []
         try:
             for variant in variants[:-1]:
                 try:
@@ -107,10 +107,12 @@ class Calls:
             times = "" if number == 1 else f" (asked {number} times)"
             raise Fault(f"{model.name}: {fault}{times}") from None
 
-    def _answer(self, model: Provider, request: Request, missed: list[Missed]) -> Reply:
+    def _answer(
+        self, model: Provider, request: Request, missed: list[FailedCall]
+    ) -> Reply:
         """Asks a model with retries; each try is a call of its own."""
 
-        def note(miss: Missed) -> None:
+        def note(miss: FailedCall) -> None:
             missed.append(miss)
             worst = self.tariffs[model.name].worst(request)
             self.recorder.missed(request, call_key(model, request), miss, worst)

@@ -29,7 +29,7 @@ _SAME = "same code as the attempt before"
 _ENDED = {"length": "it was truncated", "refusal": "it was refused"}
 
 
-class Candidate(NamedTuple):
+class ModelAnswer(NamedTuple):
     """Source of a controller (None if the model gave none) and notes on the answer."""
 
     source: str | None
@@ -60,7 +60,7 @@ class Dialogue:
     _failed: int = 0
     _unchanged: bool = False
 
-    def generate(self, k: int) -> Candidate:
+    def generate(self, k: int) -> ModelAnswer:
         """Asks for a new controller under the rules in force."""
         request = Request(
             "generate",
@@ -72,7 +72,7 @@ class Dialogue:
         )
         return self._code(self.learner, request)
 
-    def edit(self, k: int, j: int, source: str, report: Report) -> Candidate:
+    def edit(self, k: int, j: int, source: str, report: Report) -> ModelAnswer:
         """Asks for a repaired controller, candidate (k, j)."""
         request = self._repair("edit", source, report, self._at(k, j))
         return self._code(self.optimizer, request)
@@ -142,7 +142,7 @@ class Dialogue:
             max_tokens=self.calls.max_output,
         )
 
-    def _code(self, model: Provider, request: Request) -> Candidate:
+    def _code(self, model: Provider, request: Request) -> ModelAnswer:
         """Asks for code; up to twice more after an unusable answer.
 
         The repeated question says what was wrong. A truncated answer is never used; it
@@ -153,12 +153,12 @@ class Dialogue:
             reply = self.calls.ask(model, request)
             answer = _file_in(reply)
             if answer.source is not None:
-                return Candidate(answer.source, reply.notes)
+                return ModelAnswer(answer.source, reply.notes)
             problems.append(answer.problem)
             request = self._again(request, reply, answer.problem, asked)
         reasons = "; ".join(dict.fromkeys(problems))
         why = f"none of {MAX_ASKS} answers could be used: {reasons}"
-        return Candidate(None, (*reply.notes, why))
+        return ModelAnswer(None, (*reply.notes, why))
 
     def _again(
         self, request: Request, reply: Reply, problem: str, asked: int

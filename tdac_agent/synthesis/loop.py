@@ -13,18 +13,18 @@ from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.runs.recorder import Event, Recorder
-from tdac_agent.runs.records import Run
-from tdac_agent.runs.resume import check_own, check_same, run_there
+from tdac_agent.runs.resume import check_own, check_same, existing_run
+from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.synthesis.beginning import (
+from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
+from tdac_agent.synthesis.setup import (
     account_of,
     describe,
     hold_folder,
     open_record,
     settled_seed,
 )
-from tdac_agent.synthesis.calls import Calls, OutOfBudget
-from tdac_agent.synthesis.dialogue import Candidate, Dialogue
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import draw_trajectories
 from tdac_agent.verification.diagnosis.report import Report
@@ -119,9 +119,9 @@ def synthesize(
         refine=refine,
         seed=settled_seed(seed, models[0], out),
     )
-    account = account_of(models, run_there(out), max_cost, max_tokens, budget)
+    account = account_of(models, existing_run(out), max_cost, max_tokens, budget)
     with hold_folder(out):
-        before = run_there(out)
+        before = existing_run(out)
         if before is not None:
             check_same(before, run)
             if before.finished:
@@ -169,7 +169,7 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
     """Algorithm 2, until a candidate has passed or K iterations are over."""
     recorder = dialogue.calls.recorder
     run = recorder.run
-    first = None if given is None else Candidate(given)
+    first = None if given is None else ModelAnswer(given)
     # Recorded answers do not count, so that a resumed run asks as often again.
     empty = 0
     for k in range(1, run.iterations + 1):

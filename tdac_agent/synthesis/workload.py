@@ -10,7 +10,7 @@ from tdac_agent.models.provider import Request
 from tdac_agent.models.tariff import Tariff
 from tdac_agent.models.tokens import estimate_tokens
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS
-from tdac_agent.runs.records import Run
+from tdac_agent.runs.run_record import Run
 
 FEEDBACK_TOKENS = 12_000
 """Allowance for the failures, the earlier attempts and the text around them."""

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.tasks.task import Task
-from tdac_envs.core.private import user_state
+from tdac_envs.core.trusted_folders import user_state
 
 SECRET_BYTES = 32
 SEED_BITS = 32

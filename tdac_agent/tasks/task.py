@@ -131,7 +131,7 @@ def load_task(
 def _is_of_own_run(folder: Path, suite: Path) -> bool:
     """Whether a folder is a run that this installation created with these tests."""
     from tdac_agent.runs.ownership import is_own  # slow to import
-    from tdac_agent.runs.records import load_run
+    from tdac_agent.runs.run_record import load_run
 
     try:
         return is_own(load_run(folder), suite)

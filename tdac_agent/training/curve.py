@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tdac_agent.errors import RunError
 from tdac_agent.storage.files import write_atomic
-from tdac_envs.core.errors import why
+from tdac_envs.core.errors import one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 CURVE_FILE = "learning_curve.csv"
@@ -72,4 +72,4 @@ def read_curve(folder: Path) -> list[Point]:
             for row in rows
         ]
     except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
-        raise RunError(f"cannot read {file}: {why(error)}") from error
+        raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tdac_agent.storage.shipped import shipped
-from tdac_envs.core.errors import TaskError, why
+from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.learning.wrappers import WRAPPERS
 
@@ -57,7 +57,7 @@ def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
     try:
         data = parse_yaml(read_file(file, TEXT_BYTES))
     except (OSError, ValueError) as error:
-        message = f"cannot read hyperparameters {file}: {why(error)}"
+        message = f"cannot read hyperparameters {file}: {one_line_reason(error)}"
         raise TaskError(message) from error
     if not isinstance(data, dict) or not isinstance(data.get(env), dict):
         raise TaskError(f"{file} has no hyperparameters for {env}")

@@ -19,11 +19,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor
 
 from tdac_agent.errors import RunError
+from tdac_agent.training.checkpoint_marks import CHECKPOINT, REPLAY, install_checkpoint
 from tdac_agent.training.curve import Point, read_curve, write_curve
 from tdac_agent.training.hyperparameters import model_arguments
 from tdac_agent.training.plan import TrainingPlan, make_batch
 from tdac_agent.training.policy_files import write_policy
-from tdac_agent.training.vouched import CHECKPOINT, REPLAY, put
 
 ALGOS = {"ppo": PPO, "sac": SAC, "td3": TD3}
 EVALUATION_SEED = 1_000_000
@@ -193,7 +193,7 @@ def _write_checkpoint(model: Any, folder: Path) -> None:
     if hasattr(model, "replay_buffer"):
         draft = folder / f".{REPLAY}"
         model.save_replay_buffer(draft)
-        put(draft, folder / REPLAY)
+        install_checkpoint(draft, folder / REPLAY)
     draft = folder / f".{CHECKPOINT}"
     model.save(draft)
-    put(draft, folder / CHECKPOINT)
+    install_checkpoint(draft, folder / CHECKPOINT)

@@ -22,7 +22,7 @@ from tdac_agent.training.hyperparameters import (
     read_hyperparameters,
 )
 from tdac_envs.core.arguments import whole_number
-from tdac_envs.core.errors import TaskError, why
+from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.learning.wrappers import check_wrappers
 
@@ -145,7 +145,7 @@ def read_plan(folder: Path) -> TrainingPlan:
         reason = error.strerror
         raise RunError(f"no training in {str(folder)!r}: {file}: {reason}") from error
     except ValueError as error:
-        raise RunError(f"{file}: {why(error)}") from error
+        raise RunError(f"{file}: {one_line_reason(error)}") from error
 
 
 def tasks_of(plan: TrainingPlan) -> list[Task]:

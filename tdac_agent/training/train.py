@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from tdac_agent.errors import RunError
 from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.training.checkpoint_marks import check
 from tdac_agent.training.curve import PLAN_FILE, Point
 from tdac_agent.training.plan import TrainingPlan, read_plan, write_plan
-from tdac_agent.training.vouched import check
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
 

@@ -8,8 +8,8 @@ from typing import Literal
 
 from tdac_agent.sandbox import ChildUsage, ControllerError, ControllerFault
 from tdac_envs.epuck.env import EPuckEnv
-from tdac_envs.webots.log import Log, way_of
-from tdac_envs.webots.stage import Stage
+from tdac_envs.webots.log import Log, driven_length
+from tdac_envs.webots.stage import ControllerWorld
 
 Outcome = Literal[
     "reached", "out of time", "teleport", "quit", "controller ended", "error"
@@ -71,7 +71,7 @@ class WebotsReport:
 
 def report_of(
     controller: Path,
-    stage: Stage,
+    stage: ControllerWorld,
     log: Log,
     env: EPuckEnv,
     fault: ControllerFault | None,
@@ -95,7 +95,7 @@ def report_of(
         time=log.steps * env.nominal.dt,
         collisions=log.collisions,
         first_contact=log.first_contact,
-        way=way_of(log),
+        way=driven_length(log),
         d0=log.path_distances[0] if goal else None,
         d_min=min(log.path_distances) if goal else None,
         d_min_euclidean=min(log.distances) if goal else None,
@@ -111,7 +111,7 @@ def report_of(
 
 
 def _why_not(
-    outcome: Outcome, log: Log, stage: Stage, error: ControllerFault | None
+    outcome: Outcome, log: Log, stage: ControllerWorld, error: ControllerFault | None
 ) -> str:
     if log.teleport is not None:
         return f"teleport: {log.teleport}"

@@ -28,7 +28,7 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.log import Log
 from tdac_envs.webots.requests import RequestError
 from tdac_envs.webots.server import RunEnded, StepServer
-from tdac_envs.webots.stage import Stage
+from tdac_envs.webots.stage import ControllerWorld
 
 PACKAGE = Path(tdac_envs.webots.__file__).parent / "controller"
 LIMITS = Limits(output_bytes=16 << 20)
@@ -75,7 +75,7 @@ class _World:
 
 def run_controller(
     controller: Path,
-    stage: Stage,
+    stage: ControllerWorld,
     env: EPuckEnv,
     *,
     tier: str = "auto",
@@ -87,7 +87,7 @@ def run_controller(
     Args:
         controller: The file.
         stage: The world.
-        env: Environment of the stage; see `Stage.make_env`.
+        env: Environment of the stage; see `ControllerWorld.make_env`.
         tier: Sandbox tier, or `auto`.
         limits: Resource limits of the controller.
         watch: Called with the number of steps so far.
@@ -152,7 +152,7 @@ def _picture(env: EPuckEnv) -> NDArray[np.uint8]:
     return frame
 
 
-def _copy_files(folder: Path, controller: Path, stage: Stage) -> None:
+def _copy_files(folder: Path, controller: Path, stage: ControllerWorld) -> None:
     """Copies all files of the controller's folder, and the world.
 
     Raises:

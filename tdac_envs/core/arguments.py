@@ -76,7 +76,7 @@ def positive(name: str, value: float) -> float:
     return number
 
 
-def not_negative(name: str, value: float) -> float:
+def non_negative(name: str, value: float) -> float:
     """The value as a float.
 
     Raises:
@@ -116,7 +116,7 @@ def whole_number(name: str, value: float, least: int, most: int | None = None) -
     return int(value)
 
 
-def steps_of(horizon: float) -> int:
+def horizon_steps(horizon: float) -> int:
     """The horizon as an int.
 
     Raises:

@@ -2,7 +2,8 @@
 
 numba detects changes only in the file of the kernel itself, and it unpickles what it
 finds. So the folder's name has a hash of everything that the machine code depends on,
-and `tdac_envs.core.private` must confirm that no other user can have written there.
+and `tdac_envs.core.trusted_folders` must confirm that no other user can have written
+there.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from tdac_envs.core.private import copy, is_private, is_usable, user_cache
+from tdac_envs.core.trusted_folders import copy, is_private, is_usable, user_cache
 
 PACKAGE = Path(__file__).parents[1]
 

@@ -29,7 +29,7 @@ def kernel(function: F) -> F:
     """Decorator: compiles a function at its first call, or loads it from disk.
 
     All calls from Python must use the same types: float or int as annotated, and
-    `constant` for arrays that are only read. Every other combination of types is
+    `read_only` for arrays that are only read. Every other combination of types is
     compiled separately, and concurrent processes may lose each other's results.
 
     With `NUMBA_DISABLE_JIT=1` the function is not compiled.
@@ -51,7 +51,7 @@ def subkernel(function: F) -> F:
     return compiled
 
 
-def constant(array: NDArray[Any], dtype: DTypeLike | None = None) -> NDArray[Any]:
+def read_only(array: NDArray[Any], dtype: DTypeLike | None = None) -> NDArray[Any]:
     """A C-contiguous, read-only view of an array that kernels only read.
 
     For numba it has a different type than a writeable array. The data is copied only

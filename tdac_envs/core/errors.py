@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-LONGEST = 200
+MAX_QUOTED = 200
 """Largest number of characters that an error quotes from a file."""
 
 
@@ -63,21 +63,21 @@ def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
     problems = error.errors(include_url=False)
     unknown = (p for p in problems if p["type"] == "extra_forbidden")
     first = next(unknown, problems[0])
-    place = ".".join(map(str, first["loc"]))[:LONGEST]
+    place = ".".join(map(str, first["loc"]))[:MAX_QUOTED]
     reason = _REASONS.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "extra_forbidden":
         reason += hint(place, known)
     return f"{place}: {reason}" if place else reason
 
 
-def why(error: Exception) -> str:
+def one_line_reason(error: Exception) -> str:
     """One-line reason for not using a file: the OS error or the first problem."""
     from pydantic import ValidationError
 
     if isinstance(error, ValidationError):
         return first_problem(error)
     reason = error.strerror if isinstance(error, OSError) else error
-    return " ".join(str(reason).split())[:LONGEST]
+    return " ".join(str(reason).split())[:MAX_QUOTED]
 
 
 def hint(typed: str, known: Iterable[str]) -> str:

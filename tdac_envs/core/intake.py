@@ -22,7 +22,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from tdac_envs.core.errors import LONGEST
+from tdac_envs.core.errors import MAX_QUOTED
 
 TEXT_BYTES = 1_000_000
 """Size limit of a file that people write."""
@@ -194,12 +194,12 @@ def parse_json(text: bytes) -> Any:
 
 def one_line(error: object) -> str:
     """The message of an error as one line of limited length."""
-    return " ".join(str(error).split())[:LONGEST] or type(error).__name__
+    return " ".join(str(error).split())[:MAX_QUOTED] or type(error).__name__
 
 
 def printable(name: str) -> str:
     """A file name of limited length, with `?` for unprintable characters."""
-    return "".join(c if c.isprintable() else "?" for c in name[:LONGEST])
+    return "".join(c if c.isprintable() else "?" for c in name[:MAX_QUOTED])
 
 
 def check(value: Any, *, any_text: bool = False) -> None:

@@ -41,7 +41,7 @@ class Status(NamedTuple):
     outcome: str = ""
 
 
-def ending(reached: bool, collided: bool, truncated: bool) -> str:
+def outcome_of(reached: bool, collided: bool, truncated: bool) -> str:
     """The outcome after a step, as in `Status`."""
     if reached:
         return "reached"

@@ -67,7 +67,7 @@ def autoreset_mode_of(given: str | AutoresetMode) -> AutoresetMode:
         ) from None
 
 
-def several(
+def make_envs(
     make: Callable[..., Env], each: Any, options: dict[str, Any], count: int
 ) -> list[Env]:
     """The environments of a batch, one for each entry of `each`.
@@ -100,7 +100,7 @@ def several(
     return envs
 
 
-def no_pictures(render_mode: object) -> None:
+def check_no_rendering(render_mode: object) -> None:
     """Checks that `render_mode` is None.
 
     Raises:

@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import not_negative, one_of, whole_number
-from tdac_envs.drawing.runs import ending
+from tdac_envs.core.arguments import non_negative, one_of, whole_number
+from tdac_envs.drawing.runs import outcome_of
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import (
     HEADING,
@@ -68,8 +68,8 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         one_of("on_collision", on_collision, ("terminate", "block"))
         one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         self.on_collision = on_collision
-        self.wheel_slip = not_negative("wheel_slip", wheel_slip)
-        self.motor_lag = not_negative("motor_lag", motor_lag)
+        self.wheel_slip = non_negative("wheel_slip", wheel_slip)
+        self.motor_lag = non_negative("motor_lag", motor_lag)
         self.delay = whole_number("delay", delay, 0)
         self.weights = weights_of(reward_weights)
         self.render_mode = render_mode
@@ -134,7 +134,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
         x, y, _ = self.pose().tolist()
         self._trail.append((x, y))
-        self._status = ending(reached, collided, truncated) or self._status
+        self._status = outcome_of(reached, collided, truncated) or self._status
         if self.render_mode == "human":
             self.render()
 

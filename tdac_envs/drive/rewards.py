@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.core.arguments import non_negative, one_of
 from tdac_envs.core.compiled import subkernel
 
 
@@ -34,7 +34,7 @@ def weights_of(given: Mapping[str, float] | None) -> RewardWeights:
     weights = {}
     for name, value in (given or {}).items():
         one_of("a name in reward_weights", name, RewardWeights._fields)
-        weights[name] = not_negative(f"reward_weights[{name!r}]", value)
+        weights[name] = non_negative(f"reward_weights[{name!r}]", value)
     return RewardWeights(**weights)
 
 

@@ -98,7 +98,7 @@ def copy_row(source: NDArray[Any], to: NDArray[Any], row: int) -> None:
 
 
 @subkernel
-def within(value: float) -> float:
+def clip_unit(value: float) -> float:
     """The value clipped to [-1, 1]."""
     return min(max(value, -1.0), 1.0)
 
@@ -112,7 +112,7 @@ def apply_command(
     outcome: Array,
 ) -> None:
     """Computes the wheel speeds, as fractions, from the commanded ones."""
-    left, right = within(state[LEFT]), within(state[RIGHT])
+    left, right = clip_unit(state[LEFT]), clip_unit(state[RIGHT])
     if left != state[LEFT] or right != state[RIGHT]:
         outcome[CLIPPED] += 1.0
     delay = int(constants[DELAY])
@@ -127,7 +127,7 @@ def apply_command(
 
 
 @subkernel
-def settle(constants: Array, state: Array, outcome: Array, before: float) -> None:
+def finish_step(constants: Array, state: Array, outcome: Array, before: float) -> None:
     """Computes the reward of a step and whether it ends the episode.
 
     `before` is the length of the remaining path before the step.
@@ -188,7 +188,7 @@ def move(
 
 
 @subkernel
-def free_way(rest: float, approach: float, curvature: float) -> float:
+def contact_free_length(rest: float, approach: float, curvature: float) -> float:
     """Arc length h that is certainly free of contact.
 
     h is the positive root of `rest + approach * h - curvature * h**2 / 2`, or inf.

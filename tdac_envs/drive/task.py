@@ -23,7 +23,7 @@ class Pose(NamedTuple):
     heading: float
 
 
-def generous_horizon(shortest: float, full_step: float) -> int:
+def default_horizon_for(shortest: float, full_step: float) -> int:
     """Six times the steps of the shortest path at full speed, but at least 2500."""
     return max(MIN_HORIZON, math.ceil(min(6.0 * shortest / full_step, 2.0**62)))
 
@@ -46,7 +46,7 @@ def jittered_pose(
         pose = Pose(
             nominal.x + distance * math.cos(bearing),
             nominal.y + distance * math.sin(bearing),
-            wrapped(nominal.heading + turn),
+            wrap_heading(nominal.heading + turn),
         )
         if may_start(pose):
             return pose
@@ -54,7 +54,7 @@ def jittered_pose(
     return nominal._replace(heading=pose.heading)
 
 
-def wrapped(heading: float) -> float:
+def wrap_heading(heading: float) -> float:
     """The heading wrapped to (-pi, pi]; exact for a heading of any size."""
     turn = math.remainder(heading, 2.0 * math.pi)
     return math.pi if turn <= -math.pi else turn

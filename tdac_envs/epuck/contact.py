@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import kernel, subkernel
-from tdac_envs.drive.stepping import free_way, move, wrap_angle
+from tdac_envs.drive.stepping import contact_free_length, move, wrap_angle
 from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, Array, Index
 
@@ -166,7 +166,7 @@ def _travel(
             rest = SINK
         if rest <= _CLOSE:
             return travelled
-        travelled += free_way(rest, approach, curvature)
+        travelled += contact_free_length(rest, approach, curvature)
         if travelled >= limit:
             return limit
         share = travelled / length

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Addresses
-from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.core.arguments import non_negative, one_of
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import TOUCHED, info_of
@@ -197,7 +197,7 @@ class EPuckEnv(DrivenEnv):
             render_mode=render_mode,
         )
         self.variation = variation
-        self.sensor_noise = not_negative("sensor_noise", sensor_noise)
+        self.sensor_noise = non_negative("sensor_noise", sensor_noise)
         self.ground_sensors = bool(ground_sensors)
         self.gps, self.compass = bool(gps), bool(compass)
         space = observation_space(

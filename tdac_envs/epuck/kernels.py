@@ -34,11 +34,11 @@ from tdac_envs.drive.stepping import (
     apply_command,
     batch_at,
     clear,
+    clip_unit,
     copy_row,
+    finish_step,
     give_command,
     move,
-    settle,
-    within,
     wrap_angle,
 )
 from tdac_envs.epuck.contact import advance
@@ -66,7 +66,7 @@ OUTCOME = 19
 
 
 @subkernel
-def way_left(
+def remaining_path(
     field: NDArray[np.float32], constants: Array, x: float, y: float, previous: float
 ) -> float:
     """Length of the shortest path from a point to the goal, m.
@@ -124,7 +124,7 @@ def _observe(
         seen_points, seen_first, seen_extent, seen_listed, begin, end,
         constants[FLOOR], state, readings, hits,
     )  # fmt: skip
-    outcome[REMAINING] = way_left(field, constants, x, y, outcome[REMAINING])
+    outcome[REMAINING] = remaining_path(field, constants, x, y, outcome[REMAINING])
     off_x, off_y = goal_x - x, goal_y - y
     gap = math.sqrt(off_x * off_x + off_y * off_y)
     begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
@@ -191,7 +191,7 @@ def _turn_wheels(
     state[LEFT_TURNED] += swept * left
     state[RIGHT_TURNED] += swept * right
     left, right = left * state[SLIP_LEFT], right * state[SLIP_RIGHT]
-    left, right = swept * within(left), swept * within(right)
+    left, right = swept * clip_unit(left), swept * clip_unit(right)
     outcome[FORWARD] = 0.5 * (left + right) * WHEEL_RADIUS
     outcome[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]
 
@@ -229,7 +229,7 @@ def _finish(
         seen_points, seen_first, seen_extent, seen_cells, seen_listed,
         field, constants, state, pose, turned, readings, hits, outcome,
     )  # fmt: skip
-    settle(constants, state, outcome, before)
+    finish_step(constants, state, outcome, before)
 
 
 @subkernel

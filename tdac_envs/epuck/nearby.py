@@ -38,7 +38,7 @@ class Nearby:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surroundings:
+class NearbyParts:
     """The parts that a robot may touch and see, depending on its position.
 
     Attributes:
@@ -60,7 +60,7 @@ class Surroundings:
 @lru_cache(maxsize=8)
 def surroundings(
     ground: Ground, webots: bool, goal_mark: bool, reach: float
-) -> Surroundings:
+) -> NearbyParts:
     """The surroundings of a robot on a ground, from a cache.
 
     Args:
@@ -84,7 +84,7 @@ def surroundings(
     near = gaps - half <= np.maximum(surely, reach)[..., None]
     sighted = _gaps(visible, ground, width, shape) - half <= FARTHEST
     sighted |= visible.owner != FIXED
-    return Surroundings(
+    return NearbyParts(
         width,
         visible,
         _listed(near | ~fixed),

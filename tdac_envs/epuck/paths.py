@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import constant, kernel
+from tdac_envs.core.compiled import kernel, read_only
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.ground import Ground, Point
@@ -26,7 +26,7 @@ def at_goal(ground: Ground, goal: Point, tolerance: float, x: float, y: float) -
     return gap < ground.gap(x, y) or sees(*solid.arrays(), *map(float, (x, y, *goal)))
 
 
-def check_stands(ground: Ground, name: str, x: float, y: float) -> None:
+def check_body_fits(ground: Ground, name: str, x: float, y: float) -> None:
     """Checks that an e-puck fits at (x, y), the point called `name`.
 
     Raises:
@@ -63,7 +63,7 @@ def _nearest_place(ground: Ground, x: float, y: float) -> str:
     return f"the nearest free position is ({near_x:.3f}, {near_y:.3f})"
 
 
-def entry(
+def path_entry(
     ground: Ground, field: NDArray[np.float32], at: Point
 ) -> tuple[int, int] | None:
     """The nearest grid point (column, row) reachable in a straight line, or None.
@@ -76,7 +76,7 @@ def entry(
     solid, (left, low, _, _) = ground.solid, ground.bounds
     u, v = (at[0] - left) / ground.spacing, (at[1] - low) / ground.spacing
     numbers = (*at, u, v, left, low, ground.spacing, BODY_RADIUS)
-    cell = _entry_cell(*solid.arrays(), constant(field), *map(float, numbers))
+    cell = _entry_cell(*solid.arrays(), read_only(field), *map(float, numbers))
     if cell < 0:
         return None
     row, column = divmod(cell, field.shape[1])
@@ -98,7 +98,7 @@ def _entry_cell(
     spacing: float,
     radius: float,
 ) -> int:
-    """Flat index of the grid point of `entry`, at most 3 from (u, v); -1 if none."""
+    """Flat index of the point of `path_entry`, at most 3 from (u, v); -1 if none."""
     height, width = field.shape
     column, row = math.floor(u + 0.5), math.floor(v + 0.5)
     before, found = -1.0, -1
@@ -127,7 +127,7 @@ def _entry_cell(
 
 
 def open_field(open_: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """A field for `entry`: 0 at the grid points to choose from, inf elsewhere."""
+    """A field for `path_entry`: 0 at the grid points to choose from, inf elsewhere."""
     return np.where(open_, np.float32(0.0), np.float32(math.inf))
 
 
@@ -154,10 +154,10 @@ def route(ground: Ground, start: Point, goal: Point) -> NDArray[np.float32]:
     Raises:
         TaskError: No path joins start and goal; the message gives the reason.
     """
-    end = entry(ground, open_field(ground.free(BODY_RADIUS)), goal)
+    end = path_entry(ground, open_field(ground.free(BODY_RADIUS)), goal)
     if end is not None:
         field = field_to(ground, end)
-        if entry(ground, field, start) is not None:
+        if path_entry(ground, field, start) is not None:
             return field
     reason = _walled_off(ground, start, goal) or _too_narrow(ground, start, goal)
     raise TaskError(
@@ -200,7 +200,7 @@ def path_down(ground: Ground, field: NDArray[np.float32], start: Point) -> Path:
 
     It ends at the grid point of the goal. It is empty if there is no path.
     """
-    begin = entry(ground, field, start)
+    begin = path_entry(ground, field, start)
     if begin is None:
         return np.empty((0, 2))
     steps = np.asarray(field, np.float64) / ground.spacing

@@ -60,7 +60,7 @@ class EPuckScene:
             if not (movable and any(thing is one for one in pushable))
         ]
         draw_things(view, ground.world, still)
-        draw_wish(view, task)
+        draw_task(view, task)
         for robot in ground.world.robots[1:]:
             self._draw_other(robot)
         view.scale_bar()
@@ -121,7 +121,7 @@ class EPuckScene:
         _draw_epuck(self._view, robot.pose, radius, _OTHER)
 
 
-def draw_wish(view: View, task: EPuckTask) -> None:
+def draw_task(view: View, task: EPuckTask) -> None:
     """Draws the shortest path, the start and the goal."""
     view.canvas.line(view.at(task.path_from(task.start)), GREY, 2, 0.75, dash=7)
     start = view.at(task.start[:2])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import constant
+from tdac_envs.core.compiled import read_only
 from tdac_envs.worlds.footprint import Disc
 from tdac_envs.worlds.world import Part
 
@@ -81,7 +81,7 @@ class Prisms:
 
     def arrays(self) -> tuple[Array, Index, Array]:
         """`points`, `first` and `extent` as read-only arguments of kernels."""
-        return constant(self.points), constant(self.first), constant(self.extent)
+        return read_only(self.points), read_only(self.first), read_only(self.extent)
 
     def copy(self) -> Prisms:
         """A copy with its own `points` and `extent`, which may be changed."""

@@ -13,7 +13,7 @@ from tdac_envs.drawing.backdrop import CLOSE_UP, Window
 from tdac_envs.drawing.canvas import Canvas, Image
 from tdac_envs.drawing.runs import Legend, draw_runs
 from tdac_envs.epuck.ground import Bounds
-from tdac_envs.epuck.picture import SMALLEST_BODY, draw_wish
+from tdac_envs.epuck.picture import SMALLEST_BODY, draw_task
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.picture import SIDE, View, draw_things
@@ -68,7 +68,7 @@ def task_view(
     view = View(bounds, strip=strip, side=side, margin=margin)
     things = [thing for thing in ground.things if not thing.is_goal or thing.solid]
     draw_things(view, ground.world, things)
-    draw_wish(view, task)
+    draw_task(view, task)
     return view
 
 

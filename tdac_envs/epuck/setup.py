@@ -13,7 +13,7 @@ from tdac_envs.core.arguments import check_reset_options, finite_numbers
 from tdac_envs.drive.rewards import RewardWeights
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH
-from tdac_envs.epuck.nearby import Surroundings
+from tdac_envs.epuck.nearby import NearbyParts
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.task import (
     EPuckTask,
@@ -43,7 +43,7 @@ class Setup:
     """
 
     nominal: EPuckTask
-    around: Surroundings
+    around: NearbyParts
     variation: str
     fixed_horizon: bool
     on_collision: str

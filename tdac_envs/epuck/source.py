@@ -46,10 +46,10 @@ def open_world(
         raise TaskError(f"{_name(world)} has no goal; give goal=(x, y) in metres")
     if start is None and not world.robots:
         raise TaskError(f"{_name(world)} has no e-puck; give start=(x, y, heading)")
-    return world if start is None else started(world, start)
+    return world if start is None else with_start(world, start)
 
 
-def started(world: World, start: Sequence[float]) -> World:
+def with_start(world: World, start: Sequence[float]) -> World:
     """The world with its first e-puck at (x, y) or (x, y, heading).
 
     Raises:

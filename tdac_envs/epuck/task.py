@@ -10,23 +10,28 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import finite_numbers, finite_point, positive, steps_of
+from tdac_envs.core.arguments import (
+    finite_numbers,
+    finite_point,
+    horizon_steps,
+    positive,
+)
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import (
     MAX_DRAWS,
     Pose,
-    generous_horizon,
+    default_horizon_for,
     jittered_pose,
-    wrapped,
+    wrap_heading,
 )
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.paths import (
     at_goal,
-    check_stands,
-    entry,
+    check_body_fits,
     field_to,
     path_down,
+    path_entry,
     route,
 )
 from tdac_envs.grid.plan import Path
@@ -103,8 +108,8 @@ class EPuckTask:
         field = self.field
         if goal != self.goal:
             field = route(self.ground, start[:2], goal)
-        start = start._replace(heading=wrapped(start.heading))
-        shortest = way(self.ground, field, start[:2])
+        start = start._replace(heading=wrap_heading(start.heading))
+        shortest = path_length_from(self.ground, field, start[:2])
         return replace(self, start=start, goal=goal, field=field, shortest=shortest)
 
 
@@ -134,32 +139,32 @@ def make_task(
             path joins them, or the start is already within the tolerance.
     """
     begin = Pose(*finite_numbers("start", start, 3))
-    begin = begin._replace(heading=wrapped(begin.heading))
+    begin = begin._replace(heading=wrap_heading(begin.heading))
     end = finite_point("goal", goal)
     tolerance = positive("goal_tolerance", goal_tolerance)
     limit, dt = positive("max_wheel_speed", max_wheel_speed), positive("dt", dt)
-    check_stands(ground, "start", begin.x, begin.y)
-    check_stands(ground, "goal", *end)
+    check_body_fits(ground, "start", begin.x, begin.y)
+    check_body_fits(ground, "goal", *end)
     field = route(ground, begin[:2], end)
     if at_goal(ground, end, tolerance, begin.x, begin.y):
         raise TaskError(
             f"the start is already at the goal: {math.dist(begin[:2], end):.3f} m "
             f"apart with a tolerance of {tolerance:g} m; move one of them"
         )
-    shortest = way(ground, field, begin[:2])
+    shortest = path_length_from(ground, field, begin[:2])
     task = EPuckTask(ground, begin, end, limit, tolerance, dt, 1, field, shortest)
     steps = default_horizon(task) if horizon is None else horizon
-    return replace(task, horizon=steps_of(steps))
+    return replace(task, horizon=horizon_steps(steps))
 
 
 def default_horizon(task: EPuckTask) -> int:
-    """The horizon for the shortest path of a task; see `generous_horizon`."""
-    return generous_horizon(task.shortest, task.full_step)
+    """The horizon for the shortest path of a task; see `default_horizon_for`."""
+    return default_horizon_for(task.shortest, task.full_step)
 
 
-def way(ground: Ground, field: NDArray[np.float32], at: Point) -> float:
+def path_length_from(ground: Ground, field: NDArray[np.float32], at: Point) -> float:
     """Length of the shortest path from a point, m, given a field of `route`."""
-    begin = entry(ground, field, at)
+    begin = path_entry(ground, field, at)
     if begin is None:
         return math.inf
     column, row = begin
@@ -184,7 +189,7 @@ def mixed_start(task: EPuckTask, random: np.random.Generator) -> Pose:
     connected = np.flatnonzero(np.isfinite(task.field))
     for _ in range(MAX_DRAWS):
         start = ground.at(*_place(task, int(random.choice(connected))))
-        heading = wrapped(random.uniform(-math.pi, math.pi))
+        heading = wrap_heading(random.uniform(-math.pi, math.pi))
         if not at_goal(ground, task.goal, task.goal_tolerance, *start):
             return Pose(*start, heading)
     return task.start
@@ -199,7 +204,7 @@ def random_task(task: EPuckTask, random: np.random.Generator) -> EPuckTask:
     connected = np.flatnonzero(np.isfinite(task.field))
     for _ in range(MAX_DRAWS):
         ends = [_place(task, int(random.choice(connected))) for _ in range(2)]
-        heading = wrapped(random.uniform(-math.pi, math.pi))
+        heading = wrap_heading(random.uniform(-math.pi, math.pi))
         goal, start = (ground.at(*end) for end in ends)
         if not at_goal(ground, goal, task.goal_tolerance, *start):
             field = field_to(ground, ends[0])
@@ -223,7 +228,7 @@ def _may_start(task: EPuckTask, pose: Pose) -> bool:
     ground = task.ground
     return (
         ground.gap(pose.x, pose.y) >= BODY_RADIUS + 1e-3
-        and entry(ground, task.field, pose[:2]) is not None
+        and path_entry(ground, task.field, pose[:2]) is not None
         and not at_goal(ground, task.goal, task.goal_tolerance, pose.x, pose.y)
     )
 
@@ -232,7 +237,7 @@ def _restored(ground: Ground, start: Pose, goal: Point, *rest: Any) -> EPuckTask
     """Restores a pickled task and recomputes what the pickle leaves out."""
     limit, tolerance, dt, horizon = rest
     field = route(ground, start[:2], goal)
-    shortest = way(ground, field, start[:2])
+    shortest = path_length_from(ground, field, start[:2])
     return EPuckTask(
         ground, start, goal, limit, tolerance, dt, horizon, field, shortest
     )

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.drive.batching import no_pictures, several
+from tdac_envs.drive.batching import check_no_rendering, make_envs
 from tdac_envs.drive.vector import DrivenVectorEnv, Observations
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import step_rows
@@ -55,9 +55,9 @@ class EPuckVectorEnv(DrivenVectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        no_pictures(render_mode)
+        check_no_rendering(render_mode)
         num_envs = whole_number("num_envs", num_envs, 1)
-        envs = several(EPuckEnv, each, options, num_envs)
+        envs = make_envs(EPuckEnv, each, options, num_envs)
         if any(env.setup.pushes for env in envs):
             raise TaskError(
                 "a batch cannot push objects; expected on_collision='terminate', a "

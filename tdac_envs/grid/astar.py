@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import constant, kernel, subkernel
+from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.grid.grid import BoolGrid
 
 Point = tuple[int, int]
@@ -70,7 +70,7 @@ def lengths_between(
     """
     height, width = free.shape
     field: Lengths = np.empty((height + 2, width + 2))
-    _clear(constant(free), field)
+    _clear(read_only(free), field)
     field[goal[1] + 1, goal[0] + 1] = 0.0
     known = np.empty(0) if guide is None else guide.lengths.ravel()
     shortest = 0.0 if guide is None else guide.length

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import constant, kernel, subkernel
+from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.core.errors import MapError
 
 BoolGrid = NDArray[np.bool_]
@@ -102,7 +102,7 @@ def clearance(cells: BoolGrid) -> FloatGrid:
     clear = np.empty((height, width), np.float32)
     rows = np.empty((height, width), np.int32)
     site, scratch = np.empty(width + 2, np.int64), np.empty((2, width + 3))
-    _clearance(constant(cells), rows, site, scratch, clear)
+    _clearance(read_only(cells), rows, site, scratch, clear)
     return clear
 
 

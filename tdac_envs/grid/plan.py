@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import constant, kernel
+from tdac_envs.core.compiled import kernel, read_only
 from tdac_envs.grid.astar import ROUNDING, Guide, Lengths, lengths_between
 from tdac_envs.grid.grid import BoolGrid
 
@@ -85,7 +85,7 @@ def distance_field(free: BoolGrid, goal: tuple[int, int]) -> Field:
     """
     if not _is_free(free, goal):
         return np.full(free.shape, np.inf)
-    room, open_ = 4 * sum(free.shape) + 1024, constant(free)
+    room, open_ = 4 * sum(free.shape) + 1024, read_only(free)
     while True:
         field: Field = np.full(free.shape, np.inf)
         settled, buckets = np.zeros(free.size, np.bool_), np.empty((3, room), np.int64)
@@ -139,8 +139,8 @@ def descend(free: BoolGrid, field: Field, start: tuple[int, int]) -> Path:
     if not inside or not np.isfinite(field[start[1], start[0]]):
         return np.empty((0, 2))
     pixels = np.empty((int(field[start[1], start[0]]) + 2, 2), np.int64)
-    known = constant(field, np.float64)
-    count = _descend(constant(free), known, *start, pixels)
+    known = read_only(field, np.float64)
+    count = _descend(read_only(free), known, *start, pixels)
     return pixels[:count].astype(np.float64)
 
 

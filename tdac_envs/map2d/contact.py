@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from tdac_envs.core.compiled import kernel, subkernel
-from tdac_envs.drive.stepping import free_way, move
+from tdac_envs.drive.stepping import contact_free_length, move
 from tdac_envs.grid.grid import FloatGrid
 
 # A disc that starts in contact is stopped once it sinks in by this much, px, so that
@@ -213,7 +213,7 @@ def _travel(
             rest = SINK
         if rest <= _CLOSE:
             return travelled
-        travelled += free_way(rest, approach, curvature)
+        travelled += contact_free_length(rest, approach, curvature)
         if travelled >= limit:
             return limit
         part = travelled / length

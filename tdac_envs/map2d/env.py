@@ -12,18 +12,18 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Addresses
-from tdac_envs.core.arguments import not_negative, one_of
+from tdac_envs.core.arguments import non_negative, one_of
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import VARIATIONS, Pose
 from tdac_envs.map2d.kernels import begin, drive
-from tdac_envs.map2d.picture import Scene
+from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
 from tdac_envs.map2d.source import MapSource, prepare
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
-from tdac_envs.mapping.params import Said, Shade
+from tdac_envs.mapping.params import ReadingOptions, Shade
 
 
 class Map2DEnv(DrivenEnv):
@@ -162,7 +162,7 @@ class Map2DEnv(DrivenEnv):
             heading=heading,
             robot_radius=robot_radius,
             snap=snap,
-            said=Said(polarity),
+            said=ReadingOptions(polarity),
         )
         params = prepared.params
         robot = override(
@@ -196,7 +196,7 @@ class Map2DEnv(DrivenEnv):
             render_mode=render_mode,
         )
         self.variation = variation
-        self.range_noise = not_negative("range_noise", range_noise)
+        self.range_noise = non_negative("range_noise", range_noise)
         self.setup = Setup(
             self.nominal,
             variation,
@@ -214,7 +214,7 @@ class Map2DEnv(DrivenEnv):
         self.robot.constants[:] = self.setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self._bind()
-        self._scene: Scene | None = None
+        self._scene: MapScene | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -275,7 +275,7 @@ class Map2DEnv(DrivenEnv):
     def _frame(self) -> NDArray[np.uint8]:
         task, robot = self.task, self.robot
         if self._scene is None:
-            self._scene = Scene(
+            self._scene = MapScene(
                 task.terrain.grid.cells,
                 task.start,
                 task.goal,

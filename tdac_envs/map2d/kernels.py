@@ -37,11 +37,11 @@ from tdac_envs.drive.stepping import (
     Y,
     apply_command,
     batch_at,
+    clip_unit,
     copy_row,
+    finish_step,
     give_command,
     move,
-    settle,
-    within,
     wrap_angle,
 )
 from tdac_envs.drive.stepping import clear as clear_state
@@ -213,8 +213,8 @@ def _drive(
     outcome[TOUCHED] = advance(
         clear,
         state,
-        limit * within(wheel_speeds[0] * state[SLIP_LEFT]),
-        limit * within(wheel_speeds[1] * state[SLIP_RIGHT]),
+        limit * clip_unit(wheel_speeds[0] * state[SLIP_LEFT]),
+        limit * clip_unit(wheel_speeds[1] * state[SLIP_RIGHT]),
         constants[AXLE],
         constants[DT],
         constants[RADIUS],
@@ -222,7 +222,7 @@ def _drive(
     _observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
-    settle(constants, state, outcome, before)
+    finish_step(constants, state, outcome, before)
 
 
 @subkernel

@@ -28,7 +28,7 @@ ROBOT_IMAGE = Path(__file__).parents[1] / "mapping" / "maps" / "robot.png"
 SMALLEST_PICTURE = 6.0
 
 
-class Scene:
+class MapScene:
     """The static part of an episode's frames, drawn once.
 
     Args:

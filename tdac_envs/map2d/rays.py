@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import constant, kernel, subkernel
+from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.grid.grid import BoolGrid
 
 LeapGrid = NDArray[np.uint8]
@@ -36,8 +36,8 @@ def leaps_of(cells: BoolGrid) -> LeapGrid:
     """
     height, width = cells.shape
     leaps = np.zeros((4, height + 2, width + 2), np.uint8)
-    _fill_leaps(constant(cells), leaps)
-    return constant(leaps)
+    _fill_leaps(read_only(cells), leaps)
+    return read_only(leaps)
 
 
 @kernel

@@ -20,7 +20,12 @@ from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.grid.metric import Point, resolution_of, to_pixels
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.image import check_size, load_image, read_bytes
-from tdac_envs.mapping.params import UNSAID, MapParams, RobotParams, Said
+from tdac_envs.mapping.params import (
+    DEFAULT_OPTIONS,
+    MapParams,
+    ReadingOptions,
+    RobotParams,
+)
 from tdac_envs.mapping.score import nearest_free
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
@@ -51,7 +56,7 @@ def prepare(
     heading: float | None = None,
     robot_radius: float | None = None,
     snap: bool = False,
-    said: Said = UNSAID,
+    said: ReadingOptions = DEFAULT_OPTIONS,
 ) -> Prepared:
     """Reads a map and determines start, goal, heading and body radius.
 
@@ -101,7 +106,7 @@ class _Given:
     heading: float | None
     robot_radius: float | None
     snap: bool
-    said: Said
+    said: ReadingOptions
 
     @classmethod
     def of(
@@ -111,7 +116,7 @@ class _Given:
         heading: float | None,
         robot_radius: float | None,
         snap: bool,
-        said: Said,
+        said: ReadingOptions,
     ) -> _Given:
         at = end = None
         if start is not None:
@@ -208,7 +213,7 @@ def _from_image(image: Path, given: _Given) -> Prepared:
     # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
     return _with_task(
-        prepared, _Given(start, goal, given.heading, radius, False, UNSAID)
+        prepared, _Given(start, goal, given.heading, radius, False, DEFAULT_OPTIONS)
     )
 
 
@@ -221,7 +226,7 @@ def _read_image(
     goal: Point | None,
     radius: float,
     snap: bool,
-    said: Said,
+    said: ReadingOptions,
 ) -> Prepared:
     # Imported late: grids need no preprocessing.
     from tdac_envs.mapping.preprocessing import preprocess
@@ -231,9 +236,9 @@ def _read_image(
     return Prepared(grid, params, image)
 
 
-def _refuse(said: Said, what: str) -> None:
+def _refuse(said: ReadingOptions, what: str) -> None:
     """Refuses image options for a map that is not an image."""
-    if said != UNSAID:
+    if said != DEFAULT_OPTIONS:
         raise TaskError(
             f"{what} already defines which cells are obstacles; leave out polarity and "
             "threshold"

@@ -14,7 +14,7 @@ _SHORTEST_PIECE = 4.0
 
 
 @kernel
-def gets_straight(
+def is_straight_path_free(
     clear: FloatGrid, x: float, y: float, to_x: float, to_y: float, radius: float
 ) -> bool:
     """Whether a disc touches nothing on the straight line between two points.

@@ -10,26 +10,31 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import finite_numbers, finite_point, positive, steps_of
+from tdac_envs.core.arguments import (
+    finite_numbers,
+    finite_point,
+    horizon_steps,
+    positive,
+)
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import (
     MAX_DRAWS,
     Pose,
-    generous_horizon,
+    default_horizon_for,
     jittered_pose,
-    wrapped,
+    wrap_heading,
 )
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.plan import Path, descend
 from tdac_envs.map2d.terrain import (
     Terrain,
     at_goal,
-    check_stands,
-    entry,
+    check_body_fits,
     field_to,
     may_start,
+    path_entry,
+    path_length_from,
     route,
-    way,
     widest_connected_radius,
 )
 from tdac_envs.mapping.params import RobotParams
@@ -103,7 +108,7 @@ class Map2DTask:
     def path_from(self, start: Pose) -> Path:
         """Shortest path from `start` to the goal, shape (n, 2), px; empty if none."""
         radius = self.robot.radius
-        first = entry(self.terrain, self.field, start.x, start.y, radius)
+        first = path_entry(self.terrain, self.field, start.x, start.y, radius)
         if first is None:
             return np.empty((0, 2))
         free = body_free(self.terrain.clear, radius)
@@ -121,8 +126,8 @@ class Map2DTask:
             goal = self.goal
         else:
             field = route(self.terrain, start[:2], goal, radius)
-        start = start._replace(heading=wrapped(start.heading))
-        shortest = way(self.terrain, field, start.x, start.y)
+        start = start._replace(heading=wrap_heading(start.heading))
+        shortest = path_length_from(self.terrain, field, start.x, start.y)
         return replace(self, start=start, goal=goal, field=field, shortest=shortest)
 
 
@@ -153,13 +158,13 @@ def make_task(
             path joins them, or the start is already within the tolerance.
     """
     begin = Pose(*finite_numbers("start", start, 3))
-    begin = begin._replace(heading=wrapped(begin.heading))
+    begin = begin._replace(heading=wrap_heading(begin.heading))
     end = finite_point("goal", goal)
     dt = positive("dt", dt)
-    check_stands(terrain, "start", begin.x, begin.y, robot.radius)
-    check_stands(terrain, "goal", *end, robot.radius)
+    check_body_fits(terrain, "start", begin.x, begin.y, robot.radius)
+    check_body_fits(terrain, "goal", *end, robot.radius)
     field = route(terrain, begin[:2], end, robot.radius)
-    shortest = way(terrain, field, begin.x, begin.y)
+    shortest = path_length_from(terrain, field, begin.x, begin.y)
     if goal_tolerance is None:
         tolerance = min(MAX_TOLERANCE, 0.25 * shortest)
     else:
@@ -171,13 +176,13 @@ def make_task(
         )
     if horizon is None:
         horizon = default_horizon(shortest, robot, dt)
-    steps = steps_of(horizon)
+    steps = horizon_steps(horizon)
     return Map2DTask(terrain, begin, end, robot, tolerance, dt, steps, field, shortest)
 
 
 def default_horizon(shortest: float, robot: RobotParams, dt: float) -> int:
-    """The horizon for a path of `shortest` px; see `generous_horizon`."""
-    return generous_horizon(shortest, robot.max_wheel_speed * dt)
+    """The horizon for a path of `shortest` px; see `default_horizon_for`."""
+    return default_horizon_for(shortest, robot.max_wheel_speed * dt)
 
 
 def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
@@ -199,7 +204,7 @@ def mixed_start(task: Map2DTask, random: np.random.Generator) -> Pose:
     connected = np.flatnonzero(np.isfinite(task.field))
     for _ in range(MAX_DRAWS):
         y, x = divmod(int(random.choice(connected)), width)
-        heading = wrapped(random.uniform(-math.pi, math.pi))
+        heading = wrap_heading(random.uniform(-math.pi, math.pi))
         if not at_goal(task.terrain, task.goal, task.goal_tolerance, x, y):
             return Pose(x, y, heading)
     return task.start
@@ -216,7 +221,7 @@ def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
     for _ in range(MAX_DRAWS):
         goal_y, goal_x = divmod(int(random.choice(connected)), width)
         start_y, start_x = divmod(int(random.choice(connected)), width)
-        heading = wrapped(random.uniform(-math.pi, math.pi))
+        heading = wrap_heading(random.uniform(-math.pi, math.pi))
         start, goal = Pose(start_x, start_y, heading), (float(goal_x), float(goal_y))
         if not at_goal(task.terrain, goal, task.goal_tolerance, start_x, start_y):
             field = field_to(task.terrain, (goal_x, goal_y), task.robot.radius)
@@ -242,7 +247,7 @@ def _restored(
     """Restores a pickled task and recomputes what the pickle leaves out."""
     robot, tolerance, dt, horizon = rest
     field = route(terrain, start[:2], goal, robot.radius)
-    shortest = way(terrain, field, start.x, start.y)
+    shortest = path_length_from(terrain, field, start.x, start.y)
     return Map2DTask(
         terrain, start, goal, robot, tolerance, dt, horizon, field, shortest
     )

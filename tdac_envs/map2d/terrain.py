@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import constant, kernel
+from tdac_envs.core.compiled import kernel, read_only
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import (
     FloatGrid,
@@ -57,7 +57,7 @@ class Terrain:
 # A process often loads the same map several times.
 @lru_cache(maxsize=4)
 def _terrain(grid: OccupancyGrid) -> Terrain:
-    padded_clear = constant(np.pad(clearance(grid.cells), 1))
+    padded_clear = read_only(np.pad(clearance(grid.cells), 1))
     leaps = leaps_of(grid.cells)
     return Terrain(grid, padded_clear[1:-1, 1:-1], padded_clear, leaps)
 
@@ -79,7 +79,7 @@ def _near(x: float, y: float, shape: tuple[int, ...]) -> Iterator[tuple[int, int
             yield i, j
 
 
-def entry(
+def path_entry(
     terrain: Terrain, field: NDArray[np.float32], x: float, y: float, radius: float
 ) -> tuple[int, int] | None:
     """The first pixel of the shortest path from (x, y), or None if there is no path.
@@ -122,7 +122,7 @@ def _is_free_line(
     return bool(touch > 1.0)
 
 
-def check_stands(
+def check_body_fits(
     terrain: Terrain, name: str, x: float, y: float, radius: float
 ) -> None:
     """Checks that a disc of `radius` px fits at (x, y), the point called `name`.
@@ -218,7 +218,7 @@ def route(
     for _, i, j in sorted(near):
         if free[j, i] and _is_free_line(terrain, goal, (i, j), radius):
             field = _shared_field(terrain, (i, j), radius)
-            if entry(terrain, field, *start, radius) is not None:
+            if path_entry(terrain, field, *start, radius) is not None:
                 return field
             break
     widest = widest_connected_radius(terrain.clear, start, goal)
@@ -240,13 +240,15 @@ def field_to(
         Shape (height, width), float32, px, read-only; inf if there is no path.
     """
     free = body_free(terrain.clear, radius)
-    return constant(distance_field(free, goal), np.float32)
+    return read_only(distance_field(free, goal), np.float32)
 
 
 _shared_field = lru_cache(maxsize=4)(field_to)
 
 
-def way(terrain: Terrain, field: NDArray[np.float32], x: float, y: float) -> float:
+def path_length_from(
+    terrain: Terrain, field: NDArray[np.float32], x: float, y: float
+) -> float:
     """Length of the shortest path from a point, px, given a field of `field_to`."""
     return float(path_distance(terrain.leaps, field, float(x), float(y), math.inf))
 

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from tdac_envs.core.arguments import whole_number
-from tdac_envs.drive.batching import no_pictures, several
+from tdac_envs.drive.batching import check_no_rendering, make_envs
 from tdac_envs.drive.vector import DrivenVectorEnv, Observations
 from tdac_envs.map2d.env import Map2DEnv, noisy
 from tdac_envs.map2d.kernels import step_rows
@@ -48,10 +48,10 @@ class Map2DVectorEnv(DrivenVectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        no_pictures(render_mode)
+        check_no_rendering(render_mode)
         num_envs = whole_number("num_envs", num_envs, 1)
         super().__init__(
-            several(Map2DEnv, each, options, num_envs),
+            make_envs(Map2DEnv, each, options, num_envs),
             num_envs,
             autoreset_mode=autoreset_mode,
             threads=threads,

@@ -18,8 +18,15 @@ from tdac_envs.grid.grid import clearance
 from tdac_envs.mapping.cleanup import cleanings
 from tdac_envs.mapping.params import ScoreTerms
 from tdac_envs.mapping.readings import plain_reading, readings
-from tdac_envs.mapping.scene import Reading, Scene
-from tdac_envs.mapping.score import Ground, Trip, explain, guide_of, score, terms_of
+from tdac_envs.mapping.scene import MapProblem, MapReading
+from tdac_envs.mapping.score import (
+    GridMetrics,
+    NavigationTask,
+    explain,
+    guide_of,
+    score,
+    terms_of,
+)
 
 Preset = Literal["default", "paper"]
 
@@ -43,7 +50,7 @@ class Candidate:
         terms: Terms of the score; None without a task or if it is infeasible.
     """
 
-    reading: Reading
+    reading: MapReading
     inflation: int = 0
     reason: Callable[[], str] | None = None
     terms: ScoreTerms | None = None
@@ -59,7 +66,7 @@ class Candidate:
         return -np.inf if self.terms is None else score(self.terms)
 
 
-def ranked(scene: Scene, preset: Preset) -> list[Candidate]:
+def ranked(scene: MapProblem, preset: Preset) -> list[Candidate]:
     """All evaluated candidates, the chosen one first.
 
     Feasible candidates are sorted by descending score; infeasible ones follow in the
@@ -81,7 +88,7 @@ def ranked(scene: Scene, preset: Preset) -> list[Candidate]:
     return sorted(tried, key=lambda c: (c.reason is not None, -c.score))
 
 
-def _staged_search(scene: Scene) -> Iterator[Candidate]:
+def _staged_search(scene: MapProblem) -> Iterator[Candidate]:
     """Tries readings, each with all margins, up to the first feasible one."""
     for reading in readings(scene):
         candidates = _with_margins(scene, reading)
@@ -102,13 +109,13 @@ def _without_detour(candidate: Candidate, plain: Candidate) -> Candidate:
     return replace(candidate, reason=lambda: why, terms=None)
 
 
-def _paper_grid(scene: Scene) -> list[Candidate]:
+def _paper_grid(scene: MapProblem) -> list[Candidate]:
     """The full grid polarity x cleanup x inflation, without repeated computation."""
     given = scene.image.occupied
     bases = (
         [plain_reading(scene, polarity == "dark") for polarity in scene.polarities]
         if given is None
-        else [Reading(given, "given", scene.image.method)]
+        else [MapReading(given, "given", scene.image.method)]
     )
     with ThreadPoolExecutor(THREADS) as pool:
         families = list(pool.map(partial(_family, scene), bases))
@@ -119,11 +126,11 @@ def _paper_grid(scene: Scene) -> list[Candidate]:
 class _Family:
     """Readings of one polarity, and a guide for their paths; None if no path exists."""
 
-    readings: list[Reading]
+    readings: list[MapReading]
     guide: Guide | None
 
 
-def _family(scene: Scene, base: Reading) -> _Family:
+def _family(scene: MapProblem, base: MapReading) -> _Family:
     """The reading at each strength of cleanup."""
     cleaned = cleanings(base.cells, PAPER_CLEANUPS)
     family = [
@@ -136,7 +143,9 @@ def _family(scene: Scene, base: Reading) -> _Family:
     return _Family(family, guide_of(clear, scene.trip))
 
 
-def _judged(scene: Scene, family: _Family, pool: ThreadPoolExecutor) -> list[Candidate]:
+def _judged(
+    scene: MapProblem, family: _Family, pool: ThreadPoolExecutor
+) -> list[Candidate]:
     """The readings with each margin, up to the first infeasible one."""
     trip, guide = scene.trip, family.guide
     if trip is None:
@@ -145,7 +154,7 @@ def _judged(scene: Scene, family: _Family, pool: ThreadPoolExecutor) -> list[Can
         return [_candidate(reading, trip) for reading in family.readings]
     # Readings that are equal after cleanup share their array.
     grids = {id(reading.cells): reading.cells for reading in family.readings}
-    grounds = list(pool.map(Ground.of, grids.values()))
+    grounds = list(pool.map(GridMetrics.of, grids.values()))
     halves = pool.map(
         lambda margins: terms_of(grounds, trip, margins, guide),
         (INFLATIONS[:2], INFLATIONS[2:]),
@@ -158,11 +167,11 @@ def _judged(scene: Scene, family: _Family, pool: ThreadPoolExecutor) -> list[Can
     ]
 
 
-def _with_margins(scene: Scene, reading: Reading) -> list[Candidate]:
+def _with_margins(scene: MapProblem, reading: MapReading) -> list[Candidate]:
     """The reading with each margin, up to the first infeasible one."""
     if scene.trip is None:
         return [Candidate(reading)]
-    ground = Ground.of(reading.cells)
+    ground = GridMetrics.of(reading.cells)
     guide = guide_of(ground.clear, scene.trip)
     if guide is None:
         return [_candidate(reading, scene.trip)]
@@ -171,7 +180,7 @@ def _with_margins(scene: Scene, reading: Reading) -> list[Candidate]:
 
 
 def _candidates(
-    reading: Reading, trip: Trip, terms: Sequence[ScoreTerms | None]
+    reading: MapReading, trip: NavigationTask, terms: Sequence[ScoreTerms | None]
 ) -> list[Candidate]:
     candidates = []
     for inflation, each in zip(INFLATIONS, terms, strict=True):
@@ -182,7 +191,10 @@ def _candidates(
 
 
 def _candidate(
-    reading: Reading, trip: Trip, inflation: int = 0, terms: ScoreTerms | None = None
+    reading: MapReading,
+    trip: NavigationTask,
+    inflation: int = 0,
+    terms: ScoreTerms | None = None,
 ) -> Candidate:
     why = cache(partial(explain, reading.cells, trip, inflation))
     return Candidate(reading, inflation, why if terms is None else None, terms)

@@ -25,7 +25,7 @@ Shade = Literal["dark", "light"]
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class ReadingOptions:
     """The user's settings for reading a picture; None to infer a setting.
 
     Attributes:
@@ -48,7 +48,7 @@ class Said:
             )
 
 
-UNSAID = Said()
+DEFAULT_OPTIONS = ReadingOptions()
 
 
 class _Record(BaseModel):

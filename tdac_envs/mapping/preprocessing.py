@@ -13,9 +13,15 @@ from tdac_envs.core.errors import PolarityError, TaskError
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.mapping.candidates import Candidate, Preset, ranked
 from tdac_envs.mapping.image import ColourImage, MapImage, from_array, load_image
-from tdac_envs.mapping.params import UNSAID, MapParams, RobotParams, Said, Shade
+from tdac_envs.mapping.params import (
+    DEFAULT_OPTIONS,
+    MapParams,
+    ReadingOptions,
+    RobotParams,
+    Shade,
+)
 from tdac_envs.mapping.readings import readings
-from tdac_envs.mapping.scene import Reading, Scene, unclear
+from tdac_envs.mapping.scene import MapProblem, MapReading, is_polarity_unclear
 from tdac_envs.mapping.score import Point, nearest_free
 
 Source = str | Path | NDArray[np.generic] | MapImage
@@ -56,17 +62,17 @@ def preprocess(
         PolarityError: There is a task, and both polarities are likely.
         TaskError: An argument is invalid, or the task is feasible on no reading.
     """
-    source, said = as_image(image), Said(polarity, threshold)
+    source, said = as_image(image), ReadingOptions(polarity, threshold)
     scene, notes = _scene(source, start, goal, robot_radius, snap, said)
     candidates = ranked(scene, preset)
-    if unclear(scene, candidates[0].reading.polarity):
+    if is_polarity_unclear(scene, candidates[0].reading.polarity):
         if scene.trip is not None:
             raise _close_call(scene, source.colour, preset, heading)
         notes.append(f"{_CLOSE_CALL}; give polarity='dark' or 'light'")
     return _result(scene, candidates[0], preset, heading, notes)
 
 
-def examine(
+def preprocess_with_candidates(
     image: Source,
     start: tuple[float, float] | None,
     goal: tuple[float, float] | None,
@@ -75,7 +81,7 @@ def examine(
     preset: Preset,
     snap: bool,
     heading: float,
-    said: Said,
+    said: ReadingOptions,
 ) -> tuple[OccupancyGrid, MapParams, list[Candidate]]:
     """The results of `preprocess`, and all evaluated candidates; see `ranked`.
 
@@ -87,7 +93,7 @@ def examine(
     source = as_image(image)
     scene, notes = _scene(source, start, goal, robot_radius, snap, said)
     candidates = ranked(scene, preset)
-    if unclear(scene, candidates[0].reading.polarity):
+    if is_polarity_unclear(scene, candidates[0].reading.polarity):
         raise _close_call(scene, source.colour, preset, heading)
     grid, params = _result(scene, candidates[0], preset, heading, notes)
     return grid, params, candidates
@@ -99,10 +105,10 @@ def _scene(
     goal: tuple[float, float] | None,
     robot_radius: float,
     snap: bool,
-    said: Said,
-) -> tuple[Scene, list[str]]:
+    said: ReadingOptions,
+) -> tuple[MapProblem, list[str]]:
     """The picture with its task, and notes on moved points."""
-    if source.occupied is not None and said != UNSAID:
+    if source.occupied is not None and said != DEFAULT_OPTIONS:
         raise TaskError(
             f"{source.name} itself defines which cells are obstacles; leave out "
             "polarity and threshold"
@@ -114,11 +120,11 @@ def _scene(
         if pixel is not None and snap:
             pixel = _snapped(source, name, pixel, robot_radius, said, notes)
         ends.append(pixel)
-    return Scene.of(source, ends[0], ends[1], robot_radius, said), notes
+    return MapProblem.of(source, ends[0], ends[1], robot_radius, said), notes
 
 
 def _result(
-    scene: Scene, best: Candidate, preset: Preset, heading: float, notes: list[str]
+    scene: MapProblem, best: Candidate, preset: Preset, heading: float, notes: list[str]
 ) -> tuple[OccupancyGrid, MapParams]:
     """The grid and the parameters of the best candidate.
 
@@ -132,13 +138,13 @@ def _result(
     )
 
 
-def _grid(scene: Scene, best: Candidate) -> OccupancyGrid:
+def _grid(scene: MapProblem, best: Candidate) -> OccupancyGrid:
     image = scene.image
     return OccupancyGrid(best.reading.cells, image.resolution, image.origin)
 
 
 def _close_call(
-    scene: Scene, colour: ColourImage, preset: Preset, heading: float
+    scene: MapProblem, colour: ColourImage, preset: Preset, heading: float
 ) -> PolarityError:
     """The error that describes both readings of a picture and has their previews.
 
@@ -178,7 +184,7 @@ def rank_candidates(
     preset: Preset = "default",
 ) -> list[Candidate]:
     """All evaluated candidates, the chosen one first; see `ranked`."""
-    return ranked(Scene.of(as_image(image), start, goal, robot_radius), preset)
+    return ranked(MapProblem.of(as_image(image), start, goal, robot_radius), preset)
 
 
 def as_image(image: Source) -> MapImage:
@@ -209,11 +215,11 @@ def _snapped(
     name: str,
     point: Point,
     radius: float,
-    said: Said,
+    said: ReadingOptions,
     notes: list[str],
 ) -> Point:
     """The point moved to the nearest pixel that is free for the body."""
-    reading = next(readings(Scene.of(image, None, None, radius, said)))
+    reading = next(readings(MapProblem.of(image, None, None, radius, said)))
     free = body_free(clearance(reading.cells), radius)
     moved = nearest_free(free, *point)
     if moved is None or moved == point:
@@ -222,7 +228,7 @@ def _snapped(
     return moved
 
 
-def _changed(reading: Reading, preset: Preset) -> list[str]:
+def _changed(reading: MapReading, preset: Preset) -> list[str]:
     """Notes on the obstacles that the reading removes from the picture."""
     if not (reading.opening or reading.cleanup):
         return []
@@ -236,7 +242,7 @@ def _changed(reading: Reading, preset: Preset) -> list[str]:
 
 
 def _params(
-    scene: Scene, best: Candidate, heading: float, notes: list[str]
+    scene: MapProblem, best: Candidate, heading: float, notes: list[str]
 ) -> MapParams:
     image, reading = scene.image, best.reading
     height, width = scene.luminance.shape

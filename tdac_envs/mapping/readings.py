@@ -25,8 +25,8 @@ from tdac_envs.mapping.binarize import (
 from tdac_envs.mapping.cleanup import thick_share, without_lines, without_specks
 from tdac_envs.mapping.image import GreyImage, luminance
 from tdac_envs.mapping.lighting import LEVEL
-from tdac_envs.mapping.params import UNSAID
-from tdac_envs.mapping.scene import Reading, Scene, decide_light_free, touches
+from tdac_envs.mapping.params import DEFAULT_OPTIONS
+from tdac_envs.mapping.scene import MapProblem, MapReading, decide_light_free, touches
 
 SLIVER = 6.0
 """Largest width of a strip that counts as part of the outside, px."""
@@ -34,7 +34,7 @@ _FAINT = 0.3
 """Share of the distance to the floor by which a photograph's threshold is shifted."""
 
 
-def readings(scene: Scene) -> Iterator[Reading]:
+def readings(scene: MapProblem) -> Iterator[MapReading]:
     """Readings of the likelier polarity, the plainest first.
 
     Without start and goal there is only one, with marks ignored, because nothing shows
@@ -42,7 +42,7 @@ def readings(scene: Scene) -> Iterator[Reading]:
     """
     given = scene.image.occupied
     if given is not None:
-        yield Reading(given, "given", scene.image.method)
+        yield MapReading(given, "given", scene.image.method)
         return
     light_free = decide_light_free(scene)
     plain = plain_reading(scene, light_free)
@@ -56,9 +56,9 @@ def readings(scene: Scene) -> Iterator[Reading]:
 
 
 def _plain_to_bold(
-    scene: Scene, plain: Reading, unmarked: Reading | None
-) -> Iterator[Reading]:
-    mixed = _mixed(scene) if scene.said == UNSAID else None
+    scene: MapProblem, plain: MapReading, unmarked: MapReading | None
+) -> Iterator[MapReading]:
+    mixed = _mixed(scene) if scene.said == DEFAULT_OPTIONS else None
     if mixed is not None:
         yield mixed
         for extent in (4, 8, 16):
@@ -75,7 +75,7 @@ def _plain_to_bold(
     yield from _bolder(base)
 
 
-def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
+def _beyond_the_plan(scene: MapProblem, plain: MapReading) -> BoolGrid:
     """The outside of the plan; empty if start or goal is in it."""
     strong = scene.saturated
     ignored = strong if _are_marks(scene, strong, plain) else np.zeros_like(strong)
@@ -85,7 +85,7 @@ def _beyond_the_plan(scene: Scene, plain: Reading) -> BoolGrid:
     return region
 
 
-def _with_outside_closed(reading: Reading, beyond: BoolGrid) -> Reading:
+def _with_outside_closed(reading: MapReading, beyond: BoolGrid) -> MapReading:
     """The reading with the paper around the building marked as occupied.
 
     Windows are drawn with thin or grey lines, but no robot may leave through them.
@@ -106,7 +106,7 @@ def _slivers(cells: BoolGrid, beyond: BoolGrid) -> BoolGrid:
     return np.asarray(~deep[labels])
 
 
-def plain_reading(scene: Scene, light_free: bool) -> Reading:
+def plain_reading(scene: MapProblem, light_free: bool) -> MapReading:
     """The reading by one threshold, with two corrections.
 
     A map saver's "unknown" grey is occupied. If most walls are drawn in strong colours,
@@ -134,7 +134,7 @@ def plain_reading(scene: Scene, light_free: bool) -> Reading:
     return reading
 
 
-def _of_photo(scene: Scene, light_free: bool, method: str) -> Reading:
+def _of_photo(scene: MapProblem, light_free: bool, method: str) -> MapReading:
     """A photograph's reading; a threshold nearer the floor keeps blurred thin walls."""
     grey = scene.luminance
     floor = float(np.median(grey[(grey > scene.threshold) == light_free]))
@@ -154,13 +154,15 @@ def _threshold_beyond(level: int, threshold: float, light_free: bool) -> float:
     return max(threshold, safe) if light_free else min(threshold, safe)
 
 
-def _cut(grey: GreyImage, threshold: float, light_free: bool, method: str) -> Reading:
+def _cut(
+    grey: GreyImage, threshold: float, light_free: bool, method: str
+) -> MapReading:
     light = grey > threshold
     cells = ~light if light_free else light
-    return Reading(cells, "dark" if light_free else "light", method, threshold)
+    return MapReading(cells, "dark" if light_free else "light", method, threshold)
 
 
-def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
+def _are_marks(scene: MapProblem, strong: BoolGrid, plain: MapReading) -> bool:
     """Whether strong colours are marks: few pixels, covering few wall pixels."""
     on_walls = int((strong & plain.cells).sum())
     allowed = 0.05 if touches(strong, scene.ends) else 0.02
@@ -168,7 +170,7 @@ def _are_marks(scene: Scene, strong: BoolGrid, plain: Reading) -> bool:
     return few and on_walls <= 0.4 * float(plain.cells.sum())
 
 
-def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
+def _without_marks(scene: MapProblem, plain: MapReading) -> MapReading | None:
     """The reading without saturated marks and lines; None if there are none."""
     colour = scene.image.colour
     strong = scene.saturated
@@ -180,7 +182,7 @@ def _without_marks(scene: Scene, plain: Reading) -> Reading | None:
     return replace(plain, cells=cells, method=f"{plain.method}, marks ignored")
 
 
-def _mixed(scene: Scene) -> Reading | None:
+def _mixed(scene: MapProblem) -> MapReading | None:
     """The reading by colour distance from the floor, for a floor of a middle tone.
 
     None unless much of the floor's rim is darker and much of it is lighter, so that no
@@ -203,10 +205,10 @@ def _mixed(scene: Scene) -> Reading | None:
         return None
     distance = floor_distance(colour, floor)
     cells = np.asarray(distance > otsu(distance))
-    return Reading(cells, "mixed", "colour unlike the floor")
+    return MapReading(cells, "mixed", "colour unlike the floor")
 
 
-def _bolder(base: Reading) -> Iterator[Reading]:
+def _bolder(base: MapReading) -> Iterator[MapReading]:
     """Drops specks, then lines that are thin compared with this map's walls."""
     shape = base.cells.shape
     for extent in (4, 8, 16, 32):
@@ -223,14 +225,14 @@ def _bolder(base: Reading) -> Iterator[Reading]:
                 yield _note(base, cells, note, extent, width)
 
 
-def _without(base: Reading, extent: int) -> Reading:
+def _without(base: MapReading, extent: int) -> MapReading:
     cells = without_specks(base.cells, extent)
     return _note(base, cells, f"specks up to {extent} px ignored", extent, 0)
 
 
 def _note(
-    base: Reading, cells: BoolGrid, note: str, cleanup: int, opening: int
-) -> Reading:
+    base: MapReading, cells: BoolGrid, note: str, cleanup: int, opening: int
+) -> MapReading:
     return replace(
         base,
         cells=cells,

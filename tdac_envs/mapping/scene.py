@@ -12,9 +12,9 @@ from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.mapping.binarize import disc, otsu, saturated, unknown_level
 from tdac_envs.mapping.image import GreyImage, MapImage, luminance
 from tdac_envs.mapping.lighting import LEVEL, evened, photographed
-from tdac_envs.mapping.params import UNSAID, Said, Shade
+from tdac_envs.mapping.params import DEFAULT_OPTIONS, ReadingOptions, Shade
 from tdac_envs.mapping.polarity import light_free_evidence
-from tdac_envs.mapping.score import Point, Trip
+from tdac_envs.mapping.score import NavigationTask, Point
 
 Polarity = Shade | Literal["mixed", "given"]
 
@@ -26,7 +26,7 @@ CLOSE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reading:
+class MapReading:
     """One interpretation of a picture: which pixels are obstacles.
 
     Attributes:
@@ -47,7 +47,7 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class MapProblem:
     """A picture with its task, and the data that all its readings need.
 
     Attributes:
@@ -65,7 +65,7 @@ class Scene:
     start: Point | None
     goal: Point | None
     radius: float
-    said: Said = UNSAID
+    said: ReadingOptions = DEFAULT_OPTIONS
     photo: bool = False
 
     @classmethod
@@ -75,8 +75,8 @@ class Scene:
         start: Point | None,
         goal: Point | None,
         radius: float,
-        said: Said = UNSAID,
-    ) -> Scene:
+        said: ReadingOptions = DEFAULT_OPTIONS,
+    ) -> MapProblem:
         """The scene of an image and a task; start and goal may be None."""
         grey, task = luminance(image.colour), (start, goal, radius, said)
         automatic = image.occupied is None and said.threshold is None
@@ -97,11 +97,11 @@ class Scene:
         return ("dark", "light") if said is None else (said,)
 
     @property
-    def trip(self) -> Trip | None:
+    def trip(self) -> NavigationTask | None:
         """The navigation task; None unless both start and goal are given."""
         if self.start is None or self.goal is None:
             return None
-        return Trip(self.start, self.goal, self.radius)
+        return NavigationTask(self.start, self.goal, self.radius)
 
     @cached_property
     def threshold(self) -> float:
@@ -141,14 +141,14 @@ class Scene:
         return None if shades and max(shades) <= 3 else level
 
 
-def decide_light_free(scene: Scene) -> bool:
+def decide_light_free(scene: MapProblem) -> bool:
     """Whether the light side is free: as given, or by the evidence."""
     if scene.said.polarity is not None:
         return scene.said.polarity == "dark"
     return scene.evidence > 0
 
 
-def unclear(scene: Scene, polarity: Polarity) -> bool:
+def is_polarity_unclear(scene: MapProblem, polarity: Polarity) -> bool:
     """Whether the other polarity is nearly as likely as this one, or likelier."""
     settled = scene.image.occupied is not None or scene.said.polarity is not None
     if settled or polarity not in ("dark", "light"):

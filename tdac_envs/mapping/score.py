@@ -37,7 +37,7 @@ def score(terms: ScoreTerms) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Trip:
+class NavigationTask:
     """A navigation task: start and goal pixels (x, y), and the body's radius, px."""
 
     start: Point
@@ -46,7 +46,7 @@ class Trip:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ground:
+class GridMetrics:
     """The properties of a grid that its score depends on.
 
     Attributes:
@@ -58,13 +58,16 @@ class Ground:
     sharpness: float
 
     @classmethod
-    def of(cls, cells: BoolGrid) -> Ground:
+    def of(cls, cells: BoolGrid) -> GridMetrics:
         """The properties of cells, shape (height, width), bool, True = occupied."""
         return cls(clearance(cells), sharpness(cells))
 
 
 def terms_of(
-    grounds: Sequence[Ground], trip: Trip, margins: Sequence[int], guide: Guide
+    grounds: Sequence[GridMetrics],
+    trip: NavigationTask,
+    margins: Sequence[int],
+    guide: Guide,
 ) -> list[list[ScoreTerms | None]]:
     """Score terms of each grid with each margin of the planner.
 
@@ -95,7 +98,7 @@ def terms_of(
     return found
 
 
-def _terms(ground: Ground, path: Path) -> ScoreTerms | None:
+def _terms(ground: GridMetrics, path: Path) -> ScoreTerms | None:
     if len(path) == 0:
         return None
     columns, rows = path.astype(np.intp).T
@@ -106,7 +109,7 @@ def _terms(ground: Ground, path: Path) -> ScoreTerms | None:
     )
 
 
-def guide_of(clear: FloatGrid, trip: Trip) -> Guide | None:
+def guide_of(clear: FloatGrid, trip: NavigationTask) -> Guide | None:
     """A guide that speeds up `terms_of` for a grid, or for one with more obstacles.
 
     Args:
@@ -129,7 +132,7 @@ def _stays_free(path: Path, free: BoolGrid) -> bool:
     return bool(len(path) and over and free[rows[:-1], columns[1:]].all())
 
 
-def explain(cells: BoolGrid, trip: Trip, inflation: int = 0) -> str:
+def explain(cells: BoolGrid, trip: NavigationTask, inflation: int = 0) -> str:
     """Why there is no path from start to goal with a margin, and what would work.
 
     Args:
@@ -170,7 +173,7 @@ def _connected_to(free: BoolGrid, point: Point) -> BoolGrid:
     return joined if label else free
 
 
-def _narrower(clear: FloatGrid, trip: Trip) -> str:
+def _narrower(clear: FloatGrid, trip: NavigationTask) -> str:
     """The radius that would work with this start and goal; empty if none would."""
     widest = widest_radius(clear, trip.start, trip.goal)
     if widest < 0.5:

@@ -56,7 +56,7 @@ class Log:
             self.first_contact = (self.steps, x, y)
 
 
-def way_of(log: Log) -> float:
+def driven_length(log: Log) -> float:
     """Length of the driven path, m."""
     places = np.array(log.poses)[:, :2]
     return float(np.hypot(*np.diff(places, axis=0).T).sum())

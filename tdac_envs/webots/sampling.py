@@ -11,7 +11,7 @@ import numpy as np
 from tdac_envs.drive.env import Observation
 from tdac_envs.webots.devices import DARK, ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
 from tdac_envs.webots.log import Pose, turn_rate, velocity
-from tdac_envs.webots.stage import Stage
+from tdac_envs.webots.stage import ControllerWorld
 
 GRAVITY = 9.81
 Reader = Callable[[], Any]
@@ -24,7 +24,7 @@ class Sampler:
         stage: Stage with the world and the robot.
     """
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: ControllerWorld) -> None:
         self._frame = stage.frame
         self._observation: Observation = {}
         self._poses: list[Pose] = []
@@ -63,7 +63,7 @@ class Sampler:
         fresh, self._fresh = self._fresh, {}
         return fresh
 
-    def _make_readers(self, stage: Stage) -> dict[str, Reader]:
+    def _make_readers(self, stage: ControllerWorld) -> dict[str, Reader]:
         readers: dict[str, Reader] = {}
         for k in range(8):
             readers[f"ps{k}"] = partial(self._observed, "ps", k)

@@ -94,7 +94,7 @@ class SceneNode:
         return self.kind, self.base, self.define, self.parent, self.fields
 
 
-class Scene:
+class NodeTable:
     """All nodes of a file; number 0 is the root.
 
     Args:

@@ -14,7 +14,7 @@ from tdac_envs.webots.log import Log, turn_rate, velocity
 from tdac_envs.webots.motors import MotorState
 from tdac_envs.webots.requests import CHANGES, RequestError, checked, real
 from tdac_envs.webots.sampling import Sampler
-from tdac_envs.webots.stage import Stage
+from tdac_envs.webots.stage import ControllerWorld
 
 PATIENCE = 3
 """Requests answered after the end; a controller should stop after the first."""
@@ -28,12 +28,12 @@ class StepServer:
     """Answers requests of the `controller` package; see `controller.connection`.
 
     Args:
-        env: Environment of the stage, from `Stage.make_env`.
+        env: Environment of the stage, from `ControllerWorld.make_env`.
         stage: Stage with the world and the robot.
         folder: Project path reported to the controller.
     """
 
-    def __init__(self, env: EPuckEnv, stage: Stage, folder: str = "") -> None:
+    def __init__(self, env: EPuckEnv, stage: ControllerWorld, folder: str = "") -> None:
         self.log = Log()
         self._env, self._stage, self._folder = env, stage, folder
         self._basic = stage.world.time_step

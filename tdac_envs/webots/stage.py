@@ -13,12 +13,12 @@ from tdac_envs.core.arguments import finite_point
 from tdac_envs.core.errors import WorldError
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
-from tdac_envs.epuck.paths import entry, field_to, open_field
-from tdac_envs.epuck.source import started
+from tdac_envs.epuck.paths import field_to, open_field, path_entry
+from tdac_envs.epuck.source import with_start
 from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
 from tdac_envs.webots.devices import DeviceFacts, find_devices
 from tdac_envs.webots.movable import Movable, find_movables
-from tdac_envs.webots.scene import Scene
+from tdac_envs.webots.scene import NodeTable
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.wbt.fields import flag, text
 from tdac_envs.worlds.wbt.frames import Frame
@@ -29,7 +29,7 @@ from tdac_envs.worlds.world import World, check_modelled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stage:
+class ControllerWorld:
     """A world in which a controller runs.
 
     Attributes:
@@ -54,7 +54,7 @@ class Stage:
     is_moved: bool
     has_goal: bool
     left_out: tuple[str, ...]
-    scene: Scene
+    scene: NodeTable
     robot: Node
     frame: FileFrame
     movables: tuple[Movable | None, ...]
@@ -124,7 +124,7 @@ def open_stage(
     goal: Sequence[float] | None = None,
     ignore: Iterable[str] = (),
     start: Sequence[float] | None = None,
-) -> Stage:
+) -> ControllerWorld:
     """Reads a world file for a controller.
 
     Args:
@@ -147,7 +147,7 @@ def open_stage(
         world = with_goal(world, finite_point("goal", goal))
     in_file = world.robot
     if start is not None:
-        world = started(world, start)
+        world = with_start(world, start)
     has_goal = world.goal is not None
     if not has_goal:
         world = replace(world, goal=_farthest(world))
@@ -156,8 +156,8 @@ def open_stage(
     robot, own = _find_robot(document.nodes, top, path.name)
     devices, absent = find_devices(robot, world.robot.max_wheel_speed)
     frame = FileFrame.of(top, own, in_file.heading)
-    scene = Scene(document.nodes)
-    return Stage(
+    scene = NodeTable(document.nodes)
+    return ControllerWorld(
         name=path.name,
         text=content,
         world=world,
@@ -187,7 +187,7 @@ def _farthest(world: World) -> tuple[float, float]:
     """The reachable point farthest from the robot; its position if there is none."""
     ground = Ground.of(world)
     free = open_field(ground.free(BODY_RADIUS))
-    begin = entry(ground, free, world.robot.pose[:2])
+    begin = path_entry(ground, free, world.robot.pose[:2])
     if begin is None:
         return world.robot.pose[:2]
     field = field_to(ground, begin)

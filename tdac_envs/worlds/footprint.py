@@ -34,7 +34,7 @@ def metres(name: str, value: float) -> float:
     return round(number, DIGITS) + 0.0  # no negative zero
 
 
-def wrapped(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """The angle wrapped to (-pi, pi], rad, rounded to 1e-9."""
     turn = metres("an angle", math.remainder(angle, 2.0 * math.pi))
     return math.pi if abs(turn) > math.pi else turn

@@ -25,7 +25,7 @@ from tdac_envs.worlds.footprint import (
     frame,
     metres,
     ring,
-    wrapped,
+    wrap_angle,
 )
 
 MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
@@ -122,7 +122,7 @@ class EPuck:
     def __post_init__(self) -> None:
         for key in ("x", "y", "z"):
             object.__setattr__(self, key, metres(key, getattr(self, key)))
-        object.__setattr__(self, "heading", wrapped(self.heading))
+        object.__setattr__(self, "heading", wrap_angle(self.heading))
         if self.version not in MAX_WHEEL_SPEED:
             raise WorldError(f'expected version "1" or "2", got {self.version!r}')
 

@@ -14,7 +14,7 @@ from tdac_envs.grid.plan import descend, distance_field, path_length
 from tdac_envs.mapping.image import from_array, luminance
 from tdac_envs.mapping.params import ScoreTerms
 from tdac_envs.mapping.readings import plain_reading
-from tdac_envs.mapping.scene import Scene
+from tdac_envs.mapping.scene import MapProblem
 from tdac_envs.mapping.score import nearest_free
 
 SQUARE = np.ones((3, 3), np.uint8)
@@ -100,7 +100,7 @@ def terms(cells, clear, free, start, goal):
 
 def candidates(picture, start, goal, radius):
     """Of each: polarity, cleanup, inflation, cells, failure and terms; best first."""
-    scene = Scene(from_array(picture), luminance(picture), start, goal, radius)
+    scene = MapProblem(from_array(picture), luminance(picture), start, goal, radius)
     found = []
     for light_free in (True, False):
         base = plain_reading(scene, light_free)

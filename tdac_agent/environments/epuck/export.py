@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tdac_agent.environments.epuck.setting import WORLD_FILE
 from tdac_agent.errors import RunError
-from tdac_agent.runs.records import load_run
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.verification.diagnosis.report import Report

@@ -11,7 +11,7 @@ import numpy as np
 
 from tdac_agent.verification.suite.reference import Point, taut, without_flat_points
 from tdac_envs.epuck.contact import first_touch
-from tdac_envs.epuck.paths import entry, open_field
+from tdac_envs.epuck.paths import open_field, path_entry
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.plan import Path, descend, distance_field
@@ -33,11 +33,11 @@ def oracle_path(task: EPuckTask, x: float, y: float) -> Path:
     ends = np.array([[x, y], task.goal])
     for margin in MARGINS:
         free = _roomy(task, (x, y), margin)
-        last = entry(ground, open_field(free), task.goal)
+        last = path_entry(ground, open_field(free), task.goal)
         if last is None:
             continue
         field = distance_field(free, last)
-        first = entry(ground, field.astype(np.float32), (x, y))
+        first = path_entry(ground, field.astype(np.float32), (x, y))
         if first is not None:
             path = descend(free, field, first) * ground.spacing + ground.bounds[:2]
             return np.vstack([ends[:1], path, ends[1:]])

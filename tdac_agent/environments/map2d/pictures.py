@@ -10,7 +10,7 @@ from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.units import Points
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.runs import Status
-from tdac_envs.map2d.picture import Scene
+from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.run_picture import Background, trajectory_picture
 
 
@@ -44,7 +44,7 @@ class MapPictures:
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
         """Draws frames of the robot with its rays."""
         nominal, trajectory = self.setting.nominal, rollout.trajectory
-        scene = Scene(
+        scene = MapScene(
             nominal.terrain.grid.cells,
             trajectory.poses[0].tolist(),
             nominal.goal,

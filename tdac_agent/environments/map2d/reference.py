@@ -19,10 +19,10 @@ from tdac_agent.verification.suite.reference import (
     taut,
     without_flat_points,
 )
-from tdac_envs.core.compiled import constant
+from tdac_envs.core.compiled import read_only
 from tdac_envs.grid.grid import BoolGrid, body_free
 from tdac_envs.grid.plan import Path, descend, distance_field
-from tdac_envs.map2d.straight import gets_straight
+from tdac_envs.map2d.straight import is_straight_path_free
 from tdac_envs.map2d.task import Map2DTask
 
 # Clearances beyond the body that are tried for the path, px, widest first. With the
@@ -100,7 +100,7 @@ def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
     """Whether the body, grown by `safe` px, can drive straight between two points."""
     clear = task.terrain.padded_clear
     numbers = (*begin, *end, task.robot.radius + safe)
-    return gets_straight(constant(clear), *map(float, numbers))
+    return is_straight_path_free(read_only(clear), *map(float, numbers))
 
 
 def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:

@@ -22,7 +22,7 @@ from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.image import picture_size, read_bytes
 from tdac_envs.mapping.map_folder import preview_of, write_grid
-from tdac_envs.mapping.params import MapParams, RobotParams, Said
+from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import as_image
 
 DT = 0.05
@@ -157,7 +157,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         spec.goal,
         robot_radius=spec.robot.radius,
         snap=spec.snap,
-        said=Said(spec.polarity, spec.threshold),
+        said=ReadingOptions(spec.polarity, spec.threshold),
     )
     params = _with_robot(prepared.params, spec.robot)
     nominal = _feasible(prepared.grid, params, spec)

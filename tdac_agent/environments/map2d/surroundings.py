@@ -17,7 +17,7 @@ from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.plan import Path, descend, first_beyond
 from tdac_envs.map2d.task import Map2DTask
-from tdac_envs.map2d.terrain import entry
+from tdac_envs.map2d.terrain import path_entry
 
 Point = tuple[float, float]
 
@@ -78,7 +78,7 @@ class MapSurroundings:
         free = body_free(task.terrain.clear, task.robot.radius)
         field = np.asarray(task.field, np.float64)
         for x, y in places.tolist():
-            first = entry(task.terrain, task.field, x, y, task.robot.radius)
+            first = path_entry(task.terrain, task.field, x, y, task.robot.radius)
             if first is None:
                 yield None
                 continue

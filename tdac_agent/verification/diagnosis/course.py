@@ -38,7 +38,7 @@ def heading_error(
     return None
 
 
-def way_from(around: Surroundings, trajectory: Trajectory, step: int) -> Path | None:
+def path_ahead(around: Surroundings, trajectory: Trajectory, step: int) -> Path | None:
     """Start of the straightened shortest path from a pose, or from one just before."""
     for path in _paths_until(around, trajectory, step):
         return np.array(around.pull(path[: _PATH_AHEAD // 2]))

@@ -14,7 +14,7 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.course import way_from
+from tdac_agent.verification.diagnosis.course import path_ahead
 from tdac_agent.verification.diagnosis.report import Diagnosis, Episode, Report
 from tdac_agent.verification.diagnosis.surroundings import (
     surroundings_of,
@@ -99,7 +99,7 @@ def event_of(
         facts = _facts(diagnosis)
         where = _where(task, trajectory, diagnosis)
     d_min, d0 = (units.scale * d for d in (episode.d_min, episode.d0))
-    way = way_from(around, shown, trajectory.steps)
+    way = path_ahead(around, shown, trajectory.steps)
     return Event(
         title=title,
         facts=(*facts, f"path left: {d_min:.0f} of {d0:.0f} {units.length}"),

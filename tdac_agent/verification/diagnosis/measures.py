@@ -70,7 +70,7 @@ def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
     seconds, driven = trajectory.steps * trajectory.dt, float(steps.sum())
     of_success: dict[str, float] = {}
     if rollout.reached and not rollout.collisions:
-        shortest = shortest_way(task)
+        shortest = shortest_path_length(task)
         rest = float(trajectory.path_distances[-1])
         of_success = {
             "shortest": shortest,
@@ -95,7 +95,7 @@ def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
     )
 
 
-def shortest_way(task: Nominal) -> float:
+def shortest_path_length(task: Nominal) -> float:
     """Length of the shortest path from a task's start to its goal, px or m.
 
     The shortest 8-connected grid path, after every shortcut that the body can take.

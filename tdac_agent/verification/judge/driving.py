@@ -12,17 +12,17 @@ from tdac_agent.sandbox import ControllerFault, Limits
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.judge.children import Nursery
-from tdac_agent.verification.judge.contenders import Contender, driver_of
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.drivers import PolicySpec, driver_of
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
-NO_SANDBOX = "none"
+UNSANDBOXED = "none"
 """Reported as the tier of policies that run without a sandbox."""
 FOREVER = 1 << 62
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class EpisodeSetup:
     """Everything that an episode depends on, except its seed.
 
     Attributes:
@@ -32,22 +32,22 @@ class Stage:
         disturbance: Disturbance of the environment.
         tier: Sandbox tier, or `auto`.
         limits: Limits of each child, and so of each episode.
-        nursery: The child pool.
+        child_pool: The child pool.
         variation: Variation of start and goal.
     """
 
     task: Task
-    contender: Contender
+    contender: PolicySpec
     workdir: Path
     disturbance: Disturbance
     tier: str
     limits: Limits
-    nursery: Nursery
+    child_pool: ChildPool
     variation: str = "jitter"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Driven:
+class SeededResult:
     """The result of an episode.
 
     Attributes:
@@ -63,14 +63,14 @@ class Driven:
     task: Nominal
 
 
-def record_of(stage: Stage, seed: int) -> Record:
+def record_of(stage: EpisodeSetup, seed: int) -> Record:
     """An empty record for the episode of a seed."""
     env = stage.task.disturbed_env(stage.disturbance, stage.variation)
     # The environment ends an episode at its horizon, which depends on the goal.
     return Record(env, None, FOREVER, seed=seed)
 
 
-def drive_seed(stage: Stage, seed: int) -> Driven:
+def drive_seed(stage: EpisodeSetup, seed: int) -> SeededResult:
     """Drives the episode of a seed; a controller runs in a fresh child.
 
     The environment draws start and noise after `reset(seed=seed)`.
@@ -79,9 +79,9 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
     if stage.contender.kind != "controller":
         return _driven_here(stage, record, seed)
     name, source = f"seed {seed}", source_of(stage.contender)
-    child = stage.nursery.take(stage.tier, stage.limits)
+    child = stage.child_pool.take(stage.tier, stage.limits)
     try:
-        child.furnish(stage.workdir, source)
+        child.copy_files(stage.workdir, source)
         child.load()
         # Single calls and their mean time are limited instead of the episode.
         rollout = run_policy(child, record, name, held_out=False, deadline=math.inf)
@@ -89,16 +89,16 @@ def drive_seed(stage: Stage, seed: int) -> Driven:
         rollout = not_driven(record, name, fault)
     finally:
         usage = child.close()
-    return Driven(rollout, usage.cpu_seconds, child.tier, record.env.task)
+    return SeededResult(rollout, usage.cpu_seconds, child.tier, record.env.task)
 
 
-def source_of(contender: Contender) -> bytes:
+def source_of(contender: PolicySpec) -> bytes:
     """Reads the source of a controller."""
     assert contender.file is not None
     return read_file(contender.file, RECORD_BYTES)
 
 
-def _driven_here(stage: Stage, record: Record, seed: int) -> Driven:
+def _driven_here(stage: EpisodeSetup, record: Record, seed: int) -> SeededResult:
     """Drives an episode of a baseline or learned policy, which run no foreign code."""
     name = f"seed {seed}"
     try:
@@ -106,4 +106,4 @@ def _driven_here(stage: Stage, record: Record, seed: int) -> Driven:
         rollout = run_policy(driver, record, name, held_out=False, deadline=math.inf)
     except ControllerFault as fault:
         rollout = not_driven(record, name, fault)
-    return Driven(rollout, 0.0, NO_SANDBOX, record.env.task)
+    return SeededResult(rollout, 0.0, UNSANDBOXED, record.env.task)

@@ -20,12 +20,12 @@ from tdac_agent.sandbox import (
 )
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.blame import ours
-from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.remote import Unit
 from tdac_agent.verification.judge.suite_episode import (
-    Brief,
-    Order,
-    SuiteCrew,
+    EpisodeRequest,
+    SuitePool,
+    VerificationSettings,
     drive,
     load_controller,
     not_driven,
@@ -33,7 +33,7 @@ from tdac_agent.verification.judge.suite_episode import (
 )
 from tdac_agent.verification.judge.time_limit import time_limit
 from tdac_agent.verification.judge.turns import Turns
-from tdac_agent.verification.judge.workers import SIZE, Crew
+from tdac_agent.verification.judge.worker_pool import SIZE, WorkerPool
 from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_envs.drive.task import Pose
 
@@ -61,8 +61,8 @@ class Judge:
         tier: Sandbox tier, or `auto`.
         seed: Seed of the jittered starts.
         limits: Limits of each child; `cpu_seconds` is the total of all of them.
-        nursery: The child pool; a new one by default.
-        crew: The worker pool that drives episodes; a new one by default, forked now.
+        child_pool: The child pool; a new one by default.
+        worker_pool: Drives the episodes; by default a new one, forked now.
         at_a_time: Maximum number of concurrent episodes.
         wall_seconds: Time limit of the whole verification, s.
 
@@ -82,8 +82,8 @@ class Judge:
         tier: str = "auto",
         seed: int = 0,
         limits: Limits | None = None,
-        nursery: Nursery | None = None,
-        crew: SuiteCrew | None = None,
+        child_pool: ChildPool | None = None,
+        worker_pool: SuitePool | None = None,
         at_a_time: int = min(SIZE, EPISODES),
         wall_seconds: float = WALL_SECONDS,
     ) -> None:
@@ -96,17 +96,21 @@ class Judge:
         self._limits = limits or Limits()
         self._deadline = time.monotonic() + wall_seconds
         self._too_long = f"the verification took longer than {wall_seconds:g} s"
-        self._brief = Brief(source, workdir, tier, self._limits, self._deadline)
+        self._brief = VerificationSettings(
+            source, workdir, tier, self._limits, self._deadline
+        )
         self._own = ExitStack()
-        if nursery is None:
-            nursery = Nursery(ahead=False)
-            self._own.callback(nursery.close)
-        self._nursery = nursery
-        if crew is None:
+        if child_pool is None:
+            child_pool = ChildPool(ahead=False)
+            self._own.callback(child_pool.close)
+        self._child_pool = child_pool
+        if worker_pool is None:
             # Forked before the first thread starts.
-            crew = Crew(partial(drive, task, nursery), nursery.close, at_a_time)
-            self._own.callback(crew.close)
-        self._crew = crew
+            worker_pool = WorkerPool(
+                partial(drive, task, child_pool), child_pool.close, at_a_time
+            )
+            self._own.callback(worker_pool.close)
+        self._worker_pool = worker_pool
         self._pool = ThreadPoolExecutor(max_workers=at_a_time)
         # One place more than episodes, for the suite's own calls.
         self._turns = Turns(at_a_time + 1)
@@ -136,13 +140,13 @@ class Judge:
         """Context that ends a test when the verification has taken too long."""
         return time_limit(self._deadline, self._too_long)
 
-    def call_may_pass(self) -> bool:
+    def wait_before_retry(self) -> bool:
         """Whether the latest call timed out, maybe only because the machine is busy.
 
         If so, it first waits for the running episodes, so that a retry runs alone.
         """
         fault = None if self._unit is None else self._unit.fault
-        if fault is None or not fault.may_pass:
+        if fault is None or not fault.is_retryable:
             return False
         wait(self._episodes.values())
         return True
@@ -251,7 +255,7 @@ class Judge:
             return skipped(self.task, order, "not run", reason)
         with self._turns.beside():
             rollout = self.drive(name, steps, drive)
-        if not rollout.may_pass:
+        if not rollout.is_retryable:
             return rollout
         # A busy machine may be the cause, so the retry runs alone.
         with self._turns.alone():
@@ -272,7 +276,7 @@ class Judge:
         order = self._order(name, steps, drive)
         try:
             self._may_start()
-            driven = self._crew.do(self._brief, order)
+            driven = self._worker_pool.do(self._brief, order)
         except ControllerFault as fault:
             return not_driven(self.task, order, fault)
         self.tier = driven.tier
@@ -285,8 +289,8 @@ class Judge:
             return skipped(self.task, order, "error", reason)
         return driven.rollout
 
-    def _order(self, name: str, steps: int | None, drive: str) -> Order:
-        return Order(name, self.start_pose(name), steps, drive)
+    def _order(self, name: str, steps: int | None, drive: str) -> EpisodeRequest:
+        return EpisodeRequest(name, self.start_pose(name), steps, drive)
 
     def _overspent(self) -> str:
         return f"used up its limit of {self._limits.cpu_seconds} s of CPU time"
@@ -297,7 +301,7 @@ class Judge:
             with self._turns.beside():
                 return self._load()
         except ControllerFault as fault:
-            if not fault.may_pass:
+            if not fault.is_retryable:
                 raise
         with self._turns.alone():
             return self._load(final=True)
@@ -309,7 +313,7 @@ class Judge:
             ControllerFault: The import failed; later requests raise the same fault.
         """
         self._may_start()
-        child = self._nursery.take(self._brief.tier, self._limits)
+        child = self._child_pool.take(self._brief.tier, self._limits)
         self.tier = child.tier
         try:
             load_controller(child, self._brief)
@@ -334,7 +338,7 @@ class Judge:
 
     def _remember(self, fault: ControllerFault, *, final: bool) -> None:
         """Records a failed import, unless it is to be retried."""
-        if final or not fault.may_pass:
+        if final or not fault.is_retryable:
             self._import_fault = fault
 
 

@@ -98,7 +98,7 @@ class JudgePlugin:
         """Runs a test; repeats it if a call timed out, maybe on a busy machine."""
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
         reports = runtestprotocol(item, log=False, nextitem=nextitem)
-        if self._judge.call_may_pass():
+        if self._judge.wait_before_retry():
             item._initrequest()  # type: ignore[attr-defined]
             reports = runtestprotocol(item, log=False, nextitem=nextitem)
         for report in reports:

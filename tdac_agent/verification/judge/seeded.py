@@ -24,12 +24,17 @@ from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.measures import Measured, measure
 from tdac_agent.verification.diagnosis.report import Cause
-from tdac_agent.verification.judge.children import Nursery
-from tdac_agent.verification.judge.contenders import Contender
-from tdac_agent.verification.judge.driving import Driven, Stage, drive_seed, record_of
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.driving import (
+    EpisodeSetup,
+    SeededResult,
+    drive_seed,
+    record_of,
+)
 from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.turns import Turns
-from tdac_agent.verification.judge.workers import SIZE, Crew
+from tdac_agent.verification.judge.worker_pool import SIZE, WorkerPool
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
 POSES_FILE, CALLS_FILE = "poses.npz", "calls.npy"
@@ -48,7 +53,7 @@ class SeededJob(BaseModel):
 
     kind: Literal["seeds"] = "seeds"
     task: Path
-    contender: Contender
+    contender: PolicySpec
     disturbance: Disturbance
     variation: str
     seeds: tuple[int, ...]
@@ -87,7 +92,7 @@ class SeededEpisode(PrintableRecord):
         return self.outcome == "reached" and not self.collisions
 
 
-class Ending(PrintableRecord):
+class JobEnding(PrintableRecord):
     """What the judge's process found in addition to the episodes."""
 
     model_config = ConfigDict(extra="forbid")
@@ -97,14 +102,14 @@ class Ending(PrintableRecord):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Kept:
+class EpisodeSummary:
     """What is kept of an episode.
 
     Attributes:
         figures: A line of the results.
         tier: Sandbox tier; empty if nothing was started.
         late: Whether the controller timed out.
-        may_pass: Whether the time-out may be due to a busy machine.
+        is_retryable: Whether the time-out may be due to a busy machine.
         poses: Poses of an evaluation, shape (T + 1, 3), float32; else empty.
         calls: Call times of an evaluation, s, shape (T,), float32; else empty.
     """
@@ -112,30 +117,30 @@ class Kept:
     figures: SeededEpisode | Measured
     tier: str
     late: bool
-    may_pass: bool
+    is_retryable: bool
     poses: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), "f4"))
     calls: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, "f4"))
 
 
-def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
+def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
     """Runs the episodes of a job, and writes a line for each in the order of seeds.
 
     A sequential test gets them in the same order, so that its decision does not depend
     on timing. Episodes after its decision are dropped.
     """
     job.out.mkdir(exist_ok=True)
-    stage = Stage(
+    stage = EpisodeSetup(
         load_task(job.task),
         job.contender,
         job.task,
         job.disturbance,
         job.tier,
         job.limits,
-        nursery,
+        child_pool,
         job.variation,
     )
     counts, tier, fault = [0, 0], job.tier, None
-    all_kept: list[Kept] = []
+    all_kept: list[EpisodeSummary] = []
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
             with closing(_in_order(stage, job)) as episodes:
@@ -152,82 +157,84 @@ def judge_seeds(job: SeededJob, nursery: Nursery) -> None:
             fault = f"the sandbox failed: {error}"
     if job.measured:
         _write_arrays(all_kept, job.out)
-    ending = Ending(tier=tier, fault=fault)
+    ending = JobEnding(tier=tier, fault=fault)
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 
 
-def _write_arrays(all_kept: list[Kept], out: Path) -> None:
+def _write_arrays(all_kept: list[EpisodeSummary], out: Path) -> None:
     np.savez(out / POSES_FILE, *(kept.poses for kept in all_kept))
     calls = [kept.calls for kept in all_kept]
     np.save(out / CALLS_FILE, np.concatenate([np.zeros(0, np.float32), *calls]))
 
 
-def _in_order(stage: Stage, job: SeededJob) -> Generator[Kept]:
+def _in_order(stage: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
     """Yields episodes in order, several running at a time; closing waits for them."""
     size = min(SIZE, len(job.seeds))
     turns, late = Turns(size), list[int]()
     work = partial(_run_episode, stage, job.measured)
     with (
-        closing(Crew(work, stage.nursery.close, size)) as crew,
+        closing(WorkerPool(work, stage.child_pool.close, size)) as worker_pool,
         ThreadPoolExecutor(max_workers=size) as pool,
     ):
         try:
             patience = MOST_LATE if job.measured else len(job.seeds)
             yield from pool.map(
-                partial(_run_with_retry, crew, turns, late, patience), job.seeds
+                partial(_run_with_retry, worker_pool, turns, late, patience), job.seeds
             )
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def _run_episode(stage: Stage, measured: bool, seed: int, skip: bool) -> Kept:
+def _run_episode(
+    stage: EpisodeSetup, measured: bool, seed: int, skip: bool
+) -> EpisodeSummary:
     """Drives or skips the episode of a seed, and returns what is kept of it."""
     driven = _skipped(stage, seed) if skip else drive_seed(stage, seed)
     rollout = driven.rollout
     late = rollout.outcome == "error" and rollout.timed_out
     if not measured:
         found = figures(driven, seed, stage.task)
-        return Kept(found, driven.tier, late, rollout.may_pass)
-    return Kept(
+        return EpisodeSummary(found, driven.tier, late, rollout.is_retryable)
+    return EpisodeSummary(
         measure(rollout, seed, driven.task),
         driven.tier,
         late,
-        rollout.may_pass,
+        rollout.is_retryable,
         rollout.trajectory.poses.astype(np.float32),
         rollout.calls.astype(np.float32),
     )
 
 
-def _skipped(stage: Stage, seed: int) -> Driven:
+def _skipped(stage: EpisodeSetup, seed: int) -> SeededResult:
     reason = f"not driven, because {MOST_LATE} earlier episodes timed out"
     record = record_of(stage, seed)
     rollout = not_driven(record, f"seed {seed}", ControllerFault(reason, "policy"))
-    return Driven(rollout, 0.0, "", record.env.task)
+    return SeededResult(rollout, 0.0, "", record.env.task)
 
 
 def _run_with_retry(
-    crew: Crew[[int, bool], Kept],
+    worker_pool: WorkerPool[[int, bool], EpisodeSummary],
     turns: Turns,
     late: list[int],
     patience: int,
     seed: int,
-) -> Kept:
+) -> EpisodeSummary:
     """Runs an episode in the worker pool.
 
     After a time-out that may be due to a busy machine, it is run once more, alone.
     """
     skip = len(late) >= patience
     with turns.beside():
-        kept = crew.do(seed, skip)
-    if kept.late and kept.may_pass and len(late) < patience:
+        kept = worker_pool.do(seed, skip)
+    if kept.late and kept.is_retryable and len(late) < patience:
         with turns.alone():
-            kept = crew.do(seed, False)
+            kept = worker_pool.do(seed, False)
     if kept.late:
         late.append(seed)
     return kept
 
 
-def figures(driven: Driven, seed: int, task: Task) -> SeededEpisode:
+def figures(driven: SeededResult, seed: int, task: Task) -> SeededEpisode:
     """Figures of an episode, with the diagnosis of a failure."""
     rollout, failure = driven.rollout, {}
     distances, digits = rollout.distances(), task.setting.units.digits

@@ -33,11 +33,11 @@ from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
 from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
 from tdac_agent.tasks.task import load_task
-from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.jobs import SUITE, Job
-from tdac_agent.verification.judge.suite_episode import SuiteCrew, drive_known
+from tdac_agent.verification.judge.suite_episode import SuitePool, drive_known
 from tdac_agent.verification.judge.suite_run import judge_suite
-from tdac_agent.verification.judge.workers import Crew, end_with_parent
+from tdac_agent.verification.judge.worker_pool import WorkerPool, end_with_parent
 from tdac_agent.verification.suite.starts import spread_starts
 from tdac_envs.core.code_cache import has_code
 from tdac_envs.drive.env import Observation
@@ -53,23 +53,23 @@ LOADED_LATE = (
 )
 
 
-def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
+def serve(child_pool: ChildPool | None = None, known: Path | None = None) -> None:
     """Forks one worker after another until there is no further job.
 
     Writes the process id of each worker, and a line when its job is done. The worker
     writes that line itself before it cleans up; the server does so if it could not.
 
     Args:
-        nursery: Child pool of the first worker, whose job is due at once. By default
+        child_pool: Child pool of the first worker, whose job is due at once. By default
             the server makes one, and first loads everything that a job needs.
-        known: Folder of a task to read in advance; only used without `nursery`.
+        known: Folder of a task to read in advance; only used without `child_pool`.
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
     # Messages quote what a controller returned, which may be long.
     np.set_printoptions(threshold=16, edgeitems=1)
-    if nursery is None:
-        nursery = Nursery()
+    if child_pool is None:
+        child_pool = ChildPool()
         _warm_up()
         if known is not None:
             load_task(known)
@@ -80,13 +80,13 @@ def serve(nursery: Nursery | None = None, known: Path | None = None) -> None:
     while more:
         worker = os.fork()
         if worker == 0:
-            work(nursery)
+            work(child_pool)
         _write_line(b"worker %d" % worker)
         code = os.waitstatus_to_exitcode(_status_of(worker))
-        nursery.kill()
+        child_pool.kill()
         more = code != NO_JOB
         if more:
-            nursery = Nursery()
+            child_pool = ChildPool()
         if code != DID_JOB:
             _write_line(DONE)
 
@@ -118,33 +118,33 @@ def _write_line(text: bytes, descriptor: int = 1) -> None:
     os.write(descriptor, text + b"\n")
 
 
-def work(nursery: Nursery) -> NoReturn:
+def work(child_pool: ChildPool) -> NoReturn:
     """Prepares children, waits for a job on standard input, runs it and exits."""
     os.setpgid(0, 0)
     end_with_parent()
     answers = os.dup(1)
     os.dup2(2, 1)
     # Prepares only until the job arrives.
-    while not _is_readable(0) and nursery.prepare():
+    while not _is_readable(0) and child_pool.prepare():
         continue
-    crew = None
+    worker_pool = None
     if not _is_readable(0):
         # Forked after the children, which its processes share.
-        crew = _ready_crew(nursery)
+        worker_pool = _ready_worker_pool(child_pool)
         _run_empty_suite()
     request = _read_line(0)
     code = NO_JOB
     try:
         with contextlib.ExitStack() as later:
-            later.callback(nursery.close)
-            if crew is not None:
-                later.callback(crew.close)
+            later.callback(child_pool.close)
+            if worker_pool is not None:
+                later.callback(worker_pool.close)
             if request:
                 with (Path(request).parent / "output.txt").open("wb") as output:
                     os.dup2(output.fileno(), 1)
                     os.dup2(output.fileno(), 2)
                 code = 1
-                do_job(Path(request), nursery, crew, later)
+                do_job(Path(request), child_pool, worker_pool, later)
                 code = DID_JOB
                 _flush()
                 _write_line(DONE, answers)
@@ -203,10 +203,10 @@ def _run_empty_suite() -> None:
             run_tests([folder], folder / "report.jsonl")
 
 
-def _ready_crew(nursery: Nursery) -> SuiteCrew:
+def _ready_worker_pool(child_pool: ChildPool) -> SuitePool:
     """A worker pool whose processes have already driven some steps."""
-    work = partial(drive_known, nursery)
-    return Crew(work, nursery.close, first=_drive_some_steps)
+    work = partial(drive_known, child_pool)
+    return WorkerPool(work, child_pool.close, first=_drive_some_steps)
 
 
 def _drive_some_steps() -> None:
@@ -231,20 +231,20 @@ class _Still:
 
 def do_job(
     request: Path,
-    nursery: Nursery,
-    crew: SuiteCrew | None,
+    child_pool: ChildPool,
+    worker_pool: SuitePool | None,
     later: contextlib.ExitStack,
 ) -> None:
     """Runs a job of either kind in its folder; the caller closes `later` after it."""
     text = request.read_text(encoding="utf-8")
     os.chdir(request.parent)
     if json.loads(text)["kind"] == SUITE:
-        judge_suite(Job.model_validate_json(text), nursery, crew, later)
+        judge_suite(Job.model_validate_json(text), child_pool, worker_pool, later)
     else:
         # Imported late, since it loads policies of all kinds.
         from tdac_agent.verification.judge.seeded import SeededJob, judge_seeds
 
-        judge_seeds(SeededJob.model_validate_json(text), nursery)
+        judge_seeds(SeededJob.model_validate_json(text), child_pool)
 
 
 if __name__ == "__main__":

@@ -16,15 +16,15 @@ from tdac_agent.sandbox import (
 )
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.verification.judge.blame import ours
-from tdac_agent.verification.judge.children import Nursery
-from tdac_agent.verification.judge.workers import Crew
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.worker_pool import WorkerPool
 from tdac_envs.drive.task import Pose
 
 SHOWN_JITTERS = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Brief:
+class VerificationSettings:
     """Settings shared by the episodes of a verification.
 
     Attributes:
@@ -43,7 +43,7 @@ class Brief:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class EpisodeRequest:
     """A request for an episode.
 
     Attributes:
@@ -65,7 +65,7 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Driven:
+class SuiteResult:
     """The result of an episode.
 
     Attributes:
@@ -81,12 +81,14 @@ class Driven:
     import_fault: ControllerFault | None = None
 
 
-SuiteCrew = Crew[[Brief, Order], Driven]
+SuitePool = WorkerPool[[VerificationSettings, EpisodeRequest], SuiteResult]
 
 
-def drive_known(nursery: Nursery, brief: Brief, order: Order) -> Driven:
+def drive_known(
+    child_pool: ChildPool, brief: VerificationSettings, order: EpisodeRequest
+) -> SuiteResult:
     """The same as `drive`, for the task in the brief's folder."""
-    return drive(_task_of(brief.workdir), nursery, brief, order)
+    return drive(_task_of(brief.workdir), child_pool, brief, order)
 
 
 @functools.lru_cache(maxsize=1)
@@ -95,7 +97,12 @@ def _task_of(workdir: Path) -> Task:
 
 
 @ours()
-def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
+def drive(
+    task: Task,
+    child_pool: ChildPool,
+    brief: VerificationSettings,
+    order: EpisodeRequest,
+) -> SuiteResult:
     """Drives an episode in a fresh child.
 
     Raises:
@@ -105,13 +112,13 @@ def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
     record = Record(task.make_env(), order.start, limit)
     if order.drive == "truncated run_episode":
         record.truncates, record.collisions_before = True, 2
-    child = nursery.take(brief.tier, brief.limits)
+    child = child_pool.take(brief.tier, brief.limits)
     try:
         load_controller(child, brief)
     except ControllerFault as fault:
         cpu_seconds = child.close().cpu_seconds
         rollout = not_driven(task, order, fault)
-        return Driven(rollout, cpu_seconds, child.tier, fault)
+        return SuiteResult(rollout, cpu_seconds, child.tier, fault)
     try:
         if order.drive != "policy":
             seconds = child.limits.reset_seconds + 2 * limit * task.nominal.dt
@@ -128,30 +135,32 @@ def drive(task: Task, nursery: Nursery, brief: Brief, order: Order) -> Driven:
             )
     finally:
         cpu_seconds = child.close().cpu_seconds
-    return Driven(rollout, cpu_seconds, child.tier)
+    return SuiteResult(rollout, cpu_seconds, child.tier)
 
 
-def load_controller(child: Child, brief: Brief) -> None:
+def load_controller(child: Child, brief: VerificationSettings) -> None:
     """Copies the task's files and the controller to a child, and imports it there.
 
     Raises:
         ControllerFault: The controller cannot be imported.
         SandboxError: The files cannot be copied.
     """
-    child.furnish(brief.workdir, brief.source)
+    child.copy_files(brief.workdir, brief.source)
     child.load()
 
 
-def not_driven(task: Task, order: Order, fault: ControllerFault) -> Rollout:
+def not_driven(task: Task, order: EpisodeRequest, fault: ControllerFault) -> Rollout:
     """The episode of a controller that cannot be imported, or is out of resources."""
     return replace(
         skipped(task, order, "error", str(fault)),
         timed_out=isinstance(fault, ControllerTimeout),
-        may_pass=fault.may_pass,
+        is_retryable=fault.is_retryable,
     )
 
 
-def skipped(task: Task, order: Order, outcome: Outcome, reason: str) -> Rollout:
+def skipped(
+    task: Task, order: EpisodeRequest, outcome: Outcome, reason: str
+) -> Rollout:
     """An episode without steps."""
     record = Record(task.make_env(), order.start, 1)
     record.reset()

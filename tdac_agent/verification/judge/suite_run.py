@@ -7,14 +7,17 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 from tdac_agent.tasks.task import load_task
-from tdac_agent.verification.judge.children import Nursery
+from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.jobs import Job
 from tdac_agent.verification.judge.judge import Judge
-from tdac_agent.verification.judge.suite_episode import SuiteCrew
+from tdac_agent.verification.judge.suite_episode import SuitePool
 
 
 def judge_suite(
-    job: Job, nursery: Nursery, crew: SuiteCrew | None, later: contextlib.ExitStack
+    job: Job,
+    child_pool: ChildPool,
+    worker_pool: SuitePool | None,
+    later: contextlib.ExitStack,
 ) -> None:
     """Runs the suite of a job, and writes the findings."""
     task = load_task(job.task)
@@ -25,8 +28,8 @@ def judge_suite(
         tier=job.tier,
         seed=job.seed,
         limits=job.limits,
-        nursery=nursery,
-        crew=crew,
+        child_pool=child_pool,
+        worker_pool=worker_pool,
     )
     later.callback(judge.close)
     judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")

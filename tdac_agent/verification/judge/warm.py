@@ -24,8 +24,8 @@ from tdac_agent.errors import Fault
 from tdac_agent.storage.locks import wait_for
 from tdac_agent.storage.secrets import SECRET
 from tdac_agent.tasks.task import Task, lay_out
-from tdac_agent.verification.judge.children import Nursery
-from tdac_agent.verification.judge.workers import end_with_parent
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.worker_pool import end_with_parent
 
 # Environment variables of Python that the judge's process keeps. Others can change a
 # verdict; PYTHONOPTIMIZE, for example, removes every assertion.
@@ -44,7 +44,7 @@ class WarmJudge:
     The constructor returns at once; the judge warms up in the background.
 
     Args:
-        nursery: Child pool that the caller has started and will end. The server is then
+        child_pool: Pool that the caller has started and will end. The server is then
             forked from this process, which should have a single thread, and shares its
             imports. By default the server is a new interpreter.
         task: Task of most jobs, which a new interpreter reads in advance.
@@ -54,7 +54,7 @@ class WarmJudge:
 
     def __init__(
         self,
-        nursery: Nursery | None = None,
+        child_pool: ChildPool | None = None,
         *,
         task: Task | None = None,
         turn: Path | None = None,
@@ -77,11 +77,11 @@ class WarmJudge:
         environment["TMPDIR"] = self._folder.name
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
         place = environment, self._path, self._log.fileno()
-        if nursery is None:
+        if child_pool is None:
             known = [] if task is None else [lay_out(task, self._path / "task")]
             self._server = _start_server(known, *place)
         else:
-            self._server = _fork_server(nursery, *place)
+            self._server = _fork_server(child_pool, *place)
 
     def run(
         self,
@@ -206,7 +206,7 @@ def _start_server(
 
 
 def _fork_server(
-    nursery: Nursery, environment: dict[str, str], folder: Path, log: int
+    child_pool: ChildPool, environment: dict[str, str], folder: Path, log: int
 ) -> _Server:
     """Forks a server from this process, with everything that it has imported."""
     import cv2
@@ -230,7 +230,7 @@ def _fork_server(
             os.chdir(folder)
             from tdac_agent.verification.judge.server import serve
 
-            serve(nursery)
+            serve(child_pool)
         finally:
             os._exit(1)
     cv2.setNumThreads(threads)

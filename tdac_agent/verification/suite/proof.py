@@ -23,7 +23,7 @@ class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Row(_Record):
+class ProofRow(_Record):
     """Results of one controller."""
 
     controller: str
@@ -46,19 +46,19 @@ class SuiteCheck(_Record):
     profile: Profile
     seed: int
     sandbox: str = Field(description="Sandbox tier of the controllers.")
-    rows: tuple[Row, ...]
+    rows: tuple[ProofRow, ...]
     problems: tuple[str, ...] = Field(description="Reasons why it is not proven.")
     notes: tuple[str, ...] = Field(description="Remarks that the user should check.")
     seconds: float
 
 
-def row_of(name: str, reports: Sequence[Report]) -> Row:
+def row_of(name: str, reports: Sequence[Report]) -> ProofRow:
     """Summarises one controller's verifications."""
     failures: dict[str, str] = {}
     for report in reports:
         for failure in report.failures:
             failures.setdefault(failure.test, failure.message)
-    return Row(
+    return ProofRow(
         controller=name,
         repeats=len(reports),
         passed=sum(report.passed for report in reports),
@@ -88,7 +88,7 @@ def _facts(report: Report) -> dict[str, str]:
     return facts
 
 
-def problems_of(row: Row) -> Iterator[str]:
+def problems_of(row: ProofRow) -> Iterator[str]:
     """Describes the problems of suite and task that one controller's results show."""
     if row.controller == REFERENCE and row.passed < row.repeats:
         for test, message in row.failures.items():
@@ -101,7 +101,7 @@ def problems_of(row: Row) -> Iterator[str]:
 
 
 def verdict_on_suite(
-    reference: Report, rows: Sequence[Row], seconds: float
+    reference: Report, rows: Sequence[ProofRow], seconds: float
 ) -> SuiteCheck:
     """Returns the verdict on a suite.
 

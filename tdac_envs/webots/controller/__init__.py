@@ -6,26 +6,6 @@ standard library and nothing else of tdac. It accesses the simulation only throu
 does, where that is known.
 """
 
-from .absent import (
-    Altimeter,
-    Brake,
-    Camera,
-    CameraRecognitionObject,
-    Connector,
-    Display,
-    Emitter,
-    Lidar,
-    LidarPoint,
-    Pen,
-    Radar,
-    RadarTarget,
-    RangeFinder,
-    Receiver,
-    Skin,
-    Speaker,
-    TouchSensor,
-    VacuumGripper,
-)
 from .ansi import AnsiCodes
 from .connection import connect
 from .device import Device
@@ -46,6 +26,26 @@ from .sensors import (
     PositionSensor,
 )
 from .supervisor import Supervisor
+from .unmodelled import (
+    Altimeter,
+    Brake,
+    Camera,
+    CameraRecognitionObject,
+    Connector,
+    Display,
+    Emitter,
+    Lidar,
+    LidarPoint,
+    Pen,
+    Radar,
+    RadarTarget,
+    RangeFinder,
+    Receiver,
+    Skin,
+    Speaker,
+    TouchSensor,
+    VacuumGripper,
+)
 
 __all__ = [
     "GPS",

@@ -15,7 +15,7 @@ _GOAL = "goal"
 
 
 @dataclass(slots=True)
-class Found:
+class WorldContent:
     """The content of a file found so far."""
 
     robots: list[EPuck] = field(default_factory=list)

@@ -11,7 +11,7 @@ from tdac_envs.core.errors import WorldError, WorldFileError
 from tdac_envs.core.intake import printable, read_file
 from tdac_envs.worlds.bodies import bodies, floor_under
 from tdac_envs.worlds.wbt.fields import number, numbers, text
-from tdac_envs.worlds.wbt.found import Found
+from tdac_envs.worlds.wbt.found import WorldContent
 from tdac_envs.worlds.wbt.frames import Frame, world_frame
 from tdac_envs.worlds.wbt.tree import Document, Node, parse
 from tdac_envs.worlds.wbt.walk import walk
@@ -61,7 +61,7 @@ def read_world(
     """Reads the text of a `.wbt` file; see `load_world`."""
     document = parse(content, name)
     info, frame = _world_info(document), frame_of(document)
-    found = Found()
+    found = WorldContent()
     for node in document.nodes:
         try:
             walk(node, frame, found)
@@ -141,7 +141,7 @@ def _items(node: Node, name: str) -> tuple[object, ...]:
     return node.fields[name].items if name in node.fields else ()
 
 
-def _time_step(info: Node | None, found: Found) -> float:
+def _time_step(info: Node | None, found: WorldContent) -> float:
     step = _STEP if info is None else number(info, "basicTimeStep", _STEP)
     if step >= 0.001:
         return step
@@ -161,7 +161,7 @@ def _driven_first(
     return (chosen[0], *(robot for robot in robots if robot is not chosen[0]))
 
 
-def _notes(world: World, found: Found) -> list[str]:
+def _notes(world: World, found: WorldContent) -> list[str]:
     """Assumptions that depend on the whole world."""
     notes = []
     if len(world.robots) > 1:

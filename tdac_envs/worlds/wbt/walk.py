@@ -8,7 +8,7 @@ from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.wbt.appearance import reflectance
 from tdac_envs.worlds.wbt.arenas import ARENAS, arena
 from tdac_envs.worlds.wbt.fields import child, children
-from tdac_envs.worlds.wbt.found import Found, is_goal, name_of
+from tdac_envs.worlds.wbt.found import WorldContent, is_goal, name_of
 from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.wbt.geometry import GROUPS, Pieces, bounds, geometry
 from tdac_envs.worlds.wbt.physics import mass_of
@@ -31,7 +31,7 @@ _DEVICES = {
 }  # fmt: skip
 
 
-def walk(node: Node, frame: Frame, found: Found) -> None:
+def walk(node: Node, frame: Frame, found: WorldContent) -> None:
     """Adds a node and its content to `found`.
 
     Args:
@@ -64,7 +64,7 @@ def walk(node: Node, frame: Frame, found: Found) -> None:
         _unknown(node, frame, found)
 
 
-def _other_robot(node: Node, frame: Frame, found: Found) -> None:
+def _other_robot(node: Node, frame: Frame, found: WorldContent) -> None:
     own = placed(node, frame, scaled=True)
     if is_goal(node):
         found.goal(own)
@@ -73,7 +73,7 @@ def _other_robot(node: Node, frame: Frame, found: Found) -> None:
     found.left_out(node, own, why, solid=body)
 
 
-def _arena(node: Node, frame: Frame, found: Found) -> None:
+def _arena(node: Node, frame: Frame, found: WorldContent) -> None:
     made = arena(node, frame)
     if isinstance(made, str):
         found.left_out(node, placed(node, frame), made)
@@ -81,7 +81,7 @@ def _arena(node: Node, frame: Frame, found: Found) -> None:
         found.arenas.append(made)
 
 
-def _proto(node: Node, frame: Frame, found: Found) -> None:
+def _proto(node: Node, frame: Frame, found: WorldContent) -> None:
     body = PROTOS[node.kind](node, frame)
     if is_goal(node):
         found.goal(body.frame)
@@ -93,7 +93,7 @@ def _proto(node: Node, frame: Frame, found: Found) -> None:
     found.obstacle(node, obstacle)
 
 
-def _solid(node: Node, own: Frame, found: Found) -> None:
+def _solid(node: Node, own: Frame, found: WorldContent) -> None:
     """Adds a Solid with its boundingObject and Shapes, then the Solids inside it."""
     if is_goal(node):
         found.goal(own)
@@ -126,7 +126,7 @@ def _kind(node: Node) -> str:
     return model.items[0] or node.kind
 
 
-def _note_unseen(node: Node, looks: Pieces, instead: str, found: Found) -> None:
+def _note_unseen(node: Node, looks: Pieces, instead: str, found: WorldContent) -> None:
     what = ", ".join(dict.fromkeys(looks.missing))
     where = f"line {node.line}: {name_of(node) or node.kind}"
     found.notes.append(f"{where}: {what} is not modelled; sensors see {instead}")
@@ -135,7 +135,7 @@ def _note_unseen(node: Node, looks: Pieces, instead: str, found: Found) -> None:
 def _collect_shapes(
     nodes: tuple[Node, ...],
     frame: Frame,
-    found: Found,
+    found: WorldContent,
     looks: list[tuple[Pieces, float]],
 ) -> None:
     """Collects the Shapes of a Solid, and walks everything else in it."""
@@ -154,7 +154,7 @@ def _inside(node: Node, frame: Frame) -> Frame:
     return frame if node.kind == "Group" else placed(node, frame, scaled=True)
 
 
-def _group(node: Node, frame: Frame, found: Found) -> None:
+def _group(node: Node, frame: Frame, found: WorldContent) -> None:
     own = _inside(node, frame)
     if is_goal(node):
         found.goal(own)
@@ -165,7 +165,7 @@ def _group(node: Node, frame: Frame, found: Found) -> None:
             walk(part, own, found)
 
 
-def _shape(node: Node, frame: Frame, found: Found, named: Node) -> None:
+def _shape(node: Node, frame: Frame, found: WorldContent, named: Node) -> None:
     """Adds a Shape outside of Solids: sensors see it, nothing hits it."""
     shape = child(node, "geometry")
     if shape is None:
@@ -184,7 +184,7 @@ def _shape(node: Node, frame: Frame, found: Found, named: Node) -> None:
     found.obstacle(node, obstacle)
 
 
-def _joint(node: Node, frame: Frame, found: Found) -> None:
+def _joint(node: Node, frame: Frame, found: WorldContent) -> None:
     end = child(node, "endPoint")
     if end is not None:
         walk(end, frame, found)
@@ -193,7 +193,7 @@ def _joint(node: Node, frame: Frame, found: Found) -> None:
             found.notes.append(f"{name}: modelled as fixed, although on a {node.kind}")
 
 
-def _unknown(node: Node, frame: Frame, found: Found) -> None:
+def _unknown(node: Node, frame: Frame, found: WorldContent) -> None:
     # These fields may have another meaning in an unknown node.
     with suppress(WorldError):
         frame = placed(node, frame)

@@ -7,7 +7,7 @@ import pytest
 
 from tdac_agent.builtin.parameters import read_parameters
 from tdac_agent.builtin.provider import Builtin
-from tdac_agent.builtin.remedies import Bounds
+from tdac_agent.builtin.remedies import MarginBounds
 from tdac_agent.builtin.repair import read_rules, repair
 from tdac_agent.environments.map2d.builtin import (
     Parameters,
@@ -116,7 +116,7 @@ def test_each_failure_changes_its_parameter(builtin, cause, name, way):
 
 def test_stuck_switches_the_manoeuvre_on():
     """Off by default, on after a robot was stuck."""
-    parameters, _ = repair(Parameters(), report(("t", "stuck")), Bounds(), 0)
+    parameters, _ = repair(Parameters(), report(("t", "stuck")), MarginBounds(), 0)
     assert parameters.unstick_after == 100.0
 
 
@@ -138,14 +138,14 @@ def test_collision_is_laid_to_the_collision_test():
         f"{END}test_reaches_goal",
     )
     failed = report(*((test, "collision") for test in tests))
-    _, changes = repair(MIDDLE, failed, Bounds(), 0)
+    _, changes = repair(MIDDLE, failed, MarginBounds(), 0)
     assert {change.test for change in changes} == {tests[1]}
 
 
 def test_first_cause_wins():
     """Where two failures want the same parameter, the more telling one has it."""
     failed = report(("slow", "too slow"), ("hit", "collision"))
-    parameters, changes = repair(MIDDLE, failed, Bounds(), 0)
+    parameters, changes = repair(MIDDLE, failed, MarginBounds(), 0)
     behind = {change.name: change.test for change in changes}
     assert behind["slow_dist"] == "hit"
     assert behind["cruise_speed"] == "slow"
@@ -156,9 +156,9 @@ def test_margin_is_searched_from_both_sides():
     """Between a margin that collides and one that goes nowhere."""
     crash, halt = report(("t", "collision")), report(("t", "no motion"))
     parameters = replace(MIDDLE, inflation_margin=8.0)
-    bounds = Bounds(above=2.0, below=math.inf)
+    bounds = MarginBounds(above=2.0, below=math.inf)
     for failed, above, below in ((halt, 2, 8), (crash, 5, 8), (halt, 5, 6.5)):
-        bounds = Bounds(above, below)
+        bounds = MarginBounds(above, below)
         parameters, _ = repair(parameters, failed, bounds, 0)
     assert 5 < parameters.inflation_margin < 6.5
 
@@ -175,7 +175,7 @@ def test_rules_carry_the_parameters_over(builtin):
     book = RuleBook().add("Turn in place when lost.", "task", 2, ())
     request = Request("generate", "", rules=texts_of(learnt(book, reply, 3)))
     parameters = read_parameters(source_of(builtin.complete(request)), Parameters)
-    wanted, _ = repair(MIDDLE, failed, Bounds(above=2.0), 301)
+    wanted, _ = repair(MIDDLE, failed, MarginBounds(above=2.0), 301)
     assert parameters == wanted
     assert read_rules(told, Parameters)[1].above == 2.0
 

@@ -16,7 +16,7 @@ from driving_epuck import (
 
 from tdac_agent.builtin.parameters import read_parameters
 from tdac_agent.builtin.provider import Builtin, template_of
-from tdac_agent.builtin.remedies import Bounds
+from tdac_agent.builtin.remedies import MarginBounds
 from tdac_agent.builtin.repair import read_rules, repair, write_rules
 from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
 from tdac_agent.environments.epuck.entry import EPUCK
@@ -101,10 +101,10 @@ def test_parameters_are_read_back(seed, crates):
     parameters = EPuckParameters().changed(**drawn)
     text = render_epuck(parameters, crates.nominal)
     assert read_parameters(text, EPuckParameters) == parameters
-    rules = write_rules(parameters, [], Bounds(0.0015, 0.02), 1)
+    rules = write_rules(parameters, [], MarginBounds(0.0015, 0.02), 1)
     assert len(rules) <= MAX_OPERATIONS
     known, bounds = read_rules(rules, EPuckParameters)
-    assert bounds == Bounds(0.0015, 0.02)
+    assert bounds == MarginBounds(0.0015, 0.02)
     for name, value in drawn.items():
         assert getattr(known, name) == pytest.approx(value, rel=1e-2, abs=1e-3)
 
@@ -139,7 +139,7 @@ def test_the_repair_tables_know_their_parameters():
 def test_each_failure_changes_its_parameter(cause, name, way):
     """The remedy moves the parameter the right way."""
     middle = replace(TUNED, cruise_speed=0.6, unstick_after=80.0)
-    after, _ = repair(middle, failed(cause), Bounds(), 0)
+    after, _ = repair(middle, failed(cause), MarginBounds(), 0)
     assert (getattr(after, name) - getattr(middle, name)) * way > 0
 
 

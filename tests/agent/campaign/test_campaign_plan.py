@@ -10,7 +10,7 @@ from small import write_small_task
 from tdac_agent.campaign.config import CampaignError, find_config, read_config
 from tdac_agent.campaign.plan import PlannedRun, Shard, loop_of, make_plan
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.runs.records import setting_of
+from tdac_agent.runs.run_record import setting_of
 from tdac_agent.storage.shipped import shipped_names
 
 

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tdac_agent.cli.trials import attempt, died
+from tdac_agent.cli.trials import attempt, describe_signal
 
 DIES = """
 import os, signal, sys
@@ -99,4 +99,4 @@ def test_a_film_that_cannot_be_encoded_is_told(tmp_path, monkeypatch, does, told
 
 
 def test_a_signal_without_a_name_has_a_number():
-    assert died(40).startswith("died with signal 40: ")
+    assert describe_signal(40).startswith("died with signal 40: ")

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from tdac_agent.cli.mistakes import begun, fitted
-from tdac_agent.cli.sentences import tell
+from tdac_agent.cli.sentences import print_sentences
 
 LINE = "error: " + "words that are rather many " * 6 + "/a/path/" + "x" * 99
 
@@ -51,7 +51,7 @@ def test_sentences_on_a_console(indent):
     words = f"{LINE}\n[red]no markup[/]"
     for terminal in (False, True):
         console = Console(file=io.StringIO(), width=60, force_terminal=terminal)
-        tell(console, words, indent=indent)
+        print_sentences(console, words, indent=indent)
         lines = console.file.getvalue().splitlines()
         assert lines[-1] == " " * indent + "[red]no markup[/]"
         assert lines[0].startswith(" " * indent + "error: words")

@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 
 from tdac_agent.cli.progress import Progress
-from tdac_agent.cli.run_view import show_run, told_tests
-from tdac_agent.runs.records import Attempt, Run, Status
+from tdac_agent.cli.run_view import list_tests, show_run
+from tdac_agent.runs.run_record import Attempt, Run, Status
 
 TESTS = tuple(f"test_end_to_end.py::test_number_{n}_of_many" for n in range(9))
 
@@ -96,9 +96,9 @@ def test_what_is_on_record_is_told_apart(answers, unanswered, lost, expected):
 
 def test_some_names_and_how_many_more():
     """None is left out without a word."""
-    assert told_tests(TESTS[:2], 2) == "test_number_0_of_many, test_number_1_of_many"
-    assert told_tests(TESTS, 1) == "test_number_0_of_many and 8 more"
-    assert told_tests((), 4) == ""
+    assert list_tests(TESTS[:2], 2) == "test_number_0_of_many, test_number_1_of_many"
+    assert list_tests(TESTS, 1) == "test_number_0_of_many and 8 more"
+    assert list_tests((), 4) == ""
 
 
 def run_with(folder: str, status: Status, **facts):

@@ -30,11 +30,11 @@ from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.measures import (
     measure,
-    shortest_way,
+    shortest_path_length,
     spectral_arc_length,
 )
-from tdac_agent.verification.judge.contenders import Contender
-from tdac_agent.verification.judge.driving import Stage, drive_seed
+from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.driving import EpisodeSetup, drive_seed
 from tdac_envs.core.errors import TaskError
 from tdac_envs.learning.wrappers import wrap
 from tdac_envs.map2d.env import Map2DEnv
@@ -105,8 +105,8 @@ def test_what_our_policies_are_worth(ours):
 def test_who_knows_the_way_gets_there_in_a_world_too(kind, tmp_path):
     """In metres, with y up: every seed reaches the goal and touches nothing."""
     task = load_task("epuck-crates")
-    who = Contender(kind)
-    stage = Stage(task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
+    who = PolicySpec(kind)
+    stage = EpisodeSetup(task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
     for seed in range(3):
         driven = drive_seed(stage, seed)
         figures = measure(driven.rollout, seed, driven.task)
@@ -248,9 +248,9 @@ def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task):
     file = tmp_path / "model.zip"
     model = save(file, kind, env, **(options if algo == "PPO" else {}))
     write_metadata(file, SavedPolicy(algo=algo.lower(), wrappers=wrappers))
-    who = Contender("sb3", file, read_metadata(file).wrappers)
+    who = PolicySpec("sb3", file, read_metadata(file).wrappers)
     assert who.knows == "+ guidance"
-    stage = Stage(small_task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
+    stage = EpisodeSetup(small_task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
     for seed in range(3):
         driven = drive_seed(stage, seed)
         episode = measure(driven.rollout, seed, driven.task)
@@ -282,8 +282,8 @@ def test_a_batch_drives_the_episodes_of_an_evaluation(tmp_path, small_task):
     envs = VecMonitor(make_batch(plan, 4), info_keywords=("collision",))
     found = evaluate_batch(model, envs, seeds)
     envs.close()
-    who = Contender("sb3", file, WRAPPERS)
-    stage = Stage(small_task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
+    who = PolicySpec("sb3", file, WRAPPERS)
+    stage = EpisodeSetup(small_task, who, tmp_path, NO_DISTURBANCE, "auto", QUICK, None)
     alone = [drive_seed(stage, seed) for seed in seeds]
     episodes = [measure(d.rollout, 0, d.task) for d in alone]
     assert found.collision_rate == np.mean([e.collisions > 0 for e in episodes])
@@ -406,7 +406,7 @@ def test_smoothness_is_that_of_its_authors():
 def test_the_shortest_way_over_open_ground_is_straight(goal):
     """Not that of a grid in eight directions, which is up to 8 % longer."""
     env = Map2DEnv(np.zeros((120, 160), bool), (30.0, 30.0), goal, robot_radius=6)
-    assert shortest_way(env.nominal) == pytest.approx(
+    assert shortest_path_length(env.nominal) == pytest.approx(
         math.dist((30.0, 30.0), goal), rel=5e-3
     )
 

@@ -29,10 +29,10 @@ from tdac_agent.cli.run_view import show_run
 from tdac_agent.models.choice import Options
 from tdac_agent.models.prices import load_prices
 from tdac_agent.runs.history import gather_run
-from tdac_agent.runs.past import read_past
-from tdac_agent.runs.records import JOURNAL, RUN_FILE, load_rules, load_run
+from tdac_agent.runs.journal_state import read_past
 from tdac_agent.runs.replay import make as make_replay
-from tdac_agent.runs.resume import asked_for
+from tdac_agent.runs.resume import resume_arguments
+from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, load_rules, load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.yaml_file import read_yaml
 from tdac_agent.tasks.task import Task, lay_out, load_task
@@ -161,7 +161,7 @@ def use_journal(folder: Path) -> None:
 def use_parameters(folder: Path) -> None:
     """Reads a map folder, and a run's task with the parameters it was begun with."""
     prepare(folder)
-    asked_for(folder, {"seed": 3})
+    resume_arguments(folder, {"seed": 3})
 
 
 def use_training(folder: Path) -> None:

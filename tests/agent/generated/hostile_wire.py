@@ -29,7 +29,7 @@ from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
 from tdac_agent.sandbox.inner.wire import HEADER, Handle, Kind, RemoteError, WireError
 from tdac_agent.sandbox.process import Child
-from tdac_agent.sandbox.waiting import Line
+from tdac_agent.sandbox.waiting import RunQueue
 
 LIMITS = Limits(call_seconds=60.0, import_seconds=60.0, reset_seconds=60.0)
 FRAME_BYTES = 1 << 20
@@ -196,7 +196,7 @@ class Peer(Child):
 
     def __init__(self, script: list[Move]) -> None:
         self.tier, self.limits = "none", LIMITS
-        self._line = Line("thread-self")
+        self._line = RunQueue("thread-self")
         ends = [os.pipe() for _ in range(4)]
         (requests, to), (answers, back), (output, printed), (life, lifeline) = ends
         self._ours = (lifeline,)

@@ -14,7 +14,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.html_report import make_page
 from tdac_agent.html_report.page import shortened
 from tdac_agent.runs.history import gather_run
-from tdac_agent.runs.records import load_rules, load_run, status_now
+from tdac_agent.runs.run_record import load_rules, load_run, status_now
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.verification.diagnosis.report import Report
 

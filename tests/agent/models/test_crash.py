@@ -15,7 +15,7 @@ from fault_server import OPENAI, answers
 from small import write_small_task
 
 from tdac_agent.models.prices import SHIPPED, load_prices
-from tdac_agent.runs.records import load_rules, load_run
+from tdac_agent.runs.run_record import load_rules, load_run
 from tdac_agent.storage.journal import read_records
 
 CHILD = Path(__file__).parents[1] / "crash_child.py"

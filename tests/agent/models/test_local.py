@@ -21,7 +21,7 @@ from tdac_agent.models.provider import (
     missing_for,
     recorded_seed,
 )
-from tdac_agent.runs.records import load_run
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import load_task
 from tdac_envs.core.extras import install_command

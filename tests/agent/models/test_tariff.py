@@ -14,7 +14,7 @@ from tdac_agent.models.budget import NOTHING, Budget
 from tdac_agent.models.prices import SHIPPED, Price
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.tariff import UNPRICED_TOKENS, Tariff, bounds_of, tariffs_of
-from tdac_agent.runs.records import load_run
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import load_task
 from tdac_envs.core.extras import install_command

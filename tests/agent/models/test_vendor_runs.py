@@ -13,7 +13,7 @@ from small import write_small_task
 
 from tdac_agent.errors import Fault
 from tdac_agent.models.retry import RetryPolicy
-from tdac_agent.runs.records import load_run
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import load_task
 

@@ -25,7 +25,7 @@ from tdac_agent.plots import (
     plot_trajectories,
     save_figure,
 )
-from tdac_agent.runs.records import Attempt, Run
+from tdac_agent.runs.run_record import Attempt, Run
 from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.verify import verify
 from tdac_envs import preprocess

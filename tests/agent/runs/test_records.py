@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from tdac_agent.errors import RunError
 from tdac_agent.models.provider import Reply
 from tdac_agent.runs.recorder import difference
-from tdac_agent.runs.records import Attempt, Run, load_run
+from tdac_agent.runs.run_record import Attempt, Run, load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.loop import synthesize
 

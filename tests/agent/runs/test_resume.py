@@ -16,8 +16,8 @@ from tdac_agent.errors import Fault, RunError
 from tdac_agent.models.provider import PermanentFault, Reply
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.prompt import generate_prompt
-from tdac_agent.runs.records import load_run
-from tdac_agent.runs.resume import asked_for
+from tdac_agent.runs.resume import resume_arguments
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.synthesis.loop import synthesize
@@ -233,7 +233,7 @@ def test_a_folder_knows_how_it_was_begun(tmp_path, name, warm):
             judge=warm,
         )
     template.unlink()
-    known = asked_for(out)
+    known = resume_arguments(out)
     assert {key: known[key] for key in wanted} == wanted
     assert known["task"].sha256() == task.sha256()
     assert generate_prompt(known["task"], ()) == generate_prompt(task, ())

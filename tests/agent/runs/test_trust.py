@@ -13,7 +13,7 @@ from small import write_small_task
 
 from tdac_agent.prompting.prompt import PromptError, PromptTemplate, generate_prompt
 from tdac_agent.runs.ownership import is_own, is_own_folder
-from tdac_agent.runs.records import load_run
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import lasting_secret
 from tdac_agent.tasks.task import called, load_task

@@ -286,7 +286,7 @@ def test_close_may_be_repeated_and_ends_the_use(child):
 
 def test_a_child_can_be_started_before_its_controller_is_known(workdir):
     with start() as child:
-        child.furnish(workdir, "import sensors\nR = sensors.RANGE\n")
+        child.copy_files(workdir, "import sensors\nR = sensors.RANGE\n")
         child.load()
         assert child.get("R") == 220
 

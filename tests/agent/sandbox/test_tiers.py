@@ -158,6 +158,6 @@ def test_a_child_outlives_the_thread_that_started_it(tier):
     thread.start()
     thread.join()
     with children[0] as child:
-        child.furnish(None, "def policy(obs): return obs\n")
+        child.copy_files(None, "def policy(obs): return obs\n")
         child.load()
         assert child.policy(1) == 1

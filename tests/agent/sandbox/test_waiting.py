@@ -77,14 +77,14 @@ def test_on_a_busy_machine_too_much_work_is_too_much(crowded):
     """Two seconds of work are more than one, and would be at every other time."""
     with pytest.raises(ControllerTimeout, match="policy") as caught:
         crowded(BUSY).policy(2.0)
-    assert not caught.value.may_pass
+    assert not caught.value.is_retryable
 
 
 def test_on_a_busy_machine_sleeping_is_the_controllers_time(crowded):
     """A controller that waits is not in line; what for, nobody knows."""
     with pytest.raises(ControllerTimeout, match="policy") as caught:
         crowded(IDLE).policy(30.0)
-    assert caught.value.may_pass
+    assert caught.value.is_retryable
 
 
 class Thinking:

@@ -16,8 +16,8 @@ from tdac_agent.sandbox import (
     start_zygote,
 )
 from tdac_agent.sandbox.zygote import SLOTS
-from tdac_agent.verification.judge.children import Nursery
-from tdac_agent.verification.judge.workers import Crew
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.worker_pool import WorkerPool
 
 WRITER = """
 import os
@@ -60,7 +60,7 @@ def family(tier):
         if not zygote.slots:
             pytest.skip("here each child has a zygote of its own")
         children.append(fork_child(zygote, find_tier(tier), Limits()))
-        children[-1].furnish(None, WRITER)
+        children[-1].copy_files(None, WRITER)
         children[-1].load()
         return children[-1]
 
@@ -125,22 +125,22 @@ def test_a_zygote_that_was_killed_is_a_fault_of_the_sandbox():
 
 @pytest.mark.slow_after(1)
 def test_a_nursery_has_more_children_than_a_zygote_has_places(tier):
-    nursery = Nursery(ahead=False)
-    children = [nursery.take(tier, Limits()) for _ in range(SLOTS + 2)]
+    child_pool = ChildPool(ahead=False)
+    children = [child_pool.take(tier, Limits()) for _ in range(SLOTS + 2)]
     assert len({child.folder.root for child in children}) == SLOTS + 2
     for child in children:
         child.close()
-    nursery.close()
+    child_pool.close()
     assert not any(child.folder.root.parent.exists() for child in children)
 
 
 def test_nothing_of_a_child_is_left_when_it_ends(tier, tmp_path):
     """Its files go at once, whatever other children its zygote may still have."""
     (tmp_path / "map").write_text("walls")
-    nursery = Nursery(ahead=False)
-    first, second = (nursery.take(tier, Limits()) for _ in range(2))
+    child_pool = ChildPool(ahead=False)
+    first, second = (child_pool.take(tier, Limits()) for _ in range(2))
     for child in (first, second):
-        child.furnish(tmp_path, WRITER)
+        child.copy_files(tmp_path, WRITER)
         child.load()
         child.call("write", ("text",))
     first.close()
@@ -148,47 +148,47 @@ def test_nothing_of_a_child_is_left_when_it_ends(tier, tmp_path):
     assert [path for path in left if not path.is_dir()] == []
     assert (second.folder.work / "map").read_text() == "walls"
     second.close()
-    nursery.close()
+    child_pool.close()
 
 
 def test_a_nursery_that_was_not_used_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    Nursery().close()
+    ChildPool().close()
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow_after(1)
 def test_processes_share_a_nursery(tier):
     """No two of them get the same child, be it ready or not; each ends its own."""
-    nursery = Nursery(ahead=False)
+    child_pool = ChildPool(ahead=False)
     if tier == find_tier("auto").name:
-        assert nursery.prepare()
-        assert nursery.prepare()
+        assert child_pool.prepare()
+        assert child_pool.prepare()
 
     def use(number):
-        with nursery.take(tier, Limits()) as child:
-            child.furnish(None, f"NUMBER = {number}")
+        with child_pool.take(tier, Limits()) as child:
+            child.copy_files(None, f"NUMBER = {number}")
             child.load()
             return child.get("NUMBER"), str(child.folder.root)
 
-    crew = Crew(use, nursery.close, 2)
+    worker_pool = WorkerPool(use, child_pool.close, 2)
     with ThreadPoolExecutor(2) as pool:
-        results = list(pool.map(crew.do, range(SLOTS + 4)))
-    crew.close()
+        results = list(pool.map(worker_pool.do, range(SLOTS + 4)))
+    worker_pool.close()
     assert [number for number, _ in results] == list(range(SLOTS + 4))
     assert len({root for _, root in results}) == SLOTS + 4
-    nursery.close()
+    child_pool.close()
     assert not any(Path(root).parent.exists() for _, root in results)
 
 
 def test_children_that_were_ready_and_not_wanted_end():
     """Closing ends them; usual limits alone are what they are ready for."""
-    nursery = Nursery(ahead=False)
-    assert nursery.prepare()
-    child = nursery.take("auto", Limits(memory_bytes=2 << 30))
+    child_pool = ChildPool(ahead=False)
+    assert child_pool.prepare()
+    child = child_pool.take("auto", Limits(memory_bytes=2 << 30))
     child.close()
-    unwanted = nursery._ready[0]
-    nursery.close()
+    unwanted = child_pool._ready[0]
+    child_pool.close()
     with pytest.raises(SandboxError):
         unwanted.load()
 
@@ -196,15 +196,15 @@ def test_children_that_were_ready_and_not_wanted_end():
 def test_a_child_stays_where_its_taker_is(tier):
     """It may use the cores that the process which takes it may use."""
     every = os.sched_getaffinity(0)
-    nursery = Nursery(ahead=False)
+    child_pool = ChildPool(ahead=False)
     try:
         os.sched_setaffinity(0, {min(every)})
-        bound = nursery.take(tier, Limits())
+        bound = child_pool.take(tier, Limits())
     finally:
         os.sched_setaffinity(0, every)
-    free = nursery.take(tier, Limits())
+    free = child_pool.take(tier, Limits())
     assert os.sched_getaffinity(bound.controller_pid) == {min(every)}
     assert os.sched_getaffinity(free.controller_pid) == every
     for child in (bound, free):
         child.close()
-    nursery.close()
+    child_pool.close()

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_agent.storage.blobs import Blobs
-from tdac_agent.storage.journal import append_record, mend, read_records
+from tdac_agent.storage.journal import append_record, read_records, repair_end
 from tdac_agent.storage.locks import LOCK_FILE, hold, is_held
 
 # As journals of ours are: a longer number is nobody's.
@@ -57,7 +57,7 @@ def test_a_torn_tail(tmp_path_factory, records, data):
         whole = records[: ends.index(cut + 1)]
     path.write_bytes(raw[:cut] + garbage)
     assert read_records(path) == whole
-    mend(path)
+    repair_end(path)
     assert read_records(path) == whole
     append_record(path, {"last": 1})
     assert read_records(path) == [*whole, {"last": 1}]
@@ -76,7 +76,7 @@ def test_foreign_lines(tmp_path, line):
 
 def test_a_missing_journal(tmp_path):
     """It has no records, and nothing to mend."""
-    mend(tmp_path / "j")
+    repair_end(tmp_path / "j")
     assert read_records(tmp_path / "j") == []
     assert list(tmp_path.iterdir()) == []
 

@@ -18,9 +18,9 @@ from tdac_agent.models.provider import (
 )
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.models.tariff import Tariff
-from tdac_agent.runs.past import call_key, read_past
+from tdac_agent.runs.journal_state import call_key, read_past
 from tdac_agent.runs.recorder import Recorder
-from tdac_agent.runs.records import Run
+from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
 

@@ -9,7 +9,7 @@ import pytest
 from small import write_small_task
 
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
-from tdac_agent.runs.records import Attempt, Run, load_rules, load_run
+from tdac_agent.runs.run_record import Attempt, Run, load_rules, load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import load_task
 

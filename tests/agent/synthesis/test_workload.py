@@ -10,7 +10,7 @@ from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.models.prices import Price
 from tdac_agent.models.provider import Request
 from tdac_agent.models.tariff import Tariff
-from tdac_agent.runs.records import Run
+from tdac_agent.runs.run_record import Run
 from tdac_agent.synthesis.calls import OutOfBudget
 from tdac_agent.synthesis.workload import Rest, from_here, rest_of, whole
 

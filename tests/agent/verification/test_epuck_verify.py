@@ -16,7 +16,7 @@ from tdac_agent.environments.epuck.pictures import reaches
 from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.evaluation.robust import verify_robust
-from tdac_agent.runs.records import load_run
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import load_task

@@ -28,7 +28,7 @@ from enclosure import KEY, Canaries
 from grounds import write_map_task
 from rich.console import Console
 
-from tdac_agent.runs.records import load_run
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.report import Report

@@ -15,7 +15,7 @@ import pytest
 
 import tdac_envs
 from tdac_envs.core.code_cache import cache_folder
-from tdac_envs.core.compiled import constant
+from tdac_envs.core.compiled import read_only
 from tdac_envs.grid import grid, plan
 from tdac_envs.grid.grid import clearance
 from tdac_envs.map2d import contact, kernels, rays
@@ -192,7 +192,7 @@ def test_without_compiling_the_same_comes_out():
 @pytest.mark.parametrize("make", ["link", "loose", "loose file", "loose above"])
 def test_a_folder_that_others_may_write_to_is_not_believed(make, tmp_path):
     """What lies there is run, so nobody else may have put it there."""
-    from tdac_envs.core.private import is_private
+    from tdac_envs.core.trusted_folders import is_private
 
     folder = tmp_path / "above" / "cache"
     (folder / "inner").mkdir(parents=True)
@@ -218,7 +218,7 @@ as_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can be another
 @pytest.mark.parametrize("what", ["folder", "file"])
 def test_another_user_s_code_is_not_believed(what, tmp_path):
     """Not even where nobody but that user can write to it."""
-    from tdac_envs.core.private import is_private
+    from tdac_envs.core.trusted_folders import is_private
 
     folder = tmp_path / "cache"
     folder.mkdir(mode=0o755)
@@ -308,7 +308,7 @@ def test_compiled_and_plain_agree(seed):
     own = np.full(cells.shape, np.inf)
     plan._spread.py_func(free, 12, 12, own, settled, buckets)
     np.testing.assert_array_equal(field, own)
-    leaps, padded = constant(leaps_of(cells)), constant(np.pad(clear, 1))
+    leaps, padded = read_only(leaps_of(cells)), read_only(np.pad(clear, 1))
     plain = np.zeros_like(leaps)
     rays._fill_leaps.py_func(cells, plain)
     np.testing.assert_array_equal(leaps, plain)
@@ -320,6 +320,6 @@ def test_compiled_and_plain_agree(seed):
         step = (padded, x, y, angle, random.uniform(-9, 9), turn, 1.0)
         exact = contact.first_contact.py_func(*step)
         assert first_contact(*step) == pytest.approx(exact, abs=1e-9)
-        way = (leaps, constant(field, np.float32), x, y, 5.0)
+        way = (leaps, read_only(field, np.float32), x, y, 5.0)
         exact = kernels._path_distance.py_func(*way)
         assert kernels.path_distance(*way) == pytest.approx(exact, rel=1e-5)

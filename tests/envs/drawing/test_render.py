@@ -15,7 +15,7 @@ from tdac_envs.drawing.canvas import FREE, GREEN, RED, TRAIL, WALL, Canvas, fram
 from tdac_envs.drawing.marks import LEFT_RAYS, OUTCOMES, RIGHT_RAYS
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drawing.window import Window
-from tdac_envs.map2d.picture import Scene
+from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.run_picture import trajectory_picture
 from tdac_envs.mapping.params import RobotParams
 
@@ -28,7 +28,7 @@ START, GOAL = (60.0, 100.0, 0.0), (420.0, 300.0)
 
 def make_scene(cells=MAP, radius=15.0, **options):
     settings = {"goal_tolerance": 20.0, "robot": RobotParams.disc(radius)}
-    return Scene(cells, START, GOAL, **(settings | options))
+    return MapScene(cells, START, GOAL, **(settings | options))
 
 
 def near(image, colour, tolerance=12):
@@ -103,7 +103,9 @@ def test_one_pixel_walls_stay_visible_on_huge_maps():
 def test_left_rays_are_blue_and_on_the_robots_left(heading):
     """At heading 0 (looking right) the blue half lies above the robot."""
     cells, pose = np.zeros((600, 600), bool), (300.0, 300.0, heading)
-    scene = Scene(cells, START, GOAL, goal_tolerance=20.0, robot=RobotParams.disc(15.0))
+    scene = MapScene(
+        cells, START, GOAL, goal_tolerance=20.0, robot=RobotParams.disc(15.0)
+    )
     ranges = Ultrasonic(cells).ranges(*pose)
     base, image = scene.frame(pose)[:600], scene.frame(pose, ranges)[:600]
     ahead = np.array([math.cos(heading), math.sin(heading)])

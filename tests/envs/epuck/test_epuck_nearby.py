@@ -12,7 +12,7 @@ from tdac_envs.epuck.gaps import nearest_gap, nearest_of
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import sense
 from tdac_envs.epuck.nearby import listed_at, surroundings
-from tdac_envs.epuck.paths import entry, open_field
+from tdac_envs.epuck.paths import open_field, path_entry
 from tdac_envs.epuck.prisms import FIXED
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.bundled import world_file
@@ -114,6 +114,6 @@ def test_a_path_begins_at_the_nearest_point_that_the_body_gets_to(name):
             if first_touch(*solid.arrays(), *at, *way) > 1:
                 expected = (i, j)
                 break
-        assert entry(ground, open_field(free), tuple(at.tolist())) == expected
+        assert path_entry(ground, open_field(free), tuple(at.tolist())) == expected
         found += expected is not None
     assert 100 < found < 300

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tdac_envs.core.compiled import constant
+from tdac_envs.core.compiled import read_only
 from tdac_envs.drive.stepping import move, wrap_angle
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.grid.plan import distance_field
@@ -24,7 +24,7 @@ many = settings(derandomize=True, deadline=None, max_examples=3000)
 
 def padded(cells):
     """The clearance with its border, as the contact test takes it."""
-    return constant(np.pad(clearance(cells), 1))
+    return read_only(np.pad(clearance(cells), 1))
 
 
 def open_map(width, height, *occupied):
@@ -398,7 +398,7 @@ class TestPathDistance:
         world = Terrain.of(OccupancyGrid(cells))
         free = body_free(world.clear, 0.3)
         goal = tuple(int(v) for v in np.argwhere(free)[0])[::-1]
-        field = constant(distance_field(free, goal), np.float32)
+        field = read_only(distance_field(free, goal), np.float32)
         for y, x in np.argwhere(np.isfinite(field)):
             there = path_distance(world.leaps, field, float(x), float(y), -1.0)
             assert there == pytest.approx(field[y, x], abs=1e-4)
@@ -406,7 +406,7 @@ class TestPathDistance:
     def test_between_pixels_it_changes_no_faster_than_the_robot_moves(self):
         world = Terrain.of(OccupancyGrid(open_map(40, 40, np.s_[20, 5:35])))
         free = body_free(world.clear, 2.0)
-        field = constant(distance_field(free, (20, 8)), np.float32)
+        field = read_only(distance_field(free, (20, 8)), np.float32)
         line = np.linspace(5.0, 34.0, 500)
         there = [path_distance(world.leaps, field, x, 30.0, -1.0) for x in line]
         # Both ends of a hop are rounded to the lattice: up to its octile error.
@@ -415,7 +415,7 @@ class TestPathDistance:
     def test_squeezed_into_a_corner_it_uses_a_pixel_in_sight(self):
         world = Terrain.of(OccupancyGrid(open_map(30, 30)))
         free = body_free(world.clear, 5.0)
-        field = constant(distance_field(free, (20, 20)), np.float32)
+        field = read_only(distance_field(free, (20, 20)), np.float32)
         there = path_distance(world.leaps, field, 4.5, 4.5, -1.0)
         assert field[5, 5] < there <= field[5, 5] + 1.0
 
@@ -424,5 +424,5 @@ class TestPathDistance:
         world = Terrain.of(OccupancyGrid(cells))
         free = body_free(world.clear, 0.2)
         free[:, :10] = False
-        field = constant(distance_field(free, (20, 20)), np.float32)
+        field = read_only(distance_field(free, (20, 20)), np.float32)
         assert path_distance(world.leaps, field, 8.9, 15.0, 77.0) == 77.0

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from tdac_envs.core.compiled import constant
+from tdac_envs.core.compiled import read_only
 from tdac_envs.drive.stepping import move
 from tdac_envs.grid.grid import clearance
 from tdac_envs.map2d.contact import first_contact
@@ -134,7 +134,7 @@ def test_rays_are_those_of_brute_force(seed):
     points = free_points(cells, random, EACH)
     angles = random.uniform(-math.pi, math.pi, EACH)
     worst, hits = worst_ray(
-        constant(leaps_of(cells)), squares(cells), points, angles, RANGE
+        read_only(leaps_of(cells)), squares(cells), points, angles, RANGE
     )
     assert hits > EACH // 2
     assert worst < 1e-6
@@ -146,7 +146,7 @@ def test_contacts_are_those_of_the_disc_itself(seed):
     """50,000 steps on each of 20 maps touch when the disc does, and only then."""
     cells, random = some_map(seed)
     clear, radius = (
-        constant(np.pad(clearance(cells), 1)),
+        read_only(np.pad(clearance(cells), 1)),
         float(random.uniform(0.3, 3.0)),
     )
     rim = np.pad(cells, 12, constant_values=True)

@@ -20,7 +20,7 @@ from tdac_envs.map2d.task import (
     make_task,
     random_task,
 )
-from tdac_envs.map2d.terrain import entry, may_start
+from tdac_envs.map2d.terrain import may_start, path_entry
 from tdac_envs.mapping.params import RobotParams
 
 ROBOT = RobotParams.disc(4.0)
@@ -304,7 +304,7 @@ def test_where_an_episode_may_start(name):
         x, y = (near if k % 4 < 3 else anywhere).tolist()
         expected = (
             clearance_at(world.grid.cells, x, y, room) >= room
-            and entry(world, task.field, x, y, radius) is not None
+            and path_entry(world, task.field, x, y, radius) is not None
             and not at_goal(world, task.goal, task.goal_tolerance, x, y)
         )
         given = (world.padded_clear, world.leaps, task.field, x, y, radius)

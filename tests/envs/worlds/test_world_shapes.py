@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from world_texts import text
 
 from tdac_envs.core.errors import WorldError
-from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle, frame, ring, wrapped
+from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle, frame, ring, wrap_angle
 from tdac_envs.worlds.wbt.frames import axis_angle
 from tdac_envs.worlds.wbt.reader import read_world
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, World
@@ -298,15 +298,20 @@ def signed_area(corners):
 @given(angle=angles)
 def test_headings_are_wrapped_once_and_for_all(angle):
     """Into (-pi, pi]; doing it again changes nothing."""
-    heading = wrapped(angle)
+    heading = wrap_angle(angle)
     assert -math.pi < heading <= math.pi
     assert math.cos(heading - angle) == pytest.approx(1.0)
-    assert wrapped(heading) == heading
-    assert wrapped(math.atan2(math.sin(heading), math.cos(heading))) == heading
+    assert wrap_angle(heading) == heading
+    assert wrap_angle(math.atan2(math.sin(heading), math.cos(heading))) == heading
 
 
 def test_half_a_turn_is_pi():
-    assert wrapped(math.pi) == wrapped(-math.pi) == wrapped(3 * math.pi) == math.pi
+    assert (
+        wrap_angle(math.pi)
+        == wrap_angle(-math.pi)
+        == wrap_angle(3 * math.pi)
+        == math.pi
+    )
 
 
 @given(

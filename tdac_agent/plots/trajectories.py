@@ -18,8 +18,8 @@ from tdac_agent.plots.style import (
     FAILED,
     LINES,
     TEXT,
+    apply_style,
     colours_of,
-    dress,
     new_plot,
     title,
 )
@@ -57,7 +57,7 @@ def plot_trajectories(
     shape = abs((high - low) / (right - left))
     width = WIDTH * min(1.0, 0.8 / shape)
     figure = new_plot(width + 0.6, width * shape + 1.0 + 0.2 * -(-len(ways) // 3))
-    axes = dress(figure.add_subplot())
+    axes = apply_style(figure.add_subplot())
     axes.grid(visible=False)
     axes.imshow(picture, extent=extent, interpolation="antialiased")
     colours = colours_of(ways)

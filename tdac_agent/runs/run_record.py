@@ -11,7 +11,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.storage.locks import LOCK_FILE, is_held
 from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_envs.core.errors import nearest, why
+from tdac_envs.core.errors import nearest, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 Status = Literal[
@@ -169,7 +169,7 @@ def load_run(folder: Path) -> Run:
         raise RunError(f"{folder} is not a run folder: {_missing(folder)}") from error
     except (OSError, ValueError, TypeError) as error:
         raise RunError(
-            f"{folder} is not a run folder: {RUN_FILE}: {why(error)}"
+            f"{folder} is not a run folder: {RUN_FILE}: {one_line_reason(error)}"
         ) from error
 
 
@@ -196,4 +196,6 @@ def load_rules(folder: Path) -> RuleBook:
     except FileNotFoundError:
         return RuleBook()
     except (OSError, ValueError) as error:
-        raise RunError(f"{path} is not a rules file: {why(error)}") from error
+        raise RunError(
+            f"{path} is not a rules file: {one_line_reason(error)}"
+        ) from error

@@ -14,7 +14,7 @@ At = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Learnt:
+class RuleChanges:
     """The rules of the prompt before and after one candidate.
 
     Attributes:
@@ -28,12 +28,12 @@ class Learnt:
     changes: tuple[str, ...] = ()
 
 
-def what_was_learnt(journal: Iterable[JournalRecord]) -> Mapping[At, Learnt]:
+def rule_changes(journal: Iterable[JournalRecord]) -> Mapping[At, RuleChanges]:
     """The rules before and after each candidate (k, j); skips malformed records.
 
     Rules change only between iterations, so that all j of one k have the same rules.
     """
-    found: dict[At, Learnt] = {}
+    found: dict[At, RuleChanges] = {}
     rules: tuple[RepairRule, ...] = ()
     last: At | None = None
     for record in journal:
@@ -42,7 +42,7 @@ def what_was_learnt(journal: Iterable[JournalRecord]) -> Mapping[At, Learnt]:
             before = found[last].rules if last in found else ()
             known = {rule.id for rule in before}
             fresh = frozenset(rule.id for rule in rules if rule.id not in known)
-            found[at], last = Learnt(rules, fresh), at
+            found[at], last = RuleChanges(rules, fresh), at
         if record.get("event") == "rules":
             rules = _rules(record.get("rules"))
             notes = record.get("notes")

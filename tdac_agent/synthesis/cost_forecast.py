@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field
 from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.models.prices import PriceList
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.models.tariff import MAX_COST, OWN_MATTER, UNPRICED_TOKENS, Tariff
+from tdac_agent.models.tariff import MAX_COST, UNKNOWN_COST, UNPRICED_TOKENS, Tariff
 from tdac_agent.models.tokens import estimate_tokens, most_tokens
 from tdac_agent.prompting.prompt import FULL, PromptTemplate, generate_prompt
 from tdac_agent.storage.printable_record import PrintableRecord
@@ -16,7 +16,7 @@ from tdac_agent.synthesis.workload import tokens_asked, whole
 from tdac_agent.tasks.task import Task
 
 
-class Outlook(PrintableRecord):
+class CostForecast(PrintableRecord):
     """The first question of a run, and cost bounds; token numbers are estimates."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -53,7 +53,7 @@ class Outlook(PrintableRecord):
     prices_dated: str
 
 
-def foresee(
+def predict_cost(
     task: Task,
     learner: str,
     optimizer: str,
@@ -67,7 +67,7 @@ def foresee(
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
     max_tokens: int | None = None,
-) -> Outlook:
+) -> CostForecast:
     """Predicts the first prompt and the cost bounds of a run, without a model or key.
 
     Args:
@@ -108,7 +108,7 @@ def foresee(
         for name, price in zip((learner, optimizer), prices_of, strict=True)
         if price is None
     ]
-    own = [name for name in without if name.partition(":")[0] in OWN_MATTER]
+    own = [name for name in without if name.partition(":")[0] in UNKNOWN_COST]
     if base_url is not None and max_tokens is None and len(without) > len(own):
         max_tokens = UNPRICED_TOKENS
     priced = any(price is not None and price.most(1, 1) > 0 for price in prices_of)
@@ -116,7 +116,7 @@ def foresee(
     worst = NOTHING
     if first_cost != 0.0:
         worst = Tariff(price=first).most(most_tokens(prompt), max_output)
-    return Outlook(
+    return CostForecast(
         task=task.name,
         learner=learner,
         optimizer=optimizer,

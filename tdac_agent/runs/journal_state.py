@@ -54,7 +54,7 @@ def reply_of(record: JournalRecord, text: str) -> Reply | None:
 
 
 @dataclass(slots=True)
-class Past:
+class JournalState:
     """Calls and steps on record.
 
     Attributes:
@@ -106,9 +106,9 @@ class Past:
         return known
 
 
-def read_past(records: Iterable[JournalRecord]) -> Past:
+def read_past(records: Iterable[JournalRecord]) -> JournalState:
     """Reads a journal; ignores damaged records."""
-    past, asked = Past(), ""
+    past, asked = JournalState(), ""
     for record in records:
         event = record.get("event")
         past.seconds = max(past.seconds, _number(record.get("seconds")))

@@ -29,7 +29,7 @@ _ON_THE_SPOT, _GAIN = 0.7, 1.2
 
 
 @dataclass(frozen=True, slots=True)
-class Contender:
+class PolicySpec:
     """A policy, as a job names it.
 
     Attributes:
@@ -54,7 +54,7 @@ class Contender:
         return "nothing" if self.kind == "random" else "sensors"
 
 
-class Reference:
+class ReferenceDriver:
     """Drives the oracle's path by the true pose; privileged."""
 
     def __init__(self, env: JudgedEnv) -> None:
@@ -85,7 +85,7 @@ class Reference:
         return 0.0
 
 
-class Steered:
+class SteeringDriver:
     """Drives straight at a target, whatever is in between.
 
     The target is the goal, or the next waypoint of the reference route if `guided`.
@@ -119,7 +119,7 @@ class Steered:
         return 0.0
 
 
-class Random:
+class RandomDriver:
     """Uniform wheel speeds, drawn anew every second."""
 
     def __init__(self, env: JudgedEnv, seed: int) -> None:
@@ -145,23 +145,23 @@ class Random:
         return 0.0
 
 
-def _learned(contender: Contender, env: JudgedEnv) -> Driver:
+def _learned(contender: PolicySpec, env: JudgedEnv) -> Driver:
     from tdac_agent.episodes.learned import Learned
 
     assert contender.file is not None
     return Learned(contender.file, contender.wrappers, env)
 
 
-_OURS: dict[str, Callable[[Contender, JudgedEnv, int], Driver]] = {
-    "reference": lambda _, env, __: Reference(env),
-    "random": lambda _, env, seed: Random(env, seed),
-    "go-to-goal": lambda _, env, __: Steered(env, guided=False),
-    "follow-guidance": lambda _, env, __: Steered(env, guided=True),
+_OURS: dict[str, Callable[[PolicySpec, JudgedEnv, int], Driver]] = {
+    "reference": lambda _, env, __: ReferenceDriver(env),
+    "random": lambda _, env, seed: RandomDriver(env, seed),
+    "go-to-goal": lambda _, env, __: SteeringDriver(env, guided=False),
+    "follow-guidance": lambda _, env, __: SteeringDriver(env, guided=True),
     "sb3": lambda contender, env, _: _learned(contender, env),
 }
 
 
-def driver_of(contender: Contender, env: JudgedEnv, seed: int) -> Driver:
+def driver_of(contender: PolicySpec, env: JudgedEnv, seed: int) -> Driver:
     """Makes the driver of one episode, for a contender that runs in this process.
 
     Raises:

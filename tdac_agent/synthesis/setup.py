@@ -16,13 +16,13 @@ from tdac_agent.models.budget import Budget
 from tdac_agent.models.provider import Provider, recorded_seed, served_at
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
+from tdac_agent.runs.journal_state import read_past
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, sign
-from tdac_agent.runs.past import read_past
 from tdac_agent.runs.recorder import Event, Recorder
-from tdac_agent.runs.records import JOURNAL, Run
-from tdac_agent.runs.resume import run_there
+from tdac_agent.runs.resume import existing_run
+from tdac_agent.runs.run_record import JOURNAL, Run
 from tdac_agent.storage.files import clear_unfinished
-from tdac_agent.storage.journal import mend, read_records
+from tdac_agent.storage.journal import read_records, repair_end
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.tasks.installation import drawn_seed, lasting_secret
 from tdac_agent.tasks.provenance import sha256_of
@@ -119,7 +119,7 @@ def settled_seed(given: int | None, learner: Provider, out: Path) -> int | None:
     known = recorded_seed(learner) if given is None else given
     if known is not None or lasting_secret() is not None:
         return known
-    before = run_there(out)
+    before = existing_run(out)
     return drawn_seed() if before is None else before.seed
 
 
@@ -168,7 +168,7 @@ def open_record(
         if is_own_folder(before):
             run.mark = sign(run, run.folder / OWN_SUITE if task.suite else None)
     try:
-        mend(run.folder / JOURNAL)
+        repair_end(run.folder / JOURNAL)
         past = read_past(read_records(run.folder / JOURNAL))
         budget.restore({f"{run.id}/{call}": a for call, a in past.taken.items()})
         recorder = Recorder(run, past, on_event)

@@ -26,7 +26,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class Crew(Generic[P, T]):
+class WorkerPool(Generic[P, T]):
     """A worker pool, forked from this process, which should have a single thread then.
 
     While a process of the pool works, it and its children are pinned to one core that

@@ -17,7 +17,7 @@ MARKS = "checkpoint.mark"
 KEPT = 4
 
 
-def put(draft: Path, file: Path) -> None:
+def install_checkpoint(draft: Path, file: Path) -> None:
     """Marks a draft as written by this installation, then renames it to `file`."""
     marks = file.parent / MARKS
     if lasting_secret() is not None:

@@ -13,7 +13,7 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish
 
 
-def wishes_of(
+def required_permissions(
     config: CampaignConfig, base: Path, tasks: Iterable[Task]
 ) -> Iterator[Wish]:
     """Yields each permission that the user must grant; none for a shipped file.

@@ -16,7 +16,9 @@ STALL_SECONDS = 300.0
 """Longest gap between two pieces of an answer; small machines read prompts slowly."""
 
 
-def within(seconds: float, work: Callable[[], T], let_go: Callable[[], None]) -> T:
+def run_with_timeout(
+    seconds: float, work: Callable[[], T], let_go: Callable[[], None]
+) -> T:
     """Returns the result of `work`, or raises a fault if it takes too long.
 
     It runs in a separate thread, so that neither a slow name server nor a server that

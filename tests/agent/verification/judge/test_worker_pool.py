@@ -11,7 +11,7 @@ import pytest
 
 from tdac_agent.errors import Fault
 from tdac_agent.sandbox import ControllerTimeout
-from tdac_agent.verification.judge.workers import Crew
+from tdac_agent.verification.judge.worker_pool import WorkerPool
 
 
 def no_end():
@@ -26,8 +26,8 @@ def test_work_is_done_elsewhere():
         seen.append(number)
         return os.getpid(), number * factor, len(seen)
 
-    with closing(Crew(work, no_end, 1)) as crew:
-        first, second = crew.do(3, factor=7), crew.do(4, factor=7)
+    with closing(WorkerPool(work, no_end, 1)) as worker_pool:
+        first, second = worker_pool.do(3, factor=7), worker_pool.do(4, factor=7)
     assert first[0] == second[0] != os.getpid()
     assert first[1:] == (21, 1)
     assert second[1:] == (28, 2)
@@ -42,8 +42,8 @@ def test_a_member_gets_ready_by_itself():
     def get_ready():
         seen.append(os.getpid())
 
-    with closing(Crew(work, no_end, 1, first=get_ready)) as crew:
-        assert crew.do() == crew.do() == crew.members
+    with closing(WorkerPool(work, no_end, 1, first=get_ready)) as worker_pool:
+        assert worker_pool.do() == worker_pool.do() == worker_pool.members
     assert seen == []
 
 
@@ -56,9 +56,12 @@ def test_members_work_at_the_same_time():
         os.read(other, 1)
         return os.getpid()
 
-    with closing(Crew(work, no_end, 2)) as crew, ThreadPoolExecutor(2) as pool:
+    with (
+        closing(WorkerPool(work, no_end, 2)) as worker_pool,
+        ThreadPoolExecutor(2) as pool,
+    ):
         ends = [(write_a, read_b), (write_b, read_a)]
-        members = list(pool.map(lambda pair: crew.do(*pair), ends))
+        members = list(pool.map(lambda pair: worker_pool.do(*pair), ends))
     assert len(set(members)) == 2
     for descriptor in (read_a, write_a, read_b, write_b):
         os.close(descriptor)
@@ -76,9 +79,12 @@ def test_members_at_work_have_a_core_each():
         barrier.wait(60)
         return mine
 
-    with closing(Crew(work, no_end, size)) as crew, ThreadPoolExecutor(size) as pool:
+    with (
+        closing(WorkerPool(work, no_end, size)) as worker_pool,
+        ThreadPoolExecutor(size) as pool,
+    ):
         for _ in range(2):
-            found = sorted(pool.map(lambda _: crew.do(), range(size)), key=len)
+            found = sorted(pool.map(lambda _: worker_pool.do(), range(size)), key=len)
             assert [len(mine) for mine in found] == [1] * len(cores) + [len(cores)]
             assert set().union(*found[: len(cores)]) == cores
 
@@ -89,13 +95,13 @@ def test_errors_come_back_whole():
     def work():
         raise ControllerTimeout("policy", 3.0)
 
-    with closing(Crew(work, no_end, 1)) as crew:
+    with closing(WorkerPool(work, no_end, 1)) as worker_pool:
         with pytest.raises(ControllerTimeout, match="policy did not end") as caught:
-            crew.do()
+            worker_pool.do()
         assert caught.value.phase == "policy"
         assert caught.value.seconds == 3.0
         with pytest.raises(ControllerTimeout):
-            crew.do()
+            worker_pool.do()
 
 
 def test_a_dead_member_is_a_fault():
@@ -104,10 +110,10 @@ def test_a_dead_member_is_a_fault():
     def work():
         os.kill(os.getpid(), signal.SIGKILL)
 
-    with closing(Crew(work, no_end, 1)) as crew:
+    with closing(WorkerPool(work, no_end, 1)) as worker_pool:
         for _ in range(2):
             with pytest.raises(Fault, match="process of the judge"):
-                crew.do()
+                worker_pool.do()
 
 
 def test_the_end(tmp_path):
@@ -116,9 +122,9 @@ def test_the_end(tmp_path):
     def end():
         (tmp_path / str(os.getpid())).touch()
 
-    crew = Crew(os.getpid, end, 3)
-    members = crew.members
-    crew.close()
+    worker_pool = WorkerPool(os.getpid, end, 3)
+    members = worker_pool.members
+    worker_pool.close()
     assert {int(path.name) for path in tmp_path.iterdir()} == set(members)
     for pid in members:
         with pytest.raises(ProcessLookupError):
@@ -138,9 +144,12 @@ def test_members_write_to_nothing_that_is_not_theirs():
         begun.wait(60)
         return may_end.wait(60)
 
-    with closing(Crew(work, no_end, 2)) as crew, ThreadPoolExecutor(2) as pool:
+    with (
+        closing(WorkerPool(work, no_end, 2)) as worker_pool,
+        ThreadPoolExecutor(2) as pool,
+    ):
         values = [context.RawValue("i", 0) for _ in range(8)]
-        at_work = [pool.submit(crew.do) for _ in range(2)]
+        at_work = [pool.submit(worker_pool.do) for _ in range(2)]
         begun.wait(60)
         found = [value.value for value in values]
         may_end.set()

@@ -17,7 +17,7 @@ from tdac_agent.sandbox import (
     Zygote,
     find_tier,
     fork_child,
-    nothing_confines,
+    no_confining_tier_error,
     start_zygote,
 )
 from tdac_agent.sandbox.counters import shared_counters
@@ -26,7 +26,7 @@ from tdac_agent.sandbox.counters import shared_counters
 READY = 10
 
 
-class Nursery:
+class ChildPool:
     """The child pool: keeps a zygote ready that forks children, each for one use.
 
     Forks of the process that made the pool can use it, too, and share its children.
@@ -107,7 +107,7 @@ class Nursery:
                 zygote.close()
             self._zygotes, self._full = [], []
 
-    def __enter__(self) -> Nursery:
+    def __enter__(self) -> ChildPool:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -129,7 +129,7 @@ class Nursery:
                 continue
             self._best = tier
             return child
-        raise nothing_confines(reasons)
+        raise no_confining_tier_error(reasons)
 
     def _child(self, tier: Tier, limits: Limits) -> Child:
         zygote = self._zygote(tier, limits)

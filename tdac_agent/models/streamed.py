@@ -14,7 +14,7 @@ Stop = Literal["end", "length", "refusal"]
 
 
 @dataclass(slots=True)
-class Gathered:
+class StreamedAnswer:
     """The parts of an answer received so far; all numbers as the vendor reports them.
 
     Attributes:
