@@ -1,1 +1,1 @@
-"""TDAC-EPuck-v0: its tasks, pictures, worlds and export."""
+"""TDAC-EPuck-v0: its tasks, pictures, worlds and export to Webots."""

@@ -1,9 +1,9 @@
-"""Drives an e-puck in Webots by the verified controller in `tdac_policy.py`.
+"""Drives an e-puck in Webots with the verified controller in `tdac_policy.py`.
 
-The controller is asked once a step of the world. What it observes is what it was
-verified with: its pose (as the supervisor of this world knows it), the goal, the wheel
-speeds that were set last, the readings of ps0 to ps7, and the angles of the wheels. It
-answers with wheel speeds as fractions of the highest.
+The controller is called once per step of the world, with the observations it was
+verified with: the pose (from the supervisor), the goal, the last wheel speeds, the
+readings of ps0 to ps7, and the wheel angles. It returns wheel speeds as fractions of
+the maximum.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ WHEELS = ("left", "right")
 
 
 class EPuck:
-    """The robot, seen as the controller wants it."""
+    """The robot, with the controller's observations and actions."""
 
     def __init__(self, params: dict[str, Any]) -> None:
         self.robot = Supervisor()
@@ -39,20 +39,20 @@ class EPuck:
         self.speeds = [0.0, 0.0]
 
     def step(self, left: float, right: float) -> bool:
-        """Drives for a step; False at the end of the simulation."""
+        """Drives for a step; returns False if the simulation has ended."""
         self.speeds = [min(max(float(speed), -1.0), 1.0) for speed in (left, right)]
         for wheel, motor in enumerate(self.motors):
             motor.setVelocity(self.speeds[wheel] * self.limit)
         return bool(self.robot.step(self.step_ms) != -1)
 
     def pose(self) -> tuple[float, float, float]:
-        """Where it is: x, y and heading in (-pi, pi], m and rad."""
+        """Returns x, y and heading in (-pi, pi], m and rad."""
         x, y, _ = self.node.getPosition()
         turn = self.node.getOrientation()
         return x, y, math.atan2(turn[3], turn[0])
 
     def observe(self) -> dict[str, Any]:
-        """What the controller is told."""
+        """Returns the controller's observation."""
         observation = {
             "pose": self.pose(),
             "goal": self.goal,
@@ -64,14 +64,14 @@ class EPuck:
 
 
 def main() -> None:
-    """Drives until the goal is reached, or the time is over."""
+    """Drives until the goal is reached or the horizon is over."""
     os.chdir(HERE)
     with open("params.json", encoding="utf-8") as file:
         params = json.load(file)
     epuck = EPuck(params)
     import tdac_policy
 
-    # The first samples come after a step.
+    # Sensors have no readings before the first step.
     alive = epuck.step(0.0, 0.0)
     reset = getattr(tdac_policy, "reset", None)
     if alive and reset is not None:

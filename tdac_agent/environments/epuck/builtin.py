@@ -1,4 +1,4 @@
-"""The parametrised controller for the e-puck, and how failures change it."""
+"""Parameters of the controller template for the e-puck, and their remedies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tdac_agent.builtin.template import Template
 from tdac_agent.verification.suite.contract import time_step
 from tdac_envs.epuck.task import EPuckTask
 
-# What holds an e-puck up that has a plan is what its sensors take for an obstacle.
+# An e-puck with a plan gets stuck if its sensors falsely report an obstacle.
 _DISTRUSTED = Remedy(
     scale={"unstick_after": 0.5, "blocked": 1.5}, switch_on={"unstick_after": 100.0}
 )
@@ -54,41 +54,41 @@ class EPuckParameters:
         0.0,
         0.03,
         "m",
-        "room wanted beside the body where the world has it",
+        "desired clearance around the body where the world allows it",
         step=0.002,
     )
     cruise_speed: float = tunable(
-        1.0, 0.25, 1.0, "", "share of the wheel limit on a free way"
+        1.0, 0.25, 1.0, "", "fraction of the wheel limit on a free path"
     )
     slow_dist: float = tunable(
-        0.0, 0.0, 0.06, "m", "free length ahead below which it slows down"
+        0.0, 0.0, 0.06, "m", "free distance ahead below which it slows down"
     )
     blocked: float = tunable(
-        1000.0, 300.0, 1900.0, "", "reading of ps0 or ps7 at which it does not drive on"
+        1000.0, 300.0, 1900.0, "", "reading of ps0 or ps7 above which it turns away"
     )
     turn_gain: float = tunable(
-        0.3, 0.1, 1.0, "", "share of the heading error that a step corrects"
+        0.3, 0.1, 1.0, "", "fraction of the heading error corrected in a step"
     )
     turn_in_place: float = tunable(
         0.8, 0.05, 1.2, "rad", "heading error above which it turns in place"
     )
     look_steps: float = tunable(
-        5.0, 1.0, 40.0, "steps", "from one look whether the way is clear to the next"
+        5.0, 1.0, 40.0, "steps", "between two checks whether the path is clear"
     )
     unstick_after: float = tunable(
-        0.0, 0.0, 400.0, "steps", "without progress until it trusts the map alone"
+        0.0, 0.0, 400.0, "steps", "without progress before it ignores ps; 0: off"
     )
 
     def __post_init__(self) -> None:
         check(self)
 
     def changed(self, **values: float) -> EPuckParameters:
-        """A copy with some values replaced, each moved into its bounds."""
+        """Returns a copy with some values replaced, each clipped to its bounds."""
         return changed(self, values)
 
 
 def template_for(task: EPuckTask) -> Template[EPuckParameters]:
-    """The controller with a task's wheel limit, clock and tolerance."""
+    """Returns the template with a task's wheel limit, time step and tolerance."""
     facts = {
         "time_step": time_step(task.dt),
         "max_wheel_speed": task.max_wheel_speed,
@@ -99,5 +99,5 @@ def template_for(task: EPuckTask) -> Template[EPuckParameters]:
 
 
 def render_epuck(parameters: EPuckParameters, task: EPuckTask) -> str:
-    """Source of the controller with these parameters; see `template_for`."""
+    """Returns the source of the controller with these parameters."""
     return template_for(task).render(parameters)

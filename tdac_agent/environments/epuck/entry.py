@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class EPuck(Environment):
-    """An e-puck in a Webots world; m. See `Environment`."""
+    """E-pucks in Webots worlds, in m. See `Environment`."""
 
     id = "TDAC-EPuck-v0"
     folder = Path(__file__).parent
@@ -40,7 +40,7 @@ class EPuck(Environment):
     kernels = "tdac_envs.epuck"
 
     def bundled(self) -> dict[str, str]:
-        """The bundled worlds: `epuck` is `arena`, `epuck-maze` is `maze`."""
+        """Returns the bundled worlds: `epuck` is `arena`, `epuck-maze` is `maze`."""
         from tdac_envs.worlds.bundled import bundled_worlds
 
         default, *others = bundled_worlds()
@@ -53,7 +53,7 @@ class EPuck(Environment):
         return open_world_task(spec, base)
 
     def small_env(self) -> EPuckEnv:
-        """The bundled world."""
+        """Returns an environment with the default bundled world."""
         from tdac_envs.epuck.env import EPuckEnv
 
         return EPuckEnv()
@@ -65,20 +65,20 @@ class EPuck(Environment):
         use_kernels()
 
     def pictures(self, setting: Setting) -> WorldPictures:
-        """The world, with what was driven."""
+        """Returns an object that draws episodes in the world."""
         from tdac_agent.environments.epuck.pictures import WorldPictures
         from tdac_agent.environments.epuck.setting import world_setting
 
         return WorldPictures(world_setting(setting))
 
     def surroundings(self, task: Nominal) -> WorldSurroundings:
-        """The world's obstacles."""
+        """Returns the world with the queries of a diagnosis."""
         from tdac_agent.environments.epuck.surroundings import WorldSurroundings
 
         return WorldSurroundings(_own(task))
 
     def oracle(self) -> WorldOracle:
-        """It knows about worlds, too."""
+        """Returns an oracle for grids and worlds."""
         from tdac_agent.environments.epuck.world_copies import WorldOracle
 
         return WorldOracle()

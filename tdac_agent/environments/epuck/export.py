@@ -1,4 +1,4 @@
-"""A verified e-puck controller as a project of Webots."""
+"""Export of a verified e-puck controller as a Webots project."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from tdac_envs.worlds.wbt.writer import write_world
 POLICY = "tdac_policy.py"
 WORKING_FILES = ("params.json", "sensors.py", WORLD_FILE)
 SPARE = 2
-"""Steps that the adapter takes beside those of the controller."""
+"""Steps of the adapter in addition to those of the controller."""
 ADAPTER = Path(__file__).with_name("adapter.py")
 
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """Files of an exported project.
+    """An exported project.
 
     Attributes:
-        folder: Of all of it.
+        folder: Folder of the project.
         world: The `.wbt` file.
-        controller: What Webots starts.
-        tolerance: How near to the goal is at the goal, m.
-        horizon: Steps that the controller has.
-        verified_steps: Steps to the goal when it was verified, if a report says so.
+        controller: The file that Webots starts.
+        tolerance: Distance at which the goal is reached, m.
+        horizon: Maximum number of the controller's steps.
+        verified_steps: Steps to the goal in the verification, if a report states them.
     """
 
     folder: Path
@@ -49,28 +49,29 @@ def export_webots(run_folder: Path, out: Path) -> Project:
     """Writes a project: the world, and a controller folder with the verified file.
 
     Args:
-        run_folder: Of a run with a verified controller for the e-puck.
+        run_folder: Folder of a run with a verified controller for the e-puck.
         out: A new or an empty folder.
 
     Raises:
-        RunError: There is no such run, or the folder is in use.
+        RunError: There is no such run, or `out` is not an empty folder.
         TaskError: The run's task cannot be read.
     """
     run = load_run(run_folder)
     if not run.verified:
         raise RunError(
-            f"{run_folder} has no verified controller ({run.status}); only these are "
-            "exported"
+            f"{run_folder} has no verified controller ({run.status}); only verified "
+            "controllers can be exported"
         )
     task = load_task(run_folder)
     if not isinstance(task.nominal, EPuckTask):
         raise RunError(
-            f"{run_folder} is about {task.spec.env}; Webots needs {EPuckTask.env_id}"
+            f"{run_folder} is a run of {task.spec.env}; only runs of "
+            f"{EPuckTask.env_id} can be exported"
         )
     source = _read(run.controller)
     beside = {file: _read(run_folder / file) for file in WORKING_FILES}
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise RunError(f"{out} is in use; give a new or an empty folder")
+        raise RunError(f"{out} is not an empty folder; give a new or an empty one")
     name = project_name(task.name)
     project = Project(
         out,
@@ -93,12 +94,12 @@ def export_webots(run_folder: Path, out: Path) -> Project:
 
 
 def project_name(task: str) -> str:
-    """Name of world and controller; never one that a module of Webots has."""
+    """Returns the name of world and controller, which no Webots module has."""
     return "tdac_" + (re.sub(r"\W+", "_", task, flags=re.ASCII).strip("_") or "task")
 
 
 def _world(task: EPuckTask, name: str) -> str:
-    """The world that the task was verified in, with this controller in its robot."""
+    """Returns the verified world with this controller in its robot."""
     world = task.ground.world
     robot = replace(world.robot, controller=name)
     return write_world(
@@ -114,7 +115,7 @@ def _read(path: Path) -> bytes:
 
 
 def _verified_steps(run_folder: Path) -> int | None:
-    """Steps of the nominal episode, as the run's report has them."""
+    """Returns the steps of the nominal episode according to the run's report."""
     try:
         raw = read_file(run_folder / "report.json", RECORD_BYTES)
         report = Report.model_validate(parse_json(raw))
@@ -127,23 +128,23 @@ def _verified_steps(run_folder: Path) -> int | None:
 def _readme(task: Task, name: str, source: bytes, project: Project) -> str:
     digest = hashlib.sha256(source).hexdigest()
     steps = project.verified_steps
-    verified = "" if steps is None else f"\nThere it took {steps} steps to the goal."
+    verified = "" if steps is None else f"\nIt reached the goal there in {steps} steps."
     return f"""\
 # {task.name}: an e-puck controller for Webots
 
 **Not run in Webots itself.** The controller was verified in tdac's own model of this
 world (`TDAC-EPuck-v0`).{verified}
-In Webots the sensors have noise and see a mark of the goal that stands up, boxes of
-wood are darker than in the model, and the physics is another: watch it before you rely
-on it.
+In Webots the sensors have noise and detect a goal mark that stands up, wooden boxes are
+darker than in the model, and the physics differs: watch the robot before you rely on
+the controller.
 
 - `worlds/{name}.wbt`: open it in Webots R2025a. The robot is a supervisor, so that it
-  can ask where it is.
+  can read its own pose.
 - `controllers/{name}/{name}.py`: the adapter.
   Webots starts it; the Python that Webots uses needs numpy.
 - `controllers/{name}/{POLICY}`: the verified file, byte for byte.
   SHA-256 `{digest}`
-- The other files there are those that it was verified with.
+- The other files in this folder are those that it was verified with.
 
 Without Webots:
 

@@ -1,4 +1,4 @@
-"""The world of a task as its controller reads it: one e-puck, one mark of the goal."""
+"""The world of a task as its controller reads it: one e-puck and one goal mark."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ _MARK_RADIUS, _MARK_HEIGHT = 0.02, 0.002
 
 
 def flat_world(world: World, dt: float) -> World:
-    """The same world for the driven e-puck, with less that could be misread.
+    """Returns an equivalent world that is simpler to read.
 
-    E-pucks that stand are obstacles, a mark of another goal is gone (or an ordinary
-    obstacle, where it is solid), and what is not modelled is left out.
+    Other e-pucks become obstacles, marks of other goals become ordinary obstacles if
+    they are solid and are removed otherwise, and nodes that are not modelled are
+    removed.
 
     Args:
-        world: From `open_world`; has a robot and a goal.
+        world: World from `open_world`, with a robot and a goal.
         dt: Duration of a step, s.
     """
     standing = tuple(map(standing_robot, world.robots[1:]))
@@ -38,7 +39,7 @@ def _is_mark(thing: Obstacle, world: World) -> bool:
 
 
 def _mark(world: World) -> Obstacle:
-    """The file's own mark of the goal, or a flat disc."""
+    """Returns the goal mark of the file, or else a flat disc."""
     own = [thing for thing in world.obstacles if _is_mark(thing, world)]
     if own:
         return replace(own[0], name=GOAL)
@@ -49,7 +50,7 @@ def _mark(world: World) -> Obstacle:
 
 
 def _without_marks(world: World) -> Iterator[Obstacle]:
-    """The obstacles; marks of a goal only where they are solid, under another name."""
+    """Yields the obstacles; goal marks only if they are solid, with another name."""
     seen = False
     for thing in world.obstacles:
         if not thing.is_goal:

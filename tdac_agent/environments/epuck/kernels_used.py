@@ -1,4 +1,4 @@
-"""Calls of every kernel that a world needs, so that all of them are compiled."""
+"""Calls of all kernels for worlds, so that they get compiled."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tdac_envs.epuck import infrared, kernels
 
 
 def use_kernels() -> None:
-    """Calls each kernel by the function that calls it in use, in a bundled world."""
+    """Calls each kernel through its usual caller, in a bundled world."""
     epuck = use_robot("TDAC-EPuck-v0", world="arena", ground_sensors=True)
     around, pose = WorldSurroundings(epuck.nominal), epuck.nominal.start
     around.touch(pose, 10.0)

@@ -1,4 +1,4 @@
-"""A world moved and turned as a whole, and its file in another order."""
+"""Moving and turning a whole world, and reordering its file."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Motion:
     """A turn about the origin, counter-clockwise, then a shift.
 
     Attributes:
-        angle: rad.
-        x: m.
-        y: m.
+        angle: Angle of the turn, rad.
+        x: Shift along x, m.
+        y: Shift along y, m.
     """
 
     angle: float
@@ -34,40 +34,40 @@ class Motion:
     y: float
 
     def point(self, x: float, y: float) -> Point:
-        """Where a point gets to."""
+        """Moves a point."""
         cos, sin = math.cos(self.angle), math.sin(self.angle)
         return cos * x - sin * y + self.x, sin * x + cos * y + self.y
 
     def shape(self, shape: Footprint) -> Footprint:
-        """Where a footprint gets to."""
+        """Moves a footprint."""
         if isinstance(shape, Polygon):
             return Polygon.around([self.point(x, y) for x, y in shape.points])
         return self.arena_floor(shape)
 
     def arena_floor(self, shape: Disc | Rectangle) -> Disc | Rectangle:
-        """Where a floor gets to."""
+        """Moves a floor."""
         x, y = self.point(shape.x, shape.y)
         if isinstance(shape, Disc):
             return replace(shape, x=x, y=y)
         return replace(shape, x=x, y=y, yaw=shape.yaw + self.angle)
 
     def part(self, part: Part) -> Part:
-        """Where a prism gets to."""
+        """Moves a prism."""
         return replace(part, shape=self.shape(part.shape))
 
     def obstacle(self, thing: Obstacle) -> Obstacle:
-        """Where a thing gets to."""
+        """Moves an obstacle."""
         x, y = self.point(thing.x, thing.y)
         solid = tuple(map(self.part, thing.solid))
         visible = tuple(map(self.part, thing.visible))
         return replace(thing, x=x, y=y, solid=solid, visible=visible)
 
     def arena(self, arena: Arena) -> Arena:
-        """Where an arena gets to."""
+        """Moves an arena."""
         return replace(arena, inside=self.arena_floor(arena.inside))
 
     def world(self, world: World) -> World:
-        """A whole world elsewhere."""
+        """Moves a whole world."""
         robots = []
         for robot in world.robots:
             x, y = self.point(robot.x, robot.y)
@@ -83,11 +83,11 @@ class Motion:
 
 
 def reordered(text: str, random: np.random.Generator) -> str:
-    """A world file with its nodes in another order, and names for those without.
+    """Returns a world file with nodes in random order and DEF names for its solids.
 
     Args:
-        text: From `write_world`, which begins each node at the beginning of a line.
-        random: Gives the order.
+        text: File from `write_world`, in which each node starts a line.
+        random: Random number generator.
     """
     head, *nodes = text.split("\n\n")[0:1] + _nodes(text)
     first = [node for node in nodes if node.startswith(_FIRST)]
@@ -102,14 +102,14 @@ def reordered(text: str, random: np.random.Generator) -> str:
 
 
 def turned_groups(text: str, angle: float) -> str:
-    """The same world, but what has several pieces is turned, and these back again.
+    """Turns obstacles with several pieces, and turns their pieces back again.
 
-    `write_world` turns none of it, so that its pieces would be found by who does not
-    look at how it is turned.
+    The world stays the same. `write_world` turns only the pieces, so that a parser
+    which ignores the rotation of the obstacle would pass.
 
     Args:
-        text: From `write_world`.
-        angle: rad.
+        text: File from `write_world`.
+        angle: Angle of the turn, rad.
     """
     for node in _nodes(text):
         if "  boundingObject Group {" in node:
@@ -134,7 +134,7 @@ def _turned(node: str, angle: float) -> str:
 
 
 def _nodes(text: str) -> list[str]:
-    """The nodes at the top of a file that `write_world` wrote."""
+    """Returns the top-level nodes of a file from `write_world`."""
     nodes: list[list[str]] = []
     for line in text.splitlines():
         if line.endswith("{") and not line.startswith(" "):

@@ -1,4 +1,4 @@
-"""Answers about worlds that suites compare a controller's own functions with."""
+"""Exact answers about worlds with which suites compare a controller's functions."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _AROUND = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldCase:
-    """A world file, and what a controller must find in it.
+    """A world file, and the correct answers about it.
 
     Attributes:
-        name: For messages.
+        name: Name for messages.
         text: The file.
-        world: The same.
-        seed: Draws the points of `samples`.
+        world: The same world.
+        seed: Seed of the points of `samples`.
     """
 
     name: str
@@ -48,23 +48,23 @@ class WorldCase:
         return self.world.goal
 
     def resolution(self) -> float:
-        """Of a grid that is quick to make, m."""
+        """Returns a grid resolution that is quick to compute, m."""
         left, low, right, high = self._bounds()
         return max(0.01, round(max(right - left, high - low) / 150, 3))
 
     def samples(self, inflation: float, margin: float) -> Iterator[tuple[Point, bool]]:
-        """Points (x, y) with whether they must be occupied; sure cases only.
+        """Yields points (x, y) and whether they must be occupied.
 
-        Occupied is what is in something solid at the height of the body, or nearer to
-        it than `inflation`, and what is outside the arena.
+        Occupied are points in solids at the height of the body, points nearer to them
+        than `inflation`, and points outside the arena. Ambiguous points are left out.
 
         Args:
-            inflation: By how much things have grown, m.
-            margin: Points this near to a boundary are left out, m.
+            inflation: Distance by which solids are grown, m.
+            margin: Points nearer to a boundary than this are left out, m.
         """
         floor, things = floor_under(self.world), bodies(self.world)
         solid = prisms_of(p for t in things for p in at_body_height(t.solid, floor))
-        # Marks of the goal are not there; other things of other heights may be.
+        # Goal marks must be ignored; other things at other heights may be ignored.
         all_of = [t for t in things if not t.is_goal]
         unsure = prisms_of(part for t in all_of for part in (*t.solid, *t.visible))
         arena = self._walled()
@@ -81,7 +81,7 @@ class WorldCase:
                 yield (x, y), False
 
     def _points(self, solid: Prisms) -> list[Point]:
-        """Seeded points all over the world, and some in each thing."""
+        """Returns seeded points all over the world, and one in each solid part."""
         left, low, right, high = self._bounds()
         random = np.random.default_rng(self.seed)
         corners = (left - _AROUND, low - _AROUND), (right + _AROUND, high + _AROUND)
@@ -89,13 +89,13 @@ class WorldCase:
         return [(x, y) for x, y in (*spread.tolist(), *solid.extent[:, :2].tolist())]
 
     def _walled(self) -> Arena | None:
-        """The arena around the robot and the goal, if it has a wall."""
+        """Returns the walled arena around robot and goal, or None."""
         arena = self.world.arena
         both = arena is not None and arena.inside.contains(*self.goal)
         return arena if both else None
 
     def _bounds(self) -> tuple[float, float, float, float]:
-        """Of everything, m."""
+        """Returns the bounding box of everything (left, low, right, high), m."""
         world = self.world
         edges = [arena.inside.bounds for arena in world.arenas]
         edges += [p.shape.bounds for t in world.obstacles for p in t.solid]
@@ -106,10 +106,10 @@ class WorldCase:
 
 
 def _with_wall(arena: Arena, margin: float) -> Disc | Rectangle:
-    """The floor of an arena, its wall and a margin."""
+    """Returns the area of an arena's floor, its wall and a margin."""
     shape, edge = arena.inside, arena.wall_thickness + margin
     if isinstance(shape, Disc):
-        # The wall has flat pieces.
+        # The wall consists of flat pieces.
         reach = shape.radius / math.cos(math.pi / arena.facets) + edge
         return replace(shape, radius=reach)
     length, width = shape.length + 2 * edge, shape.width + 2 * edge
@@ -117,10 +117,10 @@ def _with_wall(arena: Arena, margin: float) -> Disc | Rectangle:
 
 
 def _well_inside(arena: Arena, x: float, y: float, room: float) -> bool:
-    """Whether a point is on the floor, and in a round one so far from its circle.
+    """Whether a point is on the floor, and at least `room` inside a round floor.
 
-    The flat pieces of a round wall lie outside the circle: who takes the circle for the
-    wall is right, too.
+    The flat pieces of a round wall lie outside its circle; a controller may also use
+    the circle as the wall.
     """
     shape = arena.inside
     if isinstance(shape, Disc):
@@ -129,19 +129,19 @@ def _well_inside(arena: Arena, x: float, y: float, room: float) -> bool:
 
 
 def prisms_of(parts: Iterable[Part]) -> Prisms:
-    """Parts as arrays."""
+    """Returns parts as arrays."""
     return Prisms.of(map(Owned, parts))
 
 
 def gap_to(prisms: Prisms, x: float, y: float) -> float:
-    """Distance from a point to the nearest part, m; negative within one."""
+    """Returns the distance from a point to the nearest part, m; negative inside."""
     return float(nearest_gap(*prisms.arrays(), float(x), float(y)))
 
 
 def occupied_at(
     occ: NDArray[np.bool_], origin: Point, resolution: float, point: Point
 ) -> bool:
-    """Whether the cell at a point is occupied; outside the grid it is.
+    """Whether the cell at a point is occupied; true outside the grid.
 
     Args:
         occ: Shape (height, width), `[y, x]`.

@@ -19,15 +19,15 @@ class _Record(BaseModel):
 
 
 class EPuckRobot(_Record):
-    """The e-puck's measures."""
+    """Dimensions and limits of the e-puck."""
 
-    radius: float = Field(BODY_RADIUS, description="Of the body, m.")
+    radius: float = Field(BODY_RADIUS, description="Radius of the body, m.")
     wheel_radius: float = Field(WHEEL_RADIUS, description="m")
     axle_length: float = Field(AXLE_LENGTH, description="m")
     max_wheel_speed: float = Field(description="rad/s")
-    sensor_range: float = Field(RANGE, description="Of ps0 to ps7, m.")
+    sensor_range: float = Field(RANGE, description="Range of ps0 to ps7, m.")
     sensor_azimuths: tuple[float, ...] = Field(
-        _AZIMUTHS, description="Of ps0 to ps7 from the heading, rad, left positive."
+        _AZIMUTHS, description="ps0 to ps7 relative to the heading, rad, left positive."
     )
 
 
@@ -36,7 +36,7 @@ class EPuckParams(_Record):
 
     schema_version: Literal[1] = 1
     source: str = Field(description="File name of the world.")
-    source_sha256: str = Field(description="Of the flat world file.")
+    source_sha256: str = Field(description="Hash of the flat world file.")
     start: tuple[float, float]
     heading: float
     goal: tuple[float, float]
@@ -44,19 +44,19 @@ class EPuckParams(_Record):
     dt: float = Field(description="Duration of a step, s.")
     horizon: int = Field(description="Steps.")
     robot: EPuckRobot
-    notes: tuple[str, ...] = Field((), description="What the reader supposed.")
+    notes: tuple[str, ...] = Field((), description="Assumptions of the world reader.")
 
 
 def params_of(
     task: EPuckTask, source: str, digest: str, notes: tuple[str, ...]
 ) -> EPuckParams:
-    """Contents of the file for a task.
+    """Returns the contents of the file for a task.
 
     Args:
-        task: In the flat world.
+        task: Task in the flat world.
         source: File name of the world.
-        digest: Of the flat world file.
-        notes: What the reader supposed.
+        digest: Hash of the flat world file.
+        notes: Assumptions of the world reader.
     """
     return EPuckParams(
         source=source,

@@ -25,18 +25,18 @@ class WorldPictures:
     setting: EPuckSetting
 
     def backdrop(self) -> WorldBackground:
-        """The world."""
+        """Returns the world as a background."""
         return WorldBackground.of(self.setting.nominal)
 
     def trajectories(
         self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
     ) -> Image:
-        """The world with each trajectory."""
+        """Draws the world with all trajectories."""
         nominal = self.setting.nominal
         return trajectory_picture(nominal, runs, outcomes=outcomes, labels=labels)
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
-        """Frames of the e-puck with its sensors."""
+        """Draws frames of the e-puck with its sensors."""
         nominal, trajectory = self.setting.nominal, rollout.trajectory
         scene = EPuckScene(nominal, movable=False)
         gaps, last = rollout.distances("euclidean"), trajectory.steps
@@ -54,7 +54,7 @@ class WorldPictures:
 
 
 def reaches(readings: NDArray[np.float32]) -> Points:
-    """How far the rays of ps0 to ps7 got, by what they read, m."""
+    """Returns the ray lengths of ps0 to ps7 for their readings, m."""
     distances, values = TABLE[:, 0], TABLE[:, 1]
-    # From the largest distance on: values must increase.
+    # Reversed, since `np.interp` needs increasing readings.
     return np.asarray(np.interp(readings, values[::-1], distances[::-1]))

@@ -1,4 +1,4 @@
-"""What the prompts of a task in a world say."""
+"""Prompt variables of tasks in worlds."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from tdac_envs.epuck.paths import widest_body
 from tdac_envs.worlds.bodies import BODY_BOTTOM, BODY_TOP
 
 LONGEST_WORLD = 16_000
-"""Of a world file's characters, so many are shown."""
+"""Maximum number of characters of a world file in a prompt."""
 
 
 def facts_of(task: Task) -> dict[str, Any]:
-    """Names and values for the templates of a task in a world."""
+    """Returns the template variables of a task in a world."""
     setting = world_setting(task.setting)
     nominal, robot = setting.nominal, setting.params.robot
     start = (nominal.start.x, nominal.start.y)
@@ -28,7 +28,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         "files_text": "`world.wbt`, `params.json`",
         "loaders_text": "`load_params() -> dict`",
         "params_text": setting.params.model_dump_json(indent=2),
-        # The ground's grid knows distances up to 100 mm.
+        # The ground's grid stores distances up to 100 mm.
         "widest_mm": f"{1e3 * widest:.1f}" if widest < 0.099 else "at least 99",
         "room_mm": f"{1e3 * room:.1f}",
         "cell_mm": min(10, max(1, math.floor(1e3 * room))),
@@ -46,12 +46,12 @@ def facts_of(task: Task) -> dict[str, Any]:
         "radius_mm": f"{1e3 * nominal.body_radius:g}",
         "body_bottom": f"{1e3 * BODY_BOTTOM:g}",
         "body_top": f"{1e3 * BODY_TOP:g}",
-        "world_text": _shown(setting.text),
+        "world_text": _shortened(setting.text),
     }
 
 
-def _shown(text: str) -> str:
-    """A world file, or as much of it as there is room for."""
+def _shortened(text: str) -> str:
+    """Returns a world file, cut at the maximum length."""
     if len(text) <= LONGEST_WORLD:
         return text.rstrip()
     head = text[:LONGEST_WORLD].rpartition("\n")[0]

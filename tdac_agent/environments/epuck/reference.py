@@ -1,6 +1,6 @@
 """The privileged reference for the e-puck: the oracle's path in the exact world.
 
-As `tdac_agent.environments.map2d.reference` for maps, in metres.
+The counterpart for maps is `tdac_agent.environments.map2d.reference`.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.plan import Path, descend, distance_field
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
-# Room beyond the body that is tried for the path, m, widest first.
+# Clearances beyond the body that are tried for the path, m, widest first.
 MARGINS = (0.02, 0.01, 0.005, 0.002, 0.0005, 0.0)
-# Room kept beyond the body on a shortcut, m: many times what float32 rounds away.
+# Clearance of a shortcut beyond the body, m; exceeds the rounding errors of float32.
 _SAFE = 1e-4
 
 
 def oracle_path(task: EPuckTask, x: float, y: float) -> Path:
-    """Path from (x, y) to the goal at the widest margin that still connects them.
+    """Returns the path from (x, y) to the goal with the widest possible margin.
 
     Returns:
-        Shape (n, 2), m; both ends included; only the ends where nothing connects.
+        Shape (n, 2), m, both ends included; only the ends if there is no path.
     """
     ground = task.ground
     ends = np.array([[x, y], task.goal])
@@ -45,13 +45,13 @@ def oracle_path(task: EPuckTask, x: float, y: float) -> Path:
 
 
 def reference_path(task: EPuckTask, x: float, y: float) -> list[Point]:
-    """The oracle's path from (x, y) to the goal, after shortcuts; ends included."""
+    """Returns the oracle's path to the goal after shortcuts; both ends included."""
     path = oracle_path(task, x, y)
     return without_flat_points(taut(path, lambda a, b: _free(task, a, b)))
 
 
 def _free(task: EPuckTask, begin: Point, end: Point) -> bool:
-    """Whether the body, and a little more, gets straight from one point to another."""
+    """Whether the body, slightly grown, can drive straight between two points."""
     solid = task.ground.solid
     heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
     pose, length = (float(begin[0]), float(begin[1]), heading), math.dist(begin, end)
@@ -60,7 +60,7 @@ def _free(task: EPuckTask, begin: Point, end: Point) -> bool:
 
 
 def _roomy(task: EPuckTask, start: Point, margin: float) -> BoolGrid:
-    """Grid points with room for the body and a margin, less of it near both ends."""
+    """Returns grid points with room for the body and a margin; less near both ends."""
     ground = task.ground
     free = ground.free(BODY_RADIUS + margin).copy()
     tight = ground.free(BODY_RADIUS + min(margin, MARGINS[-2]))

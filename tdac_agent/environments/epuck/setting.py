@@ -1,4 +1,4 @@
-"""Tasks in Webots worlds: what is theirs alone of a task file and a working folder."""
+"""Tasks in Webots worlds: opening them, and their part of the working folder."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class EPuckSetting:
         params: Contents of `params.json`.
         nominal: The feasible task, in the flat world.
         text: The flat world file.
-        file: The world's own file.
-        left_out: Nodes that may be solid and are ignored, in words.
+        file: The original world file.
+        left_out: Descriptions of the ignored nodes that may be solid.
     """
 
     params: EPuckParams
@@ -50,7 +50,7 @@ class EPuckSetting:
 
     @property
     def original(self) -> Original | None:
-        """The world as it was given."""
+        """The original world file."""
         return Original(f"original{self.file.suffix}", self.file)
 
     @property
@@ -59,7 +59,7 @@ class EPuckSetting:
         return METRES
 
     def remarks(self) -> list[str]:
-        """What stands in the world."""
+        """Returns the floors and obstacles of the world."""
         world = self.nominal.ground.world
         kinds = Counter(t.kind for t in world.obstacles if t.solid)
         counted = [f"{count} {kind}" for kind, count in kinds.most_common()]
@@ -67,7 +67,7 @@ class EPuckSetting:
         return [f"world {self.file.name}: {', '.join(floors + counted)}"]
 
     def env_kwargs(self) -> dict[str, Any]:
-        """Arguments that make this task's environment; see `EPuckEnv`."""
+        """Returns the constructor arguments of this task's `EPuckEnv`."""
         nominal = self.nominal
         return {
             "world": nominal.ground.world,
@@ -80,20 +80,20 @@ class EPuckSetting:
         }
 
     def make_env(self, **options: Any) -> EPuckEnv:
-        """The environment of this task; options as for `EPuckEnv`."""
+        """Constructs this task's environment; `options` override its arguments."""
         return EPuckEnv(**{**self.env_kwargs(), **options})
 
     def noise(self, relative: float) -> dict[str, float]:
-        """The published noise, which depends on the distance, with this mean."""
+        """Returns the option for the published noise, scaled to this mean."""
         return {"sensor_noise": relative / _MEAN_NOISE}
 
     def facts(self) -> dict[str, Any]:
-        """The arguments, the world by its hash, and what is missing in it."""
+        """Returns the environment's arguments, with the world's hash and `left_out`."""
         own = {"world": self.world_sha256(), "left_out": self.left_out}
         return {**self.env_kwargs(), **own}
 
     def world_sha256(self) -> str:
-        """Hash of the flat world file."""
+        """Returns the hash of the flat world file."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     def write_files(self, folder: Path) -> None:
@@ -103,13 +103,13 @@ class EPuckSetting:
         (folder / WORLD_FILE).write_text(self.text, encoding="utf-8")
 
     def preview(self) -> Image:
-        """The world from above."""
+        """Draws the world from above."""
         from tdac_envs.worlds.picture import draw_world
 
         return draw_world(self.nominal.ground.world)
 
     def portable(self) -> dict[str, Any]:
-        """The world is the folder's flat one, in which nothing is left to ignore."""
+        """Returns the keys for the flat world in the folder."""
         own: dict[str, Any] = {"world": WORLD_FILE}
         if self.left_out:
             own["left_out"] = list(self.left_out)
@@ -117,14 +117,14 @@ class EPuckSetting:
 
 
 def world_setting(setting: Setting) -> EPuckSetting:
-    """The setting, which must be a world's."""
+    """Returns the setting, which must be an `EPuckSetting`."""
     if not isinstance(setting, EPuckSetting):
         raise TypeError(f"expected an EPuckSetting, got {type(setting).__name__}")
     return setting
 
 
 def open_world_task(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
-    """The world's name, and the feasible task in it.
+    """Returns the world's name, and the feasible task in it.
 
     Args:
         spec: Contents of the task file.
@@ -132,7 +132,7 @@ def open_world_task(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
 
     Raises:
         WorldError: The world cannot be read, or has nodes that are not modelled.
-        TaskError: The task cannot be done, or there is no goal or no start.
+        TaskError: The task is infeasible, or start or goal is missing.
     """
     bundled = spec.world in bundled_worlds()
     file = world_file(spec.world if bundled else str(base / spec.world))
@@ -140,15 +140,15 @@ def open_world_task(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
     ignored = check_modelled(world, spec.ignore)
     if spec.goal is None and world.goal is None:
         raise TaskError(
-            f"{world.source} names no goal: give one, --goal X Y in metres "
-            "(`goal: [X, Y]` in a task.yaml)"
+            f"{world.source} names no goal: give --goal X Y in metres (`goal: [X, Y]` "
+            "in a task.yaml)"
         )
     if spec.start is None and not world.robots:
         raise TaskError(
-            f"{world.source} has no e-puck in it: give its place, --start X Y YAW in "
-            "metres and rad (`start: [X, Y, YAW]` in a task.yaml)"
+            f"{world.source} has no e-puck in it: give --start X Y YAW in metres and "
+            "rad (`start: [X, Y, YAW]` in a task.yaml)"
         )
-    left_out = spec.left_out or tuple(map(_in_words, ignored))
+    left_out = spec.left_out or tuple(map(_describe, ignored))
     setting = _setting(world, file, spec, left_out)
     return file.stem, setting
 
@@ -175,6 +175,6 @@ def _setting(
     return EPuckSetting(params, nominal, text, file, left_out)
 
 
-def _in_words(node: Unmodelled) -> str:
+def _describe(node: Unmodelled) -> str:
     name = f"{node.kind} {node.name!r}" if node.name else node.kind
     return f"{name} at ({node.x:g}, {node.y:g})"

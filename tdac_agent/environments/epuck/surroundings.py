@@ -1,4 +1,4 @@
-"""A Webots world as a diagnosis asks about it; mm, on the screen."""
+"""Queries of a diagnosis about a Webots world, in mm on the screen."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from tdac_envs.worlds.world import Obstacle
 Point = tuple[float, float]
 
 FENCE = "fence around the world"
-# A sensor that is farther off the bearing than this does not look there, rad.
+# Largest angle between a sensor's axis and the bearing of what it detects, rad.
 _OFF = 0.3
-# A blunter corner is none to the body.
+# Corners with larger angles do not matter to the body.
 BLUNTEST = math.radians(135.0)
 
 
@@ -40,21 +40,21 @@ class WorldSurroundings:
 
     @property
     def units(self) -> Units:
-        """Metres, told in mm."""
+        """Metres, printed in mm."""
         return METRES
 
     @property
     def radius(self) -> float:
-        """Of the body."""
+        """Radius of the body, mm."""
         return BODY_RADIUS * METRES.scale
 
     @property
     def full_speed(self) -> float:
-        """Of the body, mm/s."""
+        """Full speed of the body, mm/s."""
         return self.task.full_step / self.task.dt * METRES.scale
 
     def touch(self, pose: Pose, reach: float) -> Touch | None:
-        """The nearest thing, by its name."""
+        """Returns the nearest obstacle within `reach`."""
         x, y = METRES.place_of(pose.x, pose.y)
         near = _nearest(self.task, x, y)
         gap, (away_x, away_y) = near.gap, near.away
@@ -73,14 +73,14 @@ class WorldSurroundings:
         )
 
     def seen(self, touch: Touch, trajectory: Trajectory) -> str:
-        """Which infra-red sensor looks there, and what it read."""
+        """Describes which infrared sensor points there, and what it read."""
         off = np.abs(np.angle(np.exp(1j * (PLACES[:, 2] + touch.bearing))))
         sensor, before = int(off.argmin()), max(trajectory.steps - 10, 0)
         reading = f"ps{sensor} read {trajectory.ranges[before, sensor]:.0f}"
         if off[sensor] > _OFF:
             angle = math.degrees(float(off[sensor]))
             return (
-                f"No sensor looks there: the nearest is {angle:.0f}° off; in step "
+                f"No sensor points there: the nearest one is {angle:.0f}° off; in step "
                 f"{before} {reading}."
             )
         return (
@@ -88,16 +88,16 @@ class WorldSurroundings:
         )
 
     def path_from(self, pose: Pose) -> Path:
-        """Shortest path to the goal."""
+        """Returns the shortest path to the goal."""
         start = Pose(*METRES.place_of(pose.x, pose.y), 0.0)
         return METRES.on_screen(self.task.path_from(start))
 
     def pull(self, path: Path) -> list[Point]:
-        """Corners of a path after every shortcut that the body can take."""
+        """Returns the corners of a path after all shortcuts."""
         return taut(path, self._free)
 
     def _free(self, begin: Point, end: Point) -> bool:
-        """Whether the body gets straight from one place to another."""
+        """Whether the body can drive straight between two places."""
         (x, y), (to_x, to_y) = METRES.place_of(*begin), METRES.place_of(*end)
         solid, heading = self.task.ground.solid, math.atan2(to_y - y, to_x - x)
         length = math.hypot(to_x - x, to_y - y)
@@ -105,13 +105,13 @@ class WorldSurroundings:
         return touch > 1.0
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
-        """Where the shortest path from each place first is so far away, or ends."""
+        """Yields the path's first point `far` away from each place, or its end."""
         for x, y in places.tolist():
             path = self.path_from(Pose(x, y, 0.0))
             yield first_beyond(path, x, y, far) if len(path) else None
 
     def mistaken_goals(self) -> dict[str, Point]:
-        """X and y swapped, or a wrong sign."""
+        """Returns where typical coordinate mistakes put the goal, by description."""
         x, y = self.task.goal
         places = {
             "x and y swapped": (y, x),
@@ -123,14 +123,14 @@ class WorldSurroundings:
 
 
 class _Near(NamedTuple):
-    """What is nearest to a point.
+    """The obstacle nearest to a point.
 
     Attributes:
-        name: Of the thing.
+        name: Name of the obstacle.
         gap: Distance to it, m.
-        away: Unit vector that leads away from it.
-        outline: Its vertices, shape (n, 2), counter-clockwise; empty where they are
-            not those of the thing, which has several parts, or it has none.
+        away: Unit vector that points away from it.
+        outline: Its vertices, shape (n, 2), counter-clockwise; empty if it has several
+            parts or no vertices.
     """
 
     name: str
@@ -148,8 +148,8 @@ def _nearest(task: EPuckTask, x: float, y: float) -> _Near:
         for part in range(len(parts)):
             gap, *away = part_gap(*prisms.arrays(), part, x, y)
             outline = prisms.outline(part) if len(parts) == 1 else none
-            way = (float(away[0]), float(away[1]))
-            found.append(_Near(_name(thing), float(gap), way, outline))
+            vector = (float(away[0]), float(away[1]))
+            found.append(_Near(_name(thing), float(gap), vector, outline))
     left, low, right, high = ground.bounds
     found += [
         _Near(FENCE, x - left, (1.0, 0.0), none),
@@ -161,7 +161,7 @@ def _nearest(task: EPuckTask, x: float, y: float) -> _Near:
 
 
 def _nearest_corner(outline: Points, point: Point) -> Point | None:
-    """The nearest sharp corner of an outline within a body radius of a point."""
+    """Returns the nearest sharp corner of an outline within a body radius, or None."""
     if len(outline) < 3:
         return None
     back, ahead = np.roll(outline, 1, axis=0) - outline, np.roll(outline, -1, axis=0)
@@ -179,7 +179,7 @@ def _on_screen(place: Point) -> Point:
 
 
 def _name(thing: Obstacle) -> str:
-    """`WoodenBox 'box 3'`, `wall of the arena`, `Rock`."""
+    """Returns a name such as `WoodenBox 'box 3'`, `wall of the arena` or `Rock`."""
     if thing.kind in ("CircleArena", "RectangleArena"):
         return "wall of the arena"
     return f"{thing.kind} {thing.name!r}" if thing.name else thing.kind

@@ -1,4 +1,4 @@
-"""Copies of a world that no controller can have memorised."""
+"""Modified copies of a world, which a controller cannot have memorised."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle, ring
 from tdac_envs.worlds.wbt.writer import write_world
 from tdac_envs.worlds.world import Obstacle, Part, World
 
-# Beside the e-puck's own, round angles in which everything is askew.
+# Angles, in addition to the original one, at which nothing is parallel to an axis.
 ANGLES = (2.3, -0.7, 1.1)
 _APART, _KEEP_OFF = 0.05, 0.12
 _TRIES = 400
 
 
 class WorldOracle(Oracle):
-    """An oracle that knows about worlds, too."""
+    """An oracle for grids and worlds."""
 
     def world_cases(
         self, world: World, random: np.random.Generator | None = None
@@ -35,11 +35,11 @@ class WorldOracle(Oracle):
 def world_cases(
     world: World, random: np.random.Generator | None = None
 ) -> list[WorldCase]:
-    """A world as it is, and copies: moved, turned, renamed, reordered, with more in it.
+    """Returns a world, and copies: moved, turned, renamed, reordered, with additions.
 
     Args:
-        world: Of a task, flat.
-        random: Draws a further copy, and the points of this world.
+        world: Flat world of a task.
+        random: Random number generator for another copy and for sample points.
     """
     cases = [WorldCase("this world", write_world(world), world)]
     if random is not None:
@@ -60,7 +60,7 @@ def _copy(world: World, angle: float, random: np.random.Generator) -> WorldCase:
 
 
 def _renamed(world: World) -> World:
-    """Other names for the robot and everything but the goal."""
+    """Renames the robot and everything except the goal."""
     robots = tuple(replace(robot, name="driver") for robot in world.robots)
     things = tuple(
         thing if thing.is_goal else replace(thing, name=f"thing {number}")
@@ -70,7 +70,7 @@ def _renamed(world: World) -> World:
 
 
 def _fuller(world: World, random: np.random.Generator) -> World:
-    """The world with a further obstacle of each kind of shape, off start and goal."""
+    """Adds an obstacle of each kind of shape, away from start and goal."""
     more: list[Obstacle] = []
     for kind, parts in _shapes(random):
         place = _free_place(world, more, parts, random)
@@ -82,13 +82,13 @@ def _fuller(world: World, random: np.random.Generator) -> World:
 
 
 def _shapes(random: np.random.Generator) -> Iterator[tuple[str, list[Part]]]:
-    """Kinds of obstacles, each about the origin."""
+    """Yields kinds of obstacles, each around the origin."""
     yaw = random.uniform(-1.5, 1.5, 4)
     wide, long = random.uniform(0.06, 0.12, 2)
     corners = np.sort(random.uniform(0.0, 2.0 * math.pi, 9))
     unit = np.column_stack([np.cos(corners), np.sin(corners)])
     high = 0.12
-    # Of several pieces, and not the same when it is turned: it comes first, so that
+    # This obstacle has several pieces and is not symmetric; it is placed first, while
     # there is room for it.
     ell = Rectangle(0.03, 0.0, 0.0, 0.03, 0.12), Rectangle(-0.02, 0.045, 0.3, 0.1, 0.03)
     yield "WoodenPallet", [Part(piece, 0.0, high) for piece in ell]
@@ -111,7 +111,7 @@ def _free_place(
     parts: Iterable[Part],
     random: np.random.Generator,
 ) -> Point | None:
-    """A place where parts may be put: in the arena, off start, goal and each other."""
+    """Returns a place for parts in the arena, away from start, goal and obstacles."""
     reach = float(prisms_of(parts).extent[:, :3].max()) + _APART
     taken = prisms_of(p for t in (*bodies(world), *more) for p in t.solid)
     ends = [world.robot.pose[:2], world.goal or (0.0, 0.0)]

@@ -10,7 +10,7 @@ from tdac_envs.map2d import rays
 
 
 def use_kernels() -> None:
-    """Calls each kernel through the function that normally uses it, on a small map."""
+    """Calls each kernel through its usual caller, on a small map."""
     image = np.full((60, 90), 255, np.uint8)
     image[25:35, 30:] = 0
     start, goal, radius = (12.0, 12.0), (80.0, 50.0), 5.0

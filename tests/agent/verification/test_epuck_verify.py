@@ -197,7 +197,7 @@ def test_command_line_lists_what_is_left_out(tdac, controller, tmp_path):
         (["--world", "crate"], "did you mean 'crates'"),
         (["--world", "none.wbt"], "none.wbt: no such file"),
         (["--world", "broken.wbt"], r"broken.wbt:2:\d+|line 2"),
-        (["--world", "nogoal.wbt"], "names no goal: give one, --goal X Y in metres"),
+        (["--world", "nogoal.wbt"], "names no goal: give --goal X Y in metres"),
         (["--world", "crates", "--goal", "5", "5"], "goal \\(5, 5\\)"),
         (["--world", "crates", "--start", "0.6", "0"], "already at the goal"),
         (["--world", "crates", "--start", "0", "0", "nan"], "finite"),

@@ -275,7 +275,7 @@ class TestRefused:
         folder = make_run(tmp_path / "run", spec, "def policy(obs): return 0, 0\n")
         code, _, err = tdac("export", "webots", folder, "--out", "project")
         assert code == 2
-        assert "is about TDAC-Map2D-v0" in err
+        assert "is a run of TDAC-Map2D-v0" in err
 
     def test_a_folder_in_use(self, tdac, verified):
         """Nothing is overwritten."""
@@ -283,7 +283,7 @@ class TestRefused:
         Path("project/mine.txt").write_text("mine")
         code, _, err = tdac("export", "webots", verified, "--out", "project")
         assert code == 2
-        assert "project is in use" in err
+        assert "project is not an empty folder" in err
         assert [path.name for path in Path("project").iterdir()] == ["mine.txt"]
 
     def test_no_run(self, tdac):
