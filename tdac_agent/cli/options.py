@@ -262,10 +262,7 @@ Delay = Annotated[
 
 
 class NamedTask(Protocol):
-    """A command's parameter that replaces the flags of its task.
-
-    The call is deferred because `TaskFlags` is slow to import.
-    """
+    """A command's parameter for the flags of its task; `TaskFlags` imports slowly."""
 
     def __call__(self) -> TaskFlags:
         """The flags of the task."""

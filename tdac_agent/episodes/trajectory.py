@@ -133,7 +133,7 @@ class Rollout:
             and the 99th percentile including it.
         returned: Return value of `run_episode`, if it drove the episode.
         timed_out: Whether the controller was too slow, in one call or on average.
-        is_retryable: Whether a busy machine may be the reason, so that a retry may pass.
+        is_retryable: Whether a busy machine may be the reason, so a retry may pass.
         rooms: Shape (T + 1,): distance from the robot's centre to the nearest obstacle,
             px (for the centre of its pixel) or m; empty if not recorded.
         calls: Shape (T,): duration of each policy call, s; empty if not recorded.

@@ -30,7 +30,7 @@ def start(
 
     Args:
         workdir: Folder whose files the controller may read; ignored without a source.
-        controller_source: Text of `controller.py`; None to call `Child.copy_files` later.
+        controller_source: Text of `controller.py`; None to copy it later.
         tier: Name of a tier, or "auto" for the best one that works on this machine.
         limits: Resource limits of the child.
 

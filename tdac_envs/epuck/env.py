@@ -128,9 +128,7 @@ class EPuckEnv(DrivenEnv):
             Keep the defaults when comparing rewards.
         ignore: Names or types of unmodelled nodes to leave out. Any other unmodelled
             node that may be solid raises an error.
-        ground_sensors: Whether to observe `ground`.
-        gps: Whether to observe `gps`.
-        compass: Whether to observe `compass`.
+        ground_sensors, gps, compass: Whether to observe `ground`, `gps`, `compass`.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -143,7 +141,6 @@ class EPuckEnv(DrivenEnv):
         "render_fps": 31,
     }
     readings = "ps"
-    """Observation key of the distance sensors."""
 
     def __init__(
         self,
@@ -173,20 +170,17 @@ class EPuckEnv(DrivenEnv):
         one_of("reflectance", reflectance, ("ideal", "webots"))
         opened = open_world(world, start, goal, ignore)
         assert opened.goal is not None
-        robot = opened.robot
-        ground = Ground.of(opened)
-        self.nominal = make_task(
+        robot, ground = opened.robot, Ground.of(opened)
+        speed = robot.max_wheel_speed if max_wheel_speed is None else max_wheel_speed
+        self.nominal = self.task = make_task(
             ground,
             robot.pose,
             opened.goal,
-            max_wheel_speed=(
-                robot.max_wheel_speed if max_wheel_speed is None else max_wheel_speed
-            ),
+            max_wheel_speed=speed,
             dt=opened.time_step / 1e3 if dt is None else dt,
             goal_tolerance=goal_tolerance,
             horizon=horizon,
         )
-        self.task = self.nominal
         super().__init__(
             on_collision=on_collision,
             wheel_slip=wheel_slip,
@@ -221,8 +215,7 @@ class EPuckEnv(DrivenEnv):
         visible = setup.around.visible
         self._solid = ground.solid.copy() if self._pushes else ground.solid
         self._seen = visible.copy() if self._pushes else visible
-        self._things = np.zeros((len(ground.masses), 6))
-        self._speed = np.zeros(3)
+        self._things, self._speed = np.zeros((len(ground.masses), 6)), np.zeros(3)
         self.robot = Robot.blank(self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
@@ -268,7 +261,7 @@ class EPuckEnv(DrivenEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         calls = dict.fromkeys(
-            ("addresses", "_call_begin", "_call_drive", "_call_exact")
+            ["addresses", "_call_begin", "_call_drive", "_call_exact"]
         )
         return {**self.__dict__, **calls, "_scene": None}
 
@@ -296,8 +289,7 @@ class EPuckEnv(DrivenEnv):
             self._speed[:] = 0.0
             self._call_exact()
             return
-        (words,) = self.addresses.words
-        state, outcome = robot.state, robot.outcome
+        (words,), state, outcome = self.addresses.words, robot.state, robot.outcome
         kernels.turn_wheels(words)
         forward, turn = outcome[kernels.FORWARD :].tolist()
         outcome[TOUCHED] = push(

@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, ROUND, Array, Index
 
@@ -143,3 +146,46 @@ def clear_grid(
                 x, y = left + u * spacing, low + v * spacing
                 gap = gap_of(points, first, extent, k, x, y)[0]
                 clear[v, u] = min(clear[v, u], gap)
+
+
+@subkernel
+def remaining_path(
+    field: NDArray[np.float32],
+    left: float,
+    low: float,
+    spacing: float,
+    reach: float,
+    x: float,
+    y: float,
+    previous: float,
+) -> float:
+    """Length of the shortest path from a point to the goal, m.
+
+    It is the least sum of the distance to a grid point and the path length from there,
+    or `previous` if no grid point has a path.
+
+    Args:
+        field: Path length from each grid point, m; inf if there is none.
+        left: x of the first column, m.
+        low: y of the first row, m.
+        spacing: Distance between grid points, m.
+        reach: Body radius, m: nothing can lie between the robot and grid points that
+            are nearer, so only they count.
+        x: x of the point, m.
+        y: y of the point, m.
+        previous: Length one step earlier, m.
+    """
+    height, width = field.shape
+    u, v = (x - left) / spacing, (y - low) / spacing
+    column, row = math.floor(u), math.floor(v)
+    for ring in range(4):
+        best = math.inf
+        for j in range(max(row - ring, 0), min(row + ring + 2, height)):
+            for i in range(max(column - ring, 0), min(column + ring + 2, width)):
+                off_u, off_v = u - i, v - j
+                hop = spacing * math.sqrt(off_u * off_u + off_v * off_v)
+                if ring == 0 or hop < reach:
+                    best = min(best, field[j, i] + hop)
+        if best < math.inf:
+            return best
+    return previous

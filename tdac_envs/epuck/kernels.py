@@ -42,7 +42,7 @@ from tdac_envs.drive.stepping import (
     wrap_angle,
 )
 from tdac_envs.epuck.contact import advance
-from tdac_envs.epuck.gaps import nearest_of
+from tdac_envs.epuck.gaps import nearest_of, remaining_path
 from tdac_envs.epuck.infrared import in_sight, sense
 from tdac_envs.epuck.nearby import listed_at
 from tdac_envs.epuck.prisms import Array, Index
@@ -63,33 +63,6 @@ N_OUTCOME = 12
 # Indices of some of the arrays of `_arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19
-
-
-@subkernel
-def remaining_path(
-    field: NDArray[np.float32], constants: Array, x: float, y: float, previous: float
-) -> float:
-    """Length of the shortest path from a point to the goal, m.
-
-    It is the least sum of the distance to a grid point and the path length from there,
-    or `previous` if no grid point has a path. Only grid points nearer than the body
-    radius count, since nothing can be in between.
-    """
-    height, width = field.shape
-    spacing = constants[SPACING]
-    u, v = (x - constants[LEFT_END]) / spacing, (y - constants[LOW_END]) / spacing
-    column, row = math.floor(u), math.floor(v)
-    for ring in range(4):
-        best = math.inf
-        for j in range(max(row - ring, 0), min(row + ring + 2, height)):
-            for i in range(max(column - ring, 0), min(column + ring + 2, width)):
-                off_u, off_v = u - i, v - j
-                hop = spacing * math.sqrt(off_u * off_u + off_v * off_v)
-                if ring == 0 or hop < constants[RADIUS]:
-                    best = min(best, field[j, i] + hop)
-        if best < math.inf:
-            return best
-    return previous
 
 
 @subkernel
@@ -124,7 +97,10 @@ def _observe(
         seen_points, seen_first, seen_extent, seen_listed, begin, end,
         constants[FLOOR], state, readings, hits,
     )  # fmt: skip
-    outcome[REMAINING] = remaining_path(field, constants, x, y, outcome[REMAINING])
+    outcome[REMAINING] = remaining_path(
+        field, left, low, constants[SPACING], constants[RADIUS], x, y,
+        outcome[REMAINING],
+    )  # fmt: skip
     off_x, off_y = goal_x - x, goal_y - y
     gap = math.sqrt(off_x * off_x + off_y * off_y)
     begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
@@ -181,10 +157,7 @@ def _turn_wheels(
     wheel_speeds: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Updates wheel speeds and angles, and the commanded arc in `outcome`.
-
-    Arguments as for `_drive`.
-    """
+    """Updates wheel speeds and angles, and the commanded arc, as of `_drive`."""
     apply_command(constants, state, queue, wheel_speeds, outcome)
     swept = constants[MAX_SPEED] * constants[DT]
     left, right = float(wheel_speeds[0]), float(wheel_speeds[1])
@@ -219,10 +192,7 @@ def _finish(
     hits: Array,
     outcome: Array,
 ) -> None:
-    """Completes a step after `_turn_wheels` and the motion of the robot.
-
-    Arguments as for `_drive`; the caller has set `outcome[TOUCHED]`.
-    """
+    """Completes a step of `_drive` after the motion, which set `outcome[TOUCHED]`."""
     before = outcome[REMAINING]
     _observe(
         points, first, extent, cells, listed,
