@@ -56,7 +56,9 @@ def named():
 
 
 def found(dotted):
-    """What a dotted name stands for."""
+    """What a dotted name stands for; skips where an extra is not installed."""
+    if dotted.startswith("tdac_envs.sb3"):
+        pytest.importorskip("stable_baselines3")
     parts = dotted.split(".")
     for k in range(len(parts), 0, -1):
         try:
@@ -73,7 +75,7 @@ def found(dotted):
 def test_what_documents_import_is_there_and_public(document, module, name):
     """Whoever copies a line from the docs gets what it says."""
     assert module in MODULES
-    assert hasattr(import_module(module), name)
+    found(f"{module}.{name}")
 
 
 @pytest.mark.parametrize(("document", "name"), sorted(set(named())))
@@ -87,7 +89,7 @@ def test_every_public_module_is_in_the_documents(module):
     """The list above has nothing that nobody is told of."""
     texts = "\n".join(text for _, text in documents())
     assert re.search(rf"\b{re.escape(module)}\b", texts)
-    import_module(module)
+    found(module)
 
 
 @pytest.mark.parametrize("package", [tdac_agent, tdac_envs])

@@ -228,7 +228,7 @@ def test_jittered_start(rollout, number):
     assert episode.collisions == 0, "failed"
 
 
-def check_path(oracle, case, path, is_point):
+def check_path(oracle, case, path, is_point, unit="px"):
     """Checks a planned path: free, connected, and at most 1.1 x the shortest length.
 
     Args:
@@ -236,6 +236,7 @@ def check_path(oracle, case, path, is_point):
         case: One of `oracle.plan_cases()`.
         path: The controller's answer; must be [] if there is no path.
         is_point: Returns whether a value is a pair of whole numbers.
+        unit: Unit of lengths.
     """
     assert isinstance(path, list), (
         f"{case.name}: returned a {type(path).__name__}, not a list"
@@ -247,7 +248,7 @@ def check_path(oracle, case, path, is_point):
         )
         return
     assert path, (
-        f"{case.name}: returned [], but there is a path of {case.length:.1f} px"
+        f"{case.name}: returned [], but there is a path of {case.length:.1f} {unit}"
     )
     assert all(map(is_point, path)), f"{case.name}: points must be (int, int)"
     ends = (path[0], path[-1])
@@ -259,6 +260,6 @@ def check_path(oracle, case, path, is_point):
     assert error is None, f"{case.name}: {error}"
     length = oracle.path_length(path)
     assert length <= 1.1 * case.length + 1e-6, (
-        f"{case.name}: the path has {length:.1f} px, more than 1.1 x the shortest "
-        f"({case.length:.1f} px)"
+        f"{case.name}: the path has {length:.1f} {unit}, more than 1.1 x the "
+        f"shortest ({case.length:.1f} {unit})"
     )

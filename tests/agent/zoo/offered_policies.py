@@ -72,9 +72,16 @@ def kwargs(**given: object) -> bytes:
     return policy(DATA | {"policy_kwargs": given})
 
 
-def _offer(name: str, make: Maker | bytes, says: str, endless: bool = False) -> Offer:
+def _offer(
+    name: str, make: Maker | bytes, says: str, endless: bool = False, needs: str = ""
+) -> Offer:
     make = text(NAME, make) if isinstance(make, bytes) else make
-    return Offer("policies", name, WORDS, make, says, endless=endless)
+    return Offer("policies", name, WORDS, make, says, endless=endless, needs=needs)
+
+
+def _network(name: str, make: Maker | bytes, says: str) -> Offer:
+    """Where the network is made, or its weights are read."""
+    return _offer(name, make, says, needs="stable_baselines3")
 
 
 def _bomb(here: Path) -> None:
@@ -163,18 +170,20 @@ OFFERS = [
     _offer("no_layer", kwargs(net_arch=[-1]), "net_arch"),
     _offer("nan_setting", kwargs(log_std_init=float("nan")), "log_std_init"),
     _offer("activation", kwargs(activation_fn="<class 'os.system'>"), "activation_fn"),
-    _offer(
+    _network(
         "no_activation",
         kwargs(activation_fn="<class 'torch.nn.modules.activation.Nope'>"),
         "Nope",
     ),
-    _offer("of_another_class", kwargs(n_critics=2), "do not fit its class"),
+    _network("of_another_class", kwargs(n_critics=2), "do not fit its class"),
     _offer("weights_torn", policy(pth=b"\x80\x02"), "`policy.pth` is damaged"),
     _offer("weights_code", policy(pth=weights(Call(os.system, "true"))), "holds more"),
     _offer("weights_large", policy(pth=weights(Call(bytearray, 10**11))), "holds more"),
-    _offer("weights_list", policy(pth=weights([1, 2])), "weights"),
-    _offer("weights_nan", _tensors("{'a': torch.full((2,), float('nan'))}"), "finite"),
-    _offer("weights_whole", _tensors("{'a': torch.zeros(2).to(int)}"), "holds more"),
+    _network("weights_list", policy(pth=weights([1, 2])), "weights"),
+    _network(
+        "weights_nan", _tensors("{'a': torch.full((2,), float('nan'))}"), "finite"
+    ),
+    _network("weights_whole", _tensors("{'a': torch.zeros(2).to(int)}"), "holds more"),
     _offer("said_torn", policy(said=b"{"), "tdac.json"),
     _offer("said_deep", policy(said=b"[" * 9999), "nested deeper"),
     _offer("said_wrapper", policy(said=SAID | {"wrappers": ["os"]}), "unknown wrapper"),

@@ -7,6 +7,7 @@ time and memory, and leaves nothing behind.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import resource
@@ -42,6 +43,7 @@ class Offer:
         says: Pattern of the line on stderr.
         code: Exit code.
         endless: Whether who reads it carelessly has to be stopped from outside.
+        needs: Module without which nobody gets so far.
     """
 
     surface: str
@@ -51,6 +53,7 @@ class Offer:
     says: str
     code: int = 2
     endless: bool = False
+    needs: str = ""
 
     def __str__(self) -> str:
         return f"{self.surface}/{self.name}"
@@ -147,11 +150,12 @@ def all_offers() -> list[Offer]:
 
 
 def chosen_offers(names: list[str]) -> list[Offer]:
-    """The offers of these names or surfaces; all where none is given."""
+    """The offers of these names or surfaces, or all; none that lack what they need."""
     return [
         offer
         for offer in all_offers()
-        if not names or {offer.name, offer.surface, str(offer)} & set(names)
+        if (not names or {offer.name, offer.surface, str(offer)} & set(names))
+        and (not offer.needs or importlib.util.find_spec(offer.needs))
     ]
 
 

@@ -112,6 +112,8 @@ def impatient():
 @pytest.mark.parametrize("offer", AT_ONCE, ids=str)
 def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, impatient):
     """With exit code 2 and no traceback, whatever is in it; nothing is written."""
+    if offer.needs:
+        pytest.importorskip(offer.needs)
     here = tmp_path / "here"
     offer.make(here)
     before = sorted(here.rglob("*"))
@@ -132,6 +134,8 @@ def test_what_has_no_end_is_not_waited_for(offer):
 @pytest.mark.parametrize("offer", OFFERS, ids=str)
 def test_the_offers(offer):
     """As a process: exit code, line, time and memory are as expected, nothing left."""
+    if offer.needs:
+        pytest.importorskip(offer.needs)
     assert offers.differences(offer, offers.take(offer)) == []
 
 

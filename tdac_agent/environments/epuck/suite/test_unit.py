@@ -8,6 +8,7 @@ import pytest
 from tdac_agent.environments.epuck.oracle import occupied_at
 from tdac_agent.storage.plain import shown
 from tdac_agent.verification.suite.every_task import check_path
+from tdac_agent.verification.suite.several import Several
 
 pytestmark = pytest.mark.paper
 
@@ -61,12 +62,17 @@ def test_robot_constants(controller, task):
         "SENSOR_RANGE": params.robot.sensor_range,
         "GOAL_TOLERANCE": params.goal_tolerance,
     }
+    several = Several()
     for name, value in expected.items():
-        found = controller.constant(name)
-        assert isinstance(found, int | float), f"{name} is {shown(found)}, not a number"
-        assert math.isclose(found, value, rel_tol=1e-6), (
-            f"{name} = {shown(found)}, not {value:g} as in params.json"
-        )
+        with several:
+            found = controller.constant(name)
+            assert isinstance(found, int | float), (
+                f"{name} is {shown(found)}, not a number"
+            )
+            assert math.isclose(found, value, rel_tol=1e-6), (
+                f"{name} = {shown(found)}, not {value:g} as in params.json"
+            )
+    several.settle()
 
 
 def test_file_constant(controller):
@@ -79,18 +85,28 @@ def test_file_constant(controller):
 
 def test_parse_world(controller, cases):
     """`parse_world` finds start and goal, also in moved and turned copies."""
+    several = Several()
     for case in cases:
         world = controller.call("parse_world", case.text)
-        assert isinstance(world, dict), (
-            f"{case.name}: parse_world returned a {type(world).__name__}, not a dict"
-        )
-        missing = {"start", "goal", "arena", "obstacles"} - set(world)
-        assert not missing, f"{case.name}: missing keys: {', '.join(sorted(missing))}"
+        with several:
+            check_world(several, case, world)
+    several.settle()
+
+
+def check_world(several, case, world):
+    """Compares what the controller's parser found with the world."""
+    assert isinstance(world, dict), (
+        f"{case.name}: parse_world returned a {type(world).__name__}, not a dict"
+    )
+    missing = {"start", "goal", "arena", "obstacles"} - set(world)
+    assert not missing, f"{case.name}: missing keys: {', '.join(sorted(missing))}"
+    with several:
         x, y, yaw = numbers(world["start"], 3, f"{case.name}: start")
         off = math.dist((x, y), case.start[:2])
         assert off <= 1e-3, f"{case.name}: start ({x}, {y}), not {case.start[:2]}"
         turn = abs(math.remainder(yaw - case.start[2], math.tau))
         assert turn <= 1e-2, f"{case.name}: start yaw {yaw}, not {case.start[2]}"
+    with several:
         goal = numbers(world["goal"], 2, f"{case.name}: goal")
         off = math.dist(goal, case.goal)
         assert off <= 1e-3, f"{case.name}: goal {tuple(goal)}, not {case.goal}"
@@ -99,8 +115,11 @@ def test_parse_world(controller, cases):
 @pytest.mark.parametrize("inflation", INFLATIONS)
 def test_build_grid(controller, cases, inflation):
     """The grid is right at sample points that are not near boundaries."""
+    several = Several()
     for case in cases:
-        check_grid(controller, case, case.resolution(), inflation)
+        with several:
+            check_grid(controller, case, case.resolution(), inflation)
+    several.settle()
 
 
 def test_build_grid_of_this_world(controller, cases, generator):
@@ -152,11 +171,14 @@ def described(wrong, size, inflation):
 
 def test_astar(controller, oracle):
     """Paths are complete, free, connected, cut no corners, <= 1.1 x optimum, or []."""
+    several = Several()
     for case in oracle.plan_cases():
         path = controller.call("astar", case.occ, case.start, case.goal)
         if isinstance(path, list):
             path = [tuple(p) if isinstance(p, list) else p for p in path]
-        check_path(oracle, case, path, is_whole_pair)
+        with several:
+            check_path(oracle, case, path, is_whole_pair, "cells")
+    several.settle()
 
 
 def test_astar_on_this_world(controller, oracle, cases, generator):
