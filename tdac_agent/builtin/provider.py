@@ -75,7 +75,6 @@ class Builtin(Generic[P]):
 
 
 def _operations(rules: list[str]) -> str:
-    """Returns an optimizer's answer that adds rules for this task."""
     operations = [{"op": "add", "scope": "task", "text": rule} for rule in rules]
     return f"```json\n{json.dumps(operations, indent=1)}\n```\n"
 

@@ -151,10 +151,7 @@ _RULE = re.compile(r"^(set|keep) ([A-Z_]+) ([=<>]) (\d+(?:\.\d+)?)\b")
 
 
 def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, MarginBounds]:
-    """Reads parameters and margins from rules of `write_rules`; skips other rules.
-
-    Later rules override earlier ones.
-    """
+    """Reads rules of `write_rules`; later values replace earlier ones. Skips others."""
     values: dict[str, float] = {}
     above, below = 0.0, math.inf
     for clause in (part for rule in rules for part in rule.split(";")):

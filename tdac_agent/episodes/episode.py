@@ -89,8 +89,7 @@ class Record:
         """Advances the episode by one step.
 
         Raises:
-            EnvRefusalError: The episode has not started or has ended, or the action is
-                not two finite numbers.
+            EnvRefusalError: The episode is not running, or the action is invalid.
         """
         if not self._poses:
             raise EnvRefusalError("step() before reset()")
@@ -264,13 +263,7 @@ def _too_slow(
 def _mean_call(
     calls: list[float], wait_time: Callable[[], float], waited: float
 ) -> float:
-    """Returns the mean duration of a call without run-queue wait time, s.
-
-    Args:
-        calls: Duration of each call, s.
-        wait_time: Returns the total run-queue wait time of policy and judge, s.
-        waited: The same before the first call, s.
-    """
+    """Returns the mean duration of a call without run-queue wait time, s."""
     in_queue = max(0.0, wait_time() - waited)
     return max(0.0, math.fsum(calls) - in_queue) / max(1, len(calls))
 

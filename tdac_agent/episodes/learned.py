@@ -106,11 +106,7 @@ class _Spaces:
 
 @lru_cache(maxsize=4)
 def _load_network(file: Path, fit: _Spaces) -> Any:
-    """Returns the network of a saved policy for some spaces, with its weights.
-
-    Raises:
-        ControllerFault: The policy does not fit the spaces or is of an unknown kind.
-    """
+    """Returns the network of a saved policy, with its weights."""
     try:
         saved = read_policy(file)
         weights = load_weights(saved.weights)
@@ -146,12 +142,7 @@ def check_kind(saved: SavedNetwork) -> None:
 
 
 def _build(saved: SavedNetwork, observation: Space[Any], action: Space[Any]) -> Any:
-    """Builds a network without its weights.
-
-    Raises:
-        ControllerFault: The policy is of an unknown kind, or its settings do not fit
-            its class.
-    """
+    """Builds a network without its weights."""
     kind = _policy_class(saved.module, isinstance(observation, spaces.Dict))
     try:
         kwargs = {**_policy_kwargs(saved), "optimizer_class": _NoOptimizer}
@@ -170,7 +161,6 @@ class _NoOptimizer:
 
 
 def _policy_class(module: str, dict_observation: bool) -> Any:
-    """Returns the class of the network."""
     try:
         from importlib import import_module
 
@@ -191,7 +181,6 @@ def _policy_class(module: str, dict_observation: bool) -> Any:
 
 
 def _policy_kwargs(saved: SavedNetwork) -> dict[str, Any]:
-    """Returns the constructor arguments of the network's class."""
     from torch import nn
 
     kwargs = saved.settings.model_dump(exclude_unset=True)

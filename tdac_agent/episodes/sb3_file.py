@@ -58,7 +58,7 @@ class SavedPolicy(BaseModel):
 
 
 class Settings(BaseModel):
-    """`policy_kwargs` that define the network, without those only training needs."""
+    """`policy_kwargs` that define the network, except those only training needs."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -184,11 +184,7 @@ def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
 
 
 def _network(data: bytes) -> tuple[str, Settings]:
-    """Returns the module of the network's class, and its settings.
-
-    Raises:
-        ValueError: The data are not in the format of stable-baselines3.
-    """
+    """Returns the module of the network's class, and its settings."""
     try:
         found = json.loads(data.decode("utf-8"))
         module = str((found.get("policy_class") or {}).get("__module__"))
@@ -211,11 +207,7 @@ def _network(data: bytes) -> tuple[str, Settings]:
 
 
 def _check_weights(weights: bytes) -> None:
-    """Checks the pickle in a torch file, which is itself a zip file.
-
-    Raises:
-        ValueError: The file is damaged, or the pickle names anything but tensors.
-    """
+    """Checks that the pickle in a torch file, itself a zip file, names only tensors."""
     try:
         parts = read_zip(weights, MOST_BYTES)
         pickled = next(part for name, part in parts.items() if name.endswith(".pkl"))

@@ -26,7 +26,6 @@ def context_of(task: Task) -> dict[str, Any]:
 
 
 def _of_any(task: Task) -> dict[str, Any]:
-    """Returns the variables that are independent of the environment."""
     nominal, progress = task.nominal, task.spec.progress
     interface, limits = interface_of(task.make_env()), Limits()
     return {

@@ -109,13 +109,11 @@ def fenced_blocks(text: str, languages: frozenset[str]) -> list[str]:
 
 
 def _tree_size(source: str) -> int:
-    """Returns the number of nodes of the syntax tree."""
     with warnings.catch_warnings(action="ignore"):
         return sum(1 for _ in ast.walk(ast.parse(source)))
 
 
 def _functions(source: str) -> set[str]:
-    """Returns the names of the functions at the top level."""
     with warnings.catch_warnings(action="ignore"):
         body = ast.parse(source).body
     return {node.name for node in body if isinstance(node, ast.FunctionDef)}
@@ -132,7 +130,6 @@ def _rivals(block: _Block, best: _Block, sizes: dict[_Block, int]) -> bool:
 
 
 def _problem(lines: list[str], fences: list[_Fence], blocks: list[_Block]) -> str:
-    """Returns why an answer has no usable file."""
     if not fences:
         return "it has no fenced block"
     broken = [b for b in blocks if b.source is None and b.opening.language not in OTHER]
@@ -147,7 +144,6 @@ def _problem(lines: list[str], fences: list[_Fence], blocks: list[_Block]) -> st
 
 
 def _why_broken(source: str) -> str:
-    """Returns Python's error message for a text, with the line."""
     try:
         with warnings.catch_warnings(action="ignore"):
             ast.parse(source)
@@ -156,7 +152,7 @@ def _why_broken(source: str) -> str:
         return f"{error.msg} (line {error.lineno}: {line!r})"
     except (ValueError, RecursionError, MemoryError) as error:
         return str(error).partition("\n")[0] or type(error).__name__
-    return "there is no statement in it"
+    return "it contains no statement"
 
 
 def _overshadows(broken: _Block, best: _Block) -> bool:
@@ -235,10 +231,7 @@ def _closings(fences: list[_Fence], index: int) -> list[int]:
 def _longest(
     lines: list[str], fences: list[_Fence], index: int, closings: list[int]
 ) -> tuple[int, str | None]:
-    """Returns the last closing fence for which the block parses, and its source.
-
-    If there is none, returns the first closing fence and None.
-    """
+    """Returns the last fence with which the block parses, or the first one and None."""
     first = fences[index].line + 1
     broken = sys.maxsize
     for closing in reversed(closings):

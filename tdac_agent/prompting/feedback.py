@@ -130,7 +130,6 @@ def _root(failure: Failure) -> str:
 
 
 def _describe(group: Group) -> str:
-    """Describes a group: tests, messages, and what happened in the episodes."""
     lines = [_names(list(group.members)), *group.messages]
     lines += [f"What happened: {line}" for line in group.happened]
     return "\n   ".join(lines)
@@ -165,7 +164,6 @@ def _names(failures: list[Failure]) -> str:
 
 
 def _short(group: Group, unit: str, limit: int = 100) -> str:
-    """Describes a root cause briefly, with its figures."""
     first = group.members[0]
     if first.diagnosis is None or first.diagnosis.cause in ("error", "contract"):
         return cut(first.message, limit)

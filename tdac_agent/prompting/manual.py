@@ -59,11 +59,7 @@ def _sections(env: type) -> dict[str, str]:
 
 
 def _observation(space: spaces.Space[Any], text: str) -> str:
-    """Returns the docstring's rows for the keys of the space, with shape and range.
-
-    Raises:
-        ManualError: A key has no row.
-    """
+    """Returns the docstring's rows for the keys of the space, with shape and range."""
     assert isinstance(space, spaces.Dict)
     documented = dict(_rows(text))
     unknown = [key for key in space if key not in documented]
@@ -99,11 +95,6 @@ def _limits(box: spaces.Box) -> str:
 
 
 def _action(space: spaces.Space[Any], text: str) -> str:
-    """Returns the docstring's text about the action.
-
-    Raises:
-        ManualError: It begins with a different space.
-    """
     assert isinstance(space, spaces.Box)
     limits = _limits(space).replace(" to ", ", ")
     real = f"`Box({limits}, {space.shape}, {space.dtype})`"

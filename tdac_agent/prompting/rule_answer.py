@@ -30,11 +30,6 @@ _FOREIGN = re.compile(r"```|~~~|https?://")
 
 
 def _checked(text: str) -> str:
-    """Returns the clean text of a rule.
-
-    Raises:
-        ValueError: It has no words, is too long, or contains a code block or a URL.
-    """
     tidy = clean(text)
     if not re.search(r"\w", tidy):
         raise ValueError("a rule needs words")

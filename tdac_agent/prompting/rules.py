@@ -63,7 +63,7 @@ class RepairRule(_Record):
         sometimes = sum(0 < count < self.tried for count in passes)
         text = f"cured {always} of {len(passes)} test{'s' * (len(passes) != 1)}"
         if self.tried > 1:
-            text += f" in {self.tried} tries"
+            text += f" in each of {self.tried} tries"
         if sometimes:
             text += f", {sometimes} more in some of them"
         if self.worse:

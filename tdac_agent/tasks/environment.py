@@ -99,10 +99,7 @@ class Environment(ABC):
 
     @abstractmethod
     def reference_path(self, task: Nominal, x: float, y: float) -> list[Point]:
-        """Returns the oracle's path from (x, y) to the goal, both included.
-
-        Points that a straight drive can skip are left out.
-        """
+        """Returns the corners of the oracle's path, including (x, y) and the goal."""
 
     @abstractmethod
     def privileged_facts(self, task: Nominal) -> dict[str, Any]:

@@ -9,8 +9,7 @@ from tdac_envs.core.code_cache import cache_folder, has_code
 def compile_first(environment: Environment) -> None:
     """Compiles an environment's kernels unless compiled code is cached.
 
-    Compiling reports its progress. Without this call the judge would compile most
-    kernels, and the delay would go unexplained.
+    This reports progress; the judge, which would compile most of them, would not.
     """
     if not has_code(environment.kernels) and cache_folder() is not None:
         environment.use_kernels()

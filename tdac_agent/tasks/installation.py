@@ -29,10 +29,7 @@ SEED_BITS = 32
 
 @functools.cache
 def lasting_secret() -> bytes | None:
-    """Returns the stored secret, and creates it if needed.
-
-    Returns None, with a warning on stderr, if it cannot be stored.
-    """
+    """Returns the stored or a new secret; warns and returns None if that fails."""
     path = secret_file()
     if path is None:
         _warn("there is no home folder")

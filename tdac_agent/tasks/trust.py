@@ -68,12 +68,9 @@ def permit(whose: str | Path, wishes: Iterable[Wish], *, trust: bool) -> None:
     """
     needed = list(wishes)
     if needed and not trust:
+        start = f"{whose} was not created by this installation and wants to"
         raise NotTrustedError(
-            _line(
-                f"{whose} was not created by this installation and wants to {wish}: "
-                f"{_how_to_allow(wish)}"
-            )
-            for wish in needed
+            _line(f"{start} {wish}: {_how_to_allow(wish)}") for wish in needed
         )
     for wish in needed:
         line = _line(f"trusted for this command only: {whose} may {wish}")

@@ -16,9 +16,8 @@ _MARK_RADIUS, _MARK_HEIGHT = 0.02, 0.002
 def flat_world(world: World, dt: float) -> World:
     """Returns an equivalent world that is simpler to read.
 
-    Other e-pucks become obstacles, marks of other goals become ordinary obstacles if
-    they are solid and are removed otherwise, and nodes that are not modelled are
-    removed.
+    Other e-pucks and solid marks of other goals become ordinary obstacles; other marks
+    and nodes that are not modelled are removed.
 
     Args:
         world: World from `open_world`, with a robot and a goal.

@@ -104,8 +104,8 @@ def reordered(text: str, random: np.random.Generator) -> str:
 def turned_groups(text: str, angle: float) -> str:
     """Turns obstacles with several pieces, and turns their pieces back again.
 
-    The world stays the same. `write_world` turns only the pieces, so that a parser
-    which ignores the rotation of the obstacle would pass.
+    The world stays the same. `write_world` turns only the pieces; without this, a
+    parser that ignores the rotation of an obstacle would pass.
 
     Args:
         text: File from `write_world`.

@@ -1,4 +1,4 @@
-"""Exact answers about worlds with which suites compare a controller's functions."""
+"""Exact answers about worlds, for comparison with a controller's own functions."""
 
 from __future__ import annotations
 

@@ -171,11 +171,6 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
 
 
 def _check_robot_image(file: Path) -> None:
-    """Checks that the robot's picture can be drawn.
-
-    Raises:
-        TaskError: The file is not an image, or is too large.
-    """
     try:
         width, height = picture_size(read_bytes(file, ROBOT_IMAGE_BYTES), file.name)
     except MapError as error:

@@ -120,12 +120,7 @@ def _reached_modules(tree: ast.Module) -> Iterator[str]:
 def _root_and_hidden(
     node: ast.Attribute, inner: set[ast.expr]
 ) -> tuple[ast.expr, ast.Attribute | None]:
-    """Returns the root of a dotted name, and the first hidden module in it.
-
-    Args:
-        node: The dotted name.
-        inner: Set to which its parts are added, which are dotted names as well.
-    """
+    """Returns the root and first hidden module of a name; adds its parts to `inner`."""
     root: ast.expr = node
     hidden = None
     while isinstance(root, ast.Attribute):

@@ -1,4 +1,4 @@
-"""Exact answers with which suites compare a controller's own functions."""
+"""Exact answers, for comparison with a controller's own functions."""
 
 from __future__ import annotations
 
@@ -49,14 +49,12 @@ class Oracle:
     def shortest_length(self, occ: BoolGrid, start: Point, goal: Point) -> float:
         """Returns the octile length of the shortest 8-connected path, px.
 
+        The path cuts no corners; inf if an end is occupied or there is no path.
+
         Args:
             occ: Shape (height, width), bool `[y, x]`, True = occupied.
             start: Pixel (x, y).
             goal: Pixel (x, y).
-
-        Returns:
-            Length without corner cutting; inf if an end is occupied or there is no
-            path.
         """
         path = plan_path(~occ, start, goal)
         return path_length(path) if len(path) else math.inf

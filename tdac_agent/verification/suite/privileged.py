@@ -63,10 +63,10 @@ def privileged_controller(
         paths: Paths from `reference_paths`.
         name: Key of `POLICIES`.
     """
-    about = environment(task.env_id)
-    facts = about.privileged_facts(task)
+    entry = environment(task.env_id)
+    facts = entry.privileged_facts(task)
     templates = Environment(
-        loader=FileSystemLoader(about.folder),
+        loader=FileSystemLoader(entry.folder),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

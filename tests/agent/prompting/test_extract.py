@@ -354,7 +354,7 @@ def test_the_larger_tree_is_the_file():
         ("```json\n{}\n```", "no fenced block of Python"),
         ("```python\nx = 1\n", "its last fenced block has no end"),
         ("```python\nx = (\n```", r"'\(' was never closed \(line 1: 'x = \('\)"),
-        ("```python\n# nothing\n```", "there is no statement in it"),
+        ("```python\n# nothing\n```", "it contains no statement"),
         ("```python\nx = 1\n```", "no `def policy` at its top level"),
         ("```python\nclass policy: ...\n```", "no `def policy` at its top level"),
     ],

@@ -221,8 +221,8 @@ def test_what_came_of_a_rule():
     rule = book.rules[0]
     assert (rule.tried, rule.cured, rule.worse, rule.passes) == (2, 0, 1, (2, 1, 0))
     assert rule.effect_told == (
-        "cured 1 of 3 tests in 2 tries, 1 more in some of them; more tests failed than "
-        "before in 1 of them"
+        "cured 1 of 3 tests in each of 2 tries, 1 more in some of them; more tests "
+        "failed than before in 1 of them"
     )
     assert book.observed((), 2).rules[0].cured == 1
     edited, _ = apply(book, [edit("R1", "other")], 4, ("c",))
@@ -234,7 +234,7 @@ def test_a_record_that_does_not_tell_tests_apart():
     book, _ = apply(RuleBook(), [add("one")], 1, ("a", "b"))
     old = book.change("R1", tried=2, cured=1)
     assert old.rules[0].effect_told == (
-        "cured 0 of 2 tests in 2 tries, 2 more in some of them"
+        "cured 0 of 2 tests in each of 2 tries, 2 more in some of them"
     )
     assert old.observed(("b",), 9).rules[0].passes == (2, 1)
     assert book.change("R1", tried=1, passes=(1, 1, 1)).rules[0].passes_each == (0, 0)

@@ -232,7 +232,7 @@ def test_what_a_rule_cured_is_said_by_name(tmp_path, tdac):
     _, shown, _ = tdac("rules", folder)
     told = " ".join(shown.split())
     assert (
-        "effect: cured 2 of 6 tests in 2 tries, 1 more in some of them; cured: "
+        "effect: cured 2 of 6 tests in each of 2 tries, 1 more in some of them; cured: "
         "test_a, test_d; cured sometimes: test_b" in told
     )
     assert "failed before: test_a, test_b, test_c, test_d and 2 more" in told
