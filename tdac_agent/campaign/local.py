@@ -28,7 +28,7 @@ from tdac_agent.campaign.perform import Outcome, Terms
 from tdac_agent.campaign.plan import PlannedRun
 
 ERRORS = "errors.log"
-FAREWELL_SECONDS = 15.0
+EXIT_SECONDS = 15.0
 """Time for interrupted workers to save their progress."""
 MOST_RUNS = 500
 """Maximum number of runs of one process, in case its memory grows."""
@@ -135,7 +135,7 @@ class _Pool:
         """Interrupts busy workers, kills late ones, and waits until all have ended."""
         for worker in self.busy:
             worker.process.send_signal(signal.SIGINT)
-        deadline = time.monotonic() + FAREWELL_SECONDS
+        deadline = time.monotonic() + EXIT_SECONDS
         for worker in self.workers:
             if worker.planned is not None:
                 with suppress(subprocess.TimeoutExpired):

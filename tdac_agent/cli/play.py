@@ -95,11 +95,11 @@ def drive_disturbed(
         controller = Path(folder) / "controller.py"
         controller.write_bytes(source)
         driver = PolicySpec("controller", controller)
-        stage = EpisodeSetup(
+        setup = EpisodeSetup(
             task, driver, work, disturbance, tier, Limits(), child_pool
         )
         try:
-            return drive_seed(stage, seed)
+            return drive_seed(setup, seed)
         except SandboxError as error:
             raise Fault(f"the sandbox failed: {error}") from error
         finally:

@@ -30,21 +30,21 @@ class Entrant:
 
     Attributes:
         name: Name in tables and files.
-        contender: The policy for the judge; for `builtin`, whose file is written for
+        policy: The policy for the judge; for `builtin`, whose file is written for
             each task, a controller without a file.
         sha256: Hash of its file.
         env: Environment of its run folder, if it has one.
     """
 
     name: str
-    contender: PolicySpec
+    policy: PolicySpec
     sha256: str | None = None
     env: str | None = None
 
     @property
     def is_builtin(self) -> bool:
         """Whether a controller is written for each task."""
-        return self.contender.kind == "controller" and self.contender.file is None
+        return self.policy.kind == "controller" and self.policy.file is None
 
 
 def entrants_of(

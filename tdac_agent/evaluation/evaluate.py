@@ -118,7 +118,7 @@ def evaluate(
             )
             job = SeededJob(
                 task=lay_out(task, folder / "work"),
-                contender=entrants[0].contender,
+                policy=entrants[0].policy,
                 disturbance=NO_DISTURBANCE,
                 variation=variation,
                 seeds=seeds,
@@ -187,14 +187,14 @@ def _compete(
     entrant: Entrant, task: Task, job: SeededJob, judge: WarmJudge, watch: Watch | None
 ) -> tuple[Result, NDArray[np.float32], list[NDArray[np.float32]]]:
     """Runs a policy on a task; returns the result, call times in s, and poses."""
-    contender, sha256, note = entrant.contender, entrant.sha256, None
+    policy, sha256, note = entrant.policy, entrant.sha256, None
     if entrant.is_builtin:
         if watch is not None:
             watch(task.name, entrant.name, 0, 0)
         source, verified = write_builtin(task)
         file = job.out.with_suffix(".py")
         file.write_bytes(source)
-        contender, sha256 = replace(contender, file=file), sha256_of(source)
+        policy, sha256 = replace(policy, file=file), sha256_of(source)
         note = None if verified else NOT_VERIFIED
 
     def progress(count: int, successes: int) -> None:
@@ -202,12 +202,12 @@ def _compete(
             watch(task.name, entrant.name, count, successes)
 
     progress(0, 0)
-    request = job.model_copy(update={"contender": contender})
+    request = job.model_copy(update={"policy": policy})
     episodes, ending = run_seeds(request, task.nominal, Measured, judge, progress)
     result = Result(
         task=task.name,
         policy=entrant.name,
-        knows=contender.knows,
+        knows=policy.knows,
         episodes=tuple(episodes),
         sandbox=ending.tier,
         controller_sha256=sha256,
@@ -230,12 +230,12 @@ def _about_task(task: Task) -> EvaluatedTask:
 
 
 def _about_policy(entrant: Entrant) -> EvaluatedPolicy:
-    contender = entrant.contender
+    policy = entrant.policy
     return EvaluatedPolicy(
         name=entrant.name,
-        kind=contender.kind,
-        knows=contender.knows,
-        wrappers=contender.wrappers,
+        kind=policy.kind,
+        knows=policy.knows,
+        wrappers=policy.wrappers,
         sha256=entrant.sha256,
     )
 

@@ -88,7 +88,7 @@ def verify_robust(
         write_atomic(controller_file, source)
         job = SeededJob(
             task=lay_out(task, folder / "work"),
-            contender=PolicySpec("controller", controller_file),
+            policy=PolicySpec("controller", controller_file),
             disturbance=disturbance or Disturbance(),
             variation="jitter",
             seeds=tuple(range(first, first + episodes)),

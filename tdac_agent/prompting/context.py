@@ -20,7 +20,7 @@ from tdac_agent.verification.suite.hygiene import (
 def context_of(task: Task) -> dict[str, Any]:
     """Returns the template variables of a task.
 
-    They describe the nominal task only, not the moved starts or the tests.
+    They describe the nominal task only, not the jittered starts or the tests.
     """
     return {**_of_any(task), **task.environment.prompt_facts(task)}
 

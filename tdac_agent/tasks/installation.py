@@ -1,6 +1,6 @@
 """The installation secret, which authors of controllers do not know.
 
-It determines the moved starts of a verification and marks the run folders that this
+It determines the jittered starts of a verification and marks the run folders that this
 installation created. It is stored in the user's state folder, never in a run folder, a
 log or a sandbox.
 """
@@ -63,7 +63,7 @@ def _drawn_secret() -> bytes:
 
 
 def seed_of(source: bytes, task: Task) -> int:
-    """Returns the default seed of a controller's moved starts.
+    """Returns the default seed of a controller's jittered starts.
 
     It depends on the controller's bytes, the task and the secret: on one machine the
     same file gets the same verdict, and no author can predict the starts.
@@ -113,5 +113,5 @@ def _create(path: Path) -> None:
 
 
 def _warn(reason: str) -> None:
-    effect = "moved starts are drawn for this run only; its report has their seed"
+    effect = "jittered starts are drawn for this run only; its report has their seed"
     print(f"tdac: cannot store a secret ({reason}): {effect}", file=sys.stderr)

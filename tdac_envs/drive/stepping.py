@@ -1,7 +1,7 @@
 """Parts of a compiled step shared by all environments: motion, reward, episode end.
 
 A robot's state is kept in a few arrays. The constants below are the indices of the
-entries that all environments have; `tdac_envs.epuck.robot.Robot` documents them.
+entries that all environments have; each environment's class `Robot` documents them.
 """
 
 from __future__ import annotations

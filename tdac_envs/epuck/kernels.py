@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Words, line, plane
 from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.drive import stepping
 from tdac_envs.drive.stepping import (
     AXLE,
     DT,
@@ -54,12 +55,12 @@ MOST_TURNED = 1e4
 
 # Entries of `constants`, `state` and `outcome` beyond those of
 # `tdac_envs.drive.stepping`.
-FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(17, 22)
-N_CONSTANTS = 22
-LEFT_TURNED, RIGHT_TURNED = range(8, 10)
-N_STATE = 10
-FORWARD, TURN = range(10, 12)
-N_OUTCOME = 12
+N_CONSTANTS, N_STATE, N_OUTCOME = (
+    stepping.N_CONSTANTS + 5, stepping.N_STATE + 2, stepping.N_OUTCOME + 2,
+)  # fmt: skip
+FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(N_CONSTANTS - 5, N_CONSTANTS)
+LEFT_TURNED, RIGHT_TURNED = range(N_STATE - 2, N_STATE)
+FORWARD, TURN = range(N_OUTCOME - 2, N_OUTCOME)
 # Indices of some of the arrays of `_arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19

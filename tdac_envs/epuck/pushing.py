@@ -14,6 +14,7 @@ import numpy as np
 import pymunk
 from numpy.typing import NDArray
 
+from tdac_envs.epuck.kernels import AXLE_LENGTH
 from tdac_envs.epuck.prisms import FIXED, MID_X, MID_Y, REACH, Array, Prisms
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -25,7 +26,6 @@ and of objects."""
 _SKIN = 0.4
 _SUBSTEP = 0.002
 _GRAVITY = 9.81
-_AXLE = 0.052
 _STILL = 1e-5
 _LEAST = 0.05
 # Bound on how far anything moves in a step, m.
@@ -163,7 +163,9 @@ def _add_robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
     wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
     wheels.position, wheels.angle = robot.position, robot.angle
     pull = GRIP * ROBOT_MASS * _GRAVITY
-    space.add(robot, hull, wheels, *_friction(wheels, robot, pull, pull * _AXLE / 2))
+    space.add(
+        robot, hull, wheels, *_friction(wheels, robot, pull, pull * AXLE_LENGTH / 2)
+    )
     return robot, wheels
 
 

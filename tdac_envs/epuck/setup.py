@@ -95,7 +95,7 @@ class Setup:
         Args:
             task: Task of the episode.
             solid: Solid parts, if objects can be pushed; by default the ground's own.
-            seen: Visible parts, if objects can be pushed; by default the ground's own.
+            seen: Visible parts, if objects can be pushed; by default `around.visible`.
         """
         solid = task.ground.solid if solid is None else solid
         seen = self.around.visible if seen is None else seen

@@ -11,6 +11,7 @@ from tdac_agent.builtin.parameters import changed, check, tunable
 from tdac_agent.builtin.remedies import Remedies, Remedy
 from tdac_agent.builtin.template import Template
 from tdac_agent.verification.suite.contract import time_step
+from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
 
 # An e-puck with a plan gets stuck if its sensors falsely report an obstacle.
@@ -91,6 +92,8 @@ def template_for(task: EPuckTask) -> Template[EPuckParameters]:
     """Returns the template with a task's wheel limit, time step and tolerance."""
     facts = {
         "time_step": time_step(task.dt),
+        "wheel_radius": WHEEL_RADIUS,
+        "axle_length": AXLE_LENGTH,
         "max_wheel_speed": task.max_wheel_speed,
         "goal_tolerance": task.goal_tolerance,
     }

@@ -92,11 +92,14 @@ class EPuck(Environment):
     def privileged_facts(self, task: Nominal) -> dict[str, Any]:
         """See `Environment`."""
         from tdac_agent.verification.suite.contract import time_step
+        from tdac_envs.epuck.kernels import WHEEL_RADIUS
 
         own = _own(task)
         return {
             "largest": max(map(abs, own.ground.bounds)),
             "time_step": time_step(own.dt),
+            "wheel_radius": WHEEL_RADIUS,
+            "axle_length": own.axle_length,
             "max_wheel_speed": own.max_wheel_speed,
             "goal_tolerance": own.goal_tolerance,
         }

@@ -13,7 +13,7 @@ from tdac_agent.sandbox.inner.wire import WireError
 
 
 @contextmanager
-def ours() -> Generator[None]:
+def faults_of_judge() -> Generator[None]:
     """Turns errors that the controller did not cause into a `Fault`.
 
     Errors of the controller pass through. So do errors about values that cannot be sent

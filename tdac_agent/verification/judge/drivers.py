@@ -30,7 +30,7 @@ _ON_THE_SPOT, _GAIN = 0.7, 1.2
 
 @dataclass(frozen=True, slots=True)
 class PolicySpec:
-    """A policy, as a job names it.
+    """Which policy a job lets drive.
 
     Attributes:
         kind: Kind of policy.
@@ -145,11 +145,11 @@ class RandomDriver:
         return 0.0
 
 
-def _learned(contender: PolicySpec, env: JudgedEnv) -> Driver:
+def _learned(policy: PolicySpec, env: JudgedEnv) -> Driver:
     from tdac_agent.episodes.learned import Learned
 
-    assert contender.file is not None
-    return Learned(contender.file, contender.wrappers, env)
+    assert policy.file is not None
+    return Learned(policy.file, policy.wrappers, env)
 
 
 _OURS: dict[str, Callable[[PolicySpec, JudgedEnv, int], Driver]] = {
@@ -157,14 +157,14 @@ _OURS: dict[str, Callable[[PolicySpec, JudgedEnv, int], Driver]] = {
     "random": lambda _, env, seed: RandomDriver(env, seed),
     "go-to-goal": lambda _, env, __: SteeringDriver(env, guided=False),
     "follow-guidance": lambda _, env, __: SteeringDriver(env, guided=True),
-    "sb3": lambda contender, env, _: _learned(contender, env),
+    "sb3": lambda policy, env, _: _learned(policy, env),
 }
 
 
-def driver_of(contender: PolicySpec, env: JudgedEnv, seed: int) -> Driver:
-    """Makes the driver of one episode, for a contender that runs in this process.
+def driver_of(policy: PolicySpec, env: JudgedEnv, seed: int) -> Driver:
+    """Makes the driver of one episode, for a policy that runs in this process.
 
     Raises:
         ControllerFault: A learned policy does not fit this environment.
     """
-    return _OURS[contender.kind](contender, env, seed)
+    return _OURS[policy.kind](policy, env, seed)

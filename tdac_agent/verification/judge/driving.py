@@ -1,4 +1,4 @@
-"""One episode by its seed, driven by any contender."""
+"""One episode by its seed, driven by any policy."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class EpisodeSetup:
 
     Attributes:
         task: The task.
-        contender: The policy that drives.
+        policy: The policy that drives.
         workdir: Folder whose files a controller may read.
         disturbance: Disturbance of the environment.
         tier: Sandbox tier, or `auto`.
@@ -37,7 +37,7 @@ class EpisodeSetup:
     """
 
     task: Task
-    contender: PolicySpec
+    policy: PolicySpec
     workdir: Path
     disturbance: Disturbance
     tier: str
@@ -63,25 +63,25 @@ class SeededResult:
     task: Nominal
 
 
-def record_of(stage: EpisodeSetup, seed: int) -> Record:
+def record_of(setup: EpisodeSetup, seed: int) -> Record:
     """An empty record for the episode of a seed."""
-    env = stage.task.disturbed_env(stage.disturbance, stage.variation)
+    env = setup.task.disturbed_env(setup.disturbance, setup.variation)
     # The environment ends an episode at its horizon, which depends on the goal.
     return Record(env, None, FOREVER, seed=seed)
 
 
-def drive_seed(stage: EpisodeSetup, seed: int) -> SeededResult:
+def drive_seed(setup: EpisodeSetup, seed: int) -> SeededResult:
     """Drives the episode of a seed; a controller runs in a fresh child.
 
     The environment draws start and noise after `reset(seed=seed)`.
     """
-    record = record_of(stage, seed)
-    if stage.contender.kind != "controller":
-        return _driven_here(stage, record, seed)
-    name, source = f"seed {seed}", source_of(stage.contender)
-    child = stage.child_pool.take(stage.tier, stage.limits)
+    record = record_of(setup, seed)
+    if setup.policy.kind != "controller":
+        return _driven_here(setup, record, seed)
+    name, source = f"seed {seed}", source_of(setup.policy)
+    child = setup.child_pool.take(setup.tier, setup.limits)
     try:
-        child.copy_files(stage.workdir, source)
+        child.copy_files(setup.workdir, source)
         child.load()
         # Single calls and their mean time are limited instead of the episode.
         rollout = run_policy(child, record, name, held_out=False, deadline=math.inf)
@@ -92,17 +92,17 @@ def drive_seed(stage: EpisodeSetup, seed: int) -> SeededResult:
     return SeededResult(rollout, usage.cpu_seconds, child.tier, record.env.task)
 
 
-def source_of(contender: PolicySpec) -> bytes:
+def source_of(policy: PolicySpec) -> bytes:
     """Reads the source of a controller."""
-    assert contender.file is not None
-    return read_file(contender.file, RECORD_BYTES)
+    assert policy.file is not None
+    return read_file(policy.file, RECORD_BYTES)
 
 
-def _driven_here(stage: EpisodeSetup, record: Record, seed: int) -> SeededResult:
+def _driven_here(setup: EpisodeSetup, record: Record, seed: int) -> SeededResult:
     """Drives an episode of a baseline or learned policy, which run no foreign code."""
     name = f"seed {seed}"
     try:
-        driver = driver_of(stage.contender, record.env, seed)
+        driver = driver_of(setup.policy, record.env, seed)
         rollout = run_policy(driver, record, name, held_out=False, deadline=math.inf)
     except ControllerFault as fault:
         rollout = not_driven(record, name, fault)

@@ -19,7 +19,7 @@ from tdac_agent.sandbox import (
     Limits,
 )
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.judge.blame import ours
+from tdac_agent.verification.judge.blame import faults_of_judge
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.remote import Unit
 from tdac_agent.verification.judge.suite_episode import (
@@ -96,7 +96,7 @@ class Judge:
         self._limits = limits or Limits()
         self._deadline = time.monotonic() + wall_seconds
         self._too_long = f"the verification took longer than {wall_seconds:g} s"
-        self._brief = VerificationSettings(
+        self._settings = VerificationSettings(
             source, workdir, tier, self._limits, self._deadline
         )
         self._own = ExitStack()
@@ -132,8 +132,10 @@ class Judge:
         if self._unit is not None and self._unit.fault is not None:
             self._end_unit()
         if self._unit is None:
-            with self._ours():
-                self._unit = Unit(self._loaded(), self._deadline, self._ours)
+            with self._errors_as_faults():
+                self._unit = Unit(
+                    self._loaded(), self._deadline, self._errors_as_faults
+                )
         return self._unit
 
     def time_limit(self) -> AbstractContextManager[None]:
@@ -196,10 +198,10 @@ class Judge:
             self._submit(key)
 
     @contextmanager
-    def _ours(self) -> Generator[None]:
+    def _errors_as_faults(self) -> Generator[None]:
         """Records the first fault in the block, since a test may catch the error."""
         try:
-            with ours():
+            with faults_of_judge():
                 yield
         except Fault as fault:
             self.fault = self.fault or str(fault)
@@ -245,14 +247,14 @@ class Judge:
         return dict(zip(NAMES[1:], starts, strict=True))
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
-        with self._ours():
+        with self._errors_as_faults():
             return self._drive_with_retry(name, steps, drive)
 
     def _drive_with_retry(self, name: str, steps: int | None, drive: str) -> Rollout:
         if name != "nominal" and not self._submit(NOMINAL).result().reached:
             reason = "not run, since the nominal episode failed"
-            order = self._order(name, steps, drive)
-            return skipped(self.task, order, "not run", reason)
+            request = self._request(name, steps, drive)
+            return skipped(self.task, request, "not run", reason)
         with self._turns.beside():
             rollout = self.drive(name, steps, drive)
         if not rollout.is_retryable:
@@ -273,12 +275,12 @@ class Judge:
 
         The other arguments are as for `rollout`.
         """
-        order = self._order(name, steps, drive)
+        request = self._request(name, steps, drive)
         try:
             self._may_start()
-            driven = self._worker_pool.do(self._brief, order)
+            driven = self._worker_pool.do(self._settings, request)
         except ControllerFault as fault:
-            return not_driven(self.task, order, fault)
+            return not_driven(self.task, request, fault)
         self.tier = driven.tier
         self._account(driven.cpu_seconds)
         if driven.import_fault is not None:
@@ -286,10 +288,10 @@ class Judge:
         # Concurrent children may together use more than the limit of each.
         if self.cpu_seconds > self._limits.cpu_seconds:
             reason = f"the controller {self._overspent()}"
-            return skipped(self.task, order, "error", reason)
+            return skipped(self.task, request, "error", reason)
         return driven.rollout
 
-    def _order(self, name: str, steps: int | None, drive: str) -> EpisodeRequest:
+    def _request(self, name: str, steps: int | None, drive: str) -> EpisodeRequest:
         return EpisodeRequest(name, self.start_pose(name), steps, drive)
 
     def _overspent(self) -> str:
@@ -313,10 +315,10 @@ class Judge:
             ControllerFault: The import failed; later requests raise the same fault.
         """
         self._may_start()
-        child = self._child_pool.take(self._brief.tier, self._limits)
+        child = self._child_pool.take(self._settings.tier, self._limits)
         self.tier = child.tier
         try:
-            load_controller(child, self._brief)
+            load_controller(child, self._settings)
         except ControllerFault as fault:
             self._account(child.close().cpu_seconds)
             self._remember(fault, final=final)

@@ -52,7 +52,8 @@ class Unit:
     Args:
         child: Child with the controller imported.
         deadline: Latest end of the last call, by `time.monotonic`.
-        ours: Context of each request, which turns the judge's own errors into faults.
+        errors_as_faults: Context of each request; turns the judge's own errors into
+            faults.
 
     Attributes:
         fault: Why the process can no longer be used; None while it answers.
@@ -62,11 +63,11 @@ class Unit:
         self,
         child: Child,
         deadline: float,
-        ours: Callable[[], AbstractContextManager[None]],
+        errors_as_faults: Callable[[], AbstractContextManager[None]],
     ) -> None:
         self._child = child
         self._deadline = deadline
-        self._ours = ours
+        self._errors_as_faults = errors_as_faults
         self.fault: ControllerFault | None = None
 
     def get(self, name: str) -> Any:
@@ -105,7 +106,7 @@ class Unit:
         try:
             if seconds <= 0:
                 raise ControllerTimeout("the verification", 0)
-            with self._ours():
+            with self._errors_as_faults():
                 answer = request(seconds)
             return self._wrap(answer)
         except ControllerError:

@@ -83,7 +83,7 @@ class _Log(NamedTuple):
     records: list[BaseModel | None]
 
     def is_whole(self, failed: bool) -> bool:
-        """Whether the log is complete and its exit status agrees with `failed`."""
+        """Whether the log is complete and its exit status allows `failed` tests."""
         last = self.records[-1] if self.records else None
         ended = isinstance(last, _Finished) and last.exitstatus in (0, int(failed))
         return ended and None not in self.records

@@ -53,7 +53,7 @@ class SeededJob(BaseModel):
 
     kind: Literal["seeds"] = "seeds"
     task: Path
-    contender: PolicySpec
+    policy: PolicySpec
     disturbance: Disturbance
     variation: str
     seeds: tuple[int, ...]
@@ -129,9 +129,9 @@ def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
     on timing. Episodes after its decision are dropped.
     """
     job.out.mkdir(exist_ok=True)
-    stage = EpisodeSetup(
+    setup = EpisodeSetup(
         load_task(job.task),
-        job.contender,
+        job.policy,
         job.task,
         job.disturbance,
         job.tier,
@@ -143,7 +143,7 @@ def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
     all_kept: list[EpisodeSummary] = []
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
-            with closing(_in_order(stage, job)) as episodes:
+            with closing(_in_order(setup, job)) as episodes:
                 for kept in episodes:
                     tier = kept.tier or tier
                     file.write(kept.figures.model_dump_json() + "\n")
@@ -167,13 +167,13 @@ def _write_arrays(all_kept: list[EpisodeSummary], out: Path) -> None:
     np.save(out / CALLS_FILE, np.concatenate([np.zeros(0, np.float32), *calls]))
 
 
-def _in_order(stage: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
+def _in_order(setup: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
     """Yields episodes in order, several running at a time; closing waits for them."""
     size = min(SIZE, len(job.seeds))
     turns, late = Turns(size), list[int]()
-    work = partial(_run_episode, stage, job.measured)
+    work = partial(_run_episode, setup, job.measured)
     with (
-        closing(WorkerPool(work, stage.child_pool.close, size)) as worker_pool,
+        closing(WorkerPool(work, setup.child_pool.close, size)) as worker_pool,
         ThreadPoolExecutor(max_workers=size) as pool,
     ):
         try:
@@ -186,14 +186,14 @@ def _in_order(stage: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
 
 
 def _run_episode(
-    stage: EpisodeSetup, measured: bool, seed: int, skip: bool
+    setup: EpisodeSetup, measured: bool, seed: int, skip: bool
 ) -> EpisodeSummary:
     """Drives or skips the episode of a seed, and returns what is kept of it."""
-    driven = _skipped(stage, seed) if skip else drive_seed(stage, seed)
+    driven = _skipped(setup, seed) if skip else drive_seed(setup, seed)
     rollout = driven.rollout
     late = rollout.outcome == "error" and rollout.timed_out
     if not measured:
-        found = figures(driven, seed, stage.task)
+        found = figures(driven, seed, setup.task)
         return EpisodeSummary(found, driven.tier, late, rollout.is_retryable)
     return EpisodeSummary(
         measure(rollout, seed, driven.task),
@@ -205,9 +205,9 @@ def _run_episode(
     )
 
 
-def _skipped(stage: EpisodeSetup, seed: int) -> SeededResult:
+def _skipped(setup: EpisodeSetup, seed: int) -> SeededResult:
     reason = f"not driven, because {MOST_LATE} earlier episodes timed out"
-    record = record_of(stage, seed)
+    record = record_of(setup, seed)
     rollout = not_driven(record, f"seed {seed}", ControllerFault(reason, "policy"))
     return SeededResult(rollout, 0.0, "", record.env.task)
 

@@ -42,7 +42,7 @@ from tdac_agent.verification.suite.starts import spread_starts
 from tdac_envs.core.code_cache import has_code
 from tdac_envs.drive.env import Observation
 
-FAREWELL_SECONDS = 1.0
+EXIT_SECONDS = 1.0
 # Exit codes of a worker; a suite may end it with any other code.
 NO_JOB, DID_JOB = 77, 78
 DONE = b"done"
@@ -107,7 +107,7 @@ def _status_of(worker: int) -> int:
     watch.poll()
     watch.unregister(0)
     # A worker without a job ends by itself.
-    if not watch.poll(1000 * FAREWELL_SECONDS):
+    if not watch.poll(1000 * EXIT_SECONDS):
         os.killpg(worker, signal.SIGKILL)
     waiting.join()  # back to a single thread before the next fork
     os.close(ended)

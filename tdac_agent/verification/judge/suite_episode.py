@@ -15,7 +15,7 @@ from tdac_agent.sandbox import (
     Limits,
 )
 from tdac_agent.tasks.task import Task, load_task
-from tdac_agent.verification.judge.blame import ours
+from tdac_agent.verification.judge.blame import faults_of_judge
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.worker_pool import WorkerPool
 from tdac_envs.drive.task import Pose
@@ -85,10 +85,10 @@ SuitePool = WorkerPool[[VerificationSettings, EpisodeRequest], SuiteResult]
 
 
 def drive_known(
-    child_pool: ChildPool, brief: VerificationSettings, order: EpisodeRequest
+    child_pool: ChildPool, settings: VerificationSettings, request: EpisodeRequest
 ) -> SuiteResult:
-    """The same as `drive`, for the task in the brief's folder."""
-    return drive(_task_of(brief.workdir), child_pool, brief, order)
+    """The same as `drive`, for the task in the folder of the settings."""
+    return drive(_task_of(settings.workdir), child_pool, settings, request)
 
 
 @functools.lru_cache(maxsize=1)
@@ -96,78 +96,78 @@ def _task_of(workdir: Path) -> Task:
     return load_task(workdir)
 
 
-@ours()
+@faults_of_judge()
 def drive(
     task: Task,
     child_pool: ChildPool,
-    brief: VerificationSettings,
-    order: EpisodeRequest,
+    settings: VerificationSettings,
+    request: EpisodeRequest,
 ) -> SuiteResult:
     """Drives an episode in a fresh child.
 
     Raises:
         Fault: The sandbox or the judge failed.
     """
-    limit = order.steps if order.steps is not None else task.nominal.horizon
-    record = Record(task.make_env(), order.start, limit)
-    if order.drive == "truncated run_episode":
+    limit = request.steps if request.steps is not None else task.nominal.horizon
+    record = Record(task.make_env(), request.start, limit)
+    if request.drive == "truncated run_episode":
         record.truncates, record.collisions_before = True, 2
-    child = child_pool.take(brief.tier, brief.limits)
+    child = child_pool.take(settings.tier, settings.limits)
     try:
-        load_controller(child, brief)
+        load_controller(child, settings)
     except ControllerFault as fault:
         cpu_seconds = child.close().cpu_seconds
-        rollout = not_driven(task, order, fault)
+        rollout = not_driven(task, request, fault)
         return SuiteResult(rollout, cpu_seconds, child.tier, fault)
     try:
-        if order.drive != "policy":
+        if request.drive != "policy":
             seconds = child.limits.reset_seconds + 2 * limit * task.nominal.dt
             rollout = run_own_loop(
-                child, record, order.name, timeout=seconds, deadline=brief.deadline
+                child, record, request.name, timeout=seconds, deadline=settings.deadline
             )
         else:
             rollout = run_policy(
                 child,
                 record,
-                order.name,
-                held_out=order.held_out,
-                deadline=brief.deadline,
+                request.name,
+                held_out=request.held_out,
+                deadline=settings.deadline,
             )
     finally:
         cpu_seconds = child.close().cpu_seconds
     return SuiteResult(rollout, cpu_seconds, child.tier)
 
 
-def load_controller(child: Child, brief: VerificationSettings) -> None:
+def load_controller(child: Child, settings: VerificationSettings) -> None:
     """Copies the task's files and the controller to a child, and imports it there.
 
     Raises:
         ControllerFault: The controller cannot be imported.
         SandboxError: The files cannot be copied.
     """
-    child.copy_files(brief.workdir, brief.source)
+    child.copy_files(settings.workdir, settings.source)
     child.load()
 
 
-def not_driven(task: Task, order: EpisodeRequest, fault: ControllerFault) -> Rollout:
+def not_driven(task: Task, request: EpisodeRequest, fault: ControllerFault) -> Rollout:
     """The episode of a controller that cannot be imported, or is out of resources."""
     return replace(
-        skipped(task, order, "error", str(fault)),
+        skipped(task, request, "error", str(fault)),
         timed_out=isinstance(fault, ControllerTimeout),
         is_retryable=fault.is_retryable,
     )
 
 
 def skipped(
-    task: Task, order: EpisodeRequest, outcome: Outcome, reason: str
+    task: Task, request: EpisodeRequest, outcome: Outcome, reason: str
 ) -> Rollout:
     """An episode without steps."""
-    record = Record(task.make_env(), order.start, 1)
+    record = Record(task.make_env(), request.start, 1)
     record.reset()
     nominal = task.nominal
     return Rollout(
-        order.name,
-        order.held_out,
+        request.name,
+        request.held_out,
         outcome,
         record.trajectory(),
         nominal.goal,

@@ -34,7 +34,7 @@ KEPT_VARIABLES = frozenset(
 )
 # A start on a busy machine may take minutes; a dead server is noticed at once.
 START_SECONDS = 600.0
-FAREWELL_SECONDS = 5.0
+EXIT_SECONDS = 5.0
 POLL_SECONDS = 0.2
 
 
@@ -113,7 +113,7 @@ class WarmJudge:
             # A worker leads a process group; its children end with it.
             with suppress(ProcessLookupError):  # it has just ended by itself
                 os.killpg(worker, signal.SIGKILL)
-            self._line(FAREWELL_SECONDS)
+            self._line(EXIT_SECONDS)
             raise
 
     def _worker(self) -> int:

@@ -18,7 +18,7 @@ from tdac_agent.verification.verify import verify
 
 KEYED = "from tdac_agent.tasks.installation import keyed; print(keyed(b'x').hex())"
 LINE = "tdac: cannot store a secret ("
-END = ": moved starts are drawn for this run only; its report has their seed"
+END = ": jittered starts are drawn for this run only; its report has their seed"
 VERIFY = """
 import sys
 from tdac_agent.tasks.task import load_task
