@@ -189,7 +189,7 @@ def test_time_outs_end_a_policy_and_not_the_evaluation(controllers, small_task, 
     late = row(found, str(hangs))
     assert late.successes == 0
     assert late.outcomes == {"error": 12}
-    assert any("3 episodes before it timed out" in reason for reason in late.reasons)
+    assert any("3 earlier episodes timed out" in reason for reason in late.reasons)
     assert row(found, "reference").successes == 12
 
 
