@@ -361,7 +361,7 @@ def test_the_cpu_budget_is_for_all_episodes(small_task, good_source, no_traces):
     assert not report.passed
     assert report.child_cpu_seconds < 8
     errors = [episode.error or "" for episode in report.episodes]
-    assert any("used 2 s of CPU time" in error for error in errors), errors
+    assert any("limit of 2 s of CPU time" in error for error in errors), errors
 
 
 COMMAND = ["-m", "tdac_agent", "verify"]

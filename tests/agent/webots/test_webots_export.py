@@ -242,7 +242,7 @@ def test_the_whole_way(tdac):
     assert tdac("synth", "--task", "epuck-crates", "--out", "run")[0] == 0
     code, out, _ = tdac("export", "webots", "run", "--out", "project")
     assert code == 0
-    found = re.search(r"the goal after (\d+) steps \(verified: (\d+)\)", out)
+    found = re.search(r"the goal after (\d+) steps \(when verified: (\d+)\)", out)
     assert found is not None, out
     here, verified = map(int, found.groups())
     assert abs(here - verified) <= 0.05 * verified

@@ -99,10 +99,10 @@ def test_an_edited_callee_in_another_module_takes_effect(copied_package):
     """numba looks at the file of the kernel that is called, and at no other."""
     script = (
         "import numpy as np\n"
-        "from tdac_envs.core.compiled import constant\n"
-        "from tdac_envs.map2d.straight import gets_straight\n"
-        "clear = constant(np.full((9, 40), 9.0), np.float32)\n"
-        "print(gets_straight(clear, 4.0, 4.0, 30.0, 4.0, 2.0))\n"
+        "from tdac_envs.core.compiled import read_only\n"
+        "from tdac_envs.map2d.straight import is_straight_path_free\n"
+        "clear = read_only(np.full((9, 40), 9.0), np.float32)\n"
+        "print(is_straight_path_free(clear, 4.0, 4.0, 30.0, 4.0, 2.0))\n"
     )
     file = copied_package / "tdac_envs" / "map2d" / "contact.py"
     text = file.read_text()
