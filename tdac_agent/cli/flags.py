@@ -51,9 +51,18 @@ class TaskFlags:
     threshold: float | None = None
     instructions: str | None = None
 
-    def given(self) -> bool:
-        """Whether any flag names or changes a task."""
-        return self != TaskFlags()
+    def load_beside(self, folder: Path) -> Task:
+        """The task that `--task`, `--map` or `--world` names, or that of a folder.
+
+        Raises:
+            TaskError: Other flags would change the folder's task, or the task cannot be
+                used.
+        """
+        if self.task or self.map_image or self.world:
+            return self.load()
+        others = tuple(each.name for each in fields(self))
+        self._refuse(f"{folder} brings its own task", others)
+        return load_task(folder)
 
     def words(self) -> list[str]:
         """The command line words that repeat these flags."""

@@ -14,7 +14,7 @@ from tdac_agent.cli.robust_flags import RobustFlags
 from tdac_agent.cli.spinner import Spinner
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.report import Report
@@ -86,7 +86,7 @@ def run(
 
 def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
     """The file and its task; shows a status while a task is built from flags."""
-    if not flags.given():
+    if flags == TaskFlags():
         return controller_and_task(controller, flags)
     from tdac_agent.cli.console import Console
 
@@ -148,13 +148,13 @@ def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
         file = path / "controller.py"
         if not file.is_file():
             raise ControllerFileError(_without_controller(path))
-        return file, flags.load() if flags.given() else load_task(path)
+        return file, flags.load_beside(path)
     if not path.is_file():
         raise ControllerFileError(f"no controller {controller!r}: no such file")
     if path.suffix != ".py":
         raise ControllerFileError(f"{controller!r} is not a controller: expected a .py")
-    if not flags.given() and (path.parent / TASK_FILE).is_file():
-        return path, load_task(path.parent)
+    if (path.parent / TASK_FILE).is_file():
+        return path, flags.load_beside(path.parent)
     return path, flags.load()
 
 

@@ -94,7 +94,9 @@ def test_run_episode_schema(rollout):
     several = Several()
     with several:
         found = result["collisions"]
-        assert type(found) is int, f"run_episode: collisions is {shown(found)}, no int"
+        assert type(found) is int, (
+            f"run_episode: collisions is not an int but {shown(found)}"
+        )
     for name, expected in (("positions", steps + 1), ("speeds", steps)):
         with several:
             count = len(result[name])

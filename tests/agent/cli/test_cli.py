@@ -444,6 +444,15 @@ def test_synth_writes_a_run(tdac, good):
     assert Path("a/controller.py").is_file()
 
 
+@pytest.mark.parametrize("command", [["verify"], ["play", "--video", "a.gif"]])
+@pytest.mark.parametrize("target", [".", "controller.py"])
+def test_a_folder_keeps_its_own_task(tdac, good, command, target):
+    """Flags that would change it are refused; another task can be named."""
+    code, _, errors = tdac(*command, good / target, "--start", "60", "35")
+    assert code == 2
+    assert re.fullmatch(r"error: \S+ brings its own task: leave out --start\n", errors)
+
+
 def test_synth_says_no(tdac, tmp_path):
     """Exit 1 where nothing was verified in K iterations."""
     folder = write_small_task(tmp_path / "task", profile="policy")
