@@ -8,10 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tdac_envs.core.errors import TaskError
+
 VARIATIONS = ("nominal", "jitter", "mixed", "random")
 """How starts are drawn; `"random"` also draws the goal."""
 MIN_HORIZON = 2500
 JITTER_HEADING = 0.5
+MAX_FULL_STEP = 1e6
+"""Longest distance of one step at full speed, px or m: a longer arc takes seconds."""
 MAX_DRAWS = 1000
 
 
@@ -52,6 +56,19 @@ def jittered_pose(
             return pose
         reach *= 0.98
     return nominal._replace(heading=pose.heading)
+
+
+def check_full_step(dt: float, speed: float, unit: str) -> None:
+    """Refuses steps so long that their arcs could not be computed in time.
+
+    Raises:
+        TaskError: One is.
+    """
+    if dt * speed > MAX_FULL_STEP:
+        raise TaskError(
+            f"a step of {dt:g} s at {speed:g} {unit}/s is {dt * speed:g} {unit} long; "
+            f"the limit is {MAX_FULL_STEP:g}: use a shorter dt or slower wheels"
+        )
 
 
 def wrap_heading(heading: float) -> float:

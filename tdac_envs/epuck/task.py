@@ -20,6 +20,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import (
     MAX_DRAWS,
     Pose,
+    check_full_step,
     default_horizon_for,
     jittered_pose,
     wrap_heading,
@@ -143,6 +144,7 @@ def make_task(
     end = finite_point("goal", goal)
     tolerance = positive("goal_tolerance", goal_tolerance)
     limit, dt = positive("max_wheel_speed", max_wheel_speed), positive("dt", dt)
+    check_full_step(dt, limit * WHEEL_RADIUS, "m")
     check_body_fits(ground, "start", begin.x, begin.y)
     check_body_fits(ground, "goal", *end)
     field = route(ground, begin[:2], end)

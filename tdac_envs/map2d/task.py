@@ -20,6 +20,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import (
     MAX_DRAWS,
     Pose,
+    check_full_step,
     default_horizon_for,
     jittered_pose,
     wrap_heading,
@@ -161,6 +162,7 @@ def make_task(
     begin = begin._replace(heading=wrap_heading(begin.heading))
     end = finite_point("goal", goal)
     dt = positive("dt", dt)
+    check_full_step(dt, robot.max_wheel_speed, "px")
     check_body_fits(terrain, "start", begin.x, begin.y, robot.radius)
     check_body_fits(terrain, "goal", *end, robot.radius)
     field = route(terrain, begin[:2], end, robot.radius)

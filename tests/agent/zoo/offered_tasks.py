@@ -82,6 +82,7 @@ OFFERS = [
     _offer("large_body", robot(radius=1e300), "robot.radius"),
     _offer("thin_axle", robot(axle=1e-300), "robot.axle"),
     _offer("fast", robot(max_wheel_speed=float("inf")), "not a finite number"),
+    _offer("endless_step", task(dt=289155059), "shorter dt or slower wheels"),
     _offer("crawl", robot(max_wheel_speed=1e-9), "a horizon of at most"),
     _offer("far_start", task(start=[1e300, 50]), "start"),
     _offer("far_heading", task(start=[20, 50, 1e300]), "start"),
