@@ -4,26 +4,45 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
-from dataclasses import field, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.remedies import Remedies
 
 
-class Tuned(Protocol):
-    """Parameters of a template; the defaults are neutral.
+@dataclass(frozen=True, slots=True)
+class Tuned:
+    """Base of the parameters of a template, all of them floats with neutral defaults.
 
     The constants in the controller have the same names, in capitals. `remedies` maps
-    causes of failures to parameter changes.
+    causes of failures to parameter changes. `inflation_margin` is the desired clearance
+    around the body.
+
+    Raises:
+        ValueError: A value is out of bounds.
     """
 
-    __dataclass_fields__: ClassVar[dict[str, Any]]
     remedies: ClassVar[Remedies]
+    inflation_margin: float = 0.0
 
-    @property
-    def inflation_margin(self) -> float:
-        """Desired clearance around the body."""
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            low, high = item.metadata["low"], item.metadata["high"]
+            if not low <= value <= high:
+                raise ValueError(
+                    f"expected {item.name} in [{low:g}, {high:g}], got {value!r}"
+                )
+
+    def changed(self, **values: float) -> Self:
+        """Returns a copy with some values replaced, each clipped to its bounds."""
+        bounded: dict[str, Any] = {
+            item.name: _bounded(values[item.name], item.metadata)
+            for item in fields(self)
+            if item.name in values
+        }
+        return replace(self, **bounded)
 
 
 P = TypeVar("P", bound=Tuned)
@@ -51,31 +70,6 @@ def tunable(
     known = {"low": low, "high": high, "unit": unit, "meaning": meaning, "step": step}
     value: float = field(default=neutral, metadata=known)
     return value
-
-
-def changed(parameters: P, values: Mapping[str, float]) -> P:
-    """Returns a copy with some values replaced, each clipped to its bounds."""
-    bounded: dict[str, Any] = {
-        item.name: _bounded(values[item.name], item.metadata)
-        for item in fields(parameters)
-        if item.name in values
-    }
-    return replace(parameters, **bounded)
-
-
-def check(parameters: Tuned) -> None:
-    """Checks that all values are within their bounds.
-
-    Raises:
-        ValueError: A value is out of bounds.
-    """
-    for item in fields(parameters):
-        value = getattr(parameters, item.name)
-        low, high = item.metadata["low"], item.metadata["high"]
-        if not low <= value <= high:
-            raise ValueError(
-                f"expected {item.name} in [{low:g}, {high:g}], got {value!r}"
-            )
 
 
 def _bounded(value: float, known: Mapping[str, Any]) -> float:
@@ -110,4 +104,4 @@ def read_parameters(source: str, kind: type[P]) -> P | None:
                 found[names[name]] = float(value)
     if len(found) < len(names):
         return None
-    return changed(kind(), found)
+    return kind().changed(**found)

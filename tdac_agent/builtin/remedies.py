@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tdac_agent.builtin.parameters import P, about, changed
+from tdac_agent.builtin.parameters import P, about
 from tdac_agent.verification.diagnosis.report import Cause
 
 MARGIN = "inflation_margin"
@@ -50,7 +50,7 @@ class Remedy:
             values[MARGIN] = _wider(margin, bounds, step)
         elif self.margin == "narrower":
             values[MARGIN] = _narrower(margin, bounds, step)
-        return changed(parameters, values | off)
+        return parameters.changed(**(values | off))
 
 
 def _wider(margin: float, bounds: MarginBounds, step: float) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tdac_agent.builtin.parameters import P, Tuned, about, changed, names_of
+from tdac_agent.builtin.parameters import P, Tuned, about, names_of
 from tdac_agent.builtin.remedies import MARGIN, MarginBounds
 from tdac_agent.prompting.rules import MAX_RULE_CHARS
 from tdac_agent.verification.diagnosis.report import Cause, Report
@@ -62,7 +62,7 @@ def repair(
         wanted = _random_step(parameters, attempt)
         changes = {c.name: c for c in _compare(parameters, wanted, test, cause)}
     after = {name: change.after for name, change in changes.items()}
-    return changed(parameters, after), list(changes.values())
+    return parameters.changed(**after), list(changes.values())
 
 
 def _compare(parameters: P, wanted: P, test: str, cause: Cause) -> list[Change]:
@@ -95,7 +95,7 @@ def _random_step(parameters: P, seed: int) -> P:
         + 0.5 * random.uniform(item.metadata["low"], item.metadata["high"])
         for item in fields(parameters)
     }
-    return changed(parameters, values)
+    return parameters.changed(**values)
 
 
 def write_rules(
@@ -165,7 +165,7 @@ def read_rules(rules: Iterable[str], kind: type[P]) -> tuple[P, MarginBounds]:
             above = max(above, value)
         else:
             below = min(below, value)
-    return changed(kind(), values), MarginBounds(above, below)
+    return kind().changed(**values), MarginBounds(above, below)
 
 
 def learn_bounds(

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from tdac_agent.builtin.parameters import changed, names_of
+from tdac_agent.builtin.parameters import names_of
 from tdac_agent.builtin.provider import template_of
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
@@ -152,4 +152,4 @@ def _filled_in(values: dict[str, float], script: Path, setting: Setting) -> str:
             f"{script}: the template has no parameter {name!r}{hint(name, known)}; "
             f"known: {', '.join(known)}"
         )
-    return template.render(changed(template.kind(), values))
+    return template.render(template.kind().changed(**values))

@@ -31,6 +31,7 @@ EVALUATIONS, EPISODES = 12, 100
 MOST_ROBOTS = 100_000
 """Largest batch; an evaluation runs all of its episodes in one batch."""
 MOST_SEED = 2**31
+"""Largest seed of a training."""
 
 
 class TrainingPlan(BaseModel):

@@ -55,12 +55,12 @@ MOST_TURNED = 1e4
 
 # Entries of `constants`, `state` and `outcome` beyond those of
 # `tdac_envs.drive.stepping`.
-N_CONSTANTS, N_STATE, N_OUTCOME = (
-    stepping.N_CONSTANTS + 5, stepping.N_STATE + 2, stepping.N_OUTCOME + 2,
-)  # fmt: skip
-FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(N_CONSTANTS - 5, N_CONSTANTS)
-LEFT_TURNED, RIGHT_TURNED = range(N_STATE - 2, N_STATE)
-FORWARD, TURN = range(N_OUTCOME - 2, N_OUTCOME)
+N_CONSTANTS = stepping.N_CONSTANTS + 5
+FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(stepping.N_CONSTANTS, N_CONSTANTS)
+N_STATE = stepping.N_STATE + 2
+LEFT_TURNED, RIGHT_TURNED = range(stepping.N_STATE, N_STATE)
+N_OUTCOME = stepping.N_OUTCOME + 2
+FORWARD, TURN = range(stepping.N_OUTCOME, N_OUTCOME)
 # Indices of some of the arrays of `_arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19

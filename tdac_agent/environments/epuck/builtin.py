@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
 
-from tdac_agent.builtin.parameters import changed, check, tunable
+from tdac_agent.builtin.parameters import Tuned, tunable
 from tdac_agent.builtin.remedies import Remedies, Remedy
 from tdac_agent.builtin.template import Template
 from tdac_agent.verification.suite.contract import time_step
@@ -45,7 +45,7 @@ REMEDIES: Remedies = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class EPuckParameters:
+class EPuckParameters(Tuned):
     """Constants of the controller for the e-puck; the defaults are neutral."""
 
     remedies: ClassVar = REMEDIES
@@ -79,13 +79,6 @@ class EPuckParameters:
     unstick_after: float = tunable(
         0.0, 0.0, 400.0, "steps", "without progress before it ignores ps; 0: off"
     )
-
-    def __post_init__(self) -> None:
-        check(self)
-
-    def changed(self, **values: float) -> EPuckParameters:
-        """Returns a copy with some values replaced, each clipped to its bounds."""
-        return changed(self, values)
 
 
 def template_for(task: EPuckTask) -> Template[EPuckParameters]:

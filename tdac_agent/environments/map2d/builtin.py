@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
 
-from tdac_agent.builtin.parameters import changed, check, tunable
+from tdac_agent.builtin.parameters import Tuned, tunable
 from tdac_agent.builtin.remedies import Remedies, Remedy
 from tdac_agent.builtin.template import Template
 from tdac_envs.mapping.params import RobotParams
@@ -49,7 +49,7 @@ REMEDIES: Remedies = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class Parameters:
+class Parameters(Tuned):
     """Constants of the controller for maps; the defaults are neutral."""
 
     remedies: ClassVar = REMEDIES
@@ -87,13 +87,6 @@ class Parameters:
     unstick_after: float = tunable(
         0.0, 0.0, 400.0, "steps", "without progress before it drives carefully; 0: off"
     )
-
-    def __post_init__(self) -> None:
-        check(self)
-
-    def changed(self, **values: float) -> Parameters:
-        """Returns a copy with some values replaced, each clipped to its bounds."""
-        return changed(self, values)
 
 
 def template_for(robot: RobotParams, dt: float) -> Template[Parameters]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tdac_agent.tasks.task_file import TaskFile
     from tdac_agent.verification.suite.oracle import Oracle
     from tdac_envs.map2d.env import Map2DEnv
+    from tdac_envs.map2d.task import Map2DTask
 
 
 class Map2D(Environment):
@@ -74,10 +75,8 @@ class Map2D(Environment):
     def surroundings(self, task: Nominal) -> MapSurroundings:
         """Returns the map with the queries of a diagnosis."""
         from tdac_agent.environments.map2d.surroundings import MapSurroundings
-        from tdac_envs.map2d.task import Map2DTask
 
-        assert isinstance(task, Map2DTask)
-        return MapSurroundings(task)
+        return MapSurroundings(_own(task))
 
     def oracle(self) -> Oracle:
         """Returns an oracle for grids."""
@@ -88,18 +87,14 @@ class Map2D(Environment):
     def reference_path(self, task: Nominal, x: float, y: float) -> list[Point]:
         """See `Environment`."""
         from tdac_agent.environments.map2d.reference import reference_path
-        from tdac_envs.map2d.task import Map2DTask
 
-        assert isinstance(task, Map2DTask)
-        return reference_path(task, x, y)
+        return reference_path(_own(task), x, y)
 
     def privileged_facts(self, task: Nominal) -> dict[str, Any]:
         """See `Environment`."""
-        from tdac_envs.map2d.task import Map2DTask
-
-        assert isinstance(task, Map2DTask)
-        largest = max(task.terrain.grid.cells.shape)
-        return {"largest": largest, "robot": task.robot, "dt": task.dt}
+        own = _own(task)
+        largest = max(own.terrain.grid.cells.shape)
+        return {"largest": largest, "robot": own.robot, "dt": own.dt}
 
     def prompt_facts(self, task: Task) -> dict[str, Any]:
         """See `Environment`."""
@@ -114,6 +109,13 @@ class Map2D(Environment):
 
         own = map_setting(setting)
         return template_for(own.params.robot, own.nominal.dt)
+
+
+def _own(task: Nominal) -> Map2DTask:
+    from tdac_envs.map2d.task import Map2DTask
+
+    assert isinstance(task, Map2DTask)
+    return task
 
 
 MAP2D = Map2D()

@@ -80,6 +80,21 @@ def test_hygiene(controller, pattern):
     assert not found, f"{pattern.replace('_', ' ')}: {'; '.join(found[:8])}"
 
 
+def check_constants(controller, expected):
+    """Compares constants with the values in params.json."""
+    several = Several()
+    for name, value in expected.items():
+        with several:
+            found = controller.constant(name)
+            assert isinstance(found, int | float), (
+                f"{name} is {shown(found)}, not a number"
+            )
+            assert math.isclose(found, value, rel_tol=1e-6), (
+                f"{name} = {shown(found)}, not {value:g} as in params.json"
+            )
+    several.settle()
+
+
 @pytest.mark.paper
 def test_run_episode_schema(rollout):
     """`run_episode` returns five entries of the right types and lengths."""

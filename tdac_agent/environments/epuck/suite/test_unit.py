@@ -7,7 +7,7 @@ import pytest
 
 from tdac_agent.environments.epuck.oracle import occupied_at
 from tdac_agent.storage.plain import shown
-from tdac_agent.verification.suite.every_task import check_path
+from tdac_agent.verification.suite.every_task import check_constants, check_path
 from tdac_agent.verification.suite.several import Several
 
 pytestmark = pytest.mark.paper
@@ -62,17 +62,7 @@ def test_robot_constants(controller, task):
         "SENSOR_RANGE": params.robot.sensor_range,
         "GOAL_TOLERANCE": params.goal_tolerance,
     }
-    several = Several()
-    for name, value in expected.items():
-        with several:
-            found = controller.constant(name)
-            assert isinstance(found, int | float), (
-                f"{name} is {shown(found)}, not a number"
-            )
-            assert math.isclose(found, value, rel_tol=1e-6), (
-                f"{name} = {shown(found)}, not {value:g} as in params.json"
-            )
-    several.settle()
+    check_constants(controller, expected)
 
 
 def test_file_constant(controller):

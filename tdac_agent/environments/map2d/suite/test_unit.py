@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tdac_agent.storage.plain import shown
-from tdac_agent.verification.suite.every_task import check_path
+from tdac_agent.verification.suite.every_task import check_constants, check_path
 from tdac_agent.verification.suite.several import Several
 
 pytestmark = pytest.mark.paper
@@ -40,17 +40,7 @@ def test_robot_constants(controller, task):
         "SENSOR_FOV_DEG": robot.field_of_view_deg,
         "N_RAYS": robot.n_rays,
     }
-    several = Several()
-    for name, value in expected.items():
-        with several:
-            found = controller.constant(name)
-            assert isinstance(found, int | float), (
-                f"{name} is {shown(found)}, not a number"
-            )
-            assert math.isclose(found, value, rel_tol=1e-6), (
-                f"{name} = {shown(found)}, not {value}"
-            )
-    several.settle()
+    check_constants(controller, expected)
 
 
 @pytest.mark.parametrize("name", ["LOOKAHEAD", "STOP_DIST", "SLOW_DIST"])
