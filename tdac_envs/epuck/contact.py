@@ -24,6 +24,8 @@ _CLOSE = 1e-12
 CONTACT_GAP = 1e-9
 
 X, Y, HEADING = range(3)
+Near = tuple[Array, Index, Array, Index, int, int]
+"""The arguments `points`, `first`, `extent`, `listed`, `begin` and `end`."""
 
 
 @kernel
@@ -131,6 +133,51 @@ def _scan(
                     x, y, heading, forward, turn, radius, floor, best,
                 )  # fmt: skip
     return best, nearest
+
+
+@subkernel
+def arc_touch(
+    near: Near,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    radius: float,
+) -> float:
+    """`touch_of` for the parts `near`."""
+    points, first, extent, listed, begin, end = near
+    return touch_of(
+        points, first, extent, listed, begin, end,
+        x, y, heading, forward, turn, radius,
+    )  # fmt: skip
+
+
+@subkernel
+def near_normals(
+    near: Near, x: float, y: float, reach: float, normals: NDArray[np.float64]
+) -> int:
+    """Unit vectors to a point from the listed parts within `reach` of it.
+
+    Args:
+        near: The arguments `points`, `first`, `extent`, `listed`, `begin` and `end`.
+        x: x of the point.
+        y: y of the point.
+        reach: Distance.
+        normals: Shape (n, 2); its first rows are overwritten.
+
+    Returns:
+        The number of vectors, at most n.
+    """
+    points, first, extent, listed, begin, end = near
+    count = 0
+    for n in range(begin, end):
+        k = listed[n] if listed.shape[0] else n
+        gap, away_x, away_y = gap_of(points, first, extent, k, x, y)
+        if gap <= reach and count < normals.shape[0]:
+            normals[count, 0], normals[count, 1] = away_x, away_y
+            count += 1
+    return count
 
 
 @subkernel

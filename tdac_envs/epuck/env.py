@@ -45,7 +45,7 @@ class EPuckEnv(DrivenEnv):
     37 mm radius with two wheels of 20 mm radius, 52 mm apart. It moves along the exact
     arc of its wheel speeds, which are constant during a step. The disc swept along this
     arc is tested exactly against the shapes of all solid objects, so no step can jump
-    through a thin wall; a contact stops the robot. The world is surrounded by a fence,
+    through a thin wall. The world is surrounded by a fence,
     invisible to the sensors (0.5 m from the outermost objects if there are no walls).
 
     ## Action Space
@@ -98,8 +98,9 @@ class EPuckEnv(DrivenEnv):
     1. Termination: the robot's centre is within `goal_tolerance` of the goal, with
        nothing solid in between (`info["is_success"]`).
     2. Termination: the body touches an obstacle (`info["collision"]`). With
-       `on_collision="block"` the episode goes on: fixed obstacles stop the robot, it
-       pushes those that have a mass, and `info["collisions"]` counts the contacts.
+       `on_collision="block"` the episode goes on: the robot turns and slides along
+       fixed obstacles (`docs/contacts.md`) and pushes those that have a mass, and
+       `info["collisions"]` counts the steps in contact.
     3. Truncation: the episode has lasted `horizon` steps.
 
     ## Arguments
@@ -132,7 +133,8 @@ class EPuckEnv(DrivenEnv):
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: Initial version.
+    * v0: Initial version. Changed before the first release: with
+      `on_collision="block"`, a robot in contact turns and slides.
     """
 
     title = "TDAC-EPuck-v0"
@@ -295,6 +297,7 @@ class EPuckEnv(DrivenEnv):
         outcome[TOUCHED] = push(
             self._solid, ground.solid, ground.centres, ground.masses,
             state, self._speed, self._things, Drive(forward, turn, task.dt),
+            ground.world.friction,
         )  # fmt: skip
         self._carry()
         kernels.finish(words)

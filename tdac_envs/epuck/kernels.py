@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Words, line, plane
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive import stepping
+from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
     AXLE,
     DT,
+    FRICTION,
     GAP,
     GOAL_X,
     GOAL_Y,
@@ -28,6 +30,7 @@ from tdac_envs.drive.stepping import (
     ROOM,
     SLIP_LEFT,
     SLIP_RIGHT,
+    STOPS,
     TOLERANCE,
     TOUCHED,
     X,
@@ -42,7 +45,12 @@ from tdac_envs.drive.stepping import (
     move,
     wrap_angle,
 )
-from tdac_envs.epuck.contact import advance
+from tdac_envs.epuck.contact import (
+    CONTACT_GAP,
+    advance,
+    arc_touch,
+    near_normals,
+)
 from tdac_envs.epuck.gaps import nearest_of, remaining_path
 from tdac_envs.epuck.infrared import in_sight, sense
 from tdac_envs.epuck.nearby import listed_at
@@ -64,6 +72,8 @@ FORWARD, TURN = range(stepping.N_OUTCOME, N_OUTCOME)
 # Indices of some of the arrays of `_arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19
+
+_slide = sliding(arc_touch, near_normals)
 
 
 @subkernel
@@ -244,10 +254,17 @@ def _drive(
     else:
         left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
         begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
-        outcome[TOUCHED] = advance(
-            points, first, extent, listed, begin, end,
-            state, forward, turn, constants[RADIUS],
-        )  # fmt: skip
+        if constants[STOPS] == 1.0:
+            outcome[TOUCHED] = advance(
+                points, first, extent, listed, begin, end,
+                state, forward, turn, constants[RADIUS],
+            )  # fmt: skip
+        else:
+            outcome[TOUCHED] = _slide(
+                (points, first, extent, listed, begin, end),
+                state, forward, turn, constants[RADIUS], constants[FRICTION],
+                CONTACT_GAP,
+            )  # fmt: skip
     _finish(
         points, first, extent, cells, listed,
         seen_points, seen_first, seen_extent, seen_cells, seen_listed, field,

@@ -23,7 +23,6 @@ ROBOT_MASS = 0.16
 GRIP, SLIDE = 1.0, 0.5
 """Coulomb friction coefficients on the ground: of the robot's tyres (Webots' default)
 and of objects."""
-_SKIN = 0.4
 _SUBSTEP = 0.002
 _GRAVITY = 9.81
 _STILL = 1e-5
@@ -91,6 +90,7 @@ def push(
     speed: Array,
     things: Array,
     drive: Drive,
+    friction: float,
 ) -> bool:
     """Simulates one step with physics.
 
@@ -104,6 +104,7 @@ def push(
             overwritten.
         things: Shape (k, 6), as for `is_near`; overwritten.
         drive: Commanded motion of the robot.
+        friction: Coulomb friction coefficient of contacts.
 
     Returns:
         Whether the robot's body touched anything.
@@ -119,6 +120,9 @@ def push(
     _add_fixed(space, solid, state)
     robot, wheels = _add_robot(space, state, speed)
     touched: list[bool] = []
+    # The engine multiplies the coefficients of two shapes.
+    for shape in space.shapes:
+        shape.friction = math.sqrt(friction)
     space.on_collision(_ROBOT, None, post_solve=lambda *_: touched.append(True))
     count = max(math.ceil(drive.dt / _SUBSTEP), 1)
     for _ in range(count):
@@ -159,7 +163,7 @@ def _add_robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
         float(speed[2]),
     )
     hull = pymunk.Circle(robot, BODY_RADIUS)
-    hull.friction, hull.collision_type = _SKIN, _ROBOT
+    hull.collision_type = _ROBOT
     wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
     wheels.position, wheels.angle = robot.position, robot.angle
     pull = GRIP * ROBOT_MASS * _GRAVITY
@@ -235,5 +239,4 @@ def _add_shape(space: Any, body: Any, at: NDArray[np.float64], radius: float) ->
         shape: Any = pymunk.Circle(body, radius, (x, y))
     else:
         shape = pymunk.Poly(body, [(x, y) for x, y in at.tolist()])
-    shape.friction = _SKIN
     space.add(shape)

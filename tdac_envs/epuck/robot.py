@@ -20,13 +20,14 @@ class Robot(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
     Attributes:
-        constants: Shape (22,), float64: axle length (m), full wheel speed (rad/s), dt
+        constants: Shape (23,), float64: axle length (m), full wheel speed (rad/s), dt
             (s), body radius, sensor range (m), fraction of a wheel's speed that remains
             after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (m); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (m), horizon (steps);
-            height of the floor, x and y of the lower left corner of the path field and
-            of the cells, spacing of the field, width of the cells (m).
+            coefficient of friction between body and solids; height of the floor, x and
+            y of the lower left corner of the path field and of the cells, spacing of
+            the field, width of the cells (m).
         state: Shape (10,), float64: x, y (m), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
             over ground to wheel speed; steps so far; wheel angles (rad).

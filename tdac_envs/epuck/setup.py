@@ -76,6 +76,7 @@ class Setup:
                 *task.goal,
                 task.goal_tolerance,
                 task.horizon,
+                ground.world.friction,
                 ground.floor,
                 *ground.bounds[:2],
                 ground.spacing,

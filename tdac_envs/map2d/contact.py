@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.stepping import contact_free_length, move
 from tdac_envs.grid.grid import FloatGrid
@@ -128,6 +131,51 @@ def _scan(
                     )
             i += 1
     return best, nearest
+
+
+@subkernel
+def arc_contact(
+    clear: FloatGrid,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+    radius: float,
+) -> float:
+    """`first_contact` for other compiled code."""
+    end_x, end_y, _ = move(x, y, heading, forward, turn)
+    return contact_before(clear, x, y, heading, forward, turn, radius, end_x, end_y)
+
+
+@subkernel
+def near_normals(
+    clear: FloatGrid, x: float, y: float, reach: float, normals: NDArray[np.float64]
+) -> int:
+    """Unit vectors to a point from the occupied squares within `reach` px of it.
+
+    Args:
+        clear: Padded clearance, px.
+        x: Column of the point, px.
+        y: Row of the point, px.
+        reach: Distance, px.
+        normals: Shape (n, 2); its first rows are overwritten.
+
+    Returns:
+        The number of vectors, at most n.
+    """
+    count = 0
+    for j in range(math.ceil(y - reach - 0.5), math.floor(y + reach + 0.5) + 1):
+        for i in range(math.ceil(x - reach - 0.5), math.floor(x + reach + 0.5) + 1):
+            inside = -1 <= i < clear.shape[1] - 1 and -1 <= j < clear.shape[0] - 1
+            if not inside or clear[j + 1, i + 1] > 0.0 or count == normals.shape[0]:
+                continue
+            distance = math.sqrt(_square_distance2(x, y, i, j))
+            if 0.0 < distance <= reach:
+                normals[count, 0] = (x - max(i - 0.5, min(x, i + 0.5))) / distance
+                normals[count, 1] = (y - max(j - 0.5, min(y, j + 0.5))) / distance
+                count += 1
+    return count
 
 
 @subkernel

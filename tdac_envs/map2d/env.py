@@ -79,8 +79,9 @@ class Map2DEnv(DrivenEnv):
     1. Termination: the robot's centre is within `goal_tolerance` of the goal, with no
        wall in between (`info["is_success"]`).
     2. Termination: the body touches an obstacle (`info["collision"]`). With
-       `on_collision="block"` the robot stops there, the contact is counted in
-       `info["collisions"]`, and the episode goes on.
+       `on_collision="block"` the episode goes on: the wheels slip, so that the robot
+       turns and slides along the obstacle (`docs/contacts.md`), and
+       `info["collisions"]` counts the steps in contact.
     3. Truncation: the episode has lasted `horizon` steps.
 
     ## Arguments
@@ -117,7 +118,8 @@ class Map2DEnv(DrivenEnv):
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: Initial version.
+    * v0: Initial version. Changed before the first release: with
+      `on_collision="block"`, a robot in contact turns and slides.
     """
 
     title = "TDAC-Map2D-v0"

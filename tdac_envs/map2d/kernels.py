@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Words, block, line, plane
 from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
     AXLE,
     DT,
+    FRICTION,
     GAP,
     GOAL_X,
     GOAL_Y,
@@ -30,6 +32,7 @@ from tdac_envs.drive.stepping import (
     ROOM,
     SLIP_LEFT,
     SLIP_RIGHT,
+    STOPS,
     TOLERANCE,
     TOUCHED,
     Array,
@@ -46,7 +49,7 @@ from tdac_envs.drive.stepping import (
 )
 from tdac_envs.drive.stepping import clear as clear_state
 from tdac_envs.grid.grid import FloatGrid
-from tdac_envs.map2d.contact import contact_before
+from tdac_envs.map2d.contact import arc_contact, contact_before, near_normals
 from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
 
 # A stopped body is moved back along its arc by this distance, px, so that the next
@@ -54,6 +57,8 @@ from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
 CONTACT_GAP = 1e-6
 # Indices of some of the arrays of `_arrays_at`.
 STATE, POSE, WHEEL_SPEEDS, RANGES, OUTCOME = 5, 7, 8, 9, 10
+
+_slide = sliding(arc_contact, near_normals)
 
 
 @subkernel
@@ -81,9 +86,7 @@ def advance(
         Whether the body touched an obstacle. The robot is then placed `CONTACT_GAP`
         before the contact, with the heading it had there.
     """
-    forward = 0.5 * (left + right) * dt
-    # y points down, so a positive turn is clockwise on the screen.
-    turn = (left - right) * dt / axle
+    forward, turn = _arc(left, right, axle, dt)
     x, y, heading = state[X], state[Y], state[HEADING]
     end_x, end_y, end_heading = move(x, y, heading, forward, turn)
     touch = contact_before(
@@ -94,6 +97,13 @@ def advance(
         end_x, end_y, end_heading = move(x, y, heading, part * forward, part * turn)
     state[X], state[Y], state[HEADING] = end_x, end_y, wrap_angle(end_heading)
     return bool(touch <= 1.0)
+
+
+@subkernel
+def _arc(left: float, right: float, axle: float, dt: float) -> tuple[float, float]:
+    """Length (px) and turn (rad) of a step at constant wheel speeds."""
+    # y points down, so a positive turn is clockwise on the screen.
+    return 0.5 * (left + right) * dt, (left - right) * dt / axle
 
 
 @subkernel
@@ -210,15 +220,17 @@ def _drive(
     """
     apply_command(constants, state, queue, wheel_speeds, outcome)
     limit, before = constants[MAX_SPEED], outcome[REMAINING]
-    outcome[TOUCHED] = advance(
-        clear,
-        state,
-        limit * clip_unit(wheel_speeds[0] * state[SLIP_LEFT]),
-        limit * clip_unit(wheel_speeds[1] * state[SLIP_RIGHT]),
-        constants[AXLE],
-        constants[DT],
-        constants[RADIUS],
-    )
+    left = limit * clip_unit(wheel_speeds[0] * state[SLIP_LEFT])
+    right = limit * clip_unit(wheel_speeds[1] * state[SLIP_RIGHT])
+    axle, dt, radius = constants[AXLE], constants[DT], constants[RADIUS]
+    if constants[STOPS] == 1.0:
+        outcome[TOUCHED] = advance(clear, state, left, right, axle, dt, radius)
+    else:
+        forward, turn = _arc(left, right, axle, dt)
+        outcome[TOUCHED] = _slide(
+            clear, state, forward, turn, radius, constants[FRICTION],
+            CONTACT_GAP,
+        )  # fmt: skip
     _observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip

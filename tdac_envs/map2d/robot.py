@@ -15,16 +15,20 @@ from tdac_envs.map2d.task import Map2DTask
 Array = NDArray[np.float64]
 Observed = NDArray[np.float32]
 
+FRICTION = 0.4
+"""Coulomb friction coefficient between a robot's body and the obstacles."""
+
 
 class Robot(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
     Attributes:
-        constants: Shape (17,), float64: axle length (px), full wheel speed (px/s), dt
+        constants: Shape (18,), float64: axle length (px), full wheel speed (px/s), dt
             (s), body radius, largest range (px), fraction of a wheel's speed that
             remains after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (px); reward weights: progress,
-            goal, collision, time; goal x and y, goal tolerance (px), horizon (steps).
+            goal, collision, time; goal x and y, goal tolerance (px), horizon (steps);
+            coefficient of friction between body and obstacles.
         state: Shape (8,), float64: x, y (px), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
             over ground to wheel speed; steps so far.
@@ -105,6 +109,7 @@ def constants_of(
             *task.goal,
             task.goal_tolerance,
             task.horizon,
+            FRICTION,
         ],
         np.float64,
     )

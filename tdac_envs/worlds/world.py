@@ -29,6 +29,8 @@ from tdac_envs.worlds.footprint import (
 )
 
 MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
+INFINITE_FRICTION = 1e3
+"""Coefficient for Webots' infinite friction, and the largest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,6 +231,7 @@ class World:
         arenas: Floors, with or without walls.
         obstacles: Everything else, without the walls of the arenas.
         time_step: Physics time step, ms.
+        friction: Coulomb friction coefficient of contacts.
         unmodelled: Nodes of the file that are not in the model.
         source: File name.
         version: Webots version in the file's header.
@@ -240,6 +243,7 @@ class World:
     arenas: tuple[Arena, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     time_step: float = 32.0
+    friction: float = 1.0
     unmodelled: tuple[Unmodelled, ...] = ()
     source: str = field(default="", compare=False)
     version: str = field(default="", compare=False)
@@ -249,6 +253,10 @@ class World:
         object.__setattr__(self, "time_step", metres("time_step", self.time_step))
         if self.time_step <= 0.0:
             raise WorldError(f"expected a time step above 0, got {self.time_step}")
+        if not 0.0 <= self.friction <= INFINITE_FRICTION:
+            wanted = f"expected a friction from 0 to {INFINITE_FRICTION:g}"
+            raise WorldError(f"{wanted}, got {self.friction}")
+        object.__setattr__(self, "friction", metres("friction", self.friction))
         if self.goal is not None:
             point = (metres("x", self.goal[0]), metres("y", self.goal[1]))
             object.__setattr__(self, "goal", point)

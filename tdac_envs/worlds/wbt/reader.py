@@ -10,12 +10,12 @@ from tdac_envs.core.arguments import finite_point
 from tdac_envs.core.errors import WorldError, WorldFileError
 from tdac_envs.core.intake import printable, read_file
 from tdac_envs.worlds.bodies import bodies, floor_under
-from tdac_envs.worlds.wbt.fields import number, numbers, text
+from tdac_envs.worlds.wbt.fields import children, number, number_list, numbers, text
 from tdac_envs.worlds.wbt.found import WorldContent
 from tdac_envs.worlds.wbt.frames import Frame, world_frame
 from tdac_envs.worlds.wbt.tree import Document, Node, parse
 from tdac_envs.worlds.wbt.walk import walk
-from tdac_envs.worlds.world import EPuck, World
+from tdac_envs.worlds.world import INFINITE_FRICTION, EPuck, World
 
 LARGEST_FILE = 2_000_000
 """Maximum size of a world file, bytes."""
@@ -23,7 +23,7 @@ LARGEST_FILE = 2_000_000
 _FLU_SINCE = (2022, 1)
 _ENU_SINCE = (2020, 2)
 _Z_UP = {"ENU": True, "NUE": False, "EUN": False}
-_STEP = 32.0
+_STEP, _MATERIAL = 32.0, "default"
 _RAISED = 0.005
 
 
@@ -75,6 +75,7 @@ def read_world(
         arenas=tuple(found.arenas),
         obstacles=tuple(found.obstacles),
         time_step=_time_step(info, found),
+        friction=_friction(info),
         unmodelled=tuple(found.unmodelled),
         source=name,
         version=document.version,
@@ -147,6 +148,19 @@ def _time_step(info: Node | None, found: WorldContent) -> float:
         return step
     found.notes.append(f"basicTimeStep {step:g} is replaced by {_STEP:g}, as in Webots")
     return _STEP
+
+
+def _friction(info: Node | None) -> float:
+    """The friction between two default materials: those of e-pucks and most solids."""
+    pairs = () if info is None else children(info, "contactProperties")
+    for pair in pairs:
+        materials = {text(pair, f"material{k}", _MATERIAL) for k in (1, 2)}
+        found = number_list(pair, "coulombFriction")
+        if materials == {_MATERIAL} and found:
+            return (
+                found[0] if 0.0 <= found[0] < INFINITE_FRICTION else INFINITE_FRICTION
+            )
+    return 1.0
 
 
 def _driven_first(

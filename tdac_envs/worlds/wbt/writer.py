@@ -40,7 +40,9 @@ def write_world(world: World, *, supervisor: bool = False) -> str:
     blocks = [
         "\n".join(["#VRML_SIM R2025a utf8", *map(_comment, world.unmodelled), ""]),
         "\n".join([*map(_extern, externs), ""]),
-        _block("WorldInfo", [f"basicTimeStep {_n(world.time_step)}"]),
+        _block(
+            "WorldInfo", [f"basicTimeStep {_n(world.time_step)}", *_friction(world)]
+        ),
         _block("Viewpoint", [f"orientation {_FROM_ABOVE}", _position(world)]),
         "TexturedBackground {\n}\nTexturedBackgroundLight {\n}",
         *map(_arena, world.arenas),
@@ -50,6 +52,13 @@ def write_world(world: World, *, supervisor: bool = False) -> str:
         blocks.append(_block("DEF GOAL Pose", [_translation(*world.goal, 0.0)]))
     blocks += map(_obstacle, world.obstacles)
     return "\n".join(blocks) + "\n"
+
+
+def _friction(world: World) -> list[str]:
+    if world.friction == 1.0:
+        return []
+    properties = f"ContactProperties {{ coulombFriction [ {_n(world.friction)} ] }}"
+    return [f"contactProperties [ {properties} ]"]
 
 
 def _extern(name: str) -> str:

@@ -1,0 +1,141 @@
+"""Compiled motion of a disc that is not stopped by obstacles but slides along them.
+
+The rule is the limit of slow motion with dry friction. Up to a contact, the robot
+follows its arc exactly. In contact, its wheels slip: the body keeps turning as
+commanded, loses its velocity into the obstacle, and friction between its rim and the
+obstacle changes its velocity along the obstacle by at most `friction` times the lost
+velocity, until the rim no longer slides. It never gets faster than commanded. In a
+corner that it can only enter, it turns on the spot.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.compiled import subkernel
+from tdac_envs.drive.stepping import HEADING, Array, X, Y, move, wrap_angle
+
+MOST_NORMALS = 16
+"""Contacts considered at a time."""
+_FEWEST_PIECES, _MOST_PIECES, _TURN_OF_A_PIECE = 8, 32, 0.1
+_INTO = -1e-9
+
+
+def sliding(find_contact: Any, find_normals: Any) -> Any:
+    """Returns the subkernel `slide` for one kind of obstacles.
+
+    Args:
+        find_contact: Subkernel `(obstacles, x, y, heading, forward, turn, radius)` that
+            returns the fraction of an arc at which the disc first touches an obstacle,
+            or 2.0.
+        find_normals: Subkernel `(obstacles, x, y, reach, normals)` that writes the unit
+            vectors away from the obstacles within `reach` of a point, shape
+            (`MOST_NORMALS`, 2), and returns their number.
+    """
+
+    @subkernel
+    def slide(
+        obstacles: Any,
+        state: Array,
+        forward: float,
+        turn: float,
+        radius: float,
+        friction: float,
+        gap: float,
+    ) -> bool:
+        """Moves a disc for one step, along obstacles where they are in its way.
+
+        Args:
+            obstacles: First argument of `find_contact` and `find_normals`.
+            state: Begins with x, y (any unit of length) and heading (rad); overwritten.
+            forward: Length of the commanded arc, negative backwards.
+            turn: Commanded change of heading, rad.
+            radius: Radius of the disc.
+            friction: Coulomb friction coefficient between disc and obstacles.
+            gap: Distance along its motion at which the disc stops before an obstacle.
+
+        Returns:
+            Whether an obstacle was in the way.
+        """
+        x, y, heading = state[X], state[Y], state[HEADING]
+        pieces = math.ceil(abs(turn) / _TURN_OF_A_PIECE)
+        piece = 1.0 / min(max(pieces, _FEWEST_PIECES), _MOST_PIECES)
+        rest, touched = 1.0, False
+        while rest > 0.0:
+            arc, bend = rest * forward, rest * turn
+            part = find_contact(obstacles, x, y, heading, arc, bend, radius)
+            if part > 1.0:
+                x, y, heading = move(x, y, heading, arc, bend)
+                break
+            touched = True
+            part = max(part - gap / abs(arc), 0.0)
+            x, y, heading = move(x, y, heading, part * arc, part * bend)
+            rest -= part * rest
+            share = min(piece, rest)
+            normals = np.empty((MOST_NORMALS, 2))
+            count = find_normals(obstacles, x, y, radius + 2.0 * gap, normals)
+            along_x, along_y = slide_velocity(
+                forward, heading + 0.5 * share * turn, radius * turn, friction,
+                normals[:count],
+            )  # fmt: skip
+            length = share * math.sqrt(along_x * along_x + along_y * along_y)
+            if length > 0.0:
+                bearing = math.atan2(along_y, along_x)
+                part = find_contact(obstacles, x, y, bearing, length, 0.0, radius)
+                part = max(part - gap / length, 0.0) if part <= 1.0 else 1.0
+                x, y, _ = move(x, y, bearing, part * length, 0.0)
+            heading += share * turn
+            rest -= share
+        state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
+        return touched
+
+    return slide
+
+
+@subkernel
+def slide_velocity(
+    forward: float,
+    heading: float,
+    rim: float,
+    friction: float,
+    normals: NDArray[np.float64],
+) -> tuple[float, float]:
+    """The velocity of a disc in contact with obstacles; see the module docstring.
+
+    Args:
+        forward: Commanded speed, negative backwards.
+        heading: rad.
+        rim: Commanded speed of the rim due to turning, positive counter-clockwise.
+        friction: Coulomb friction coefficient.
+        normals: Shape (n, 2): unit vectors from the obstacles to the disc.
+    """
+    to_x, to_y = forward * math.cos(heading), forward * math.sin(heading)
+    is_blocked, best, best_x, best_y = False, -math.inf, 0.0, 0.0
+    for i in range(normals.shape[0]):
+        away_x, away_y = normals[i, 0], normals[i, 1]
+        into = to_x * away_x + to_y * away_y
+        if into >= 0.0:
+            continue
+        is_blocked = True
+        along = to_y * away_x - to_x * away_y
+        slip = along - rim
+        along -= math.copysign(min(-friction * into, abs(slip)), slip)
+        along = min(max(along, -abs(forward)), abs(forward))
+        x, y = -away_y * along, away_x * along
+        agrees = x * to_x + y * to_y
+        if agrees > best and not _enters(x, y, abs(forward), normals):
+            best, best_x, best_y = agrees, x, y
+    return (best_x, best_y) if is_blocked else (to_x, to_y)
+
+
+@subkernel
+def _enters(x: float, y: float, speed: float, normals: NDArray[np.float64]) -> bool:
+    """Whether a velocity leads into an obstacle."""
+    for j in range(normals.shape[0]):
+        if x * normals[j, 0] + y * normals[j, 1] < _INTO * speed:
+            return True
+    return False
