@@ -1,6 +1,6 @@
 """Draws `docs/contact.png`: a robot slides along a wall and turns out of a corner.
 
-    python tools/draw_contact.py [FILE]
+Usage: python tools/draw_contact.py [FILE]
 """
 
 from __future__ import annotations
