@@ -12,7 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import kernel, subkernel
-from tdac_envs.drive.stepping import contact_free_length, move, wrap_angle
+from tdac_envs.drive.sliding import sliding
+from tdac_envs.drive.stepping import (
+    FRICTION,
+    HEADING,
+    RADIUS,
+    STOPS,
+    X,
+    Y,
+    contact_free_length,
+    move,
+    wrap_angle,
+)
 from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.prisms import MID_X, MID_Y, REACH, Array, Index
 
@@ -23,7 +34,6 @@ _CLOSE = 1e-12
 # A stopped body is moved back along its arc by this distance, m.
 CONTACT_GAP = 1e-9
 
-X, Y, HEADING = range(3)
 Near = tuple[Array, Index, Array, Index, int, int]
 """The arguments `points`, `first`, `extent`, `listed`, `begin` and `end`."""
 
@@ -262,3 +272,35 @@ def advance(
     x, y, heading = move(x, y, heading, share * forward, share * turn)
     state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
     return bool(touch <= 1.0)
+
+
+_slide = sliding(arc_touch, near_normals)
+
+
+@subkernel
+def move_body(
+    near: Near, state: Array, forward: float, turn: float, constants: Array
+) -> bool:
+    """Moves the robot along an arc; a contact stops it, or it slides.
+
+    Args:
+        near: The arguments `points`, `first`, `extent`, `listed`, `begin` and `end`.
+        state: Begins with x, y and heading, which are overwritten.
+        forward: Arc length, m, negative backwards.
+        turn: Change of heading, rad.
+        constants: See `tdac_envs.epuck.robot.Robot`.
+
+    Returns:
+        Whether it touched a part.
+    """
+    radius = constants[RADIUS]
+    if constants[STOPS] == 0.0:
+        friction = constants[FRICTION]
+        touched: bool = _slide(
+            near, state, forward, turn, radius, friction, CONTACT_GAP
+        )
+        return touched
+    points, first, extent, listed, begin, end = near
+    return advance(
+        points, first, extent, listed, begin, end, state, forward, turn, radius
+    )

@@ -133,8 +133,7 @@ class EPuckEnv(DrivenEnv):
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: Initial version. Changed before the first release: with
-      `on_collision="block"`, a robot in contact turns and slides.
+    * v0: Initial version. `on_collision="block"` changed before the first release.
     """
 
     title = "TDAC-EPuck-v0"
@@ -262,10 +261,8 @@ class EPuckEnv(DrivenEnv):
         return np.column_stack([centres, np.zeros(len(centres))])
 
     def __getstate__(self) -> dict[str, Any]:
-        calls = dict.fromkeys(
-            ["addresses", "_call_begin", "_call_drive", "_call_exact"]
-        )
-        return {**self.__dict__, **calls, "_scene": None}
+        calls = "addresses", "_call_begin", "_call_drive", "_call_exact"
+        return {**self.__dict__, **dict.fromkeys(calls), "_scene": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

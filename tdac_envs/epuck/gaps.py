@@ -1,4 +1,4 @@
-"""Compiled distances to prisms.
+"""Compiled distances to prisms, and the length of the remaining path.
 
 Lengths are metres. `points`, `first` and `extent` are the arrays of a
 `tdac_envs.epuck.prisms.Prisms`. Functions that also take `listed`, `begin` and `end`
@@ -70,6 +70,21 @@ def _depth(
         if side > outside:
             outside, out_x, out_y = side, edge_y / length, -edge_x / length
     return min(outside, 0.0), out_x, out_y
+
+
+@subkernel
+def listed_at(
+    cells: Index, count: int, left: float, low: float, width: float, x: float, y: float
+) -> tuple[int, int]:
+    """Begin and end in `listed` of the parts that are relevant at a point.
+
+    `cells` is that of a `tdac_envs.epuck.nearby.Nearby`, with cells of `width` m.
+    Outside the grid, these are all of the `count` parts.
+    """
+    column, row = math.floor((x - left) / width), math.floor((y - low) / width)
+    if 0 <= row < cells.shape[0] and 0 <= column < cells.shape[1] - 1:
+        return cells[row, column], cells[row, column + 1]
+    return 0, count
 
 
 @kernel

@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Words, line, plane
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive import stepping
-from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
     AXLE,
     DT,
-    FRICTION,
     GAP,
     GOAL_X,
     GOAL_Y,
@@ -30,7 +28,6 @@ from tdac_envs.drive.stepping import (
     ROOM,
     SLIP_LEFT,
     SLIP_RIGHT,
-    STOPS,
     TOLERANCE,
     TOUCHED,
     X,
@@ -45,15 +42,9 @@ from tdac_envs.drive.stepping import (
     move,
     wrap_angle,
 )
-from tdac_envs.epuck.contact import (
-    CONTACT_GAP,
-    advance,
-    arc_touch,
-    near_normals,
-)
-from tdac_envs.epuck.gaps import nearest_of, remaining_path
+from tdac_envs.epuck.contact import move_body
+from tdac_envs.epuck.gaps import listed_at, nearest_of, remaining_path
 from tdac_envs.epuck.infrared import in_sight, sense
-from tdac_envs.epuck.nearby import listed_at
 from tdac_envs.epuck.prisms import Array, Index
 
 WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
@@ -72,8 +63,6 @@ FORWARD, TURN = range(stepping.N_OUTCOME, N_OUTCOME)
 # Indices of some of the arrays of `_arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19
-
-_slide = sliding(arc_touch, near_normals)
 
 
 @subkernel
@@ -254,17 +243,9 @@ def _drive(
     else:
         left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
         begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
-        if constants[STOPS] == 1.0:
-            outcome[TOUCHED] = advance(
-                points, first, extent, listed, begin, end,
-                state, forward, turn, constants[RADIUS],
-            )  # fmt: skip
-        else:
-            outcome[TOUCHED] = _slide(
-                (points, first, extent, listed, begin, end),
-                state, forward, turn, constants[RADIUS], constants[FRICTION],
-                CONTACT_GAP,
-            )  # fmt: skip
+        outcome[TOUCHED] = move_body(
+            (points, first, extent, listed, begin, end), state, forward, turn, constants
+        )
     _finish(
         points, first, extent, cells, listed,
         seen_points, seen_first, seen_extent, seen_cells, seen_listed, field,

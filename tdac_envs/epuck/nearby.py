@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import kernel, subkernel
+from tdac_envs.core.compiled import kernel
 from tdac_envs.epuck.gaps import gap_of
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import FARTHEST, at_ray_height
@@ -129,17 +129,3 @@ def cell_gaps(
             x, y = left + (column + 0.5) * width, low + (row + 0.5) * width
             for k in range(count):
                 gaps[row, column, k] = gap_of(points, first, extent, k, x, y)[0]
-
-
-@subkernel
-def listed_at(
-    cells: Index, count: int, left: float, low: float, width: float, x: float, y: float
-) -> tuple[int, int]:
-    """Begin and end in `Nearby.listed` of the parts that are relevant at a point.
-
-    Outside the grid, these are all of the `count` parts.
-    """
-    column, row = math.floor((x - left) / width), math.floor((y - low) / width)
-    if 0 <= row < cells.shape[0] and 0 <= column < cells.shape[1] - 1:
-        return cells[row, column], cells[row, column + 1]
-    return 0, count

@@ -19,6 +19,8 @@ Observed = NDArray[np.float32]
 class Robot(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
+    `kernels._arrays_at` and the indices beside it follow the order of the fields.
+
     Attributes:
         constants: Shape (23,), float64: axle length (m), full wheel speed (rad/s), dt
             (s), body radius, sensor range (m), fraction of a wheel's speed that remains

@@ -118,8 +118,7 @@ class Map2DEnv(DrivenEnv):
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: Initial version. Changed before the first release: with
-      `on_collision="block"`, a robot in contact turns and slides.
+    * v0: Initial version. `on_collision="block"` changed before the first release.
     """
 
     title = "TDAC-Map2D-v0"

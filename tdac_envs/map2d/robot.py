@@ -22,6 +22,8 @@ FRICTION = 0.4
 class Robot(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
+    `kernels._arrays_at` and the indices beside it follow the order of the fields.
+
     Attributes:
         constants: Shape (18,), float64: axle length (px), full wheel speed (px/s), dt
             (s), body radius, largest range (px), fraction of a wheel's speed that

@@ -8,10 +8,10 @@ import pytest
 
 from tdac_envs import bundled_worlds, load_world
 from tdac_envs.epuck.contact import first_touch, touch_of
-from tdac_envs.epuck.gaps import nearest_gap, nearest_of
+from tdac_envs.epuck.gaps import listed_at, nearest_gap, nearest_of
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import sense
-from tdac_envs.epuck.nearby import listed_at, surroundings
+from tdac_envs.epuck.nearby import surroundings
 from tdac_envs.epuck.paths import open_field, path_entry
 from tdac_envs.epuck.prisms import FIXED
 from tdac_envs.worlds.bodies import BODY_RADIUS
