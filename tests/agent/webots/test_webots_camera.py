@@ -118,15 +118,13 @@ def test_save_image(printed):
         "print(camera.saveImage('one.png', 100), camera.saveImage('two.jpg', 80),\n"
         "      camera.saveImage('no/folder.png', 100))\n"
         "one, two = open('one.png', 'rb').read(), open('two.jpg', 'rb').read()\n"
-        "print(one == two, one[1:4], one[16:24])\n"
+        "size = [int.from_bytes(one[at : at + 4], 'big') for at in (16, 20)]\n"
+        "print(one == two, one[1:4], size)\n"
     )
     assert out[0] == "-1"
     assert out[1].startswith("tdac: Camera.saveImage() writes PNG")
     assert out[2].startswith("Error: wb_camera_save_image() failed")
-    assert out[3:] == [
-        "0 0 -1",
-        r"True b'PNG' b'\x00\x00\x004\x00\x00\x00'" + "'",
-    ]
+    assert out[3:] == ["0 0 -1", "True b'PNG' [52, 39]"]
 
 
 def test_what_is_not_supported_is_said_once(printed):
@@ -174,6 +172,6 @@ def test_a_controller_that_steers_by_its_camera(drive):
     assert run.report.output == "there\n", run.report
     assert run.report.collisions == 0
     x, y, heading = run.report.end
-    assert -0.25 < x < -0.08
+    assert -0.35 < x < -0.15
     assert abs(y) < 0.1
     assert abs(heading) < 0.5

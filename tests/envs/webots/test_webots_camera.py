@@ -1,12 +1,13 @@
 """Camera images: what is seen where, against projections and plain ray marching."""
 
 import math
+import runpy
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from tdac_envs.epuck.prisms import Owned, Prisms
 from tdac_envs.webots.cameras import MOST_PIXELS, Cameras
 from tdac_envs.webots.controller.png import png
 from tdac_envs.webots.rendering import brightness, look_through
@@ -106,7 +107,7 @@ class TestProjection:
         arena = "RectangleArena { floorSize 3 3 floorTileSize 0.2 0.3 }\n"
         image = picture(HEAD + arena + "E-puck { }\n")
         left, up = rays()
-        near = np.where(up < -0.1, EYE[2] / -up, np.nan)
+        near = EYE[2] / np.maximum(-up, 0.1)
         x, y = EYE[0] + near, near * left
         even = (np.floor((x + 1.5) / 0.1) + np.floor((y + 1.5) / 0.15)) % 2 == 0
         seen, red = up < -0.1, image[..., 2]
@@ -331,9 +332,7 @@ def test_clear_surfaces_are_not_seen():
     image = scenery.image(view, 0.0055, 52, 39, np.empty((0, 3)))
     assert (image[..., 2] == 0).all()
     assert (image[30, 26, :2] > 0).tolist() == [True, False]
-    assert len(scenery.prisms.extent) == len(
-        Prisms.of([Owned(decal), Owned(decal)]).extent
-    )
+    assert len(scenery.prisms.extent) == 2
 
 
 def test_png_files_can_be_read():
@@ -341,3 +340,13 @@ def test_png_files_can_be_read():
     image = np.random.default_rng(0).integers(0, 256, (7, 5, 4), np.uint8)
     data = np.frombuffer(png(image.tobytes(), 5, 7), np.uint8)
     assert (cv2.imdecode(data, cv2.IMREAD_UNCHANGED) == image[..., :3]).all()
+
+
+def test_the_picture_of_the_docs():
+    """It is the one that its script draws."""
+    root = Path(__file__).parents[3]
+    script, file = root / "tools" / "camera_picture.py", root / "docs" / "camera.png"
+    if not (script.exists() and file.exists()):
+        pytest.skip("only in a clone of the repository")
+    drawn = runpy.run_path(str(script))["picture"]()[..., :3]
+    assert np.abs(cv2.imread(str(file)).astype(int) - drawn).max() <= 1
