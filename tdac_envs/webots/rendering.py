@@ -109,6 +109,12 @@ def _entry(
 
 
 @subkernel
+def _along(view: Array, row: int, x: float, y: float, z: float) -> float:
+    """Scalar product of a row of `view` and a vector."""
+    return float(x * view[row, 0] + y * view[row, 1] + z * view[row, 2])
+
+
+@subkernel
 def _window(
     points: Array, first: Index, extent: Array, part: int, view: Array, near: float
 ) -> tuple[float, float, float, float]:
@@ -117,9 +123,10 @@ def _window(
     is_disc = end - begin == 1
     corners = 4 if is_disc else end - begin
     left, top, right, bottom = math.inf, math.inf, -math.inf, -math.inf
-    across = np.dot(view[RIGHT], view[RIGHT])
-    first_column = np.dot(view[CORNER], view[RIGHT]) / across
-    first_row = np.dot(view[CORNER], view[DOWN]) / across
+    across = _along(view, RIGHT, view[RIGHT, 0], view[RIGHT, 1], view[RIGHT, 2])
+    corner = view[CORNER]
+    first_column = _along(view, RIGHT, corner[0], corner[1], corner[2]) / across
+    first_row = _along(view, DOWN, corner[0], corner[1], corner[2]) / across
     behind = 0
     for n in range(2 * corners):
         if is_disc:
@@ -129,14 +136,12 @@ def _window(
             x, y = points[begin + n % corners, 0], points[begin + n % corners, 1]
         z = extent[part, LOW] if n < corners else extent[part, HIGH]
         x, y, z = x - view[0, 0], y - view[0, 1], z - view[0, 2]
-        away = x * view[FORWARD, 0] + y * view[FORWARD, 1] + z * view[FORWARD, 2]
+        away = _along(view, FORWARD, x, y, z)
         if away <= near:
             behind += 1
             continue
-        column = x * view[RIGHT, 0] + y * view[RIGHT, 1] + z * view[RIGHT, 2]
-        row = x * view[DOWN, 0] + y * view[DOWN, 1] + z * view[DOWN, 2]
-        column = column / (across * away) - first_column
-        row = row / (across * away) - first_row
+        column = _along(view, RIGHT, x, y, z) / (across * away) - first_column
+        row = _along(view, DOWN, x, y, z) / (across * away) - first_row
         left, right = min(left, column), max(right, column)
         top, bottom = min(top, row), max(bottom, row)
     if 0 < behind < 2 * corners:
