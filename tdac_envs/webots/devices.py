@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from tdac_envs.epuck.infrared import TABLE
+from tdac_envs.webots.cameras import CAMERA_TYPE, CameraFacts
 from tdac_envs.worlds.wbt.fields import children, numbers, text
 from tdac_envs.worlds.wbt.robots import inside
 from tdac_envs.worlds.wbt.tree import Node
@@ -26,7 +28,7 @@ _PLACED = {
     "Compass": ("compass", 39),
     "InertialUnit": ("inertial unit", 46),
 }
-_MUTE = (("Camera", 38), ("Emitter", 43), ("Receiver", 56), ("Speaker", 59))
+_MUTE = (("Emitter", 43), ("Receiver", 56), ("Speaker", 59))
 GYRO_SCALE = 100000.0 / 13.3158
 """Gyro reading per rad/s."""
 _MAX_RATE, _MAX_ACCEL = 13.3158, 100.0
@@ -57,15 +59,20 @@ class DeviceFacts:
 
 
 def find_devices(
-    robot: Node, max_velocity: float
+    robot: Node, max_velocity: float, cameras: Iterable[CameraFacts] = ()
 ) -> tuple[tuple[DeviceFacts, ...], tuple[str, ...]]:
     """The devices of an e-puck, and the names of those that are not modelled.
 
     Args:
         robot: Node of the e-puck: the PROTO or a plain Robot.
         max_velocity: Maximum speed of the motors, rad/s.
+        cameras: Its cameras.
     """
     devices = [*_standard(max_velocity), *_ground(robot)]
+    devices += [
+        DeviceFacts(camera.name, "Camera", CAMERA_TYPE, camera.plain())
+        for camera in cameras
+    ]
     absent = ["tof"] if text(robot, "version") == "2" else []
     for node, offset in _mounted(robot):
         default, number = _PLACED.get(node.kind, ("", 0))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tdac_envs.drive.env import Observation
+from tdac_envs.webots.cameras import Cameras
 from tdac_envs.webots.devices import DARK, ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
 from tdac_envs.webots.log import Pose, turn_rate, velocity
 from tdac_envs.webots.stage import ControllerWorld
@@ -22,14 +23,17 @@ class Sampler:
 
     Args:
         stage: Stage with the world and the robot.
+        cameras: Cameras of the robot.
     """
 
-    def __init__(self, stage: ControllerWorld) -> None:
+    def __init__(self, stage: ControllerWorld, cameras: Cameras) -> None:
         self._frame = stage.frame
         self._observation: Observation = {}
         self._poses: list[Pose] = []
         self._dt = stage.world.time_step / 1e3
         self._readers = self._make_readers(stage)
+        for camera in stage.cameras:
+            self._readers[camera.name] = partial(cameras.expose, camera.name)
         # Sampling period and time of the last sample, ms.
         self._sampling: dict[str, tuple[int, float]] = {}
         self._fresh: dict[str, Any] = {}

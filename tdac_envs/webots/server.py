@@ -9,6 +9,7 @@ import numpy as np
 
 from tdac_envs.drive.env import Observation
 from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.webots.cameras import Cameras
 from tdac_envs.webots.devices import DARK, WHEELS
 from tdac_envs.webots.log import Log, turn_rate, velocity
 from tdac_envs.webots.motors import MotorState
@@ -40,7 +41,9 @@ class StepServer:
         self._observation: Observation = {}
         limit = stage.world.robot.max_wheel_speed
         self._motors = {name: MotorState(limit) for name, _ in WHEELS}
-        self._sampler = Sampler(stage)
+        self._cameras = Cameras(stage.cameras, stage.world, stage.sky, stage.robot, env)
+        self._images: dict[str, bytes] = {}
+        self._sampler = Sampler(stage, self._cameras)
         self._warnings: list[str] = []
         self._warned: set[str] = set()
         self._late_requests = 0
@@ -119,6 +122,7 @@ class StepServer:
 
     def _answer(self) -> dict[str, Any]:
         warnings, self._warnings = self._warnings, []
+        images, self._images = self._images, {}
         return {
             "over": self.is_over,
             "time": self._now() / 1e3,
@@ -126,6 +130,7 @@ class StepServer:
             "velocity": self._velocity() if self._reveals_velocity else [0.0] * 6,
             "places": self._places(),
             "warnings": warnings,
+            "images": images,
         }
 
     @property
@@ -137,6 +142,10 @@ class StepServer:
     def _command(self, device: str, what: str, value: Any) -> None:
         if what == "enable" and device in self._sampler:
             self._enable(device, value)
+            return
+        if what == "image" and device in self._cameras:
+            image = self._cameras.image(device)
+            self._images |= {} if image is None else {device: image}
             return
         if device not in self._motors:
             raise RequestError(f"no device {device:.40} that accepts {what:.40}")

@@ -15,11 +15,13 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.paths import field_to, open_field, path_entry
 from tdac_envs.epuck.source import with_start
+from tdac_envs.webots.cameras import CameraFacts, find_cameras
 from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
 from tdac_envs.webots.devices import DeviceFacts, find_devices
 from tdac_envs.webots.movable import Movable, find_movables
 from tdac_envs.webots.scene import NodeTable
 from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.wbt.colours import BLACK_SKY, Sky, sky_of
 from tdac_envs.worlds.wbt.fields import flag, text
 from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.wbt.reader import frame_of, read_text, read_world, with_goal
@@ -46,6 +48,8 @@ class ControllerWorld:
         movables: Objects that can be pushed, in the environment's order.
         devices: Modelled devices of the robot.
         absent: Names of the devices that are not modelled.
+        cameras: Cameras of the robot.
+        sky: What cameras see beyond the world.
     """
 
     name: str
@@ -60,6 +64,8 @@ class ControllerWorld:
     movables: tuple[Movable | None, ...]
     devices: tuple[DeviceFacts, ...]
     absent: tuple[str, ...]
+    cameras: tuple[CameraFacts, ...] = ()
+    sky: Sky = BLACK_SKY
 
     @property
     def is_supervisor(self) -> bool:
@@ -154,7 +160,8 @@ def open_stage(
     document = parse(content, path.name)
     top = frame_of(document)
     robot, own = _find_robot(document.nodes, top, path.name)
-    devices, absent = find_devices(robot, world.robot.max_wheel_speed)
+    cameras, too_large = find_cameras(robot, own, in_file)
+    devices, absent = find_devices(robot, world.robot.max_wheel_speed, cameras)
     frame = FileFrame.of(top, own, in_file.heading)
     scene = NodeTable(document.nodes)
     return ControllerWorld(
@@ -169,7 +176,9 @@ def open_stage(
         frame=frame,
         movables=find_movables(Ground.of(world), document.nodes, top),
         devices=devices,
-        absent=absent,
+        absent=(*absent, *too_large),
+        cameras=cameras,
+        sky=sky_of(document.nodes),
     )
 
 

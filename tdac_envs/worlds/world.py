@@ -27,6 +27,7 @@ from tdac_envs.worlds.footprint import (
     ring,
     wrap_angle,
 )
+from tdac_envs.worlds.looks import ALUMINIUM, Look, chequered
 
 MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
 INFINITE_FRICTION = 1e3
@@ -73,6 +74,8 @@ class Obstacle:
         reflectance: Factor in [0.2, 1] by which Webots divides the distance that a
             sensor measures; 1 if it is unknown or nothing is visible.
         is_goal: Whether the object marks the goal.
+        looks: How cameras see each of the visible parts; empty if the file does not
+            tell.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Obstacle:
     mass: float | None = None
     reflectance: float = 1.0
     is_goal: bool = False
+    looks: tuple[Look, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "x", metres("x", self.x))
@@ -149,6 +153,8 @@ class Arena:
         wall_height: Height of the wall above the floor, m; 0 without a wall.
         z: Height of the floor, m.
         facets: Number of flat segments of a round wall; each touches the disc.
+        floor_look: How cameras see the floor.
+        wall_look: How cameras see the wall.
     """
 
     inside: Disc | Rectangle
@@ -156,6 +162,8 @@ class Arena:
     wall_height: float = 0.0
     z: float = 0.0
     facets: int = 48
+    floor_look: Look = field(default=chequered(0.5, 0.5), compare=False, repr=False)
+    wall_look: Look = field(default=ALUMINIUM, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         for key in ("wall_thickness", "wall_height", "z"):
@@ -191,7 +199,8 @@ class Arena:
         else:
             pieces = frame(shape, thickness)
         parts = tuple(Part(p, self.z, self.z + self.wall_height) for p in pieces)
-        return Obstacle("", self.kind, shape.x, shape.y, parts, parts)
+        looks = (self.wall_look,) * len(parts)
+        return Obstacle("", self.kind, shape.x, shape.y, parts, parts, looks=looks)
 
 
 @dataclass(frozen=True, slots=True)

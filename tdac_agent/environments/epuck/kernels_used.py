@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tdac_agent.environments.epuck.surroundings import WorldSurroundings
 from tdac_agent.environments.kernels_used import use_robot
 from tdac_envs.epuck import infrared, kernels
+from tdac_envs.webots.rendering import look_through
+from tdac_envs.webots.scenery import Scenery
+from tdac_envs.worlds.wbt.colours import BLACK_SKY
 
 
 def use_kernels() -> None:
@@ -18,3 +23,6 @@ def use_kernels() -> None:
     (words,) = epuck.addresses.words
     kernels.turn_wheels(words)
     kernels.finish(words)
+    view = look_through(np.zeros(3), np.eye(3), 1.0, 4, 3)
+    scenery = Scenery.of(epuck.nominal.ground.world, BLACK_SKY)
+    scenery.image(view, 0.01, 4, 3, epuck.things())

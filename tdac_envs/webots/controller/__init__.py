@@ -7,6 +7,7 @@ does, where that is known.
 """
 
 from .ansi import AnsiCodes
+from .camera import Camera
 from .connection import connect
 from .device import Device
 from .field import Field
@@ -29,7 +30,6 @@ from .supervisor import Supervisor
 from .unmodelled import (
     Altimeter,
     Brake,
-    Camera,
     CameraRecognitionObject,
     Connector,
     Display,

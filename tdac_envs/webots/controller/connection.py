@@ -41,6 +41,8 @@ class Connection:
         self.motors: dict[str, object] = {}
         self._world: World | None = None
         self._commands: list[tuple[str, str, Any]] = []
+        self._images: dict[str, bytes] = {}
+        self._is_over = False
 
     def open(self, world: World) -> None:
         """Starts the simulation and keeps its facts."""
@@ -75,6 +77,13 @@ class Connection:
         """Reports a supervisor call; returns whether the simulation goes on."""
         return self._request(0, (call, node, field)) == 0
 
+    def image(self, camera: str) -> bytes | None:
+        """The image of a camera's last sample; None if the simulation has ended."""
+        if not self._is_over:
+            self.command(camera, "image", 0)
+            self._request(0, None)
+        return self._images.pop(camera, None)
+
     def _request(self, duration: int, event: Any) -> int:
         self.check()
         assert self._world is not None
@@ -84,6 +93,8 @@ class Connection:
         self.values.update(answer["values"])
         self.velocity = answer["velocity"]
         self.places.update(answer["places"])
+        self._images.update(answer["images"])
+        self._is_over = answer["over"]
         for text in answer["warnings"]:
             complain(text)
         return -1 if answer["over"] else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from . import led, motor, sensors, unmodelled
+from . import camera, led, motor, sensors, unmodelled
 from .connection import c_int, connection
 from .device import Device
 from .input import Joystick, Keyboard, Mouse
@@ -21,7 +21,7 @@ _KINDS: dict[str, type[Device]] = {
     "InertialUnit": sensors.InertialUnit,
     "Accelerometer": sensors.Accelerometer,
     "Gyro": sensors.Gyro,
-    "Camera": unmodelled.Camera,
+    "Camera": camera.Camera,
     "Emitter": unmodelled.Emitter,
     "Receiver": unmodelled.Receiver,
     "Speaker": unmodelled.Speaker,

@@ -34,40 +34,6 @@ class _Mute(Device):
         return self._period
 
 
-class Camera(_Mute):
-    """A camera that never has an image."""
-
-    def getWidth(self) -> int:
-        """Image width, pixels."""
-        return 52
-
-    def getHeight(self) -> int:
-        """Image height, pixels."""
-        return 39
-
-    def getFov(self) -> float:
-        """Field of view, rad."""
-        return 0.84
-
-    def getNear(self) -> float:
-        """Distance of the near plane, m."""
-        return 0.0055
-
-    def hasRecognition(self) -> bool:
-        """Always False."""
-        return False
-
-    getImage: Any = unsupported("Camera.getImage")
-    getImageArray: Any = unsupported("Camera.getImageArray")
-    saveImage: Any = unsupported("Camera.saveImage", -1)
-    recognitionEnable: Any = unsupported("Camera.recognitionEnable")
-    recognitionDisable: Any = unsupported("Camera.recognitionDisable")
-    getRecognitionObjects: Any = unsupported("Camera.getRecognitionObjects", ())
-    getRecognitionNumberOfObjects: Any = unsupported(
-        "Camera.getRecognitionNumberOfObjects", 0
-    )
-
-
 class Emitter(_Mute):
     """An emitter without receivers."""
 

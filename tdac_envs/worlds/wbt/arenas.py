@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tdac_envs.worlds.footprint import THINNEST, Disc, Rectangle
+from tdac_envs.worlds.wbt.colours import floor_look, wall_look
 from tdac_envs.worlds.wbt.fields import number, numbers
 from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.wbt.placing import placed
@@ -44,11 +45,14 @@ def arena(node: Node, frame: Frame) -> Arena | str:
             x, y, own.heading, max(length, THINNEST), max(width, THINNEST)
         )
     if node.kind == "Floor":
-        return Arena(inside, z=z)
+        return Arena(inside, z=z, floor_look=floor_look(node))
     thickness = _positive(node, "wallThickness", 0.01) * stretch[0]
     height = _positive(node, "wallHeight", 0.1) * stretch[2]
     facets = int(min(max(number(node, "subdivision", 48.0), 8.0), 200.0))
-    return Arena(inside, max(thickness, THINNEST), max(height, THINNEST), z, facets)
+    return Arena(
+        inside, max(thickness, THINNEST), max(height, THINNEST), z, facets,
+        floor_look(node), wall_look(node),
+    )  # fmt: skip
 
 
 def _positive(node: Node, name: str, default: float) -> float:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from contextlib import suppress
 
 from tdac_envs.core.errors import WorldError
+from tdac_envs.worlds.looks import Look
 from tdac_envs.worlds.wbt.appearance import reflectance
 from tdac_envs.worlds.wbt.arenas import ARENAS, arena
+from tdac_envs.worlds.wbt.colours import look, proto_look
 from tdac_envs.worlds.wbt.fields import child, children
 from tdac_envs.worlds.wbt.found import WorldContent, is_goal, name_of
 from tdac_envs.worlds.wbt.frames import Frame
@@ -29,6 +31,9 @@ _DEVICES = {
     "Lidar", "LightSensor", "Microphone", "Pen", "Radar", "Radio", "RangeFinder",
     "Receiver", "Servo", "Speaker", "TouchSensor", "VacuumGripper",
 }  # fmt: skip
+
+# A Shape's geometry, reflectance and look.
+_Shown = tuple[Pieces, float, Look]
 
 
 def walk(node: Node, frame: Frame, found: WorldContent) -> None:
@@ -88,7 +93,7 @@ def _proto(node: Node, frame: Frame, found: WorldContent) -> None:
     x, y, _ = body.frame.origin.tolist()
     obstacle = Obstacle(
         name_of(node), node.kind, x, y, body.solid, body.visible, body.mass,
-        body.reflectance, is_goal(node),
+        body.reflectance, is_goal(node), (proto_look(node),) * len(body.visible),
     )  # fmt: skip
     found.obstacle(node, obstacle)
 
@@ -97,23 +102,26 @@ def _solid(node: Node, own: Frame, found: WorldContent) -> None:
     """Adds a Solid with its boundingObject and Shapes, then the Solids inside it."""
     if is_goal(node):
         found.goal(own)
-    place, looks = len(found.obstacles), list[tuple[Pieces, float]]()
+    place, looks = len(found.obstacles), list[_Shown]()
     _collect_shapes(children(node), own, found, looks)
     bounding = child(node, "boundingObject")
     body = Pieces() if bounding is None else bounds(bounding, own)
     for missing in dict.fromkeys(body.missing):
         found.left_out(node, own, f"its boundingObject is {missing}")
-    visible = sum((pieces for pieces, _ in looks), Pieces())
+    visible = sum((pieces for pieces, _, _ in looks), Pieces())
+    colours = [own for pieces, _, own in looks for _ in pieces.parts]
     if visible.missing:
         seen = "its boundingObject" if body.parts else "nothing of it"
         _note_unseen(node, visible, seen, found)
         visible += Pieces(body.parts)
+        colours += [looks[0][2]] * len(body.parts)
     if node.kind != "Solid" and not body.parts and not visible.parts:
         return
     x, y, _ = own.origin.tolist()
     obstacle = Obstacle(
         name_of(node), _kind(node), x, y, body.parts, visible.parts,
         mass_of(node, body.volume), looks[0][1] if looks else 1.0, is_goal(node),
+        tuple(colours),
     )  # fmt: skip
     found.obstacle(node, obstacle, place)
 
@@ -136,14 +144,14 @@ def _collect_shapes(
     nodes: tuple[Node, ...],
     frame: Frame,
     found: WorldContent,
-    looks: list[tuple[Pieces, float]],
+    looks: list[_Shown],
 ) -> None:
     """Collects the Shapes of a Solid, and walks everything else in it."""
     for node in nodes:
         if node.kind == "Shape":
             shape = child(node, "geometry")
             if shape is not None:
-                looks.append((geometry(shape, frame), reflectance(node)))
+                looks.append((geometry(shape, frame), reflectance(node), look(node)))
         elif node.kind in GROUPS:
             _collect_shapes(children(node), _inside(node, frame), found, looks)
         else:
@@ -179,8 +187,9 @@ def _shape(node: Node, frame: Frame, found: WorldContent, named: Node) -> None:
     if mark and not is_goal(named):
         found.goal(frame)
     obstacle = Obstacle(
-        name, "Shape", x, y, (), looks.parts, None, reflectance(node), mark
-    )
+        name, "Shape", x, y, (), looks.parts, None, reflectance(node), mark,
+        (look(node),) * len(looks.parts),
+    )  # fmt: skip
     found.obstacle(node, obstacle)
 
 

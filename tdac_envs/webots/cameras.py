@@ -1,0 +1,226 @@
+"""The cameras of a robot: their facts, and their images."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tdac_envs.core.errors import WorldError
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.epuck.prisms import Array
+from tdac_envs.webots.rendering import look_through
+from tdac_envs.webots.scenery import Scenery
+from tdac_envs.worlds.bodies import floor_under
+from tdac_envs.worlds.wbt.colours import Sky
+from tdac_envs.worlds.wbt.fields import children, number, numbers, text
+from tdac_envs.worlds.wbt.frames import Frame, axis_angle, own_axes, world_frame
+from tdac_envs.worlds.wbt.placing import placed
+from tdac_envs.worlds.wbt.robots import ROBOTS
+from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.world import EPuck, World
+
+MOST_PIXELS = 1 << 21
+"""Largest image; cameras with more pixels are not modelled."""
+CAMERA_TYPE = 38
+"""Webots' number of the node type."""
+_EYE, _TURRET = (0.03, 0.0, 0.028), (-0.0095, 0.0, 0.0486)
+_NEAR = 0.0055
+# Width, height, pixels, and field of view, rad: of the PROTO, and of a Camera node.
+_EPUCK_SIZE, _CAMERA_SIZE = ((52, 39), 0.84), ((64, 64), math.pi / 4.0)
+_NARROWEST, _CLOSEST = 0.01, 1e-6
+_NO_FRAME = ("Group", "HingeJoint", "SliderJoint", "Slot")
+_NO_TURN = (0.0, 0.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraFacts:
+    """A camera.
+
+    Attributes:
+        name: Device name.
+        width: Width of an image, pixels.
+        height: Height of an image, pixels.
+        field_of_view: Horizontal field of view, rad; the pixels are squares.
+        near: Distance of the near plane, m.
+        place: Shape (3,): position relative to the robot (forward, left, up), m.
+        axes: Shape (3, 3): its directions forwards, left and up as columns, relative to
+            the robot's.
+    """
+
+    name: str
+    width: int
+    height: int
+    field_of_view: float
+    near: float
+    place: Array
+    axes: Array
+
+    def plain(self) -> dict[str, float]:
+        """The facts that are sent to the controller."""
+        return {
+            "width": self.width,
+            "height": self.height,
+            "fov": self.field_of_view,
+            "near": self.near,
+        }
+
+
+def find_cameras(
+    robot: Node, own: Frame, epuck: EPuck
+) -> tuple[tuple[CameraFacts, ...], tuple[str, ...]]:
+    """The cameras of an e-puck, and the names of those that are not modelled.
+
+    Args:
+        robot: Node of the e-puck: the PROTO or a plain Robot.
+        own: Its frame.
+        epuck: The e-puck in the world.
+
+    Raises:
+        WorldError: A field is invalid.
+    """
+    found: list[CameraFacts] = []
+    absent: list[str] = []
+    for name, node, prefix, frame in _nodes(robot, _own_frame(robot, own, epuck)):
+        camera = _read(name, node, prefix, frame)
+        if camera.width * camera.height > MOST_PIXELS:
+            absent.append(camera.name)
+        elif camera.name not in [other.name for other in found]:
+            found.append(camera)
+    return tuple(found), tuple(absent)
+
+
+class Cameras:
+    """Takes images: remembers what a camera would see, and renders it when asked.
+
+    Args:
+        cameras: The cameras.
+        world: World of the environment.
+        sky: Its sky.
+        robot: Node of the robot.
+        env: The environment.
+    """
+
+    def __init__(
+        self,
+        cameras: tuple[CameraFacts, ...],
+        world: World,
+        sky: Sky,
+        robot: Node,
+        env: EPuckEnv,
+    ) -> None:
+        self._cameras = {camera.name: camera for camera in cameras}
+        self._world, self._sky, self._env = world, sky, env
+        # A Robot node may have its origin above the ground.
+        is_proto = robot.kind not in ROBOTS
+        self._ground = floor_under(world) if is_proto else world.robot.z
+        self._scenery: Scenery | None = None
+        # Poses of the robot and of the movable objects at the last sample.
+        self._seen: dict[str, tuple[Array, Array]] = {}
+        self._images: dict[str, bytes] = {}
+        self._count = 0
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._cameras
+
+    def expose(self, name: str) -> int:
+        """Takes a sample, which is not rendered yet; returns its number."""
+        self._seen[name] = self._env.pose(), self._env.things()
+        self._images.pop(name, None)
+        self._count += 1
+        return self._count
+
+    def image(self, name: str) -> bytes | None:
+        """The last image in Webots' format, BGRA; None before the first sample."""
+        if name not in self._seen:
+            return None
+        if name not in self._images:
+            self._images[name] = self._render(self._cameras[name], *self._seen[name])
+        return self._images[name]
+
+    def _render(self, camera: CameraFacts, pose: Array, things: Array) -> bytes:
+        if self._scenery is None:
+            self._scenery = Scenery.of(self._world, self._sky)
+        x, y, heading = pose.tolist()
+        turn = axis_angle(0.0, 0.0, 1.0, heading)
+        place = turn @ camera.place + (x, y, self._ground)
+        width, height = camera.width, camera.height
+        axes = turn @ camera.axes
+        view = look_through(place, axes, camera.field_of_view, width, height)
+        scenery = self._scenery
+        return scenery.image(view, camera.near, width, height, things).tobytes()
+
+
+_Found = tuple[str, Node, str, Frame]
+
+
+def _own_frame(robot: Node, own: Frame, epuck: EPuck) -> Frame:
+    """The frame of the robot's node relative to the robot: forward, left, up.
+
+    An e-puck in a file is often saved with a slight tilt, but drives upright. The axes
+    and the origin of a Robot node may differ from those of the PROTO.
+    """
+    if robot.kind not in ROBOTS:
+        return world_frame(not own.y_up, own.y_up)
+    level = axis_angle(0.0, 0.0, 1.0, -epuck.heading)
+    origin = own.origin - (epuck.x, epuck.y, epuck.z)
+    return Frame(level @ own.matrix, level @ origin, own.y_up)
+
+
+def _nodes(robot: Node, own: Frame) -> Iterator[_Found]:
+    """Default name, node, prefix of the fields, and frame of each camera."""
+    if robot.kind in ROBOTS:
+        yield from _within(robot, own)
+        return
+    at = own_axes(_EYE, own.y_up)
+    turn = numbers(robot, "camera_rotation", _NO_TURN)
+    yield "camera", robot, "camera_", own.inside(at, turn)
+    turret = own.inside(own_axes(_TURRET, own.y_up))
+    for node in children(robot, "turretSlot"):
+        yield from _mounted(node, turret)
+
+
+def _within(node: Node, frame: Frame) -> Iterator[_Found]:
+    for field in ("children", "endPoint"):
+        for part in children(node, field):
+            yield from _mounted(part, frame)
+
+
+def _mounted(node: Node, frame: Frame) -> Iterator[_Found]:
+    if node.kind not in _NO_FRAME:
+        try:
+            frame = placed(node, frame)
+        except WorldError:
+            if node.kind == "Camera":
+                raise
+            return  # fields of an unknown node may mean something else
+    if node.kind == "Camera":
+        yield text(node, "name", "camera"), node, "", frame
+    yield from _within(node, frame)
+
+
+def _read(name: str, node: Node, prefix: str, frame: Frame) -> CameraFacts:
+    (width, height), view = _EPUCK_SIZE if prefix else _CAMERA_SIZE
+    near = _NEAR if prefix else number(node, "near", 0.01)
+    angle = number(node, f"{prefix}fieldOfView", view)
+    axes = frame.flu().matrix
+    lengths = np.linalg.norm(axes, axis=0)
+    if lengths.min() < 1e-6:
+        raise node.error(f"the camera {name!r} is scaled to nothing")
+    return CameraFacts(
+        name,
+        _length(node, f"{prefix}width", width),
+        _length(node, f"{prefix}height", height),
+        angle if _NARROWEST <= angle <= math.pi - _NARROWEST else view,
+        near if near > _CLOSEST else _NEAR,
+        frame.origin,
+        axes / lengths,
+    )
+
+
+def _length(node: Node, field: str, usual: int) -> int:
+    """A number of pixels; the usual one if it is below 1."""
+    length = int(number(node, field, usual))
+    return length if length >= 1 else usual

@@ -1,0 +1,162 @@
+"""Cameras, whose images the simulation renders when a controller asks for them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .connection import connection
+from .messages import complain, once, unsupported
+from .png import png
+from .sensors import Sensor
+
+
+class Camera(Sensor):
+    """A colour camera.
+
+    Args:
+        name: Device name in the world.
+        sampling_period: Period, ms; if given, the camera is enabled at once.
+    """
+
+    _c_name = "camera"
+
+    def __init__(self, name: str, sampling_period: int | None = None) -> None:
+        super().__init__(name, sampling_period)
+        self._sampled: Any = None
+        self._image: bytes | None = None
+
+    def getImage(self) -> bytes | None:
+        """The last image: blue, green, red and 255 of each pixel, row by row.
+
+        None before the first sample, and with an error if the camera is disabled.
+        """
+        return self._last("get_image")
+
+    def getImageArray(self) -> list[list[list[int]]] | None:
+        """The last image as `array[x][y]`: red, green and blue; None as `getImage`."""
+        image, width = self._last("get_image"), self.width
+        if image is None:
+            return None
+        return [
+            [
+                [image[at + 2], image[at + 1], image[at]]
+                for at in range(4 * x, len(image), 4 * width)
+            ]
+            for x in range(width)
+        ]
+
+    @staticmethod
+    def imageGetRed(image: bytes, width: int, x: int, y: int) -> int:
+        """Red of a pixel of an image, 0 to 255."""
+        return image[4 * (y * width + x) + 2]
+
+    @staticmethod
+    def imageGetGreen(image: bytes, width: int, x: int, y: int) -> int:
+        """Green of a pixel of an image, 0 to 255."""
+        return image[4 * (y * width + x) + 1]
+
+    @staticmethod
+    def imageGetBlue(image: bytes, width: int, x: int, y: int) -> int:
+        """Blue of a pixel of an image, 0 to 255."""
+        return image[4 * (y * width + x)]
+
+    @staticmethod
+    def imageGetGray(image: bytes, width: int, x: int, y: int) -> int:
+        """Mean of red, green and blue of a pixel, rounded down."""
+        return sum(image[4 * (y * width + x) : 4 * (y * width + x) + 3]) // 3
+
+    imageGetGrey = imageGetGray
+
+    def saveImage(self, filename: str, quality: int) -> int:
+        """Writes the last image to a PNG file; returns 0, or -1 if there is none.
+
+        Args:
+            filename: Path; ".jpg" files get the same content, with a message.
+            quality: Without effect, since PNG is lossless.
+        """
+        del quality
+        image = self._last("save_image")
+        if image is None:
+            return -1
+        if not filename.lower().endswith(".png"):
+            once("tdac: Camera.saveImage() writes PNG, whatever the file is called")
+        try:
+            with open(filename, "wb") as file:
+                file.write(png(image, self.width, self.height))
+        except OSError as error:
+            complain(f"Error: wb_camera_save_image() failed: {error}")
+            return -1
+        return 0
+
+    def getWidth(self) -> int:
+        """Image width, pixels."""
+        return self.width
+
+    def getHeight(self) -> int:
+        """Image height, pixels."""
+        return self.height
+
+    def getFov(self) -> float:
+        """Horizontal field of view, rad."""
+        return self.fov
+
+    def getNear(self) -> float:
+        """Distance of the near plane, m."""
+        return self.near
+
+    def hasRecognition(self) -> bool:
+        """Always False."""
+        return False
+
+    @property
+    def image(self) -> bytes | None:
+        """See `getImage`."""
+        return self._last("get_image")
+
+    @property
+    def width(self) -> int:
+        """See `getWidth`."""
+        return int(self._facts.get("width", 0))
+
+    @property
+    def height(self) -> int:
+        """See `getHeight`."""
+        return int(self._facts.get("height", 0))
+
+    @property
+    def fov(self) -> float:
+        """See `getFov`; setting it has no effect."""
+        return float(self._facts.get("fov", float("nan")))
+
+    @fov.setter
+    def fov(self, angle: float) -> None:
+        self.setFov(angle)
+
+    @property
+    def near(self) -> float:
+        """See `getNear`."""
+        return float(self._facts.get("near", float("nan")))
+
+    def _last(self, getter: str) -> bytes | None:
+        """The image of the last sample, asked for once; None if there is none."""
+        sampled = self._sample(getter, None)
+        if sampled is None:
+            return None
+        if sampled != self._sampled:
+            self._sampled, self._image = sampled, connection.image(self.name)
+        return self._image
+
+    setFov: Any = unsupported("Camera.setFov")
+    getMinFov: Any = unsupported("Camera.getMinFov", float("nan"))
+    getMaxFov: Any = unsupported("Camera.getMaxFov", float("nan"))
+    getExposure: Any = unsupported("Camera.getExposure", float("nan"))
+    setExposure: Any = unsupported("Camera.setExposure")
+    getFocalLength: Any = unsupported("Camera.getFocalLength", 0.0)
+    getFocalDistance: Any = unsupported("Camera.getFocalDistance", 0.0)
+    setFocalDistance: Any = unsupported("Camera.setFocalDistance")
+    recognitionEnable: Any = unsupported("Camera.recognitionEnable")
+    recognitionDisable: Any = unsupported("Camera.recognitionDisable")
+    getRecognitionObjects: Any = unsupported("Camera.getRecognitionObjects", ())
+    getRecognitionNumberOfObjects: Any = unsupported(
+        "Camera.getRecognitionNumberOfObjects", 0
+    )
