@@ -17,18 +17,17 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.film import film_of
 from tdac_agent.cli.flags import check_finite, check_tier
 from tdac_agent.storage.plain import printable
 from tdac_agent.webots.report import WebotsReport
-from tdac_agent.webots.run import WebotsRun, frames, run_controller
+from tdac_agent.webots.run import frames, run_controller
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.video import SUFFIXES, write_video
-from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.task import TOLERANCE
 from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds.bundled import world_file
 
-STRIDE = 2
 # A line that a controller prints more often is shown once, with its count.
 REPEATS = 5
 _CONTROL_SEQUENCES = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
@@ -45,6 +44,7 @@ def run(
     ignore: tuple[str, ...],
     webots_sensors: bool,
     video: Path | None,
+    speed: float | None,
     tier: str,
     as_json: bool,
 ) -> int:
@@ -76,9 +76,10 @@ def run(
     if video is not None:
         with console.status(f"drawing {escape(video.name)} …"):
             env = stage.make_env(**options, render_mode="rgb_array")
-            _write_video(done, env, video)
+            film = film_of(done.log.steps, env.nominal.dt, speed)
+            write_video(frames(env, done.log, film.stride), video, film.fps)
         if not as_json:
-            print(f"wrote {video} (at twice real time)")
+            print(f"wrote {video} ({film})")
     return 0 if done.report.passed else 1
 
 
@@ -102,11 +103,6 @@ def _watcher(bar: Progress, name: str, most: int) -> Callable[[int], None]:
             bar.update(row, completed=steps, refresh=True)
 
     return watch
-
-
-def _write_video(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
-    """Writes a video of the run, with a frame per `STRIDE` steps."""
-    write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
 
 
 def _without_repeats(text: str) -> str:

@@ -545,9 +545,10 @@ def test_polarity_and_threshold_are_flags_and_keys(tdac, image, chessboard, tmp_
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif"])
 def test_play_writes_a_film(tdac, good, suffix):
-    """Exit 0 where the goal was reached."""
-    code, out, _ = tdac("play", good, "--video", f"a.{suffix}")
+    """Exit 0 where the goal was reached; the speed of the film is told."""
+    code, out, _ = tdac("play", good, "--video", f"a.{suffix}", "--speed", "20")
     assert code == 0
+    assert f"wrote a.{suffix} (at 20 times real time, " in out
     assert "reached after" in out
     assert Path(f"a.{suffix}").stat().st_size > 1000
 
