@@ -31,7 +31,7 @@ def test_the_speed_is_told(steps, dt, speed, told):
     st.one_of(st.none(), st.floats(0.01, 1000.0)),
 )
 def test_frames_and_rate_agree(steps, dt, speed):
-    """A frame shows `stride` steps for as long as the speed says, and none is wasted."""
+    """A frame stands for `stride` steps at this speed; never faster than `MOST_FPS`."""
     film = film_of(steps, dt, speed)
     assert film.stride * dt * film.fps == pytest.approx(film.speed)
     assert film.fps <= MOST_FPS * 1.001
