@@ -137,13 +137,13 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256)
 
 
-def write_builtin(task: Task) -> tuple[bytes, bool]:
+def write_builtin(task: Task, tier: str = "auto") -> tuple[bytes, bool]:
     """Writes a controller without a model; returns it and whether it is verified.
 
     If no candidate is verified, the controller is the last one.
     """
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
-        run = synthesize(task, BUILTIN, out=Path(name) / "run")
+        run = synthesize(task, BUILTIN, out=Path(name) / "run", tier=tier)
         if run.verified:
             return run.controller.read_bytes(), True
         candidates = sorted((run.folder / "iterations").rglob("controller.py"))

@@ -196,7 +196,7 @@ def _compete(
     if entrant.is_builtin:
         if watch is not None:
             watch(task.name, entrant.name, 0, 0)
-        source, verified = write_builtin(task)
+        source, verified = write_builtin(task, job.tier)
         file = job.out.with_suffix(".py")
         file.write_bytes(source)
         policy, sha256 = replace(policy, file=file), sha256_of(source)

@@ -20,6 +20,7 @@ from tdac_agent.tasks.registry import environment, own_environments
 from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.tasks.task_file import (
     TASK_FILE,
+    Profile,
     TaskFile,
     bundled_task,
     bundled_tasks,
@@ -71,6 +72,13 @@ class Task:
         """Step limit of the progress test."""
         default = max(MIN_PROGRESS_STEPS, math.ceil(0.16 * self.nominal.horizon))
         return self.spec.progress.steps or default
+
+    def with_profile(self, profile: Profile | None) -> Task:
+        """Returns the task with another profile; None keeps its own."""
+        if profile is None:
+            return self
+        spec = self.spec.model_copy(update={"profile": profile})
+        return replace(self, spec=spec)
 
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's environment."""

@@ -399,6 +399,21 @@ def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
     assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
 
 
+@pytest.mark.parametrize("command", ["verify", "check-suite"])
+def test_a_misspelt_fixture_is_a_fault_of_the_suite(tdac, good, tmp_path, command):
+    """It says nothing about the controller; the line and the nearest name are told."""
+    text = "\n\ndef test_mine(rolout):\n    assert rolout().reached, 'not reached'\n"
+    (tmp_path / "test_mine.py").write_text(text)
+    words = [good, "--paper"] if command == "verify" else ["--task", good]
+    flags = ("--profile", "policy", "--suite", tmp_path)
+    code, out, err = tdac(command, *words, *flags)
+    assert (code, out) == (3, "")
+    assert err.splitlines()[-1] == (
+        "infrastructure fault: the suite is broken: own/test_mine.py:3: test_mine "
+        "needs the fixture 'rolout', which does not exist (did you mean 'rollout'?)"
+    )
+
+
 @pytest.mark.slow
 def test_check_suite_says_yes(tdac, tmp_path):
     """Exit 0 and a table of the controllers."""
