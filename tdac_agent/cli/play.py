@@ -5,9 +5,11 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from tdac_agent.cli.console import Console
 from tdac_agent.cli.display import has_display
 from tdac_agent.cli.film import film_of
 from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.printed import show_printed
 from tdac_agent.cli.robust_flags import DisturbanceFlags, require_flag
 from tdac_agent.cli.verify import controller_and_task
 from tdac_agent.episodes.pictures import pictures_of
@@ -59,6 +61,7 @@ def run(
         driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
         rollout = driven.rollout
     _show(rollout, task, video, speed)
+    show_printed(rollout.printed, Console())
     steps = rollout.trajectory.steps
     print(f"{rollout.name}: {rollout.outcome} after {steps} steps" + _because(rollout))
     return 0 if rollout.reached else 1

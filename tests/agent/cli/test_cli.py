@@ -568,6 +568,20 @@ def test_play_writes_a_film(tdac, good, suffix):
     assert Path(f"a.{suffix}").stat().st_size > 1000
 
 
+def test_play_shows_what_the_controller_printed(tdac, good):
+    """Its lines, without control sequences; what repeats is counted."""
+    file = good / "controller.py"
+    text = "def policy(obs):\n    print('\\x1b[31mhello')\n    return 0.0, 0.0\n"
+    file.write_text(f"print('once')\n{text}")
+    code, out, _ = tdac("play", good, "--video", "a.gif", "--speed", "100")
+    assert code == 1
+    lines = out.splitlines()
+    at = lines.index("the controller printed")
+    assert lines[at + 1] == "once"
+    assert re.fullmatch(r"hello  \(×\d+\)", lines[at + 2])
+    assert "\x1b" not in out
+
+
 def test_play_says_what_went_wrong(tdac, good):
     """Exit 1 and the reason where the controller fails."""
     (good / "controller.py").write_text("import nosuchmodule\n")
