@@ -19,6 +19,7 @@ from small import SHORT, small_cells, write_small_task
 
 from tdac_agent.cli.main import PARTS, command_line
 from tdac_agent.cli.options import task_flags
+from tdac_agent.runs.resume import resume_arguments
 from tdac_envs.mapping.bundled import bundled_map
 
 COMMANDS = [
@@ -457,6 +458,35 @@ def test_synth_writes_a_run(tdac, good):
     run = json.loads(out)
     assert run["status"] == "verified"
     assert Path("a/controller.py").is_file()
+
+
+def test_synth_keeps_the_profile_and_takes_a_tier(tdac, good):
+    """The profile is part of the run and of its task; a run asks for no tier."""
+    (good / "controller.py").unlink()
+    words = ["synth", "--task", good, "--out", "a", "--profile", "policy"]
+    code, out, _ = tdac(*words, "--json", "--tier", "rlimits")
+    assert code == 0
+    assert json.loads(out)["profile"] == "policy"
+    about = json.loads(Path("a/report.json").read_text())["provenance"]
+    assert (about["profile"], about["sandbox"]) == ("policy", "rlimits")
+    arguments = resume_arguments(Path("a"))
+    assert arguments["task"].spec.profile == "policy"
+    assert "tier" not in arguments
+    code, _, errors = tdac(*words[:-2])
+    assert (code, "profile policy instead of paper" in errors) == (2, True)
+    code, _, errors = tdac("synth", "--resume", "a", "--profile", "paper")
+    assert (code, "leave out --profile" in errors) == (2, True)
+    code, _, errors = tdac("synth", "--resume", "a", "--tier", "strong")
+    assert (code, "unknown sandbox tier 'strong'" in errors) == (2, True)
+
+
+def test_usage_names_arguments_without_braces(tdac):
+    """`POLICY...` is one or more, `[DIR]` may be left out."""
+    assert "tdac evaluate [OPTIONS] POLICY..." in tdac("evaluate", "--help")[1]
+    assert "tdac runs [OPTIONS] [DIR]" in tdac("runs", "--help")[1]
+    text = tdac("webots", "run", "--help")[1]
+    assert "tdac webots run [OPTIONS] CONTROLLER WORLD" in text
+    assert "px" not in text
 
 
 @pytest.mark.parametrize("command", [["verify"], ["play", "--video", "a.gif"]])
