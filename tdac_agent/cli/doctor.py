@@ -46,12 +46,14 @@ class Check:
         works: Whether it passed.
         detail: What works, or why it does not and what to do.
         needed: Whether tdac is unusable without it.
+        warning: Whether it passed, but will soon need attention.
     """
 
     name: str
     works: bool
     detail: str
     needed: bool = False
+    warning: bool = False
 
 
 def run(as_json: bool) -> int:
@@ -66,7 +68,7 @@ def run(as_json: bool) -> int:
         }
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
     else:
-        _show(checks)
+        show_checks(checks)
     return 0 if _usable(checks) else 3
 
 
@@ -133,15 +135,16 @@ def _models() -> list[Check]:
     """Whether models of the bundled campaigns are retired, or soon will be."""
     from tdac_agent.campaign.config import read_config
     from tdac_agent.models.choice import OFFLINE
-    from tdac_agent.models.lifecycle import model_warnings, retired
+    from tdac_agent.models.lifecycle import URGENT_DAYS, model_warnings, retired
 
     checks = []
     for name in shipped_names("*.yaml"):
         models = read_config(shipped(name)).models
-        gone = retired(models)
-        notes = model_warnings(models)
+        usable = not retired(models)
+        soon = usable and bool(retired(models, within_days=URGENT_DAYS))
+        notes = "; ".join(model_warnings(models))
         if notes:
-            checks.append(Check(f"campaign {name}", not gone, "; ".join(notes)))
+            checks.append(Check(f"campaign {name}", usable, notes, warning=soon))
         elif any(model.partition(":")[0] not in OFFLINE for model in models):
             detail = "none of its models is known to be retired soon"
             checks.append(Check(f"campaign {name}", True, detail))
@@ -153,17 +156,21 @@ def _versions() -> dict[str, str]:
     return {"python": platform.python_version(), **versions}
 
 
-def _show(checks: list[Check]) -> None:
+def show_checks(checks: list[Check]) -> None:
+    """Prints a line per check with its mark, then the versions."""
     console = Console()
     grid = Table.grid(padding=(0, 1, 0, 0))
     grid.add_column()
     grid.add_column(no_wrap=True)
     grid.add_column(overflow="fold")
     for check in checks:
-        mark = "[green]✔[/]" if check.works else "[yellow]–[/]"
-        if check.needed and not check.works:
-            mark = "[red]✘[/]"
-        grid.add_row(mark, escape(check.name), escape(check.detail))
+        grid.add_row(_mark(check), escape(check.name), escape(check.detail))
     console.print(grid)
     versions = ", ".join(f"{name} {value}" for name, value in _versions().items())
     console.print(f"\n{versions}", highlight=False)
+
+
+def _mark(check: Check) -> str:
+    if check.works:
+        return "[yellow]![/]" if check.warning else "[green]✔[/]"
+    return "[red]✘[/]" if check.needed else "[yellow]–[/]"

@@ -14,10 +14,12 @@ from tdac_agent.models.prices import SHIPPED, load_prices, price_file
 from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, predict_cost
+from tdac_agent.tasks.task_file import Profile
 
 
 def run(
     flags: TaskFlags,
+    profile: Profile | None,
     models: dict[str, Any],
     k: int,
     j: int,
@@ -28,6 +30,7 @@ def run(
 
     Args:
         flags: Flags that name the task.
+        profile: What a controller must define; by default as the task says.
         models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
             `max_output`, `max_cost` and `max_tokens`, as for `synthesize`.
         k: Iterations.
@@ -40,7 +43,7 @@ def run(
     for name in (learner, optimizer):
         check_name(name)
     template, prices = load_template(models["prompt"]), load_prices()
-    task = flags.load()
+    task = flags.load().with_profile(profile)
     over_http = models["key_over_http"]
     options = Options(task.setting, models["base_url"], over_http)
     missing = [

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
@@ -12,10 +14,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.evaluate_view import show_evaluation
 from tdac_agent.cli.flags import check_tier
-from tdac_agent.errors import ControllerFileError
+from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.evaluation.entrants import entrants_of
 from tdac_agent.evaluation.evaluate import evaluate, load_tasks
 from tdac_agent.evaluation.evaluation_report import Evaluation
+from tdac_agent.evaluation.unfinished import count_kept
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -62,7 +66,7 @@ def run(
         doing = escape(f"{task}: {policy}")
         bar.update(row, completed=count, successes=successes, doing=doing, refresh=True)
 
-    with ChildPool() as child_pool:
+    with ChildPool() as child_pool, _keeping(console, out):
         loaded = load_tasks(tasks)
         with WarmJudge(child_pool) as judge, bar:
             found = evaluate(
@@ -87,7 +91,25 @@ def run(
             pictures = ", ".join(f"{task.name}.png" for task in found.tasks)
             files = f"evaluation.json, episodes.csv, timing.csv, {pictures}"
             console.print(escape(f"wrote {files} to {out}"), soft_wrap=True)
+    if found.all_crashed:
+        console.print("[red]every policy crashed in every episode[/]")
+        return 1
     return 0
+
+
+@contextmanager
+def _keeping(console: Console, out: Path | None) -> Generator[None]:
+    """Reports the finished episodes that an interrupted evaluation left or leaves."""
+    if out is not None and (before := count_kept(out)):
+        left = f"{before} finished episodes of an interrupted evaluation"
+        print_sentences(console, f"{out} has {left}; none of them is driven again")
+    try:
+        yield
+    except (KeyboardInterrupt, Fault, OSError):
+        if out is not None and (now := count_kept(out)):
+            kept = f"{now} finished episodes are kept in {out}"
+            print_sentences(console, f"{kept}; the same command continues from there")
+        raise
 
 
 def wrapper_names(words: list[str]) -> list[str]:

@@ -23,16 +23,18 @@ NONE = "–"
 # Least width of long policy names, so that a table fits into 80 columns.
 WIDEST = 12
 LEGEND = (
-    "95 %: exact interval of the rate (Clopper-Pearson). hit: episodes with a contact. "
-    "time, path: relative to the shortest path at full speed; SPARC: smoothness, "
-    "spectral arc length of the speed (0 is smoothest); these are medians of the "
-    "successes. gap: clearance beside the body, least / mean. ms/step: median / 99th "
-    "percentile of a policy call, measured by the judge."
+    "knows: what the policy may use; sensors include pose and goal, + map and + "
+    "guidance come in addition to sensors, privileged is everything. 95 %: exact "
+    "interval of the rate (Clopper-Pearson). hit: episodes with a contact. time, path: "
+    "relative to the shortest path at full speed; SPARC: smoothness, spectral arc "
+    "length of the speed (0 is smoothest); these are medians of the successes. gap: "
+    "clearance beside the body, least / mean. ms/step: median / 99th percentile of a "
+    "policy call, measured by the judge."
 )
 PAIRED = (
     ">: reaches the goal more often; ~: no significant difference; by McNemar's exact "
     "test, not corrected for the number of pairs. only one: episodes in which only one "
-    "of the two reaches the goal."
+    "of the two reaches the goal. both know: what both may use; empty if it differs."
 )
 # Level of each comparison; not corrected for multiple tests.
 SIGNIFICANT = 0.05

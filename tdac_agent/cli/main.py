@@ -13,6 +13,7 @@ import signal
 import sys
 from collections.abc import Callable
 from copy import copy
+from functools import partial
 from typing import Annotated, Any
 
 import typer
@@ -51,9 +52,17 @@ def _without_types(parameters: list[Any]) -> list[Any]:
         is_argument = isinstance(parameter, TyperArgument)
         if is_argument:
             parameter.metavar = parameter.metavar or parameter.name.upper()
+            parameter.get_usage_pieces = partial(_usage, parameter)
         if is_argument or parameter.is_bool_flag:
             parameter.display_type_rich = lambda **_: ""
     return parameters
+
+
+def _usage(argument: Any, _context: Any) -> list[str]:
+    """An argument in the usage line; Typer would write `{POLICY...}...`."""
+    name = argument.metavar.removesuffix("...")
+    name = name if argument.required else f"[{name}]"
+    return [name if argument.nargs == 1 else f"{name}..."]
 
 
 app = typer.Typer(

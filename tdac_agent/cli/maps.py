@@ -108,15 +108,18 @@ def _print_candidates(console: Console, ranked: list[Candidate]) -> None:
         if len(readings) > 1:
             console.print(f"reading {number}: {escape(reading)}")
     failed = [c for c in ranked if c.terms is None]
+    if failed:
+        console.print("[dim]Not chosen, since the robot could not drive there:[/]")
     for candidate in failed[:EXPLAINED]:
         text = _describe(candidate)
         if candidate.inflation:
             text += f", margin {candidate.inflation} px"
         failure = escape(candidate.failure or "")
-        console.print(f"[dim]infeasible: {escape(text)}: {failure}[/]")
+        console.print(f"[dim]  {escape(text)}: {failure}[/]")
     hidden = max(len(feasible) - SHOWN, 0) + max(len(failed) - EXPLAINED, 0)
     if hidden:
-        console.print(f"and {hidden} more candidates (--json lists all)")
+        more = "1 more candidate" if hidden == 1 else f"{hidden} more candidates"
+        console.print(f"and {more} (--json lists all)")
 
 
 def _table(candidates: list[Candidate], readings: list[str]) -> Table:

@@ -37,6 +37,16 @@ WRAPPER = (
     "`flatten`, or `none`."
 )
 VIDEO = "Write a .mp4 or .gif video"
+Speed = Annotated[
+    Optional[float],  # noqa: UP045 - typer reads it at run time
+    number_flag(
+        "--speed",
+        min=0.01,
+        max=1000.0,
+        help="Speed of the video, relative to real time.  [default: 1; more if it "
+        "would last longer than a minute]",
+    ),
+]
 RANGE_NOISE = "Noise of each range, standard deviation relative to the range."
 WHEEL_SLIP = "Noise of each wheel's speed, standard deviation relative to the speed."
 MOTOR_LAG = "Time constant of the wheel speeds, s."

@@ -5,8 +5,11 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from tdac_agent.cli.console import Console
 from tdac_agent.cli.display import has_display
+from tdac_agent.cli.film import film_of
 from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.printed import show_printed
 from tdac_agent.cli.robust_flags import DisturbanceFlags, require_flag
 from tdac_agent.cli.verify import controller_and_task
 from tdac_agent.episodes.pictures import pictures_of
@@ -28,13 +31,13 @@ from tdac_envs.drawing.video import write_video
 from tdac_envs.drawing.window import Window
 
 SUFFIXES = (".mp4", ".gif")
-STRIDE = 2
 
 
 def run(
     controller: str,
     flags: TaskFlags,
     video: Path | None,
+    speed: float | None,
     episode: str | None,
     seed: int | None,
     disturbed: DisturbanceFlags,
@@ -57,19 +60,29 @@ def run(
     else:
         driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
         rollout = driven.rollout
-    frames = pictures_of(task.setting).frames(rollout, STRIDE)
-    rate = 1.0 / (task.nominal.dt * STRIDE)
-    if video is not None:
-        write_video(frames, video, fps=2 * rate)
-        print(f"wrote {video} (at twice real time)")
-    else:
-        window = Window(f"tdac: {task.name}", rate)
-        for frame in frames:
-            window.show(frame)
-        window.close()
+    _show(rollout, task, video, speed)
+    show_printed(rollout.printed, Console())
     steps = rollout.trajectory.steps
     print(f"{rollout.name}: {rollout.outcome} after {steps} steps" + _because(rollout))
     return 0 if rollout.reached else 1
+
+
+def _show(
+    rollout: Rollout, task: Task, video: Path | None, speed: float | None
+) -> None:
+    """Writes the episode as a video, or shows it in a window."""
+    steps, dt = rollout.trajectory.steps, task.nominal.dt
+    # A window can be closed at any time: it shows real time, however long it lasts.
+    film = film_of(steps, dt, 1.0 if video is None and speed is None else speed)
+    frames = pictures_of(task.setting).frames(rollout, film.stride)
+    if video is not None:
+        write_video(frames, video, film.fps)
+        print(f"wrote {video} ({film})")
+        return
+    window = Window(f"tdac: {task.name}", film.fps)
+    for frame in frames:
+        window.show(frame)
+    window.close()
 
 
 def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:

@@ -14,6 +14,7 @@ from tdac_agent.cli.options import (
     MotorLag,
     NamedTask,
     RangeNoise,
+    Speed,
     Tier,
     WheelSlip,
     file_flag,
@@ -36,6 +37,7 @@ def play(
         Optional[Path],  # noqa: UP045 - typer reads it at run time
         file_flag(help=f"{VIDEO} instead of opening a window."),
     ] = None,
+    speed: Speed = None,
     episode: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option(
@@ -65,5 +67,7 @@ def play(
 
     disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
     raise typer.Exit(
-        command.run(controller, named_task(), video, episode, seed, disturbed, tier)
+        command.run(
+            controller, named_task(), video, speed, episode, seed, disturbed, tier
+        )
     )

@@ -45,7 +45,7 @@ def show_report(
         _show_failed(console, group.members)
         for message in group.messages:
             print_sentences(console, message, indent=2)
-        for text in group.happened:
+        for text in _held_out(report) if group.held_out else group.happened:
             print_sentences(console, f"what happened: {text}", indent=2)
     if not_run:
         _show_failed(console, not_run)
@@ -70,6 +70,18 @@ def show_report(
             "the profile paper needs all these functions and constants; "
             "--profile policy needs only policy(obs)"
         )
+
+
+def _held_out(report: Report) -> list[str]:
+    """How each failed held-out episode ended; its diagnosis is kept from models."""
+    ended = [
+        f"{episode.name}: {episode.outcome} in step {episode.steps}"
+        + (f": {episode.error}" if episode.error else "")
+        for episode in report.episodes
+        if episode.held_out and (episode.outcome != "reached" or episode.collisions)
+    ]
+    told = "held out: a model is told only that such a start failed, so there is no"
+    return [*ended, f"({told} diagnosis; `tdac play --episode` shows it)"]
 
 
 def _show_failed(console: Console, failures: Sequence[Failure]) -> None:

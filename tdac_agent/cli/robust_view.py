@@ -52,6 +52,7 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
             f"[bold {colour}]{_decision(result)}[/] after {report.episodes} of at most "
             f"{result.test.limit} episodes"
         )
+        say(_legend(result))
         say(_error_rates(result))
 
 
@@ -115,6 +116,15 @@ def _decision(result: SequentialResult) -> str:
     if result.decision == "rejected":
         return f"rejected at {_percent(result.test.accept_at)}"
     return "undecided, therefore not accepted,"
+
+
+def _legend(result: SequentialResult) -> str:
+    return (
+        "  accepted: the episodes fit a success rate of "
+        f"{_percent(result.test.accept_at)} much better than one of "
+        f"{_percent(result.at_refused_rate.rate)}; the test ends as soon as it can "
+        "decide (docs/robustness.md), and errs rarely:"
+    )
 
 
 def _error_rates(result: SequentialResult) -> str:

@@ -83,6 +83,8 @@ def _attempts(run: Run) -> Table:
     table.add_column("j", justify="right")
     table.add_column("result")
     table.add_column("failed tests")
+    table.caption = "k: iteration; j: attempt to repair its candidate (0: the first)"
+    table.caption_justify = "left"
     for attempt in run.attempts:
         failed = list_tests(attempt.failed_tests, 4) or _why_invalid(attempt)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import sys
 from datetime import UTC, datetime
@@ -23,6 +24,8 @@ from tdac_agent.training.curve import PLAN_FILE, read_curve
 
 USUAL = Path("runs")
 """Default folder; it does not exist before the first run."""
+DEEPEST = 6
+"""Levels of subfolders that are searched for runs."""
 WIDE = 100
 """Console width from which all columns fit."""
 _COLOURS = {
@@ -51,7 +54,7 @@ def run(folder: Path, as_json: bool) -> int:
         return 0
     console = Console()
     if rows:
-        console.print(_table(rows, console.width))
+        console.print(_table(rows, folder, console.width))
         for row in rows:
             if row["status"] == "unreadable":
                 print_sentences(console, f"{row['run']}: {row['reason']}", "red")
@@ -66,9 +69,26 @@ def run(folder: Path, as_json: bool) -> int:
 
 
 def _folders(folder: Path) -> list[Path]:
-    """The folder itself and its subfolders, if they are run or training folders."""
-    places = [folder, *(path for path in folder.iterdir() if path.is_dir())]
-    return [place for place in places if _is_run(place)]
+    """The run and training folders in a folder, itself included, at any usual depth.
+
+    A campaign has its runs three levels below its folder. Nothing is searched below a
+    run, in hidden folders, or behind symbolic links to folders.
+
+    Raises:
+        OSError: The folder cannot be read.
+    """
+    with os.scandir(folder):
+        pass  # `os.walk` would report no error
+    found = []
+    for name, below, _ in os.walk(folder):
+        place = Path(name)
+        if _is_run(place):
+            found.append(place)
+        depth = len(place.relative_to(folder).parts)
+        if depth == DEEPEST or (depth and place in found[-1:]):
+            below.clear()
+        below[:] = [each for each in below if not each.startswith(".")]
+    return found
 
 
 def _is_run(place: Path) -> bool:
@@ -146,11 +166,14 @@ def _age(row: dict[str, Any]) -> tuple[str, str]:
     return row.get("started", ""), row["run"]
 
 
-def _table(rows: list[dict[str, Any]], width: int) -> Table:
+def _table(rows: list[dict[str, Any]], folder: Path, width: int) -> Table:
     """One line per run; cuts long learner names, drops columns on a narrow console."""
     wide = width >= WIDE
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    table.add_column("run", no_wrap=True)
+    within = max(len(row["run"]) for row in rows) > width // 2
+    if within:
+        table.title, table.title_justify = escape(f"in {folder}:"), "left"
+    table.add_column("run", overflow="fold")
     if wide:
         table.add_column("task", no_wrap=True)
     table.add_column("learner", overflow="ellipsis", min_width=8)
@@ -160,14 +183,16 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
         table.add_column(name, justify="right", no_wrap=True)
     if wide:
         table.add_column("started", no_wrap=True)
+    legend = ["k: iterations begun / allowed"] if "k" in figures else []
     if any("–" in column for column in figures.values()):
-        table.caption = "–: no model was asked, or it does not report this"
-        table.caption_justify = "left"
+        legend.append("–: no model was asked, or it does not report this")
+    table.caption = "; ".join(legend)
+    table.caption_justify = "left"
     for number, row in enumerate(rows):
         status = row["status"]
         task, started = row.get("task", ""), _when(row.get("started", ""))
         table.add_row(
-            escape(row["run"]),
+            escape(_within(folder, row["run"]) if within else row["run"]),
             *([escape(task)] if wide else []),
             # No-break spaces: the name is cut, not wrapped.
             escape(row.get("learner", "").replace(" ", "\N{NO-BREAK SPACE}")),
@@ -176,6 +201,11 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
             *([started] if wide else []),
         )
     return table
+
+
+def _within(folder: Path, run: str) -> str:
+    """The path of a run, relative to the folder that the user gave."""
+    return str(Path(run).relative_to(folder))
 
 
 def _figures(rows: list[dict[str, Any]]) -> dict[str, list[str]]:

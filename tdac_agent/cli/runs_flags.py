@@ -57,7 +57,11 @@ def report_command(
 @app.command("runs", epilog="Examples: `tdac runs`; `tdac runs results --json`")
 def runs_command(
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Run folder, or folder of runs.")
+        Path,
+        typer.Argument(
+            metavar="DIR",
+            help="Run folder, folder of runs, or campaign; subfolders are searched.",
+        ),
     ] = Path("runs"),
     as_json: Json = False,
 ) -> None:

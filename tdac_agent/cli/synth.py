@@ -10,7 +10,7 @@ from typing import Any
 from rich.markup import escape
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.cli.flags import TaskFlags, check_tier
 from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault
@@ -18,7 +18,7 @@ from tdac_agent.runs.resume import check_own, existing_run, resume_arguments
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import Task, called
-from tdac_agent.tasks.task_file import TASK_FILE
+from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.verify import read_source
 
@@ -27,6 +27,7 @@ _EXIT = {"verified": 0, "budget": 4}
 
 def run(
     flags: TaskFlags,
+    profile: Profile | None,
     wanted: dict[str, Any],
     out: Path | None,
     start_from: Path | None,
@@ -38,6 +39,7 @@ def run(
 
     Args:
         flags: Flags that name the task.
+        profile: What a controller must define; by default as the task says.
         wanted: Further arguments of `synthesize`.
         out: Run folder; the next free one by default.
         start_from: Controller to begin with.
@@ -45,10 +47,11 @@ def run(
         trust: Whether the task's own tests may run.
         as_json: Whether to print the run record as JSON.
     """
+    check_tier(wanted["tier"])
     console = Console(stderr=as_json)
     source = None if start_from is None else read_text(start_from)
     with console.status("preparing the task …"):
-        task = allowed(flags.load(), suite, trust=trust)
+        task = allowed(flags.load().with_profile(profile), suite, trust=trust)
     folder = out if out is not None else next_folder(task.name)
     wanted = {**wanted, "task": task, "out": folder, "start_from": source}
     return synthesise_and_show(wanted, console)
@@ -57,7 +60,7 @@ def run(
 def resume(
     folder: Path,
     given: dict[str, Any],
-    limits: dict[str, Any],
+    settings: dict[str, Any],
     trust: bool,
     as_json: bool,
 ) -> int:
@@ -66,17 +69,18 @@ def resume(
     Args:
         folder: Run folder.
         given: Flags given again, which permits their use by a run from elsewhere.
-        limits: `max_cost` and `max_tokens`; None keeps the run's limit.
+        settings: `max_cost` and `max_tokens`, where None keeps the run's limit; `tier`.
         trust: Whether a run from elsewhere may run and contact all that it names.
         as_json: Whether to print the run record as JSON.
     """
+    check_tier(settings["tier"])
     console = Console(stderr=as_json)
     before = load_run(folder)
     if before.finished:
         check_own(before)
         return _show(before, console, before=before)
     with console.status("preparing the task …"):
-        wanted = resume_arguments(folder, {**given, **limits}, trust=trust)
+        wanted = resume_arguments(folder, {**given, **settings}, trust=trust)
     return synthesise_and_show(wanted, console)
 
 

@@ -19,7 +19,9 @@ from tdac_agent.cli.options import (
     MaxTokens,
     NamedTask,
     Optimizer,
+    Profile,
     Suite,
+    Tier,
     Trust,
     dir_flag,
     file_flag,
@@ -34,7 +36,7 @@ ALLOWED = (
 )
 """Flags that, given again with --resume, permit their use by a run from elsewhere."""
 WITH_RESUME = frozenset(
-    {"resume", "max_cost", "max_tokens", "as_json", "trust", *ALLOWED}
+    {"resume", "max_cost", "max_tokens", "tier", "as_json", "trust", *ALLOWED}
 )
 
 
@@ -48,6 +50,7 @@ WITH_RESUME = frozenset(
 def synth(
     context: typer.Context,
     named_task: NamedTask,
+    profile: Profile = None,
     from_: Annotated[
         Optional[Path],  # noqa: UP045
         file_flag("--from", help="Controller to begin with."),
@@ -101,6 +104,7 @@ def synth(
         ),
     ] = None,
     seed: JitterSeed = None,
+    tier: Tier = "auto",
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
@@ -116,7 +120,8 @@ def synth(
         given = {
             name: value for name, value in given.items() if _is_typed(context, name)
         }
-        raise typer.Exit(command.resume(resume, given, limits, trust, as_json))
+        settings = {**limits, "tier": tier}
+        raise typer.Exit(command.resume(resume, given, settings, trust, as_json))
     models = {
         "learner": learner,
         "optimizer": optimizer,
@@ -129,12 +134,12 @@ def synth(
         from tdac_agent.cli import dry_run as dry
 
         raise typer.Exit(
-            dry.run(named_task(), {**models, **limits}, k, j, refine, as_json)
+            dry.run(named_task(), profile, {**models, **limits}, k, j, refine, as_json)
         )
     loop = {"iterations": k, "patience": j, "refine": refine, "seed": seed}
-    wanted = {**models, **limits, **loop}
+    wanted = {**models, **limits, **loop, "tier": tier}
     raise typer.Exit(
-        command.run(named_task(), wanted, out, from_, suite, trust, as_json)
+        command.run(named_task(), profile, wanted, out, from_, suite, trust, as_json)
     )
 
 

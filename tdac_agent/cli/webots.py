@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -17,21 +15,16 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.film import film_of
 from tdac_agent.cli.flags import check_finite, check_tier
-from tdac_agent.storage.plain import printable
+from tdac_agent.cli.printed import show_printed
 from tdac_agent.webots.report import WebotsReport
-from tdac_agent.webots.run import WebotsRun, frames, run_controller
+from tdac_agent.webots.run import frames, run_controller
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.video import SUFFIXES, write_video
-from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.task import TOLERANCE
 from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds.bundled import world_file
-
-STRIDE = 2
-# A line that a controller prints more often is shown once, with its count.
-REPEATS = 5
-_CONTROL_SEQUENCES = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
 
 
 def run(
@@ -45,6 +38,7 @@ def run(
     ignore: tuple[str, ...],
     webots_sensors: bool,
     video: Path | None,
+    speed: float | None,
     tier: str,
     as_json: bool,
 ) -> int:
@@ -76,9 +70,10 @@ def run(
     if video is not None:
         with console.status(f"drawing {escape(video.name)} …"):
             env = stage.make_env(**options, render_mode="rgb_array")
-            _write_video(done, env, video)
+            film = film_of(done.log.steps, env.nominal.dt, speed)
+            write_video(frames(env, done.log, film.stride), video, film.fps)
         if not as_json:
-            print(f"wrote {video} (at twice real time)")
+            print(f"wrote {video} ({film})")
     return 0 if done.report.passed else 1
 
 
@@ -104,36 +99,13 @@ def _watcher(bar: Progress, name: str, most: int) -> Callable[[int], None]:
     return watch
 
 
-def _write_video(done: WebotsRun, env: EPuckEnv, video: Path) -> None:
-    """Writes a video of the run, with a frame per `STRIDE` steps."""
-    write_video(frames(env, done.log, STRIDE), video, 2.0 / (env.nominal.dt * STRIDE))
-
-
-def _without_repeats(text: str) -> str:
-    """The text with each often repeated line once, followed by its count."""
-    lines = text.rstrip().splitlines()
-    counts = Counter(lines)
-    kept: list[str] = []
-    seen: set[str] = set()
-    for line in lines:
-        if counts[line] <= REPEATS or not line.strip():
-            kept.append(line)
-        elif line not in seen:
-            kept.append(f"{line}  (×{counts[line]})")
-        seen.add(line)
-    return "\n".join(kept)
-
-
 def _show(report: WebotsReport, console: Console) -> None:
     if report.sandbox == "rlimits":
         console.print(
             "[yellow]warning: with the sandbox tier rlimits, the controller can access "
             "files and the network[/]"
         )
-    if report.output.strip():
-        console.print("[cyan]the controller printed[/]")
-        output = printable(_CONTROL_SEQUENCES.sub("", report.output))
-        console.print(Text(_without_repeats(output)), soft_wrap=True)
+    show_printed(report.output, console)
     if report.error is not None:
         console.print("[red]the controller failed[/]")
         console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)

@@ -10,10 +10,9 @@ import typer
 from tdac_agent.cli.options import (
     VIDEO,
     WORLD_FILE,
-    Heading,
     Ignore,
     Json,
-    Start,
+    Speed,
     Tier,
     dir_flag,
     file_flag,
@@ -42,14 +41,24 @@ def webots_run(
             help="Maximum steps of the world.  [default: the environment's horizon]",
         ),
     ] = None,
-    start: Start = None,
-    heading: Heading = None,
+    start: Annotated[
+        Optional[tuple[float, float]],  # noqa: UP045
+        typer.Option(
+            "--start",
+            metavar="X Y [YAW]",
+            help="Start, m; for YAW, see --heading.  [default: the robot's place]",
+        ),
+    ] = None,
+    heading: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(metavar="YAW", help="Start heading, rad, from +x towards +y."),
+    ] = None,
     goal: Annotated[
         Optional[tuple[float, float]],  # noqa: UP045
         typer.Option(
             "--goal",
             metavar="X Y",
-            help="Goal: m in a world.  [default: its node GOAL]",
+            help="Goal, m.  [default: the world's node GOAL]",
         ),
     ] = None,
     tolerance: Annotated[
@@ -70,6 +79,7 @@ def webots_run(
         Optional[Path],  # noqa: UP045
         file_flag(help=f"{VIDEO}."),
     ] = None,
+    speed: Speed = None,
     tier: Tier = "auto",
     as_json: Json = False,
 ) -> None:
@@ -82,7 +92,7 @@ def webots_run(
     raise typer.Exit(
         webots.run(
             controller, world, steps, start, heading, goal, tolerance,
-            tuple(ignore or ()), webots_sensors, video, tier, as_json,
+            tuple(ignore or ()), webots_sensors, video, speed, tier, as_json,
         )
     )  # fmt: skip
 

@@ -136,6 +136,7 @@ class Rollout:
         rooms: Shape (T + 1,): distance from the robot's centre to the nearest obstacle,
             px (for the centre of its pixel) or m; empty if not recorded.
         calls: Shape (T,): duration of each policy call, s; empty if not recorded.
+        printed: What the controller printed, of bounded length.
     """
 
     name: str
@@ -152,6 +153,7 @@ class Rollout:
     is_retryable: bool = False
     rooms: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     calls: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    printed: str = ""
 
     @property
     def reached(self) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 from tdac_agent.episodes.learned import check_kind
 from tdac_agent.episodes.sb3_file import MOST_BYTES, load_weights, read_policy
 from tdac_agent.errors import ControllerFileError
+from tdac_agent.evaluation.controller_file import check_controller
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
@@ -92,14 +93,20 @@ def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
         )
     if path.suffix == ".zip":
         return _learned(given, path, wrappers)
+    if path.suffix != ".py":
+        raise ControllerFileError(
+            f"{given!r} is not a controller: expected a .py (or a run folder, or a "
+            ".zip of stable-baselines3)"
+        )
     return _controller(given, path)
 
 
 def _controller(name: str, file: Path) -> Entrant:
     if not file.is_file():
         raise ControllerFileError(f"no controller.py in {name!r}")
-    sha256 = sha256_of(read_source(file))
-    return Entrant(name, PolicySpec("controller", file.resolve()), sha256)
+    source = read_source(file)
+    check_controller(name, source)
+    return Entrant(name, PolicySpec("controller", file.resolve()), sha256_of(source))
 
 
 def _env_of(run_folder: Path) -> str | None:
@@ -130,13 +137,13 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256)
 
 
-def write_builtin(task: Task) -> tuple[bytes, bool]:
+def write_builtin(task: Task, tier: str = "auto") -> tuple[bytes, bool]:
     """Writes a controller without a model; returns it and whether it is verified.
 
     If no candidate is verified, the controller is the last one.
     """
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
-        run = synthesize(task, BUILTIN, out=Path(name) / "run")
+        run = synthesize(task, BUILTIN, out=Path(name) / "run", tier=tier)
         if run.verified:
             return run.controller.read_bytes(), True
         candidates = sorted((run.folder / "iterations").rglob("controller.py"))

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.metadata
 import itertools
-import platform
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_agent.errors import Fault
 from tdac_agent.evaluation.entrants import Entrant, entrants_of, write_builtin
 from tdac_agent.evaluation.evaluation_report import (
     EvaluatedPolicy,
@@ -27,13 +26,15 @@ from tdac_agent.evaluation.evaluation_report import (
 )
 from tdac_agent.evaluation.overlay import Overlay, draw_overlay
 from tdac_agent.evaluation.seeded_run import run_seeds
+from tdac_agent.evaluation.unfinished import folder_of, open_store
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.provenance import VERSIONED, sha256_of
+from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.tasks.task import Task, called, lay_out, load_task
 from tdac_agent.verification.diagnosis.measures import Measured
-from tdac_agent.verification.judge.seeded import CALLS_FILE, POSES_FILE, SeededJob
+from tdac_agent.verification.judge.kept_episodes import kept_episodes
+from tdac_agent.verification.judge.seeded import SeededJob
 from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import one_of, whole_number
@@ -79,7 +80,8 @@ def evaluate(
         tier: Sandbox tier; `auto` for the best one on this machine.
         limits: Limits of a controller's process in each episode.
         out: Folder for `evaluation.json`, `episodes.csv`, `timing.csv`, and a picture
-            of each task; by default nothing is written.
+            of each task; by default nothing is written. Until then it keeps each
+            finished episode: after an interruption, the same call continues.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with task, policy, episodes and successes so far.
 
@@ -89,7 +91,8 @@ def evaluate(
     Raises:
         TaskError: A task or a number is invalid, or a run folder is for another
             environment than a task.
-        ControllerFileError: A policy's file cannot be read.
+        ControllerFileError: A policy's file cannot be read, or is no policy.
+        RunError: Another evaluation writes to `out`.
         Fault: The sandbox is broken.
     """
     whole_number("episodes", episodes, 1, MOST_EPISODES)
@@ -103,12 +106,11 @@ def evaluate(
                 f"{entrant.name} was written for {entrant.env}; the task "
                 f"{task.name!r} is of {task.spec.env}"
             )
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
     seeds = episode_seeds(seed, episodes)
     results: list[Result] = []
     timings: list[Timing] = []
     with contextlib.ExitStack() as stack:
+        store = stack.enter_context(open_store(out))
         warm = judge or stack.enter_context(WarmJudge())
         for task in loaded:
             folder = Path(
@@ -123,7 +125,7 @@ def evaluate(
                 variation=variation,
                 seeds=seeds,
                 test=None,
-                measured=True,
+                keep=store,
                 tier=tier,
                 limits=limits or Limits(),
                 out=folder / "results",
@@ -137,20 +139,20 @@ def evaluate(
                 overlays.append(Overlay.of(result, poses))
             if out is not None:
                 draw_overlay(task, overlays, out / f"{task.name}.png")
-    found = Evaluation(
-        variation=variation,
-        seed=seed,
-        episodes=episodes,
-        tasks=tuple(map(_about_task, loaded)),
-        policies=tuple(map(_about_policy, entrants)),
-        rows=tuple(map(row_of, results)),
-        comparisons=comparisons_of(results),
-        versions=_versions(),
-        results=tuple(results),
-        timings=tuple(timings),
-    )
-    if out is not None:
-        write_evaluation(found, out)
+        found = Evaluation(
+            variation=variation,
+            seed=seed,
+            episodes=episodes,
+            tasks=tuple(map(_about_task, loaded)),
+            policies=tuple(map(_about_policy, entrants)),
+            rows=tuple(map(row_of, results)),
+            comparisons=comparisons_of(results),
+            versions=versions(),
+            results=tuple(results),
+            timings=tuple(timings),
+        )
+        if out is not None:
+            write_evaluation(found, out)
     return found
 
 
@@ -186,36 +188,53 @@ def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:
 def _compete(
     entrant: Entrant, task: Task, job: SeededJob, judge: WarmJudge, watch: Watch | None
 ) -> tuple[Result, NDArray[np.float32], list[NDArray[np.float32]]]:
-    """Runs a policy on a task; returns the result, call times in s, and poses."""
+    """Runs a policy on a task; returns the result, call times in s, and poses.
+
+    Episodes that `job.keep` has already are not driven again.
+    """
     policy, sha256, note = entrant.policy, entrant.sha256, None
     if entrant.is_builtin:
         if watch is not None:
             watch(task.name, entrant.name, 0, 0)
-        source, verified = write_builtin(task)
+        source, verified = write_builtin(task, job.tier)
         file = job.out.with_suffix(".py")
         file.write_bytes(source)
         policy, sha256 = replace(policy, file=file), sha256_of(source)
         note = None if verified else NOT_VERIFIED
 
+    request = job.model_copy(update={"policy": policy})
+    assert job.keep is not None
+    keep = folder_of(job.keep, task, request, sha256)
+    before = kept_episodes(keep, job.seeds)
+    reached = sum(each.figures.success for each in before.values())
+
     def progress(count: int, successes: int) -> None:
         if watch is not None:
-            watch(task.name, entrant.name, count, successes)
+            watch(task.name, entrant.name, len(before) + count, reached + successes)
 
     progress(0, 0)
-    request = job.model_copy(update={"policy": policy})
-    episodes, ending = run_seeds(request, task.nominal, Measured, judge, progress)
+    missing = tuple(seed for seed in job.seeds if seed not in before)
+    if missing:
+        late = sum(each.late for each in before.values())
+        rest = {"keep": keep, "seeds": missing, "late": late}
+        request = request.model_copy(update=rest)
+        run_seeds(request, task.nominal, Measured, judge, progress)
+    kept = {**before, **kept_episodes(keep, missing)}
+    if lost := [seed for seed in job.seeds if seed not in kept]:
+        raise Fault(f"the judge did not keep the episodes of {len(lost)} seeds")
+    episodes = [kept[seed] for seed in job.seeds]
+    tiers = [each.tier for each in episodes if each.tier]
     result = Result(
         task=task.name,
         policy=entrant.name,
         knows=policy.knows,
-        episodes=tuple(episodes),
-        sandbox=ending.tier,
+        episodes=tuple(each.figures for each in episodes),
+        sandbox=tiers[-1] if tiers else job.tier,
         controller_sha256=sha256,
         note=note,
     )
-    with np.load(job.out / POSES_FILE) as poses:
-        trajectories = [poses[f"arr_{number}"] for number in range(len(episodes))]
-    return result, np.load(job.out / CALLS_FILE), trajectories
+    calls = np.concatenate([each.calls for each in episodes])
+    return result, calls, [each.poses for each in episodes]
 
 
 def _about_task(task: Task) -> EvaluatedTask:
@@ -238,8 +257,3 @@ def _about_policy(entrant: Entrant) -> EvaluatedPolicy:
         wrappers=policy.wrappers,
         sha256=entrant.sha256,
     )
-
-
-def _versions() -> dict[str, str]:
-    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
-    return {"python": platform.python_version(), **versions}

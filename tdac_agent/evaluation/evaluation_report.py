@@ -144,6 +144,11 @@ class Evaluation(_Record):
     results: tuple[Result, ...] = Field(exclude=True)
     timings: tuple[Timing, ...] = Field(exclude=True)
 
+    @property
+    def all_crashed(self) -> bool:
+        """Whether each policy failed with an error of its own in every episode."""
+        return all(row.outcomes.get("error", 0) == row.episodes for row in self.rows)
+
     def to_frame(self) -> pd.DataFrame:
         """Tidy data with a row for each episode; lengths in the unit of its task."""
         import pandas as pd

@@ -93,7 +93,6 @@ def verify_robust(
             variation="jitter",
             seeds=tuple(range(first, first + episodes)),
             test=test,
-            measured=False,
             tier=tier,
             limits=limits or Limits(),
             out=folder / "results",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
 import yaml
@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 FILE = Path(__file__).parent / "lifecycle.yaml"
 SOON_DAYS = 90
+URGENT_DAYS = 30
 
 
 class Lifecycle(BaseModel):
@@ -22,6 +23,7 @@ class Lifecycle(BaseModel):
     dated: date
     source: str
     ends: dict[str, date] = Field(description="Retirement date by model name.")
+    successors: dict[str, str] = Field({}, description="Model to use instead, by name.")
 
 
 @functools.cache
@@ -30,11 +32,19 @@ def load_lifecycle() -> Lifecycle:
     return Lifecycle.model_validate(yaml.safe_load(FILE.read_text("utf-8")))
 
 
-def retired(models: Iterable[str], today: date | None = None) -> list[str]:
-    """Returns the given models (`--learner` names) that are retired."""
-    now = today or datetime.now(UTC).date()
+def retired(
+    models: Iterable[str], today: date | None = None, *, within_days: int = 0
+) -> list[str]:
+    """Returns the given models that are retired, or will be within some days.
+
+    Args:
+        models: `--learner` names.
+        today: The date to compare with; the present one by default.
+        within_days: Days after `today` that count as well.
+    """
+    last = (today or datetime.now(UTC).date()) + timedelta(days=within_days)
     ends = load_lifecycle().ends
-    return [model for model in models if model in ends and ends[model] <= now]
+    return [m for m in dict.fromkeys(models) if m in ends and ends[m] <= last]
 
 
 def model_warnings(models: Iterable[str], today: date | None = None) -> list[str]:
@@ -42,10 +52,9 @@ def model_warnings(models: Iterable[str], today: date | None = None) -> list[str
     now = today or datetime.now(UTC).date()
     known = load_lifecycle()
     lines = []
-    for model in dict.fromkeys(models):
-        end = known.ends.get(model)
-        if end is None or (end - now).days > SOON_DAYS:
-            continue
+    for model in retired(models, now, within_days=SOON_DAYS):
+        end, successor = known.ends[model], known.successors.get(model)
         when = f"was retired on {end}" if end <= now else f"will be retired on {end}"
-        lines.append(f"{model} {when} (as of {known.dated})")
+        instead = "" if successor is None else f"; its successor is {successor}"
+        lines.append(f"{model} {when} (as of {known.dated}){instead}")
     return lines

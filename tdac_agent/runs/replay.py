@@ -129,7 +129,11 @@ class Replay:
         # The introduction may have become longer.
         question = recorded.partition(BEGIN)[0]
         if self._reworded and asked.partition(BEGIN)[0].endswith(question):
-            return (f"the recorded question was worded differently from {line} on",)
+            place = f" from {line} on" if same else ""
+            return (
+                f"the question is worded differently{place} than when it was recorded; "
+                "the recorded answer is used",
+            )
         raise PermanentFault(f"the question differs from the record in {line}: {where}")
 
 

@@ -25,6 +25,7 @@ CONFIGURATION = {
     "version": "version of tdac",
     "task": "task",
     "task_sha256": "map, start, goal or limits of the task",
+    "profile": "profile",
     "suite_sha256": "suite",
     "learner": "learner",
     "optimizer": "optimizer",
@@ -95,7 +96,13 @@ def _difference(words: str, before: object, now: object) -> str:
     """A difference in words, with the values unless they are hashes."""
     if words == "seed":
         before, now = ("none" if value is None else value for value in (before, now))
-    if isinstance(before, int) or words in {"learner", "optimizer", "task", "seed"}:
+    if isinstance(before, int) or words in {
+        "learner",
+        "optimizer",
+        "task",
+        "profile",
+        "seed",
+    }:
         return f"{words} {before} instead of {now}"
     return f"different {words}"
 

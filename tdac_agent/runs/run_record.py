@@ -11,6 +11,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.storage.locks import LOCK_FILE, is_held
 from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.task_file import Profile
 from tdac_envs.core.errors import nearest, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
@@ -69,6 +70,7 @@ class Run(PrintableRecord):
     served_at: dict[str, str] = Field(
         {}, description="Server address by model, unless it is the vendor's."
     )
+    profile: Profile = Field("paper", description="What a controller must define.")
     prompt: str = Field("full", description="Template of the first question.")
     refine: bool = Field(True, description="Whether failures become rules.")
     max_output: int = Field(0, description="Token limit of an answer.")

@@ -35,6 +35,13 @@ class ChildUsage:
     output_tail: str
     status: int
 
+    @property
+    def printed(self) -> str:
+        """The printed text that was kept; `[...]` stands for a gap."""
+        kept = len(self.output_head.encode()) + len(self.output_tail.encode())
+        gap = "\n[...]\n" if self.output_bytes > kept else ""
+        return self.output_head + gap + self.output_tail
+
 
 class ProcessEnd:
     """Ends one child, once; every call returns its usage.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from tdac_agent.errors import Fault
@@ -56,6 +57,7 @@ def synthesize(
     budget: Budget | None = None,
     index: int = 0,
     retry: RetryPolicy | None = None,
+    tier: str = "auto",
     judge: WarmJudge | None = None,
     on_event: Event | None = None,
 ) -> Run:
@@ -87,6 +89,8 @@ def synthesize(
         budget: Budget shared with other runs, instead of these limits.
         index: Index among otherwise equal runs, which keeps their answers apart.
         retry: Retry policy after faults.
+        tier: Sandbox tier of all candidates; `auto` for the best one on this machine.
+            It is not recorded: a run folder cannot ask for a weaker one.
         judge: A warm judge, to reuse in consecutive runs; None starts one.
         on_event: Called with each journal record.
 
@@ -141,16 +145,24 @@ def synthesize(
         paid = any(model.paid for model in models)
         with ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge(task=task))
-            return _run(dialogue, start_from, warm, paid=paid)
+            return _run(dialogue, start_from, _Tests(warm, tier), paid=paid)
 
 
-def _run(dialogue: Dialogue, given: str | None, judge: WarmJudge, *, paid: bool) -> Run:
+@dataclass(frozen=True, slots=True)
+class _Tests:
+    """Where candidates are tested: by which judge, in which sandbox tier."""
+
+    judge: WarmJudge
+    tier: str
+
+
+def _run(dialogue: Dialogue, given: str | None, tests: _Tests, *, paid: bool) -> Run:
     """Runs the loop, and records how it ended."""
     recorder = dialogue.calls.recorder
     try:
         if paid:
-            _prove(dialogue.task, recorder, judge)
-        _search(dialogue, given, judge)
+            _prove(dialogue.task, recorder, tests)
+        _search(dialogue, given, tests)
     except OutOfBudget as error:
         facts = {"enough": error.way_on, "outlook": error.outlook}
         recorder.finish("budget", reason=str(error), **facts)
@@ -165,7 +177,7 @@ def _run(dialogue: Dialogue, given: str | None, judge: WarmJudge, *, paid: bool)
     return recorder.run
 
 
-def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
+def _search(dialogue: Dialogue, given: str | None, tests: _Tests) -> None:
     """Algorithm 2, until a candidate has passed or K iterations are over."""
     recorder = dialogue.calls.recorder
     run = recorder.run
@@ -189,7 +201,7 @@ def _search(dialogue: Dialogue, given: str | None, judge: WarmJudge) -> None:
                 recorder.judged(k, j, report, notes, unchanged=True)
                 dialogue.saw_no_change(k, j)
             else:
-                report = _verify(dialogue.task, recorder, k, j, source, folder, judge)
+                report = _verify(dialogue.task, recorder, k, j, source, folder, tests)
                 recorder.judged(k, j, report, notes)
                 dialogue.saw(k, j, report)
             if report.passed:
@@ -211,7 +223,7 @@ def _given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
     )
 
 
-def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
+def _prove(task: Task, recorder: Recorder, tests: _Tests) -> None:
     """Checks the test suite before an answer is paid for, once per run.
 
     Raises:
@@ -225,8 +237,8 @@ def _prove(task: Task, recorder: Recorder, judge: WarmJudge) -> None:
         recorder.tell({"event": "prove.step", "doing": doing})
 
     recorder.event("prove.start")
-    seed = recorder.run.seed
-    proof = prove_suite(task, seed=seed, judge=judge, on_progress=tell)
+    seed, judge = recorder.run.seed, tests.judge
+    proof = prove_suite(task, tier=tests.tier, seed=seed, judge=judge, on_progress=tell)
     facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
     recorder.event("prove.end", **facts)
 
@@ -238,14 +250,19 @@ def _verify(
     j: int,
     source: str,
     folder: Path,
-    judge: WarmJudge,
+    tests: _Tests,
 ) -> Report:
     """The report on a candidate; a recorded one is reused."""
     seed = recorder.run.seed
     recorder.event("verify.start", k=k, j=j)
     kept = kept_report(folder, task, source, seed) if recorder.run.mark else None
     return kept or verify(
-        folder / "controller.py", task, seed=seed, out=folder, judge=judge
+        folder / "controller.py",
+        task,
+        tier=tests.tier,
+        seed=seed,
+        out=folder,
+        judge=tests.judge,
     )
 
 

@@ -96,6 +96,7 @@ def describe(
     return Run(
         task=task.name,
         task_sha256=task.sha256(),
+        profile=task.spec.profile,
         learner=models[0].name,
         optimizer=models[1].name,
         served_at={name: url for name, url in addresses.items() if url is not None},

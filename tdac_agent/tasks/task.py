@@ -20,6 +20,7 @@ from tdac_agent.tasks.registry import environment, own_environments
 from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.tasks.task_file import (
     TASK_FILE,
+    Profile,
     TaskFile,
     bundled_task,
     bundled_tasks,
@@ -71,6 +72,13 @@ class Task:
         """Step limit of the progress test."""
         default = max(MIN_PROGRESS_STEPS, math.ceil(0.16 * self.nominal.horizon))
         return self.spec.progress.steps or default
+
+    def with_profile(self, profile: Profile | None) -> Task:
+        """Returns the task with another profile; None keeps its own."""
+        if profile is None:
+            return self
+        spec = self.spec.model_copy(update={"profile": profile})
+        return replace(self, spec=spec)
 
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's environment."""
@@ -154,15 +162,19 @@ def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:
 def called(task: Task) -> str:
     """Describes a task: a bundled one by its name, others also by map hash and goal.
 
-    A name alone does not identify a task: any map may have a bundled map's name.
+    A name alone does not identify a task: any map may have a bundled map's name. The
+    task of a bundled world may be named after the world (`maze` for `epuck-maze`).
     """
     name, setting = task.name, task.setting
-    if name in bundled_tasks():
-        known = _bundled(name)
+    places = task.environment.bundled().items()
+    alias = next((known for known, place in places if name in (known, place)), None)
+    known = None if alias is None else _bundled(alias)
+    if alias and known and known.setting.world_sha256() == setting.world_sha256():
         if known.sha256() == task.sha256():
-            return name
-        same = known.setting.world_sha256() == setting.world_sha256()
-        name += ", changed" if same else ", not the bundled one"
+            return alias
+        name = f"{alias}, changed"
+    elif name in bundled_tasks():
+        name += ", not the bundled one"
     tolerance = setting.units.told(task.nominal.goal_tolerance)
     return f"{name} (map {setting.world_sha256()[:8]}, goal within {tolerance})"
 

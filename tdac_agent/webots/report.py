@@ -106,7 +106,7 @@ def report_of(
         traceback=error.traceback if isinstance(error, ControllerError) else "",
         left_out=stage.left_out,
         sandbox=tier,
-        output=_printed(usage),
+        output=usage.printed,
     )
 
 
@@ -125,9 +125,3 @@ def _why_not(
     if stage.has_goal and outcome != "reached":
         reasons.append(f"the goal was not reached ({outcome})")
     return "; ".join(reasons)
-
-
-def _printed(usage: ChildUsage) -> str:
-    kept = len(usage.output_head.encode()) + len(usage.output_tail.encode())
-    gap = "\n[...]\n" if usage.output_bytes > kept else ""
-    return usage.output_head + gap + usage.output_tail

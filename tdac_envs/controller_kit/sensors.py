@@ -236,8 +236,9 @@ def show(
             for _ in frames:
                 pass
         else:
-            write_video(frames, HERE / "controller.mp4", fps=30)
-            print("no display: wrote", HERE / "controller.mp4")
+            real_time = env.metadata["render_fps"] / 2  # every second step is drawn
+            write_video(frames, HERE / "controller.mp4", fps=real_time)
+            print("no display: wrote", HERE / "controller.mp4", "(at real time)")
     except KeyboardInterrupt:
         outcome.append("stopped")
     finally:

@@ -61,7 +61,7 @@ class EPuckEnv(DrivenEnv):
     | `pose` | (3,) | m, m, rad | x, y, heading in (-pi, pi] |
     | `goal` | (2,) | m | x, y of the goal |
     | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
-    | `ps` | (8,) | | readings of ps0 to ps7, 67 (nothing near) to 4095 (contact) |
+    | `ps` | (8,) | | ps0 to ps7: 67 with nothing near, 2000 to 2700 at a contact |
     | `wheel_positions` | (2,) | rad | angles turned by the wheels since the reset |
     | `ground` | (3,) | | readings of gs0 to gs2, with `ground_sensors=True` |
     | `gps` | (3,) | m | x, y, z, with `gps=True` |

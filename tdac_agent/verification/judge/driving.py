@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tdac_agent.episodes.episode import Record, not_driven, run_policy
@@ -89,6 +89,7 @@ def drive_seed(setup: EpisodeSetup, seed: int) -> SeededResult:
         rollout = not_driven(record, name, fault)
     finally:
         usage = child.close()
+    rollout = replace(rollout, printed=usage.printed)
     return SeededResult(rollout, usage.cpu_seconds, child.tier, record.env.task)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import functools
 from collections.abc import Callable
-from importlib.util import decode_source
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.sandbox import ControllerError
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.judge import Judge, rollout_key
-from tdac_agent.verification.suite.contract import MAX_SOURCE_BYTES
+from tdac_agent.verification.suite.contract import ParseError, parse_source
 from tdac_agent.verification.suite.oracle import Oracle
 
 JUDGE: pytest.StashKey[Judge] = pytest.StashKey()
@@ -36,19 +35,10 @@ class Controller:
     @functools.cached_property
     def tree(self) -> ast.Module:
         """Syntax tree of the source; a source that does not parse fails the test."""
-        size = len(self._judge.source)
-        if size > MAX_SOURCE_BYTES:
-            limit = f"at most {MAX_SOURCE_BYTES} are allowed"
-            pytest.fail(f"the source has {size} bytes, {limit}", pytrace=False)
         try:
-            # Respects the encoding that the file declares, as Python does.
-            return ast.parse(decode_source(self._judge.source))
-        except SyntaxError as error:
-            line = f" (line {error.lineno})" if error.lineno else ""
-            reason = f"{error.msg}{line}"
-        except (ValueError, RecursionError, MemoryError) as error:
-            reason = str(error) or type(error).__name__
-        pytest.fail(f"the source does not parse: {reason}", pytrace=False)
+            return parse_source(self._judge.source)
+        except ParseError as error:
+            pytest.fail(str(error), pytrace=False)
 
     def constant(self, name: str) -> Any:
         """Value of a top-level name."""

@@ -18,6 +18,7 @@ from tdac_agent.verification.diagnosis.report import (
 )
 from tdac_agent.verification.judge import fixtures as suite_fixtures
 from tdac_agent.verification.judge.judge import Judge
+from tdac_envs.core.errors import hint
 
 # Some of these take more time than the tests of a verification.
 UNUSED_PLUGINS = (
@@ -32,6 +33,8 @@ UNUSED_PLUGINS = (
 )
 # Maximum depth of a traceback, which limits the time that pytest takes to format it.
 MOST_CALLS = 50
+FIXTURES = ("controller", "task", "rollout", "oracle", "generator")
+"""The fixtures of suites; see `docs/suites.md`."""
 
 
 class JudgePlugin:
@@ -79,13 +82,18 @@ class JudgePlugin:
             return (yield)
 
     @pytest.hookimpl(tryfirst=True)
-    def pytest_runtest_makereport(self, call: pytest.CallInfo[None]) -> None:
+    def pytest_runtest_makereport(
+        self, item: pytest.Item, call: pytest.CallInfo[None]
+    ) -> None:
         """Cuts errors to a bounded size, before pytest formats them line by line.
 
         A message may quote megabytes that a controller returned, and deeply nested
-        source gives a traceback of many calls.
+        source gives a traceback of many calls. A fixture that does not exist is a fault
+        of the suite.
         """
         error = None if call.excinfo is None else call.excinfo.value
+        if isinstance(error, pytest.FixtureLookupError):
+            self._judge.fault = self._judge.fault or _unknown_fixture(item, error)
         known: set[int] = set()
         while error is not None and id(error) not in known:
             known.add(id(error))
@@ -105,6 +113,15 @@ class JudgePlugin:
             item.ihook.pytest_runtest_logreport(report=report)
         item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
         return True
+
+
+def _unknown_fixture(item: pytest.Item, error: pytest.FixtureLookupError) -> str:
+    """Names the test, the fixture that it asks for, and the nearest documented one."""
+    file, line, name = item.location
+    place = file if line is None else f"{file}:{line + 1}"
+    known = [each for each in FIXTURES if each != error.argname]
+    wrong = f"{name} needs the fixture {error.argname!r}, which does not exist"
+    return f"the suite is broken: {place}: {wrong}{hint(str(error.argname), known)}"
 
 
 def _shorten(error: BaseException) -> None:

@@ -12,6 +12,7 @@ from tdac_agent.errors import Fault
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.verification.diagnosis.report import (
     MAX_MESSAGE,
+    OWN,
     Diagnosis,
     Failure,
     Verdict,
@@ -25,6 +26,10 @@ INTERNAL_ERROR = 3
 """pytest's exit status after an internal error."""
 BREAKDOWN = "INTERNALERROR>"
 """Prefix of the lines that pytest prints about an internal error."""
+EXPECTED = ("AssertionError", "Failed: ", "tdac_agent.", "line ")
+"""How the messages of assertions, of `pytest.fail` and of our own errors begin."""
+OWN_FOLDER = f"/suites/{OWN}/"
+"""Part of each path in the user's suite, as a verification lays it out."""
 NOT_RUN = "the test did not run to its end"
 TORN = "the report log is damaged or incomplete, so no test in it counts as passed"
 
@@ -34,8 +39,26 @@ class _Crash(PrintableRecord):
     lineno: int | None = None
 
 
+class _Place(PrintableRecord):
+    path: str
+    lineno: int
+
+
+class _Call(PrintableRecord):
+    reprfileloc: _Place | None = None
+
+
+class _Entry(PrintableRecord):
+    data: _Call = _Call()
+
+
+class _Traceback(PrintableRecord):
+    reprentries: list[_Entry] = Field(default_factory=list)
+
+
 class _Details(PrintableRecord):
     reprcrash: _Crash | None = None
+    reprtraceback: _Traceback | None = None
 
 
 class _Collected(PrintableRecord):
@@ -211,6 +234,8 @@ def _message(record: _Collected) -> str:
     details = record.longrepr
     if isinstance(details, _Details):
         text = _of_crash(details.reprcrash) if details.reprcrash else ""
+        if not text.startswith(EXPECTED):
+            text = _own_line(details.reprtraceback) + text
     elif isinstance(details, tuple):
         text = details[-1]  # of a skip: file, line, reason
     else:
@@ -222,6 +247,22 @@ def _message(record: _Collected) -> str:
     if separator and head.startswith("tdac_agent."):
         text = tail
     return text if len(text) <= MAX_MESSAGE else f"{text[:MAX_MESSAGE]} …"
+
+
+def _own_line(calls: _Traceback | None) -> str:
+    """`own/FILE:LINE: `, the last line of the user's suite in a traceback; or nothing.
+
+    An error that is no assertion may be one of the test, and its message alone does not
+    say where.
+    """
+    places = (
+        [] if calls is None else [each.data.reprfileloc for each in calls.reprentries]
+    )
+    for place in reversed(places):
+        _, found, file = f"/{place.path if place else ''}".rpartition(OWN_FOLDER)
+        if place is not None and found:
+            return f"{OWN}/{file}:{place.lineno}: "
+    return ""
 
 
 def _of_crash(crash: _Crash) -> str:

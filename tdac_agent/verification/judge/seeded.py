@@ -32,12 +32,12 @@ from tdac_agent.verification.judge.driving import (
     drive_seed,
     record_of,
 )
+from tdac_agent.verification.judge.kept_episodes import KeptEpisode, keep_episode
 from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.turns import Turns
 from tdac_agent.verification.judge.worker_pool import SIZE, WorkerPool
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
-POSES_FILE, CALLS_FILE = "poses.npz", "calls.npy"
 # In an evaluation, the remaining episodes are skipped after this many time-outs.
 MOST_LATE = 3
 
@@ -45,8 +45,9 @@ MOST_LATE = 3
 class SeededJob(BaseModel):
     """Episodes to run; all paths are absolute.
 
-    `test` stops a robust verification early. `measured` is set for an evaluation, which
-    keeps measures instead of a diagnosis, and poses and call times as well.
+    `test` stops a robust verification early. `keep` is the folder of an evaluation,
+    which keeps measures instead of a diagnosis, and poses and call times as well;
+    `late` is the number of time-outs among its episodes that were run before.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -58,7 +59,8 @@ class SeededJob(BaseModel):
     variation: str
     seeds: tuple[int, ...]
     test: SequentialTest | None
-    measured: bool
+    keep: Path | None = None
+    late: int = 0
     tier: str
     limits: Limits
     out: Path
@@ -140,44 +142,39 @@ def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
         job.variation,
     )
     counts, tier, fault = [0, 0], job.tier, None
-    all_kept: list[EpisodeSummary] = []
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
             with closing(_in_order(setup, job)) as episodes:
                 for kept in episodes:
                     tier = kept.tier or tier
+                    if job.keep is not None and isinstance(kept.figures, Measured):
+                        keep_episode(job.keep, _lasting(kept, kept.figures))
                     file.write(kept.figures.model_dump_json() + "\n")
                     file.flush()
                     counts[not kept.figures.success] += 1
-                    if job.measured:
-                        all_kept.append(kept)
                     if job.test and job.test.decide(*counts) != "undecided":
                         break
         except SandboxError as error:
             fault = f"the sandbox failed: {error}"
-    if job.measured:
-        _write_arrays(all_kept, job.out)
     ending = JobEnding(tier=tier, fault=fault)
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 
 
-def _write_arrays(all_kept: list[EpisodeSummary], out: Path) -> None:
-    np.savez(out / POSES_FILE, *(kept.poses for kept in all_kept))
-    calls = [kept.calls for kept in all_kept]
-    np.save(out / CALLS_FILE, np.concatenate([np.zeros(0, np.float32), *calls]))
+def _lasting(kept: EpisodeSummary, figures: Measured) -> KeptEpisode:
+    return KeptEpisode(figures, kept.tier, kept.late, kept.poses, kept.calls)
 
 
 def _in_order(setup: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
     """Yields episodes in order, several running at a time; closing waits for them."""
     size = min(SIZE, len(job.seeds))
-    turns, late = Turns(size), list[int]()
-    work = partial(_run_episode, setup, job.measured)
+    turns, late = Turns(size), [0] * job.late
+    work = partial(_run_episode, setup, job.keep is not None)
     with (
         closing(WorkerPool(work, setup.child_pool.close, size)) as worker_pool,
         ThreadPoolExecutor(max_workers=size) as pool,
     ):
         try:
-            patience = MOST_LATE if job.measured else len(job.seeds)
+            patience = MOST_LATE if job.keep is not None else len(job.seeds)
             yield from pool.map(
                 partial(_run_with_retry, worker_pool, turns, late, patience), job.seeds
             )

@@ -116,9 +116,9 @@ def drive(
     try:
         load_controller(child, settings)
     except ControllerFault as fault:
-        cpu_seconds = child.close().cpu_seconds
-        rollout = not_driven(task, request, fault)
-        return SuiteResult(rollout, cpu_seconds, child.tier, fault)
+        usage = child.close()
+        rollout = replace(not_driven(task, request, fault), printed=usage.printed)
+        return SuiteResult(rollout, usage.cpu_seconds, child.tier, fault)
     try:
         if request.drive != "policy":
             seconds = child.limits.reset_seconds + 2 * limit * task.nominal.dt
@@ -134,8 +134,9 @@ def drive(
                 deadline=settings.deadline,
             )
     finally:
-        cpu_seconds = child.close().cpu_seconds
-    return SuiteResult(rollout, cpu_seconds, child.tier)
+        usage = child.close()
+    rollout = replace(rollout, printed=usage.printed)
+    return SuiteResult(rollout, usage.cpu_seconds, child.tier)
 
 
 def load_controller(child: Child, settings: VerificationSettings) -> None:

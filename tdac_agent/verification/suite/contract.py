@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import functools
+import warnings
 from collections.abc import Iterator
+from importlib.util import decode_source
 
 ALLOWED_IMPORTS = frozenset(
     [
@@ -34,6 +36,32 @@ _HIDDEN_MODULES = frozenset(
     ]
 )
 MAX_SOURCE_BYTES = 200_000
+
+
+class ParseError(ValueError):
+    """A source is too large or does not parse; the message says why."""
+
+
+def parse_source(source: bytes) -> ast.Module:
+    """Returns the syntax tree, in the encoding that the file declares, as Python does.
+
+    Raises:
+        ParseError: There is none.
+    """
+    size = len(source)
+    if size > MAX_SOURCE_BYTES:
+        limit = f"at most {MAX_SOURCE_BYTES} are allowed"
+        raise ParseError(f"the source has {size} bytes, {limit}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)
+            return ast.parse(decode_source(source))
+    except SyntaxError as error:
+        line = f" (line {error.lineno})" if error.lineno else ""
+        reason = f"{error.msg}{line}"
+    except (ValueError, RecursionError, MemoryError) as error:
+        reason = str(error) or type(error).__name__
+    raise ParseError(f"the source does not parse: {reason}")
 
 
 def time_step(dt: float) -> int | float:

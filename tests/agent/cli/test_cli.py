@@ -19,6 +19,7 @@ from small import SHORT, small_cells, write_small_task
 
 from tdac_agent.cli.main import PARTS, command_line
 from tdac_agent.cli.options import task_flags
+from tdac_agent.runs.resume import resume_arguments
 from tdac_envs.mapping.bundled import bundled_map
 
 COMMANDS = [
@@ -399,6 +400,21 @@ def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
     assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
 
 
+@pytest.mark.parametrize("command", ["verify", "check-suite"])
+def test_a_misspelt_fixture_is_a_fault_of_the_suite(tdac, good, tmp_path, command):
+    """It says nothing about the controller; the line and the nearest name are told."""
+    text = "\n\ndef test_mine(rolout):\n    assert rolout().reached, 'not reached'\n"
+    (tmp_path / "test_mine.py").write_text(text)
+    words = [good, "--paper"] if command == "verify" else ["--task", good]
+    flags = ("--profile", "policy", "--suite", tmp_path)
+    code, out, err = tdac(command, *words, *flags)
+    assert (code, out) == (3, "")
+    assert err.splitlines()[-1] == (
+        "infrastructure fault: the suite is broken: own/test_mine.py:3: test_mine "
+        "needs the fixture 'rolout', which does not exist (did you mean 'rollout'?)"
+    )
+
+
 @pytest.mark.slow
 def test_check_suite_says_yes(tdac, tmp_path):
     """Exit 0 and a table of the controllers."""
@@ -442,6 +458,35 @@ def test_synth_writes_a_run(tdac, good):
     run = json.loads(out)
     assert run["status"] == "verified"
     assert Path("a/controller.py").is_file()
+
+
+def test_synth_keeps_the_profile_and_takes_a_tier(tdac, good):
+    """The profile is part of the run and of its task; a run asks for no tier."""
+    (good / "controller.py").unlink()
+    words = ["synth", "--task", good, "--out", "a", "--profile", "policy"]
+    code, out, _ = tdac(*words, "--json", "--tier", "rlimits")
+    assert code == 0
+    assert json.loads(out)["profile"] == "policy"
+    about = json.loads(Path("a/report.json").read_text())["provenance"]
+    assert (about["profile"], about["sandbox"]) == ("policy", "rlimits")
+    arguments = resume_arguments(Path("a"))
+    assert arguments["task"].spec.profile == "policy"
+    assert "tier" not in arguments
+    code, _, errors = tdac(*words[:-2])
+    assert (code, "profile policy instead of paper" in errors) == (2, True)
+    code, _, errors = tdac("synth", "--resume", "a", "--profile", "paper")
+    assert (code, "leave out --profile" in errors) == (2, True)
+    code, _, errors = tdac("synth", "--resume", "a", "--tier", "strong")
+    assert (code, "unknown sandbox tier 'strong'" in errors) == (2, True)
+
+
+def test_usage_names_arguments_without_braces(tdac):
+    """`POLICY...` is one or more, `[DIR]` may be left out."""
+    assert "tdac evaluate [OPTIONS] POLICY..." in tdac("evaluate", "--help")[1]
+    assert "tdac runs [OPTIONS] [DIR]" in tdac("runs", "--help")[1]
+    text = tdac("webots", "run", "--help")[1]
+    assert "tdac webots run [OPTIONS] CONTROLLER WORLD" in text
+    assert "px" not in text
 
 
 @pytest.mark.parametrize("command", [["verify"], ["play", "--video", "a.gif"]])
@@ -545,11 +590,26 @@ def test_polarity_and_threshold_are_flags_and_keys(tdac, image, chessboard, tmp_
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif"])
 def test_play_writes_a_film(tdac, good, suffix):
-    """Exit 0 where the goal was reached."""
-    code, out, _ = tdac("play", good, "--video", f"a.{suffix}")
+    """Exit 0 where the goal was reached; the speed of the film is told."""
+    code, out, _ = tdac("play", good, "--video", f"a.{suffix}", "--speed", "20")
     assert code == 0
+    assert f"wrote a.{suffix} (at 20 times real time, " in out
     assert "reached after" in out
     assert Path(f"a.{suffix}").stat().st_size > 1000
+
+
+def test_play_shows_what_the_controller_printed(tdac, good):
+    """Its lines, without control sequences; what repeats is counted."""
+    file = good / "controller.py"
+    text = "def policy(obs):\n    print('\\x1b[31mhello')\n    return 0.0, 0.0\n"
+    file.write_text(f"print('once')\n{text}")
+    code, out, _ = tdac("play", good, "--video", "a.gif", "--speed", "100")
+    assert code == 1
+    lines = out.splitlines()
+    at = lines.index("the controller printed")
+    assert lines[at + 1] == "once"
+    assert re.fullmatch(r"hello  \(×\d+\)", lines[at + 2])
+    assert "\x1b" not in out
 
 
 def test_play_says_what_went_wrong(tdac, good):

@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from tdac_agent.cli.doctor import Check, show_checks
 from tdac_agent.cli.trials import attempt, describe_signal
 
 DIES = """
@@ -100,3 +101,17 @@ def test_a_film_that_cannot_be_encoded_is_told(tmp_path, monkeypatch, does, told
 
 def test_a_signal_without_a_name_has_a_number():
     assert describe_signal(40).startswith("died with signal 40: ")
+
+
+def test_what_soon_ends_has_no_tick(capsys):
+    """Each state of a check has its own mark."""
+    show_checks(
+        [
+            Check("good", True, "-"),
+            Check("soon retired", True, "-", warning=True),
+            Check("optional", False, "-"),
+            Check("broken", False, "-", needed=True),
+        ]
+    )
+    lines = capsys.readouterr().out.splitlines()[:4]
+    assert [line.split()[0] for line in lines] == ["✔", "!", "–", "✘"]

@@ -1,6 +1,7 @@
 """What a person sees of a run, on a screen of 80 columns."""
 
 import io
+import json
 import shlex
 from pathlib import Path
 
@@ -168,6 +169,24 @@ def test_runs_in_a_table(tdac, monkeypatch, columns):
     assert ("started" in out) == ("a:task:of mine" in row) == (columns == 120)
     assert max(map(len, out.splitlines())) <= columns
     assert "to continue: tdac synth --resume runs/epuck-clutter-12" in out
+
+
+def test_runs_of_a_campaign_are_found(tdac, monkeypatch):
+    """Three levels below its folder; not in hidden folders, nor below another run."""
+    record = run_with("x", "interrupted").model_dump_json()
+    names = [f"campaigns/mine/runs/a-kind-of-run-{'x' * 20}/r000{n}" for n in (1, 2)]
+    hidden, inside = "campaigns/mine/.old/r0001", f"{names[0]}/iterations/copy"
+    for name in (*names, hidden, inside):
+        Path(name).mkdir(parents=True)
+        (Path(name) / "run.json").write_text(record)
+    code, out, _ = tdac("runs", "campaigns", "--json")
+    assert code == 0
+    assert sorted(row["run"] for row in json.loads(out)) == names
+    monkeypatch.setenv("COLUMNS", "80")
+    out = tdac("runs", "campaigns/mine")[1]
+    assert out.startswith("in campaigns/mine:")
+    assert out.count("interrupted") == len(names)
+    assert f"to continue: tdac synth --resume {names[1]}" in out
 
 
 def test_no_column_of_dashes(tdac):

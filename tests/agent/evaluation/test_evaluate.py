@@ -7,6 +7,9 @@ import math
 import pickle
 import re
 import shutil
+import signal
+import subprocess
+import sys
 import zipfile
 from itertools import pairwise
 
@@ -25,8 +28,10 @@ from tdac_agent.episodes.sb3_file import SavedPolicy, read_metadata, write_metad
 from tdac_agent.evaluation.evaluate import NO_DISTURBANCE, episode_seeds, evaluate
 from tdac_agent.evaluation.evaluation_report import compare
 from tdac_agent.evaluation.overlay import COLOURS
+from tdac_agent.evaluation.unfinished import FOLDER
 from tdac_agent.metrics.exact import sign_test
 from tdac_agent.sandbox import ControllerFault
+from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.measures import (
     measure,
@@ -434,9 +439,87 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
     assert json.loads(again)["rows"][0]["interval"]["method"] == "Clopper-Pearson"
 
 
+def kept_in(out):
+    """Contents of the files of finished episodes, by path."""
+    return {file: file.read_bytes() for file in (out / FOLDER).glob("*/*.npz")}
+
+
+def test_an_interrupted_evaluation_goes_on(small_task, warm, tmp_path):
+    """No finished episode is driven again, and the results are those of one piece."""
+    words = (["reference", "go-to-goal"], [small_task], 5)
+    out = tmp_path / "out"
+
+    def interrupt(_task, policy, count, _successes):
+        if policy == "go-to-goal" and count >= 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(*words, out=out, judge=warm, watch=interrupt)
+    kept = kept_in(out)
+    assert len(kept) >= 7
+    damaged = min(kept)
+    damaged.write_bytes(kept.pop(damaged)[:100])
+    seen = []
+    found = evaluate(*words, out=out, judge=warm, watch=lambda *now: seen.append(now))
+    first = {policy: count for _, policy, count, _ in reversed(seen)}
+    assert sum(first.values()) == len(kept)
+    assert not (out / FOLDER).exists()
+    whole = evaluate(*words, judge=warm)
+    assert found.model_dump_json() == whole.model_dump_json()
+    assert (out / "evaluation.json").read_text() == (
+        whole.model_dump_json(indent=2) + "\n"
+    )
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from tdac_agent import evaluate
+
+def watch(task, policy, count, successes):
+    if count >= 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+evaluate(["go-to-goal"], [sys.argv[1]], 6, out=Path(sys.argv[2]), watch=watch)
+"""
+
+
+def test_a_killed_evaluation_goes_on(tdac, tmp_path):
+    """The same command uses what a process left that was killed with -9."""
+    folder, out = write_small_task(tmp_path / "task"), tmp_path / "out"
+    child = [sys.executable, "-c", KILLED, str(folder), str(out)]
+    assert subprocess.run(child, check=False).returncode == -signal.SIGKILL
+    kept = len(kept_in(out))
+    assert kept >= 3
+    words = ["evaluate", "go-to-goal", "--task", folder, "--episodes", 6, "--out", out]
+    with hold(out / FOLDER / LOCK_FILE):
+        code, _, errors = tdac(*words)
+    assert (code, "another evaluation writes to" in errors) == (2, True)
+    code, text, errors = tdac(*words)
+    assert code == 0, errors
+    assert f"{kept} finished episodes of an interrupted evaluation" in text
+    assert len(pd.read_csv(out / "episodes.csv")) == 6
+
+
+def test_who_only_crashes_is_exit_1(tdac, controllers, tmp_path):
+    """With the reason; beside a policy that drives, it is a row like others."""
+    folder = write_small_task(tmp_path / "task")
+    words = ["evaluate", controllers / "three.py", "--task", folder, "--episodes", 2]
+    code, text, _ = tdac(*words)
+    assert code == 1
+    assert "must return two finite numbers" in " ".join(text.split())
+    assert text.splitlines()[-1] == "every policy crashed in every episode"
+    assert tdac(*words, "random")[0] == 0
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (["plan.png"], "'plan.png' is not a controller: expected a .py"),
+        (["syntax.py"], r"'syntax.py' is not a controller: .*'\(' was never closed"),
+        (["image.py"], "'image.py' is not a controller: the source does not parse"),
+        (["none.py"], "'none.py' is not a controller: it defines no function policy"),
+        (["os.py"], "that tdac verify accepts: line 1: import of 'os'; allowed modul"),
         (["reference", "reference"], "the policy 'reference' is given twice"),
         (["referenc"], "no policy 'referenc': .*did you mean 'reference'"),
         (["empty"], "no controller.py in 'empty'"),
@@ -461,6 +544,15 @@ def test_usage_errors_are_one_line(tdac, words, message, tmp_path):
     (here / "world" / "task.yaml").write_text("env: TDAC-EPuck-v0")
     (here / "world" / "controller.py").write_text("def policy(obs): return 0, 0")
     (here / "text.zip").write_text("no zip")
+    for name in ("plan.png", "image.py"):
+        (here / name).write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
+    policy = "def policy(obs): return 0, 0"
+    for name, source in (
+        ("syntax.py", "def policy(obs:"),
+        ("none.py", "x = 1"),
+        ("os.py", f"import os\n{policy}"),
+    ):
+        (here / name).write_text(source)
     with zipfile.ZipFile(here / "plain.zip", "w") as archive:
         weights = io.BytesIO()
         with zipfile.ZipFile(weights, "w") as inner:

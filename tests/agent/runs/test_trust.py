@@ -17,6 +17,7 @@ from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import lasting_secret
 from tdac_agent.tasks.task import called, load_task
+from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.trust import NotTrustedError, tree_sha256
 from tdac_agent.verification.verify import verify
 
@@ -191,6 +192,15 @@ def test_a_task_is_called_by_what_it_is(tmp_path):
     near = called(load_task(folder / "maze.yaml"))
     assert near.startswith("maze, changed (map ")
     assert near.endswith("goal within 900 px)")
+
+
+def test_a_bundled_world_has_the_name_of_its_task():
+    """`--world maze` is the bundled task `epuck-maze`, not a forged maze."""
+    about = {"env": "TDAC-EPuck-v0", "world": "maze"}
+    task = load_task(TaskFile.model_validate(about))
+    assert called(task) == called(load_task("epuck-maze")) == "epuck-maze"
+    moved = load_task(TaskFile.model_validate({**about, "tolerance": 0.03}))
+    assert called(moved).startswith("epuck-maze, changed (map ")
 
 
 def test_the_verdict_names_the_folder(tdac, good):

@@ -102,16 +102,24 @@ def test_bundled_world(tdac):
     assert run["world"] == "arena.wbt"
 
 
-def test_film(tdac, there):
-    """The film has a picture of every second step and of the last."""
+@pytest.mark.parametrize(
+    ("speed", "frames", "told"),
+    [
+        ([], 12, "(at real time, 1 s)"),
+        (["--speed", 4], 6, "(at 4 times real time, 0 s)"),
+    ],
+)
+def test_film(tdac, there, speed, frames, told):
+    """Real time by default; with `--speed`, a picture stands for more steps."""
     film = there / "run.mp4"
-    code, _, _ = tdac(
+    code, out, _ = tdac(
         "webots", "run", CONTROLLERS / "module_loop.py", there / "open.wbt",
-        "--steps", 21, "--video", film,
+        "--steps", 21, "--video", film, *speed,
     )  # fmt: skip
     assert code == 1
-    frames = cv2.VideoCapture(str(film))
-    assert int(frames.get(cv2.CAP_PROP_FRAME_COUNT)) == 12
+    assert f"run.mp4 {told}" in out
+    read = cv2.VideoCapture(str(film))
+    assert int(read.get(cv2.CAP_PROP_FRAME_COUNT)) == frames
 
 
 def test_a_controller_that_fails(tdac, there):

@@ -20,6 +20,7 @@ from tdac_envs.epuck.infrared import (
     spread,
 )
 from tdac_envs.epuck.prisms import Owned, Prisms
+from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.world import Part
 
 STILL = np.zeros(2, np.float32)
@@ -55,6 +56,16 @@ def test_between_the_rows_it_is_linear_and_beyond_them_constant():
         expected = np.interp(distances, TABLE[:, 0], TABLE[:, column])
         found = [function(float(d)) for d in distances]
         np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_a_contact_reads_as_the_manual_says():
+    """A flat wall across a ray that touches the hull; the sensors lie inside of it."""
+    forward = PLACES[:, 0] * np.cos(PLACES[:, 2]) + PLACES[:, 1] * np.sin(PLACES[:, 2])
+    ways = (BODY_RADIUS - forward) / math.cos(ELEVATION)
+    found = [response(float(way)) for way in ways]
+    assert round(min(found), -2) == 2000
+    assert round(max(found), -2) == 2700
+    assert "67 with nothing near, 2000 to 2700 at a contact" in EPuckEnv.__doc__
 
 
 @pytest.mark.parametrize("gap", [0.01, 0.02, 0.03, 0.04, 0.05, 0.06])

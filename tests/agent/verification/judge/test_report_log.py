@@ -41,6 +41,14 @@ def leaky():
     raise ValueError("teardown")
 
 
+def first(task):
+    return task.params["robot"]
+
+
+def test_of_an_error(task):
+    assert first(task)["radius"] > 0
+
+
 def test_skips():
     pytest.skip("no reason")
 
@@ -52,10 +60,6 @@ def test_expected_to_fail():
 
 def test_teardown(leaky):
     warnings.warn("a warning")
-
-
-def test_setup(nonexistent):
-    pass
 
 
 def test_half_a_character(controller):
@@ -123,11 +127,11 @@ def test_whole_results_are_read(results):
     assert all(f.diagnosis is not None for f in failures)
     tests, failures = outcomes(results["odd"])
     told = {f.test.removeprefix("own/test_odd.py::"): f.message for f in failures}
-    assert "fixture 'nonexistent' not found" in told.pop("test_setup")
+    assert told.pop("test_of_an_error").startswith("own/test_odd.py:14: TypeError: ")
     assert told == {
         "test_skips": "Skipped: no reason",
-        "test_expected_to_fail": "line 19: an assertion without a message",
-        "test_teardown": "ValueError: teardown",
+        "test_expected_to_fail": "line 27: an assertion without a message",
+        "test_teardown": "own/test_odd.py:10: ValueError: teardown",
         "test_half_a_character": "it is \ufffd\ufffd[31m",
     }
 

@@ -1,0 +1,48 @@
+"""The speed of a video: how much faster than real time, and how many frames it has."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+LONGEST_SECONDS = 60.0
+"""A video at real time is at most this long; of a longer episode it plays faster."""
+MOST_FPS = 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """How an episode is filmed.
+
+    Attributes:
+        speed: Simulated time / playing time.
+        stride: Steps between two frames.
+        fps: Frames per second of playing time.
+        seconds: Playing time, s.
+    """
+
+    speed: float
+    stride: int
+    fps: float
+    seconds: float
+
+    def __str__(self) -> str:
+        """The speed in words, as in `at real time, 41 s`."""
+        speed = "real time" if self.speed == 1.0 else f"{self.speed:g} times real time"
+        return f"at {speed}, {self.seconds:.0f} s"
+
+
+def film_of(steps: int, dt: float, speed: float | None = None) -> Film:
+    """Plans a video of an episode.
+
+    Args:
+        steps: Steps of the episode.
+        dt: Time per step, s.
+        speed: Simulated time / playing time; by default 1, or the least whole number
+            with which the video lasts at most `LONGEST_SECONDS`.
+    """
+    simulated = steps * dt
+    if speed is None:
+        speed = float(max(1, math.ceil(round(simulated / LONGEST_SECONDS, 6))))
+    stride = max(1, math.ceil(round(speed / (dt * MOST_FPS), 6)))
+    return Film(speed, stride, speed / (dt * stride), simulated / speed)

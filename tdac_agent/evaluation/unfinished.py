@@ -1,0 +1,76 @@
+"""Where an evaluation keeps finished episodes until its results are written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+from tdac_agent.errors import RunError
+from tdac_agent.storage.files import clear_unfinished
+from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.judge.kept_episodes import SUFFIX
+from tdac_agent.verification.judge.seeded import SeededJob
+
+FOLDER = "unfinished"
+
+
+@contextmanager
+def open_store(out: Path | None) -> Generator[Path]:
+    """Opens the folder of finished episodes; removes it if the block succeeds.
+
+    An interrupted evaluation leaves it in `out`; without `out` it is temporary.
+
+    Raises:
+        RunError: It cannot be written, or another evaluation writes to it.
+    """
+    with ExitStack() as stack:
+        if out is None:
+            folder = tempfile.TemporaryDirectory(prefix="tdac-evaluate-")
+            yield Path(stack.enter_context(folder))
+            return
+        store = out.absolute() / FOLDER
+        try:
+            store.mkdir(parents=True, exist_ok=True)
+            mine = stack.enter_context(hold(store / LOCK_FILE))
+        except OSError as error:
+            raise RunError(f"cannot write to {store}: {error.strerror}") from error
+        if not mine:
+            raise RunError(f"another evaluation writes to {out}; wait until it ends")
+        clear_unfinished(store)
+        yield store
+        shutil.rmtree(store)
+
+
+def count_kept(out: Path) -> int:
+    """Number of finished episodes that an interrupted evaluation left in `out`."""
+    return sum(1 for _ in (out / FOLDER).glob(f"*/*{SUFFIX}"))
+
+
+def folder_of(store: Path, task: Task, job: SeededJob, sha256: str | None) -> Path:
+    """The folder, made if missing, of a policy's episodes on a task.
+
+    Its name depends on everything that determines an episode, except its seed.
+
+    Args:
+        store: See `open_store`.
+        task: The task.
+        job: The job with the policy.
+        sha256: Hash of the policy's file, if any.
+    """
+    facts = {
+        "task": [task.sha256(), task.setting.world_sha256()],
+        "policy": [job.policy.kind, job.policy.wrappers, sha256],
+        "variation": job.variation,
+        "sandbox": [job.tier, asdict(job.limits)],
+        "versions": versions(),
+    }
+    folder = store / sha256_of(json.dumps(facts, sort_keys=True).encode())[:16]
+    folder.mkdir(exist_ok=True)
+    return folder
