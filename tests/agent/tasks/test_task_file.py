@@ -14,7 +14,7 @@ MANUAL = Path(__file__).parents[3] / "docs" / "tasks.md"
 
 def test_each_key_has_a_row():
     """With a meaning; keys of `robot` are written with a dot."""
-    row = re.compile(r"^\| `([\w.]+)` \|(?:[^|]*\|){3,}$", re.MULTILINE)
+    row = re.compile(r"^\| `([\w.]+)` \|(?:[^|\n]*\|){3,}$", re.MULTILINE)
     rows = set(row.findall(MANUAL.read_text("utf-8")))
     names = {field.alias or name for name, field in TaskFile.model_fields.items()}
     robot = {f"robot.{name}" for name in RobotSpec.model_fields}
