@@ -163,7 +163,7 @@ def called(task: Task) -> str:
             return name
         same = known.setting.world_sha256() == setting.world_sha256()
         name += ", changed" if same else ", not the bundled one"
-    tolerance = setting.units.told(task.nominal.goal_tolerance)
+    tolerance = setting.told(task.nominal.goal_tolerance)
     return f"{name} (map {setting.world_sha256()[:8]}, goal within {tolerance})"
 
 

@@ -8,6 +8,7 @@ walls, so that a closed map stays closed.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -34,17 +35,33 @@ _FAINT = 0.3
 """Share of the distance to the floor by which a photograph's threshold is shifted."""
 
 
-def readings(scene: MapProblem) -> Iterator[MapReading]:
+def readings(scene: MapProblem, light_free: bool | None = None) -> Iterator[MapReading]:
     """Readings of the likelier polarity, the plainest first.
 
     Without start and goal there is only one, with marks ignored, because nothing shows
-    whether a bolder one is needed.
+    whether a bolder one is needed. Readings that keep specks of up to `scene.least` px
+    are left out, unless there is no other.
+
+    Args:
+        scene: The picture with its task.
+        light_free: The polarity; by default from the picture, start and goal.
     """
+    found = False
+    for reading in _all_readings(scene, light_free):
+        found = found or reading.cleanup >= scene.least
+        if found:
+            yield reading
+    if not found:
+        yield reading
+
+
+def _all_readings(scene: MapProblem, light_free: bool | None) -> Iterator[MapReading]:
     given = scene.image.occupied
     if given is not None:
         yield MapReading(given, "given", scene.image.method)
         return
-    light_free = decide_light_free(scene)
+    if light_free is None:
+        light_free = decide_light_free(scene)
     plain = plain_reading(scene, light_free)
     unmarked = _without_marks(scene, plain)
     if not scene.ends:
@@ -141,6 +158,12 @@ def _of_photo(scene: MapProblem, light_free: bool, method: str) -> MapReading:
     cut = scene.threshold + _FAINT * (floor - scene.threshold)
     # This threshold does not apply to the original picture.
     return replace(_cut(grey, cut, light_free, method), threshold=None)
+
+
+def unknown_grey(method: str) -> int | None:
+    """The unknown grey that a reading's `method` names, or None."""
+    found = re.search(r"unknown grey (\d+) not free", method)
+    return int(found[1]) if found else None
 
 
 def _threshold_beyond(level: int, threshold: float, light_free: bool) -> float:
