@@ -283,23 +283,21 @@ def _snapped(scene: MapProblem, light_free: bool) -> tuple[MapProblem, list[str]
     reading = _clearest(scene, light_free)
     moved = snap(reading.cells, scene.start, scene.goal, scene.radius, scene.units)
     ends = [None if p is None else _pixel(p) for p in (moved.start, moved.goal)]
-    least = 0 if reading.opening else reading.cleanup
-    return replace(scene, start=ends[0], goal=ends[1], least=least), list(moved.notes)
+    pointed = tuple(scene.ends) if reading.words else ()
+    scene = replace(scene, start=ends[0], goal=ends[1], pointed=pointed)
+    return scene, list(moved.notes)
 
 
 def _clearest(scene: MapProblem, light_free: bool) -> MapReading:
-    """The plainest reading that frees as many ends as any: no words cover them."""
+    """The plainest reading on which as few ends as possible need a move."""
     best, most = None, (-1, -1)
     for reading in readings(scene, light_free):
         free = body_free(clearance(reading.cells), scene.radius)
-        body = sum(fits(free, end) for end in scene.ends)
-        # Only words count here: thin lines may be walls.
-        bare = (
-            0 if reading.opening else sum(fits(~reading.cells, e) for e in scene.ends)
-        )
-        if best is None or (body, bare) > most:
-            best, most = reading, (body, bare)
-        if body == len(scene.ends):
+        fitting = sum(fits(free, end) for end in scene.ends)
+        # Thin lines and specks under a start may be obstacles, words are not.
+        if best is None or (fitting, reading.words) > most:
+            best, most = reading, (fitting, reading.words)
+        if fitting == len(scene.ends):
             break
     assert best is not None
     return best
@@ -307,14 +305,17 @@ def _clearest(scene: MapProblem, light_free: bool) -> MapReading:
 
 def _changed(reading: MapReading, preset: Preset) -> list[str]:
     """Notes on the obstacles that the reading removes from the picture."""
-    if not (reading.opening or reading.cleanup):
+    if not (reading.opening or reading.cleanup or reading.words):
         return []
     if preset == "paper":
         what = f"pieces and holes under {reading.cleanup} px removed, gaps closed"
         return [f"cleaned with strength {reading.cleanup}: {what}; check the preview"]
-    what = f"specks up to {reading.cleanup} px"
+    parts = ["words over start or goal"] if reading.words else []
     if reading.opening:
-        what = f"lines under {reading.opening} px and {what}"
+        parts.append(f"lines under {reading.opening} px")
+    if reading.cleanup:
+        parts.append(f"specks up to {reading.cleanup} px")
+    what = " and ".join(parts)
     return [f"treated as free space: {what}; check the preview"]
 
 

@@ -28,6 +28,7 @@ from tdac_envs.mapping.image import GreyImage, luminance
 from tdac_envs.mapping.lighting import LEVEL
 from tdac_envs.mapping.params import DEFAULT_OPTIONS
 from tdac_envs.mapping.scene import MapProblem, MapReading, decide_light_free, touches
+from tdac_envs.mapping.words import without_words
 
 SLIVER = 6.0
 """Largest width of a strip that counts as part of the outside, px."""
@@ -39,23 +40,12 @@ def readings(scene: MapProblem, light_free: bool | None = None) -> Iterator[MapR
     """Readings of the likelier polarity, the plainest first.
 
     Without start and goal there is only one, with marks ignored, because nothing shows
-    whether a bolder one is needed. Readings that keep specks of up to `scene.least` px
-    are left out, unless there is no other.
+    whether a bolder one is needed.
 
     Args:
         scene: The picture with its task.
         light_free: The polarity; by default from the picture, start and goal.
     """
-    found = False
-    for reading in _all_readings(scene, light_free):
-        found = found or reading.cleanup >= scene.least
-        if found:
-            yield reading
-    if not found:
-        yield reading
-
-
-def _all_readings(scene: MapProblem, light_free: bool | None) -> Iterator[MapReading]:
     given = scene.image.occupied
     if given is not None:
         yield MapReading(given, "given", scene.image.method)
@@ -77,19 +67,37 @@ def _plain_to_bold(
 ) -> Iterator[MapReading]:
     mixed = _mixed(scene) if scene.said == DEFAULT_OPTIONS else None
     if mixed is not None:
-        yield mixed
+        yield from _with_words(scene, [mixed])
         for extent in (4, 8, 16):
-            yield _without(mixed, extent)
+            yield _without(_wordless(scene, mixed) or mixed, extent)
         return
-    yield plain
     base = unmarked or plain
-    if unmarked is not None:
-        yield unmarked
+    plainest = [plain] if unmarked is None else [plain, unmarked]
     if scene.unknown is not None:
         # Output of a mapping tool: its dark pixels were measured, not drawn.
+        yield from plainest
         yield _without(base, 4)
         return
-    yield from _bolder(base)
+    yield from _with_words(scene, plainest)
+    yield from _bolder(_wordless(scene, base) or base)
+
+
+def _with_words(scene: MapProblem, plainest: list[MapReading]) -> Iterator[MapReading]:
+    """The readings, then the last one without the words over start and goal."""
+    wordless = _wordless(scene, plainest[-1])
+    if wordless is None or not scene.pointed:
+        yield from plainest
+    if wordless is not None:
+        yield wordless
+
+
+def _wordless(scene: MapProblem, base: MapReading) -> MapReading | None:
+    """The reading without the words over start and goal; None if there are none."""
+    cells = without_words(base.cells, scene.pointed or scene.ends)
+    if cells is None:
+        return None
+    note = "words over start or goal ignored"
+    return replace(base, cells=cells, method=f"{base.method}, {note}", words=True)
 
 
 def _beyond_the_plan(scene: MapProblem, plain: MapReading) -> BoolGrid:

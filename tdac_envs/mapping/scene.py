@@ -37,6 +37,7 @@ class MapReading:
         threshold: Luminance threshold that was applied, 0..255.
         cleanup: Strength of `cleanup.cleanings`, or largest size of dropped specks, px.
         opening: Lines thinner than this were dropped, px.
+        words: Whether words over start or goal were dropped.
     """
 
     cells: BoolGrid
@@ -45,6 +46,7 @@ class MapReading:
     threshold: float | None = None
     cleanup: int = 0
     opening: int = 0
+    words: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +62,8 @@ class MapProblem:
         said: The user's settings.
         photo: Whether it is a photograph whose light was evened.
         units: Units of messages.
-        least: Specks up to this size, px, are ignored in any case, because they cover
-            the place where the user pointed.
+        pointed: Where the user pointed, if words that cover these places are to be
+            ignored in any case; else empty.
     """
 
     image: MapImage
@@ -72,7 +74,7 @@ class MapProblem:
     said: ReadingOptions = DEFAULT_OPTIONS
     photo: bool = False
     units: MapUnits = PIXELS
-    least: int = 0
+    pointed: tuple[Point, ...] = ()
 
     @classmethod
     def of(
