@@ -102,7 +102,8 @@ class MapUnits:
         """Formats a length in px as `length` does, without the unit."""
         if self.frame is None:
             return f"{length:g}" if decimals is None else f"{length:.{decimals}f}"
-        return self.rounded(length * self.per_pixel)
+        fewer = 0 if decimals is None else max(0, 1 - decimals)
+        return self.rounded(length * self.per_pixel, self.decimals - fewer)
 
     def at_most(self, length: float) -> str:
         """Formats a length in px, rounded down, so that advice about bodies holds."""
@@ -112,9 +113,10 @@ class MapUnits:
             return f"{floor:.1f} px"
         return f"{self.rounded(floor)} m"
 
-    def rounded(self, value: float) -> str:
-        """A number with `decimals` decimals, without trailing zeros."""
-        text = f"{value:z.{self.decimals}f}"
+    def rounded(self, value: float, decimals: int | None = None) -> str:
+        """A number in these units with some decimals, without trailing zeros."""
+        places = self.decimals if decimals is None else max(decimals, 0)
+        text = f"{value:z.{places}f}"
         return text.rstrip("0").rstrip(".") if "." in text else text
 
 

@@ -107,10 +107,17 @@ def _gap(clear: FloatGrid, widest: float, start: Pixel, goal: Pixel) -> Point:
 
 
 def _wall(clear: FloatGrid, start: Pixel, goal: Pixel) -> Point:
-    """The middle of the thinnest wall between the parts around two pixels."""
+    """The middle of the thinnest wall between the parts around two pixels.
+
+    Of equally thin places, it is the one nearest to the middle between the pixels.
+    """
     labels = pieces_of(body_free(clear, 0.0))
     here, there = (labels == labels[end[::-1]] for end in (start, goal))
     distance = cv2.distanceTransform((~there).astype(np.uint8), cv2.DIST_L2, 5)
-    y, x = divmod(int(np.argmin(np.where(here, distance, np.inf))), clear.shape[1])
+    distance[~here] = np.inf
+    rows, columns = np.nonzero(distance <= distance.min() + 0.5)
+    middle = np.add(start, goal) / 2
+    best = int(np.argmin(np.hypot(columns - middle[0], rows - middle[1])))
+    x, y = int(columns[best]), int(rows[best])
     near = nearest_free(there, x, y) or goal
     return (x + near[0]) / 2, (y + near[1]) / 2

@@ -13,9 +13,9 @@ from tdac_envs.grid.grid import BoolGrid
 Boxes = NDArray[np.int64]
 
 HIGHEST, WIDEST, ALONE = 0.12, 0.3, 0.08
-"""Largest height and width of a letter, or of letters that touch each other, and largest
-size of a single one, as shares of the map's shorter side."""
-_SOLID, _HOLLOW = 0.6, 0.62
+"""Largest height and width of a letter, or of letters that touch each other, and the
+largest size of a single one, as shares of the map's shorter side."""
+_SOLID, _HOLLOW = 0.75, 0.62
 """Pieces that fill, or whose hole fills, more of their box are no letters."""
 _GAP = 0.6
 """Largest gap between the letters of a word, as a share of their height."""
