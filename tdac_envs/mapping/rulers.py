@@ -56,17 +56,19 @@ class Rulers:
             canvas: The map.
             framed: The canvas's picture, moved by (`left`, `TOP`).
         """
-        border = int(canvas.to_frame((-0.5, -0.5))[0][0]) + self.left
+        outline = ((-0.5, -0.5), (self._width - 0.5, self._height - 0.5))
+        low, high = canvas.to_frame(outline)
+        low, high = np.ceil(low), np.floor(high)
         taken: list[tuple[int, int, int]] = []
         for axis in (0, 1):
             for k in self._ticks(axis):
                 ends = self._ends(axis, k)
                 if ends is None or (k % 5 and self._is_rotated):
                     continue
-                pixels = np.rint(canvas.to_frame(ends)).astype(int)
-                pixels += np.array([self.left, TOP])
+                at = np.clip(np.rint(canvas.to_frame(ends)), low, high)
+                pixels = at.astype(np.int64) + np.array([self.left, TOP])
                 label = "" if k % 5 else self._label(axis, k)
-                self._mark(framed, pixels, border, label, taken)
+                self._mark(framed, pixels, self.left + int(low[0]), label, taken)
 
     def _ticks(self, axis: int) -> range:
         """Multiples of a fifth of a step on the map; every fifth has a number."""
@@ -103,11 +105,13 @@ class Rulers:
             taken: Places of labels, to be extended.
         """
         begin, end = ends
-        is_top = min(begin[1], end[1]) <= TOP + 2
-        at = min((begin, end), key=lambda p: p[1] if is_top else p[0])
+        across, down = np.abs(end - begin)
+        is_top = bool(down > across)
+        axis = 1 if is_top else 0
+        at = min((begin, end), key=lambda point: int(point[axis]))
         if label:
             _draw_faintly(framed, begin, end)
-        if not is_top and at[0] > border + 2:
+        if at[axis] > (TOP if is_top else border) + 2:
             return
         size = 8 if label else 4
         if is_top:

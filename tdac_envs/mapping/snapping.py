@@ -76,7 +76,8 @@ def _places(free: BoolGrid, ends: dict[str, Point]) -> dict[str, Point]:
     rows, columns = np.nonzero(free)
     if len(stay) == len(ends) or rows.size == 0:
         return ends
-    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    found = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
+    labels = np.asarray(found, np.int32)
     pieces = labels[rows, columns]
     nearest = {
         name: _nearest_by_piece(pieces, rows, columns, point)

@@ -99,7 +99,7 @@ def _is_letter(labels: NDArray[np.int32], number: int, box: NDArray[np.int64]) -
     x0, y0, x1, y1 = box.tolist()
     piece = labels[y0:y1, x0:x1] == number
     if piece.mean() > _SOLID:
-        return min(piece.shape) < 6
+        return bool(min(piece.shape) < 6)
     holes = cv2.connectedComponentsWithStats((~piece).astype(np.uint8), connectivity=4)
     stats = np.asarray(holes[2])[1:]
     left, top = stats[:, cv2.CC_STAT_LEFT], stats[:, cv2.CC_STAT_TOP]

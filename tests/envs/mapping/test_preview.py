@@ -51,7 +51,7 @@ def test_a_closed_wall_is_marked_where_it_is_thinnest():
 
 def test_the_narrowest_gap_is_marked():
     found = fault(refusal(rooms(gap=10)))
-    assert found.label == "narrowest gap: a radius of 4.9 px gets through"
+    assert found.label == "narrowest gap: a radius of 4.3 px gets through"
     assert math.dist(found.at, (99.5, 64.5)) < 3
     assert found.start_side[START[::-1]]
     assert found.goal_side[GOAL[::-1]]
@@ -61,10 +61,10 @@ def test_the_narrowest_gap_is_marked():
 def test_the_gap_is_named_in_metres():
     units = MapUnits.metres(OccupancyGrid(rooms(), 0.1, (0.0, 0.0, 0.0)))
     error = refusal(rooms(gap=10), units=units)
-    assert fault(error).label == "narrowest gap: a radius of 0.49 m gets through"
+    assert fault(error).label == "narrowest gap: a radius of 0.43 m gets through"
     assert str(error) == (
         "array: start (4.05, 7.95) and goal (16.05, 3.95) are not connected for a "
-        "robot of 0.8 m radius; the largest radius that gets through is 0.49 m"
+        "robot of 0.8 m radius; the largest radius that gets through is 0.43 m"
     )
 
 
@@ -137,8 +137,8 @@ def test_rulers_in_metres_follow_the_frame():
     """x = 0 is ten pixels from the left border, and y grows upwards."""
     frame = OccupancyGrid(rooms(), 0.1, (-1.0, -2.0, 0.0))
     rows, columns = ticks(MapUnits.metres(frame))
-    assert 40 - 0.5 in pytest.approx(columns, abs=0.6)
-    assert 4 * (120 - 20) - 0.5 in pytest.approx(rows - 30, abs=0.6)
+    assert np.abs(columns - (40 - 0.5)).min() <= 0.6
+    assert np.abs(rows - 30 - (4 * (120 - 20) - 0.5)).min() <= 0.6
     steps = np.diff(columns)
     assert steps == pytest.approx(steps[0], abs=1)
 

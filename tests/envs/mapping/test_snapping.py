@@ -62,7 +62,7 @@ def test_both_ends_move_to_one_part_of_the_map():
     """Each alone would move into its own part."""
     cells = np.zeros((80, 200), np.bool_)
     cells[:, 98:102] = True
-    moved = snap(cells, (96, 40), (103, 40), 6.0)
+    moved = snap(cells, (96, 30), (103, 60), 6.0)
     free = body_free(clearance(cells), 6.0)
     assert moved.start != moved.goal
     assert moved.start is not None
