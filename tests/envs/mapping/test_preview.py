@@ -122,9 +122,8 @@ def ticks(units):
     framed = np.full((30 + 480, rulers.left + 814, 3), 236, np.uint8)
     rulers.draw(canvas, framed)
     dark = framed.sum(axis=2) < 300
-    return np.flatnonzero(dark[:510, rulers.left - 2]), np.flatnonzero(dark[28]) - (
-        rulers.left
-    )
+    rows, columns = dark[30:510, rulers.left - 2], dark[28, rulers.left :]
+    return np.flatnonzero(rows) + 30, np.flatnonzero(columns)
 
 
 def test_rulers_in_pixels_mark_pixel_centres():
