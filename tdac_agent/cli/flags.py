@@ -7,24 +7,18 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from tdac_agent.sandbox import TIERS
 from tdac_agent.tasks.registry import environment_with_key
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.tasks.task_file import TaskFile, checked
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
-from tdac_envs.grid.grid import OccupancyGrid
-from tdac_envs.grid.metric import resolution_of, to_pixels
 from tdac_envs.map2d.source import check_exists
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
-from tdac_envs.mapping.image import load_image
 
-Point = tuple[float, float]
 FIXED_BY_TASK = (
     *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
-    *("polarity", "threshold"),
+    *("robot_image", "snap", "metres", "polarity", "threshold", "instructions"),
 )
 ONLY_FOR_MAPS = (
     *("map_image", "robot_radius", "robot_image", "snap", "metres"),
@@ -73,7 +67,7 @@ class TaskFlags:
                 continue
             values = value if isinstance(value, tuple) else (value,)
             given = [] if value is True else map(as_word, values)
-            words += [flag("map" if name == "map_image" else name), *given]
+            words += [flag(name), *given]
         return words + [word for name in self.ignore for word in ("--ignore", name)]
 
     def load(self, default: str = "maze") -> Task:
@@ -112,7 +106,7 @@ class TaskFlags:
         """
         given = [name for name in names if getattr(self, name) not in (None, (), False)]
         if given:
-            flags = ", ".join(flag(name.replace("_image", "")) for name in given)
+            flags = ", ".join(map(flag, given))
             raise TaskError(f"{why}: leave out {flags}")
 
     def _world_spec(self, world: str) -> TaskFile:
@@ -136,8 +130,6 @@ class TaskFlags:
         goal, radius = self.goal, self.robot_radius
         if self.metres and source in bundled_maps():
             raise TaskError("--metres needs a --map with a resolution, as in map.yaml")
-        if self.metres:
-            start, goal, radius = in_pixels(Path(source), self.start, goal, radius)
         if source in bundled_maps() and start is None:
             start = bundled_map(source).start
         if start is not None and self.heading is not None:
@@ -147,6 +139,7 @@ class TaskFlags:
             "start": start,
             "goal": goal,
             "snap": self.snap,
+            "metres": self.metres,
             "polarity": self.polarity,
             "threshold": self.threshold,
             "robot": {"radius": radius, "image": self.robot_image},
@@ -167,7 +160,7 @@ def _checked(given: dict[str, Any]) -> TaskFile:
 
 def flag(field: str) -> str:
     """The flag of a field, as in `--robot-radius`."""
-    return f"--{field.replace('_', '-')}"
+    return "--map" if field == "map_image" else f"--{field.replace('_', '-')}"
 
 
 def as_word(value: object) -> str:
@@ -207,26 +200,6 @@ def check_radius(radius: float | None) -> None:
     """
     if radius is not None and not radius > 0:
         raise TaskError(f"--robot-radius must be greater than 0, got {radius:g}")
-
-
-def in_pixels(
-    path: Path, start: Point | None, goal: Point | None, radius: float | None
-) -> tuple[Point | None, Point | None, float | None]:
-    """Converts start, goal and body radius from metres in the map's frame to pixels.
-
-    Raises:
-        MapError: The map has no resolution.
-    """
-    image = load_image(path)
-    frame = OccupancyGrid(
-        np.zeros(image.colour.shape[:2], np.bool_), image.resolution, image.origin
-    )
-    resolution = resolution_of(frame)
-    return (
-        None if start is None else to_pixels(frame, *start),
-        None if goal is None else to_pixels(frame, *goal),
-        None if radius is None else radius / resolution,
-    )
 
 
 def _text(given: str | None) -> str:

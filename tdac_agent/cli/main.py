@@ -160,13 +160,50 @@ def _names(part: typer.Typer) -> set[str | None]:
     return commands | {group.name for group in part.registered_groups}
 
 
-def with_heading(words: list[str]) -> list[str]:
-    """The words with each `--start X Y YAW` as `--start X Y --heading YAW`."""
-    for at, word in enumerate(words):
-        pose = words[at + 1 : at + 4]
-        if word == "--start" and len(pose) == 3 and all(map(_is_number, pose)):
-            return [*words[: at + 3], "--heading", *with_heading(words[at + 3 :])]
-    return words
+PLACES = ("--start", "--goal")
+
+
+def with_places(words: list[str]) -> list[str]:
+    """The words with each place as `--goal X Y` or `--start X Y --heading YAW`.
+
+    Understands `--start X Y YAW`, `--start X,Y`, `--start "X, Y"`, `--start=X,Y` and
+    the like.
+    """
+    done: list[str] = []
+    rest = list(words)
+    while rest:
+        flag, is_joined, value = rest[0].partition("=")
+        del rest[0]
+        done.append(f"{flag}{is_joined}{value}")
+        if flag not in PLACES:
+            continue
+        numbers, used = _numbers([value, *rest] if is_joined else rest)
+        if len(numbers) < 2 or (len(numbers) == 3 and flag == "--goal"):
+            continue
+        yaw = ["--heading", numbers[2]] if len(numbers) == 3 else []
+        done[-1:] = [flag, *numbers[:2], *yaw]
+        del rest[: used - bool(is_joined)]
+    return done
+
+
+def _numbers(words: list[str]) -> tuple[list[str], int]:
+    """The two or three numbers that the words begin with, and how many words they are.
+
+    Numbers in one word are separated by commas or spaces; if the first word has two of
+    them, the place ends with it.
+    """
+    numbers: list[str] = []
+    for used, word in enumerate(words):
+        parts = [part for part in word.replace(",", " ").strip("()[] ").split() if part]
+        is_place = len(parts) > 1
+        if not parts or not all(map(_is_number, parts)) or (numbers and is_place):
+            return numbers, used
+        if len(numbers) + len(parts) > 3:
+            return numbers, used
+        numbers += parts
+        if is_place:
+            return numbers, used + 1
+    return numbers, len(words)
 
 
 def _is_number(word: str) -> bool:
@@ -191,8 +228,7 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
-        words = sys.argv[1:]
-        words = words if words[:1] == ["map"] else with_heading(words)
+        words = with_places(sys.argv[1:])
         code = command_line(words)(words, prog_name="tdac", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         code = 130

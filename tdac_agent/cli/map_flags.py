@@ -11,11 +11,13 @@ from tdac_agent.cli.options import (
     MAP_FILE,
     WORLD_FILE,
     Goal,
+    Heading,
     Json,
     Metres,
     Polarity,
     Radius,
     Snap,
+    Start,
     Threshold,
     dir_flag,
     file_flag,
@@ -27,11 +29,9 @@ app = typer.Typer()
 @app.command("map", epilog="Example: `tdac map plan.png --start 90 302 --goal 178 386`")
 def map_command(
     image: Annotated[str, typer.Argument(help=f"{MAP_FILE}, or bundled map.")],
-    start: Annotated[
-        Optional[tuple[float, float]],  # noqa: UP045 - typer reads it at run time
-        typer.Option("--start", metavar="X Y", help="Start: px on a map."),
-    ] = None,
+    start: Start = None,
     goal: Goal = None,
+    heading: Heading = None,
     robot_radius: Radius = None,
     snap: Snap = False,
     metres: Metres = False,
@@ -49,13 +49,14 @@ def map_command(
 ) -> None:
     """Turn a map image into an occupancy grid, with a preview.
 
-    Without start and goal, the preview has rulers to read off pixel coordinates.
+    The preview has rulers, in pixels or metres, to read off start and goal.
     """
     from tdac_agent.cli import maps
     from tdac_envs.mapping.params import ReadingOptions
 
     said = ReadingOptions(polarity, threshold)
-    maps.run(image, start, goal, robot_radius, snap, metres, said, preset, out, as_json)
+    task = maps.MapTask(start, goal, heading, robot_radius)
+    maps.run(image, task, snap, metres, said, preset, out, as_json)
 
 
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import check_finite, check_radius, in_pixels
-from tdac_envs.core.errors import PolarityError, TaskError
-from tdac_envs.mapping.bundled import bundled_map, bundled_maps
+from tdac_agent.cli.flags import check_finite, check_radius
+from tdac_envs.core.errors import PicturedError, TaskError
+from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.map2d.source import units_of
+from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import Candidate, Preset
 from tdac_envs.mapping.image import load_image
 from tdac_envs.mapping.map_folder import write_map
@@ -22,13 +24,59 @@ from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 
 SHOWN, EXPLAINED = 8, 2
 Point = tuple[float, float]
+LEGEND = (
+    "margin: distance that the planner keeps in addition to the body radius",
+    "clearance: smallest distance between the path and an obstacle",
+    "path: its length",
+    "sharpness: changes between free and occupied, per pixel",
+    "score: 2.5 clearance - 0.02 path - 1.2 sharpness, lengths in px; highest is best",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class MapTask:
+    """The task on a map as typed: px or, with `--metres`, m in the map's frame."""
+
+    start: Point | None
+    goal: Point | None
+    heading: float | None
+    robot_radius: float | None
+
+    def check(self) -> None:
+        """Checks the flags together.
+
+        Raises:
+            TaskError: A number is not finite, or a flag is missing.
+        """
+        if (self.start is None) != (self.goal is None):
+            raise TaskError("give both --start X Y and --goal X Y, or neither")
+        heading = None if self.heading is None else (self.heading,)
+        check_finite(start=self.start, goal=self.goal, heading=heading)
+        check_radius(self.robot_radius)
+
+    def in_pixels(self, units: MapUnits) -> MapTask:
+        """The task in pixels."""
+        heading, radius = self.heading, self.robot_radius
+        return MapTask(
+            None if self.start is None else units.pixels(self.start),
+            None if self.goal is None else units.pixels(self.goal),
+            None if heading is None else units.heading_in_pixels(heading),
+            None if radius is None else units.length_in_pixels(radius),
+        )
+
+    def or_else(self, bundled: BundledMap) -> MapTask:
+        """This task, with the values of a bundled map instead of None."""
+        return MapTask(
+            self.start or bundled.start,
+            self.goal or bundled.goal,
+            bundled.heading if self.heading is None else self.heading,
+            self.robot_radius or bundled.robot_radius,
+        )
 
 
 def run(
     image: str,
-    start: Point | None,
-    goal: Point | None,
-    robot_radius: float | None,
+    typed: MapTask,
     snap: bool,
     metres: bool,
     said: ReadingOptions,
@@ -37,30 +85,34 @@ def run(
     as_json: bool,
 ) -> None:
     """Preprocesses a map, writes its folder and prints the best candidates."""
-    if (start is None) != (goal is None):
-        raise TaskError("give both --start X Y and --goal X Y, or neither")
-    check_finite(start=start, goal=goal)
-    path, heading = Path(image), 0.0
+    typed.check()
+    path = Path(image)
     if image in bundled_maps():
         bundled = bundled_map(image)
-        heading = bundled.heading
-        path, start, goal = bundled.image, start or bundled.start, goal or bundled.goal
-        robot_radius = robot_radius or bundled.robot_radius
-    if metres:
-        start, goal, robot_radius = in_pixels(path, start, goal, robot_radius)
-    check_radius(robot_radius)
-    radius = RobotParams().radius if robot_radius is None else robot_radius
+        path, typed = bundled.image, typed.or_else(bundled)
+    units = units_of(path, metres=metres)
+    task = typed.in_pixels(units)
+    if task.start is None and task.heading is not None:
+        raise TaskError("--heading needs --start X Y")
     source = load_image(path)
     folder = out if out is not None else Path(f"{path.stem}-map")
-    how: Any = {"preset": preset, "snap": snap, "heading": heading, "said": said}
+    radius = RobotParams().radius if task.robot_radius is None else task.robot_radius
     try:
         grid, params, ranked = preprocess_with_candidates(
-            source, start, goal, radius, **how
+            source,
+            task.start,
+            task.goal,
+            radius,
+            preset=preset,
+            snap=snap,
+            heading=task.heading or 0.0,
+            said=said,
+            units=units,
         )
-    except PolarityError as error:
+    except PicturedError as error:
         error.folder = folder
         raise
-    files = write_map(folder, grid, params, source)
+    files = write_map(folder, grid, params, source, units)
     if as_json:
         rows = [_row(candidate) for candidate in ranked]
         record = {
@@ -71,10 +123,10 @@ def run(
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
         return
     console = Console(highlight=False)
-    _print_reading(console, params, ranked[0])
-    if start is not None:  # candidates have figures only if there is a task
-        _print_candidates(console, ranked)
-    _print_files(console, params, folder)
+    _print_reading(console, params, ranked[0], units)
+    if task.start is not None:  # candidates have figures only if there is a task
+        _print_candidates(console, ranked, units)
+    _print_files(console, params, folder, units)
 
 
 def _row(candidate: Candidate) -> dict[str, object]:
@@ -91,29 +143,37 @@ def _row(candidate: Candidate) -> dict[str, object]:
     }
 
 
-def _print_reading(console: Console, params: MapParams, chosen: Candidate) -> None:
+def _print_reading(
+    console: Console, params: MapParams, chosen: Candidate, units: MapUnits
+) -> None:
     """Prints the map's name and size, how it was read, and the notes."""
     size = f"{params.width} x {params.height} px"
+    if units != PIXELS:
+        size += f" ({units.length(params.width)} x {units.length(params.height)})"
     console.print(f"{escape(params.source)}, {size}: {escape(_describe(chosen))}")
     for note in params.notes:
         console.print(f"[yellow]note:[/] {escape(note)}")
 
 
-def _print_candidates(console: Console, ranked: list[Candidate]) -> None:
-    """Prints the best candidates, and why others are infeasible."""
+def _print_candidates(
+    console: Console, ranked: list[Candidate], units: MapUnits
+) -> None:
+    """Prints the best candidates with a legend, and why others are infeasible."""
     feasible = [c for c in ranked if c.terms is not None]
     readings = list(dict.fromkeys(_describe(c) for c in feasible[:SHOWN]))
-    console.print(_table(feasible[:SHOWN], readings))
+    console.print(_table(feasible[:SHOWN], readings, units))
     for number, reading in enumerate(readings, 1):
         if len(readings) > 1:
             console.print(f"reading {number}: {escape(reading)}")
+    for line in LEGEND:
+        console.print(f"[dim]{line}[/]")
     failed = [c for c in ranked if c.terms is None]
     if failed:
         console.print("[dim]Not chosen, since the robot could not drive there:[/]")
     for candidate in failed[:EXPLAINED]:
         text = _describe(candidate)
         if candidate.inflation:
-            text += f", margin {candidate.inflation} px"
+            text += f", margin {units.length(candidate.inflation)}"
         failure = escape(candidate.failure or "")
         console.print(f"[dim]  {escape(text)}: {failure}[/]")
     hidden = max(len(feasible) - SHOWN, 0) + max(len(failed) - EXPLAINED, 0)
@@ -122,18 +182,19 @@ def _print_candidates(console: Console, ranked: list[Candidate]) -> None:
         console.print(f"and {more} (--json lists all)")
 
 
-def _table(candidates: list[Candidate], readings: list[str]) -> Table:
+def _table(candidates: list[Candidate], readings: list[str], units: MapUnits) -> Table:
     """The figures of feasible candidates, with their reading if there are several."""
     table = Table(title="Candidates, the chosen one first", title_justify="left")
-    names = ["margin, px", "clearance, px", "path, px", "sharpness", "score"]
+    lengths = [f"{name}, {units.name}" for name in ("margin", "clearance", "path")]
+    names = [*lengths, "sharpness", "score"]
     for name in names if len(readings) == 1 else ["reading", *names]:
         table.add_column(name, justify="right", no_wrap=True)
     for place, candidate in enumerate(candidates):
         assert candidate.terms is not None
         figures = [
-            str(candidate.inflation),
-            f"{candidate.terms.min_clearance:.1f}",
-            f"{candidate.terms.path_length:.0f}",
+            units.number(candidate.inflation, 0),
+            units.number(candidate.terms.min_clearance, 1),
+            units.number(candidate.terms.path_length, 0),
             f"{candidate.terms.sharpness:.3f}",
             f"{candidate.score:.2f}",
         ]
@@ -154,10 +215,16 @@ def _describe(candidate: Candidate) -> str:
     return text
 
 
-def _print_files(console: Console, params: MapParams, folder: Path) -> None:
+def _print_files(
+    console: Console, params: MapParams, folder: Path, units: MapUnits
+) -> None:
     preview = escape(str(folder / "preview.png"))
     console.print(f"wrote {escape(str(folder))}; look at {preview}")
     if params.start is None:
+        metres = "" if units == PIXELS else " --metres"
         console.print(
             "read start and goal off its rulers, then give --start X Y --goal X Y"
+            + metres
         )
+    if params.resolution is not None and units == PIXELS:
+        console.print("lengths are in px; --metres uses the map's frame")

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
-    from tdac_envs.core.errors import PolarityError
+    from tdac_envs.core.errors import PicturedError
 
 from tdac_agent.cli.terminal import unfiltered
 
@@ -24,12 +24,12 @@ _WRONG_FILE = {errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL, errno.EFBIG}
 def explain(error: Exception) -> NoReturn:
     """Ends the process with a one-line message; only a bug gets a traceback."""
     from tdac_agent.errors import Fault
-    from tdac_envs.core.errors import MAX_QUOTED, PolarityError, TdacError
+    from tdac_envs.core.errors import MAX_QUOTED, PicturedError, TdacError
 
     if hasattr(error, "format_message"):  # a usage error found by typer
         _explain_usage(error)
-    if isinstance(error, PolarityError):
-        fail(f"error: {error}{_write_previews(error)}", 2)
+    if isinstance(error, PicturedError):
+        fail(f"error: {error}{_write_pictures(error)}", 2)
     if isinstance(error, TdacError):
         *others, last = getattr(error, "lines", (str(error),))
         for line in others:
@@ -44,13 +44,13 @@ def explain(error: Exception) -> NoReturn:
     fail("internal error: please report the lines above", 3)
 
 
-def _write_previews(error: PolarityError) -> str:
-    """Draws both readings of a map; returns where, or nothing if that fails."""
+def _write_pictures(error: PicturedError) -> str:
+    """Draws why a map is refused; returns where, or nothing if that fails."""
     from tdac_envs.core.errors import MapError
-    from tdac_envs.mapping.map_folder import write_previews
+    from tdac_envs.mapping.map_folder import write_pictures
 
     try:
-        files = write_previews(error)
+        files = write_pictures(error)
     except MapError:
         return ""
     return f"; look at {' and '.join(map(str, files))}"

@@ -26,7 +26,7 @@ number_flag = functools.partial(typer.Option, metavar="N")
 dir_flag = functools.partial(typer.Option, metavar="DIR")
 file_flag = functools.partial(typer.Option, metavar="FILE")
 TASK = "Bundled task (`maze`, `epuck`, …), task.yaml, or run folder"
-MAP_FILE = "Map image, ROS map.yaml, MovingAI .map"
+MAP_FILE = "Map image, ROS map.yaml, MovingAI .map, .npy grid"
 WORLD_FILE = "Webots .wbt file"
 VARIATION = (
     "Start poses: the task's own (nominal), within a body radius of it (jitter), "
@@ -86,7 +86,7 @@ Start = Annotated[
     typer.Option(
         "--start",
         metavar="X Y [YAW]",
-        help="Start: px on a map, m in a world; for YAW, see --heading.",
+        help="Start: px on a map, m in a world, also as X,Y; for YAW, see --heading.",
     ),
 ]
 Goal = Annotated[
@@ -100,7 +100,9 @@ Radius = Annotated[
 Heading = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option(
-        metavar="YAW", help="Start heading, rad, from +x towards +y (down on a map)."
+        metavar="YAW",
+        help="Start heading, rad, from +x towards +y (down on a map, up with "
+        "--metres).",
     ),
 ]
 RobotImage = Annotated[
@@ -108,11 +110,18 @@ RobotImage = Annotated[
     file_flag("--robot-image", help="Picture of the robot, nose to the right."),
 ]
 Snap = Annotated[
-    bool, typer.Option("--snap", help="Move start and goal to the nearest free place.")
+    bool,
+    typer.Option(
+        "--snap", help="Move start and goal to the nearest free, connected places."
+    ),
 ]
 Metres = Annotated[
     bool,
-    typer.Option("--metres", help="Lengths are metres in the map's frame (map.yaml)."),
+    typer.Option(
+        "--metres",
+        help="Places, lengths and headings, in and out, are m and rad in the map's "
+        "frame (map.yaml).",
+    ),
 ]
 Polarity = Annotated[
     Optional[Literal["dark", "light"]],  # noqa: UP045

@@ -198,7 +198,7 @@ def _table(rows: list[dict[str, Any]], folder: Path, width: int) -> Table:
             escape(row.get("learner", "").replace(" ", "\N{NO-BREAK SPACE}")),
             f"[{_COLOURS.get(status, 'yellow')}]{status}[/]",
             *(column[number] for column in figures.values()),
-            *([started] if wide else []),
+            *([escape(started)] if wide else []),
         )
     return table
 
@@ -235,5 +235,5 @@ def _figures_of(row: dict[str, Any]) -> tuple[str, str, str]:
 def _when(started: str) -> str:
     try:
         return f"{datetime.fromisoformat(started).astimezone():%m-%d %H:%M}"
-    except ValueError:
+    except (ValueError, OverflowError):
         return started[:11]

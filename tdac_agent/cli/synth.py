@@ -139,14 +139,14 @@ def read_text(path: Path) -> str:
 
 
 def _heading(task: Task, learner: str, optimizer: str | None) -> str:
-    nominal, units = task.nominal, task.setting.units
-    radius = units.scale * nominal.body_radius
+    nominal, setting = task.nominal, task.setting
     model = " (a tuned template, no language model)" if learner == "builtin" else ""
     if optimizer not in (None, learner):
         model += f", optimizer [bold]{escape(str(optimizer))}[/]"
     return (
-        f"task [bold]{escape(called(task))}[/]: path {units.told(nominal.shortest)}, "
-        f"body radius {radius:g} {units.length}, at most {nominal.horizon} steps; "
+        f"task [bold]{escape(called(task))}[/]: path {setting.told(nominal.shortest)}, "
+        f"body radius {setting.told(nominal.body_radius)}, "
+        f"at most {nominal.horizon} steps; "
         f"learner [bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
     )
 

@@ -145,6 +145,9 @@ class Setting(Protocol):
     def units(self) -> Units:
         """Units of places and lengths."""
 
+    def told(self, length: float) -> str:
+        """Formats a length in the units that the user has chosen: `12 px`, `0.6 m`."""
+
     @property
     def left_out(self) -> tuple[str, ...]:
         """Descriptions of the ignored nodes that may be solid."""

@@ -175,7 +175,7 @@ def called(task: Task) -> str:
         name = f"{alias}, changed"
     elif name in bundled_tasks():
         name += ", not the bundled one"
-    tolerance = setting.units.told(task.nominal.goal_tolerance)
+    tolerance = setting.told(task.nominal.goal_tolerance)
     return f"{name} (map {setting.world_sha256()[:8]}, goal within {tolerance})"
 
 

@@ -71,6 +71,10 @@ class TaskFile(_Strict):
     start: Annotated[tuple[Place, ...] | None, Field(min_length=2, max_length=3)] = None
     goal: tuple[Place, Place] | None = None
     snap: bool = Field(False, description="Move start and goal to free places.")
+    metres: bool = Field(
+        False,
+        description="Places, lengths and heading are m and rad in the map's frame.",
+    )
     polarity: Literal["dark", "light"] | None = Field(
         None, description="Which pixels of the map image are obstacles."
     )

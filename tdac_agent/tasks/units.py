@@ -61,6 +61,11 @@ class Units:
         """Formats a length of the environment: `12 px`, `250 mm`."""
         return f"{length * self.scale:.0f} {self.length}"
 
+    def figure(self, length: float) -> str:
+        """Formats a length of the environment with at least three digits: `12.5 px`."""
+        shown = length * self.scale
+        return f"{shown:.3g} {self.length}" if shown < 100 else self.told(length)
+
     def told_place(self, x: float, y: float) -> str:
         """Formats a place of the environment: `(12, 34)`, `(0.12, -0.34)`."""
         d = self.decimals - 1

@@ -25,13 +25,13 @@ class TaskError(TdacError):
     """A start, goal or robot does not make a feasible task on its map."""
 
 
-class PolarityError(TaskError):
-    """A map's obstacles may be dark or light: the user must choose.
+class PicturedError(TaskError):
+    """A map or a task on it is refused; pictures of the map show why.
 
     Attributes:
         name: Name of the map.
-        pictures: Image, grid and parameters for a preview, by polarity.
-        folder: Folder for both previews, set by the command line; None for the default.
+        pictures: Image, grid, parameters and units of each picture, by its name.
+        folder: Folder for the pictures, set by the command line; None for the default.
     """
 
     def __init__(
@@ -41,6 +41,14 @@ class PolarityError(TaskError):
         self.name = name
         self.pictures = pictures or {}
         self.folder: Path | None = None
+
+
+class PolarityError(PicturedError):
+    """A map's obstacles may be dark or light: the user must choose."""
+
+
+class RefusedError(PicturedError):
+    """A start, goal or robot does not make a feasible task; a picture shows where."""
 
 
 class WorldError(TdacError):

@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 from tdac_envs.core.errors import MapError
-from tdac_envs.grid.grid import OccupancyGrid
 
 Point = tuple[float, float]
 
 
-def to_pixels(grid: OccupancyGrid, x_m: float, y_m: float) -> Point:
+class Framed(Protocol):
+    """A map with a frame: an `OccupancyGrid`, a `MapImage` or `MapParams`."""
+
+    @property
+    def height(self) -> int:
+        """Number of rows, px."""
+
+    @property
+    def resolution(self) -> float | None:
+        """Metres per pixel; None if the map has no scale."""
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """Pose (x, y, yaw) of the lower-left pixel, m and rad."""
+
+
+def to_pixels(grid: Framed, x_m: float, y_m: float) -> Point:
     """Pixel coordinates of a point in the map frame.
 
     The outer corner of the lower-left pixel is at `origin[:2]`. Right and up in the
@@ -31,7 +47,7 @@ def to_pixels(grid: OccupancyGrid, x_m: float, y_m: float) -> Point:
     return right / resolution - 0.5, grid.height - 0.5 - up / resolution
 
 
-def to_metres(grid: OccupancyGrid, x: float, y: float) -> Point:
+def to_metres(grid: Framed, x: float, y: float) -> Point:
     """Map-frame coordinates in metres of a point in pixels; inverse of `to_pixels`.
 
     Raises:
@@ -45,7 +61,7 @@ def to_metres(grid: OccupancyGrid, x: float, y: float) -> Point:
     )
 
 
-def resolution_of(grid: OccupancyGrid) -> float:
+def resolution_of(grid: Framed) -> float:
     """Metres per pixel; divide a length in metres by it to get pixels.
 
     Raises:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,8 +15,9 @@ from numpy.typing import NDArray
 from tdac_envs.core.arguments import finite, finite_numbers, finite_point, positive
 from tdac_envs.core.errors import MapError, TaskError, hint
 from tdac_envs.core.intake import printable, read_array
-from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
-from tdac_envs.grid.metric import Point, resolution_of, to_pixels
+from tdac_envs.grid.grid import OccupancyGrid
+from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.grid.metric import Point
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.image import check_size, load_image, read_bytes
 from tdac_envs.mapping.params import (
@@ -26,7 +26,7 @@ from tdac_envs.mapping.params import (
     ReadingOptions,
     RobotParams,
 )
-from tdac_envs.mapping.score import nearest_free
+from tdac_envs.mapping.snapping import snap
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
 
@@ -57,6 +57,7 @@ def prepare(
     robot_radius: float | None = None,
     snap: bool = False,
     said: ReadingOptions = DEFAULT_OPTIONS,
+    units: MapUnits = PIXELS,
 ) -> Prepared:
     """Reads a map and determines start, goal, heading and body radius.
 
@@ -70,6 +71,7 @@ def prepare(
         robot_radius: Body radius, px; from the params if None, else 15.
         snap: Whether to move start and goal to the nearest place where the body fits.
         said: Polarity and threshold of an image, where the user gave them.
+        units: Units of messages and notes, from `units_of`.
 
     Raises:
         MapError: The map cannot be read or used.
@@ -77,7 +79,7 @@ def prepare(
     """
     if robot_radius is not None:
         robot_radius = positive("robot_radius", robot_radius)
-    given = _Given.of(start, goal, heading, robot_radius, snap, said)
+    given = _Given.of(start, goal, heading, robot_radius, snap, said, units)
     if not isinstance(source, str | Path):
         _refuse(said, "a grid")
         return _with_task(_from_cells(_as_cells(source), "array"), given)
@@ -107,6 +109,7 @@ class _Given:
     robot_radius: float | None
     snap: bool
     said: ReadingOptions
+    units: MapUnits = PIXELS
 
     @classmethod
     def of(
@@ -117,6 +120,7 @@ class _Given:
         robot_radius: float | None,
         snap: bool,
         said: ReadingOptions,
+        units: MapUnits,
     ) -> _Given:
         at = end = None
         if start is not None:
@@ -128,7 +132,7 @@ class _Given:
             end = finite_point("goal", goal)
         if heading is not None:
             heading = finite("heading", heading)
-        return cls(at, end, heading, robot_radius, snap, said)
+        return cls(at, end, heading, robot_radius, snap, said, units)
 
     def or_else(self, bundled: BundledMap) -> _Given:
         """These options, with the values of a bundled map instead of None."""
@@ -139,6 +143,7 @@ class _Given:
             self.robot_radius or bundled.robot_radius,
             self.snap,
             self.said,
+            self.units,
         )
 
 
@@ -161,23 +166,37 @@ def _with_task(prepared: Prepared, given: _Given) -> Prepared:
             "in pixels (`tdac map IMAGE` draws rulers for reading them)"
         )
     if given.snap:
-        params = _snapped(prepared.grid, params)
+        params = _snapped(prepared.grid, params, given.units)
     return Prepared(prepared.grid, params, prepared.image)
 
 
-def _snapped(grid: OccupancyGrid, params: MapParams) -> MapParams:
+def _snapped(grid: OccupancyGrid, params: MapParams, units: MapUnits) -> MapParams:
     """Moves start and goal to the nearest pixels where the body fits."""
-    free = body_free(clearance(grid.cells), params.robot.radius)
-    changes: dict[str, Any] = {}
-    notes = list(params.notes)
-    for name in ("start", "goal"):
-        x, y = point = getattr(params, name)
-        if grid.is_occupied(x, y) or not free[math.floor(y + 0.5), math.floor(x + 0.5)]:
-            moved = nearest_free(free, round(x), round(y))
-            if moved is not None:
-                changes[name] = moved
-                notes.append(f"{name} {point} moved to {moved}")
-    return params.model_copy(update={**changes, "notes": tuple(notes)})
+    ends = params.start, params.goal
+    moved = snap(grid.cells, *ends, params.robot.radius, units)
+    notes = (*params.notes, *moved.notes)
+    changes = {"start": moved.start, "goal": moved.goal, "notes": notes}
+    return params.model_copy(update=changes)
+
+
+def units_of(source: str | Path, *, metres: bool) -> MapUnits:
+    """The units of places and lengths on a map: pixels, or metres in its frame.
+
+    Args:
+        source: Path of a map file or map folder.
+        metres: Whether the user gives and reads metres.
+
+    Raises:
+        MapError: Metres are wanted, but the map cannot be read or has no resolution.
+    """
+    if not metres:
+        return PIXELS
+    path = Path(source)
+    check_exists(path)
+    if path.is_dir():
+        _check_is_map_folder(path)
+        return MapUnits.metres(_from_folder(path).grid)
+    return MapUnits.metres(load_image(path))
 
 
 def metres_to_pixels(
@@ -191,17 +210,10 @@ def metres_to_pixels(
     Raises:
         MapError: The map cannot be read, or has no resolution.
     """
-    check_exists(Path(source))
-    if Path(source).is_dir():
-        _check_is_map_folder(Path(source))
-        grid = _from_folder(Path(source)).grid
-    else:
-        image = load_image(source)
-        empty = np.zeros(image.colour.shape[:2], np.bool_)
-        grid = OccupancyGrid(empty, image.resolution, image.origin)
-    scale = resolution_of(grid)
-    points = [None if p is None else to_pixels(grid, *p) for p in (start, goal)]
-    return points[0], points[1], None if robot_radius is None else robot_radius / scale
+    units = units_of(source, metres=True)
+    points = [None if p is None else units.pixels(p) for p in (start, goal)]
+    radius = None if robot_radius is None else units.length_in_pixels(robot_radius)
+    return points[0], points[1], radius
 
 
 def _from_image(image: Path, given: _Given) -> Prepared:
@@ -209,7 +221,8 @@ def _from_image(image: Path, given: _Given) -> Prepared:
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
     radius = given.robot_radius or RobotParams().radius
     ends = given.start, given.goal
-    prepared = read(image, _digest(image), *ends, radius, given.snap, given.said)
+    how = given.snap, given.said, given.units
+    prepared = read(image, _digest(image), *ends, radius, *how)
     # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
     return _with_task(
@@ -227,12 +240,13 @@ def _read_image(
     radius: float,
     snap: bool,
     said: ReadingOptions,
+    units: MapUnits,
 ) -> Prepared:
     # Imported late: grids need no preprocessing.
     from tdac_envs.mapping.preprocessing import preprocess
 
-    how: Any = {"snap": snap, "polarity": said.polarity, "threshold": said.threshold}
-    grid, params = preprocess(image, start, goal, robot_radius=radius, **how)
+    how: Any = {"polarity": said.polarity, "threshold": said.threshold, "units": units}
+    grid, params = preprocess(image, start, goal, radius, snap=snap, **how)
     return Prepared(grid, params, image)
 
 

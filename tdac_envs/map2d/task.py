@@ -26,6 +26,7 @@ from tdac_envs.drive.task import (
     wrap_heading,
 )
 from tdac_envs.grid.grid import body_free
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import Path, descend
 from tdac_envs.map2d.terrain import (
     Terrain,
@@ -141,6 +142,7 @@ def make_task(
     dt: float = 0.05,
     goal_tolerance: float | None = None,
     horizon: int | None = None,
+    units: MapUnits = PIXELS,
 ) -> Map2DTask:
     """Makes a task and checks that it is feasible.
 
@@ -153,6 +155,7 @@ def make_task(
         goal_tolerance: Distance at which the goal is reached, px; by default
             min(20, d0 / 4).
         horizon: Number of steps; by default max(2500, 6 * d0 / (v_max * dt)).
+        units: Units of messages.
 
     Raises:
         TaskError: A number is not valid, the body does not fit at start or goal, no
@@ -163,9 +166,9 @@ def make_task(
     end = finite_point("goal", goal)
     dt = positive("dt", dt)
     check_full_step(dt, robot.max_wheel_speed, "px")
-    check_body_fits(terrain, "start", begin.x, begin.y, robot.radius)
-    check_body_fits(terrain, "goal", *end, robot.radius)
-    field = route(terrain, begin[:2], end, robot.radius)
+    check_body_fits(terrain, "start", begin.x, begin.y, robot.radius, units)
+    check_body_fits(terrain, "goal", *end, robot.radius, units)
+    field = route(terrain, begin[:2], end, robot.radius, units)
     shortest = path_length_from(terrain, field, begin.x, begin.y)
     if goal_tolerance is None:
         tolerance = min(MAX_TOLERANCE, 0.25 * shortest)
@@ -173,8 +176,9 @@ def make_task(
         tolerance = positive("goal_tolerance", goal_tolerance)
     if at_goal(terrain, end, tolerance, begin.x, begin.y):
         raise TaskError(
-            f"the start is already at the goal: {math.dist(begin[:2], end):.1f} px "
-            f"apart with a tolerance of {tolerance:.1f} px; move one of them"
+            "the start is already at the goal: "
+            f"{units.length(math.dist(begin[:2], end), 1)} apart with a tolerance of "
+            f"{units.length(tolerance, 1)}; move one of them"
         )
     if horizon is None:
         horizon = default_horizon(shortest, robot, dt)

@@ -21,6 +21,7 @@ from tdac_envs.grid.grid import (
     clearance,
     clearance_at,
 )
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.map2d.contact import first_contact, has_room
 from tdac_envs.map2d.kernels import path_distance
@@ -123,7 +124,12 @@ def _is_free_line(
 
 
 def check_body_fits(
-    terrain: Terrain, name: str, x: float, y: float, radius: float
+    terrain: Terrain,
+    name: str,
+    x: float,
+    y: float,
+    radius: float,
+    units: MapUnits = PIXELS,
 ) -> None:
     """Checks that a disc of `radius` px fits at (x, y), the point called `name`.
 
@@ -132,31 +138,38 @@ def check_body_fits(
             message suggests the nearest free pixel.
     """
     grid = terrain.grid
-    point = f"{name} ({x:g}, {y:g})"
+    point = f"{name} {units.point(x, y)}"
     if not (-0.5 <= x < grid.width - 0.5 and -0.5 <= y < grid.height - 0.5):
-        raise TaskError(
-            f"{point} lies outside the map of {grid.width} x {grid.height} px"
-        )
+        extent = f"{grid.width} x {grid.height} px"
+        if units != PIXELS:
+            extent = f"{units.length(grid.width)} x {units.length(grid.height)}"
+        raise TaskError(f"{point} lies outside the map of {extent}")
     if grid.is_occupied(x, y):
         problem = "lies in an obstacle"
     elif (room := clearance_at(grid.cells, x, y, radius)) < radius:
         problem = (
-            f"is {room:.1f} px from a wall, too near for a body of {radius:g} px radius"
+            f"is {units.length(room, 1)} from a wall, too near for a body of "
+            f"{units.length(radius)} radius"
         )
     else:
         return
-    raise TaskError(f"{point} {problem}; {_nearest_place(terrain, x, y, radius)}")
+    nearest = _nearest_place(terrain, x, y, radius, units)
+    raise TaskError(f"{point} {problem}; {nearest}")
 
 
-def _nearest_place(terrain: Terrain, x: float, y: float, radius: float) -> str:
+def _nearest_place(
+    terrain: Terrain, x: float, y: float, radius: float, units: MapUnits
+) -> str:
     rows, columns = np.nonzero(body_free(terrain.clear, radius))
     if rows.size == 0:
         return (
             "the body fits nowhere; the largest clearance is "
-            f"{terrain.clear.max():.1f} px"
+            f"{units.length(float(terrain.clear.max()), 1)}"
         )
     nearest = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
-    return f"the nearest free pixel is ({columns[nearest]}, {rows[nearest]})"
+    place = "pixel" if units == PIXELS else "place"
+    point = units.point(int(columns[nearest]), int(rows[nearest]))
+    return f"the nearest free {place} is {point}"
 
 
 @kernel
@@ -204,7 +217,11 @@ def may_start(
 
 
 def route(
-    terrain: Terrain, start: Point, goal: Point, radius: float
+    terrain: Terrain,
+    start: Point,
+    goal: Point,
+    radius: float,
+    units: MapUnits = PIXELS,
 ) -> NDArray[np.float32]:
     """Length of the shortest path to the goal from each pixel; see `field_to`.
 
@@ -222,12 +239,13 @@ def route(
                 return field
             break
     widest = widest_connected_radius(terrain.clear, start, goal)
-    reason = f"the widest body that gets through has a radius of {widest:.1f} px"
+    radius_text = units.at_most(widest) if units != PIXELS else f"{widest:.1f} px"
+    reason = f"the widest body that gets through has a radius of {radius_text}"
     if widest <= 0.0:
         reason = "they are in separate rooms"
     raise TaskError(
-        f"no free path for a body of {radius:g} px radius from start ({start[0]:g}, "
-        f"{start[1]:g}) to goal ({goal[0]:g}, {goal[1]:g}): {reason}"
+        f"no free path for a body of {units.length(radius)} radius from start "
+        f"{units.point(*start)} to goal {units.point(*goal)}: {reason}"
     )
 
 

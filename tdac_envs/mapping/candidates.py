@@ -15,6 +15,7 @@ from tdac_envs.core.arguments import positive
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.astar import Guide
 from tdac_envs.grid.grid import clearance
+from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.mapping.cleanup import cleanings
 from tdac_envs.mapping.params import ScoreTerms
 from tdac_envs.mapping.readings import plain_reading, readings
@@ -77,7 +78,8 @@ def ranked(scene: MapProblem, preset: Preset) -> list[Candidate]:
     """
     if scene.start is not None and scene.start == scene.goal:
         raise TaskError(
-            f"start and goal are the same pixel {scene.start}; choose two pixels"
+            f"start and goal are the same pixel {scene.units.point(*scene.start)}; "
+            "choose two pixels"
         )
     if not scene.radius > 0:
         raise TaskError(f"expected a robot radius above 0 px, got {scene.radius:g}")
@@ -93,19 +95,23 @@ def _staged_search(scene: MapProblem) -> Iterator[Candidate]:
     for reading in readings(scene):
         candidates = _with_margins(scene, reading)
         yield candidates[0]
-        yield from (_without_detour(c, candidates[0]) for c in candidates[1:])
+        for candidate in candidates[1:]:
+            yield _without_detour(candidate, candidates[0], scene.units)
         if candidates[0].reason is None:
             return
 
 
-def _without_detour(candidate: Candidate, plain: Candidate) -> Candidate:
+def _without_detour(
+    candidate: Candidate, plain: Candidate, units: MapUnits
+) -> Candidate:
     """Makes a margin infeasible if it lengthens the path too much."""
     if candidate.terms is None or plain.terms is None:
         return candidate
     longer = candidate.terms.path_length / max(plain.terms.path_length, 1.0) - 1
     if longer <= MAX_DETOUR:
         return candidate
-    why = f"the margin of {candidate.inflation} px makes the path {longer:.0%} longer"
+    margin = units.length(candidate.inflation)
+    why = f"the margin of {margin} makes the path {longer:.0%} longer"
     return replace(candidate, reason=lambda: why, terms=None)
 
 

@@ -46,6 +46,8 @@ class MapImage:
         method: The rule of the file that gave `occupied`.
         resolution: Metres per pixel, or None.
         origin: Pose (x, y, yaw) of the lower-left pixel, m and rad.
+        unknown: Shape (height, width), bool: occupied pixels of which the file says
+            that they are unknown; None if it does not say so.
     """
 
     colour: ColourImage
@@ -55,6 +57,17 @@ class MapImage:
     method: str = ""
     resolution: float | None = None
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    unknown: BoolGrid | None = None
+
+    @property
+    def height(self) -> int:
+        """Number of rows, px."""
+        return int(self.colour.shape[0])
+
+    @property
+    def width(self) -> int:
+        """Number of columns, px."""
+        return int(self.colour.shape[1])
 
     def __post_init__(self) -> None:
         height, width = self.colour.shape[:2]
@@ -78,12 +91,12 @@ def luminance(colour: ColourImage) -> GreyImage:
 
 
 def load_image(path: str | Path) -> MapImage:
-    """Reads a map file: a picture, a ROS `map.yaml` or a MovingAI `.map`.
+    """Reads a picture, a ROS `map.yaml`, a MovingAI `.map` or a `.npy` grid.
 
     Raises:
         MapError: The file is missing, unreadable, too large or of a single colour.
     """
-    from tdac_envs.mapping.map_files import read_movingai, read_ros_yaml
+    from tdac_envs.mapping.map_files import read_grid, read_movingai, read_ros_yaml
 
     path = Path(path)
     suffix = path.suffix.lower()
@@ -91,6 +104,8 @@ def load_image(path: str | Path) -> MapImage:
         return read_ros_yaml(path)
     if suffix == ".map":
         return read_movingai(path)
+    if suffix == ".npy":
+        return read_grid(path)
     return read_picture(path)
 
 

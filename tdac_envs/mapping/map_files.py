@@ -1,8 +1,9 @@
-"""Map files that define their obstacles: ROS `map.yaml` and MovingAI `.map`."""
+"""Map files that define their obstacles: ROS `map.yaml`, MovingAI `.map`, `.npy`."""
 
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -10,13 +11,14 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_envs.core.errors import MapError, first_problem
-from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, printable
+from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, printable, read_array
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.mapping.image import (
     ColourImage,
     MapImage,
     check_size,
     decode,
+    from_array,
     read_bytes,
 )
 from tdac_envs.mapping.params import Length, Place
@@ -50,14 +52,16 @@ def read_ros_yaml(path: Path) -> MapImage:
     picture = path.parent / ros.image
     data = read_bytes(picture)
     colour = decode(data, picture.name)
+    free, unknown = _free_and_unknown(colour, ros)
     return MapImage(
         colour,
         printable(path.name),
         hashlib.sha256(text + data).hexdigest(),
-        ~_known_free(colour, ros),
+        ~free,
         f"ros {ros.mode}",
         ros.resolution,
         ros.origin,
+        unknown,
     )
 
 
@@ -74,15 +78,40 @@ def _parse_ros(text: bytes, path: Path) -> RosMap:
         raise MapError(f"{path}: {first_problem(error)}") from None
 
 
-def _known_free(colour: ColourImage, ros: RosMap) -> BoolGrid:
-    """Pixels whose occupancy is below `free_thresh`, by the map server's rules."""
+def _free_and_unknown(colour: ColourImage, ros: RosMap) -> tuple[BoolGrid, BoolGrid]:
+    """Free pixels and unknown ones, by the map server's rules.
+
+    Pixels with an occupancy below `free_thresh` are free, above `occupied_thresh`
+    occupied, and unknown in between.
+    """
     shade = colour.mean(axis=2)
     if ros.negate:
         shade = 255.0 - shade
     if ros.mode == "raw":
         # Values are occupancy in percent; above 100 means unknown.
-        return np.asarray(shade / 100.0 < ros.free_thresh)
-    return np.asarray((255.0 - shade) / 255.0 < ros.free_thresh)
+        occupancy = shade / 100.0
+        return occupancy < ros.free_thresh, occupancy > 1.0
+    occupancy = (255.0 - shade) / 255.0
+    free = occupancy < ros.free_thresh
+    return free, ~free & (occupancy <= ros.occupied_thresh)
+
+
+def read_grid(path: Path) -> MapImage:
+    """Reads a `.npy` file with a bool array `[y, x]`, True = occupied.
+
+    Raises:
+        MapError: It is not such a file, or too large.
+    """
+    try:
+        cells = read_array(read_bytes(path))
+    except ValueError as error:
+        raise MapError(f"cannot read the grid {path}: {error}") from error
+    if cells.ndim != 2:
+        raise MapError(f"{path}: expected a 2-D grid of cells, got shape {cells.shape}")
+    check_size(path.name, cells.shape[1], cells.shape[0])
+    if cells.dtype != np.bool_:
+        raise MapError(f"{path}: expected a bool array, got {cells.dtype}")
+    return replace(from_array(cells), name=printable(path.name))
 
 
 def read_movingai(path: Path) -> MapImage:

@@ -11,21 +11,26 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.errors import MapError, PolarityError
+from tdac_envs.core.errors import MapError, PicturedError, RefusedError
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import plan_path
 from tdac_envs.mapping.params import MapParams
 
 if TYPE_CHECKING:
     from tdac_envs.drawing.canvas import Image
-    from tdac_envs.mapping.image import ColourImage
+    from tdac_envs.mapping.image import MapImage
     from tdac_envs.mapping.preprocessing import Source
 
 FILES = ("occupancy.npy", "occupancy.png", "params.json", "preview.png")
 
 
 def write_map(
-    folder: str | Path, grid: OccupancyGrid, params: MapParams, image: Source
+    folder: str | Path,
+    grid: OccupancyGrid,
+    params: MapParams,
+    image: Source,
+    units: MapUnits = PIXELS,
 ) -> list[Path]:
     """Writes the four files of a preprocessed map; all of them or none.
 
@@ -38,6 +43,7 @@ def write_map(
         grid: From `preprocess`.
         params: From `preprocess`.
         image: The source that was given to `preprocess`.
+        units: Units of the preview's rulers and legend.
 
     Returns:
         The files, in the order above.
@@ -49,7 +55,7 @@ def write_map(
     from tdac_envs.mapping.preprocessing import as_image
 
     folder = Path(folder)
-    preview = preview_of(as_image(image).colour, grid, params)
+    preview = preview_of(as_image(image), grid, params, units)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".map-", dir=folder) as work:
@@ -64,8 +70,11 @@ def write_map(
     return [folder / name for name in FILES]
 
 
-def write_previews(error: PolarityError) -> list[Path]:
-    """Writes `preview-dark.png` and `preview-light.png` of a map of unclear polarity.
+def write_pictures(error: PicturedError) -> list[Path]:
+    """Writes the pictures of an error, which show why a map is refused.
+
+    They are `preview-dark.png` and `preview-light.png` of a map of unclear polarity,
+    or `refused.png` with the place where a task fails.
 
     Args:
         error: From `preprocess`. The files go to its `folder`, by default `NAME-map`.
@@ -77,9 +86,13 @@ def write_previews(error: PolarityError) -> list[Path]:
     files = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for polarity, (colour, grid, params) in error.pictures.items():
-            files.append(folder / f"preview-{polarity}.png")
-            files[-1].write_bytes(png(preview_of(colour, grid, params)))
+        for name, (image, grid, params, units) in error.pictures.items():
+            files.append(folder / f"{name}.png")
+            reason = ""
+            if isinstance(error, RefusedError):
+                reason = str(error).removeprefix(f"{error.name}: ")
+            picture = preview_of(image, grid, params, units, reason)
+            files[-1].write_bytes(png(picture))
     except OSError as fault:
         raise MapError(
             f"{folder}: cannot be written: {fault.strerror}; choose another folder"
@@ -87,17 +100,29 @@ def write_previews(error: PolarityError) -> list[Path]:
     return files
 
 
-def preview_of(colour: ColourImage, grid: OccupancyGrid, params: MapParams) -> Image:
+def preview_of(
+    image: MapImage,
+    grid: OccupancyGrid,
+    params: MapParams,
+    units: MapUnits = PIXELS,
+    reason: str = "",
+) -> Image:
     """A picture of a map with its obstacles, task and shortest path, uint8 RGB.
 
     Args:
-        colour: Shape (height, width, 3), uint8 RGB, the map's picture.
+        image: The map as read.
         grid: From `preprocess`.
         params: From `preprocess`.
+        units: Units of rulers and legend.
+        reason: Why the task is refused; the picture then shows where it fails.
     """
+    from tdac_envs.mapping.fault import fault_of
     from tdac_envs.mapping.preview import draw_preview
 
-    return draw_preview(colour, grid.cells, params, shortest_path(grid, params))
+    cells = grid.cells
+    fault = fault_of(cells, params, units) if reason else None
+    path = np.empty((0, 2)) if reason else shortest_path(grid, params)
+    return draw_preview(image, cells, params, path, units, fault, reason)
 
 
 def png(picture: Image) -> bytes:

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.errors import PolarityError, TaskError
+from tdac_envs.core.errors import PolarityError, RefusedError, TaskError
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.mapping.candidates import Candidate, Preset, ranked
-from tdac_envs.mapping.image import ColourImage, MapImage, from_array, load_image
+from tdac_envs.mapping.image import MapImage, from_array, load_image
 from tdac_envs.mapping.params import (
     DEFAULT_OPTIONS,
     MapParams,
@@ -21,8 +22,14 @@ from tdac_envs.mapping.params import (
     Shade,
 )
 from tdac_envs.mapping.readings import readings
-from tdac_envs.mapping.scene import MapProblem, MapReading, is_polarity_unclear
-from tdac_envs.mapping.score import Point, nearest_free
+from tdac_envs.mapping.scene import (
+    MapProblem,
+    MapReading,
+    decide_light_free,
+    is_polarity_unclear,
+)
+from tdac_envs.mapping.score import Point
+from tdac_envs.mapping.snapping import fits, snap
 
 Source = str | Path | NDArray[np.generic] | MapImage
 
@@ -40,6 +47,7 @@ def preprocess(
     heading: float = 0.0,
     polarity: Shade | None = None,
     threshold: float | None = None,
+    units: MapUnits = PIXELS,
 ) -> tuple[OccupancyGrid, MapParams]:
     """The occupancy grid of a map picture, and the parameters that were chosen.
 
@@ -51,23 +59,25 @@ def preprocess(
         robot_radius: Body radius, px.
         preset: "default" tries readings from the plain one to bolder ones and takes the
             first feasible one; "paper" is the literal grid of Algorithm 1.
-        snap: Move start and goal to the nearest pixel that is free for the body;
-            `MapParams.notes` records the move.
+        snap: Move start and goal to the nearest connected pixels that are free for the
+            body; `MapParams.notes` records the move.
         heading: Start heading, rad, from +x towards +y.
         polarity: Which pixels are obstacles; inferred from the picture if None.
         threshold: Luminance, 0..255, above which a pixel is light; inferred if None.
+        units: Units of messages and notes.
 
     Raises:
         MapError: The image cannot be used.
         PolarityError: There is a task, and both polarities are likely.
-        TaskError: An argument is invalid, or the task is feasible on no reading.
+        RefusedError: The task is feasible on no reading.
+        TaskError: An argument is invalid.
     """
     source, said = as_image(image), ReadingOptions(polarity, threshold)
-    scene, notes = _scene(source, start, goal, robot_radius, snap, said)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, said, units)
     candidates = ranked(scene, preset)
     if is_polarity_unclear(scene, candidates[0].reading.polarity):
         if scene.trip is not None:
-            raise _close_call(scene, source.colour, preset, heading)
+            raise _close_call(scene, source, preset, heading)
         notes.append(f"{_CLOSE_CALL}; give polarity='dark' or 'light'")
     return _result(scene, candidates[0], preset, heading, notes)
 
@@ -82,19 +92,21 @@ def preprocess_with_candidates(
     snap: bool,
     heading: float,
     said: ReadingOptions,
+    units: MapUnits = PIXELS,
 ) -> tuple[OccupancyGrid, MapParams, list[Candidate]]:
     """The results of `preprocess`, and all evaluated candidates; see `ranked`.
 
     Raises:
         MapError: As `preprocess` does.
         PolarityError: Both polarities are likely, even without a task.
+        RefusedError: As `preprocess` does.
         TaskError: As `preprocess` does.
     """
     source = as_image(image)
-    scene, notes = _scene(source, start, goal, robot_radius, snap, said)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, said, units)
     candidates = ranked(scene, preset)
     if is_polarity_unclear(scene, candidates[0].reading.polarity):
-        raise _close_call(scene, source.colour, preset, heading)
+        raise _close_call(scene, source, preset, heading)
     grid, params = _result(scene, candidates[0], preset, heading, notes)
     return grid, params, candidates
 
@@ -104,8 +116,9 @@ def _scene(
     start: tuple[float, float] | None,
     goal: tuple[float, float] | None,
     robot_radius: float,
-    snap: bool,
+    snapping: bool,
     said: ReadingOptions,
+    units: MapUnits,
 ) -> tuple[MapProblem, list[str]]:
     """The picture with its task, and notes on moved points."""
     if source.occupied is not None and said != DEFAULT_OPTIONS:
@@ -113,14 +126,17 @@ def _scene(
             f"{source.name} itself defines which cells are obstacles; leave out "
             "polarity and threshold"
         )
-    notes: list[str] = []
-    ends: list[Point | None] = []
+    alone = MapProblem.of(source, None, None, robot_radius, said, units)
     for name, point in (("start", start), ("goal", goal)):
-        pixel = None if point is None else _to_pixel(source, name, point)
-        if pixel is not None and snap:
-            pixel = _snapped(source, name, pixel, robot_radius, said, notes)
-        ends.append(pixel)
-    return MapProblem.of(source, ends[0], ends[1], robot_radius, said), notes
+        if point is not None and not np.isfinite(point).all():
+            raise TaskError(f"expected {name} to be two finite numbers, got {point}")
+        if point is not None and not _is_inside(source, point):
+            raise _outside(alone, name, start, goal)
+    ends = [None if point is None else _pixel(point) for point in (start, goal)]
+    scene = replace(alone, start=ends[0], goal=ends[1])
+    if not snapping:
+        return scene, []
+    return _snapped(scene, source.occupied is None and decide_light_free(alone))
 
 
 def _result(
@@ -129,28 +145,36 @@ def _result(
     """The grid and the parameters of the best candidate.
 
     Raises:
-        TaskError: The task is infeasible on it.
+        RefusedError: The task is infeasible on it.
     """
+    params = _params(scene, best, heading, notes + _changed(best.reading, preset))
     if best.reason is not None:
-        raise TaskError(f"{scene.image.name}: {best.reason()}")
-    return _grid(scene, best), _params(
-        scene, best, heading, notes + _changed(best.reading, preset)
-    )
+        raise _refusal(scene, best.reading, params, best.reason())
+    return _grid(scene, best.reading), params
 
 
-def _grid(scene: MapProblem, best: Candidate) -> OccupancyGrid:
+def _refusal(
+    scene: MapProblem, reading: MapReading, params: MapParams, reason: str
+) -> RefusedError:
+    """The error with a picture of a reading on which the task is infeasible."""
+    name = scene.image.name
+    picture = (scene.image, _grid(scene, reading), params, scene.units)
+    return RefusedError(f"{name}: {reason}", name, {"refused": picture})
+
+
+def _grid(scene: MapProblem, reading: MapReading) -> OccupancyGrid:
     image = scene.image
-    return OccupancyGrid(best.reading.cells, image.resolution, image.origin)
+    return OccupancyGrid(reading.cells, image.resolution, image.origin)
 
 
 def _close_call(
-    scene: MapProblem, colour: ColourImage, preset: Preset, heading: float
+    scene: MapProblem, source: MapImage, preset: Preset, heading: float
 ) -> PolarityError:
     """The error that describes both readings of a picture and has their previews.
 
     Args:
         scene: The picture as it was evaluated.
-        colour: The original picture.
+        source: The original picture.
         preset: As for `preprocess`.
         heading: As for `preprocess`.
     """
@@ -160,18 +184,21 @@ def _close_call(
         one = replace(scene, said=replace(scene.said, polarity=polarity))
         best = ranked(one, preset)[0]
         free = float(1 - best.reading.cells.mean())
-        summaries.append(f"{polarity} obstacles leave {free:.0%} free{_path(best)}")
+        summaries.append(
+            f"{polarity} obstacles leave {free:.0%} free{_path(best, scene.units)}"
+        )
         params = _params(one, best, heading, [])
-        pictures[polarity] = (colour, _grid(one, best), params)
+        grid = _grid(one, best.reading)
+        pictures[f"preview-{polarity}"] = (source, grid, params, scene.units)
     message = f"{scene.image.name}: {_CLOSE_CALL}: {', '.join(summaries)}"
     advice = "give polarity='dark' or 'light' (--polarity dark or --polarity light)"
     return PolarityError(f"{message}; {advice}", scene.image.name, pictures)
 
 
-def _path(best: Candidate) -> str:
+def _path(best: Candidate, units: MapUnits) -> str:
     """A remark on the length of the path."""
     if best.terms is not None:
-        return f" and a path of {best.terms.path_length:.0f} px"
+        return f" and a path of {units.length(best.terms.path_length, 0)}"
     return "" if best.reason is None else " and no path"
 
 
@@ -196,48 +223,99 @@ def as_image(image: Source) -> MapImage:
     return load_image(image)
 
 
-def _to_pixel(image: MapImage, name: str, point: tuple[float, float]) -> Point:
-    """The pixel that contains the point; raises TaskError outside the map."""
-    height, width = image.colour.shape[:2]
-    if not np.isfinite(point).all():
-        raise TaskError(f"expected {name} to be two finite numbers, got {point}")
-    x, y = int(np.floor(point[0] + 0.5)), int(np.floor(point[1] + 0.5))
-    if not (0 <= x < width and 0 <= y < height):
-        raise TaskError(
-            f"{name} ({point[0]:g}, {point[1]:g}) lies outside the map; expected "
-            f"0 <= x < {width} and 0 <= y < {height}"
-        )
-    return x, y
+def _is_inside(image: MapImage, point: tuple[float, float]) -> bool:
+    x, y = np.floor(np.add(point, 0.5))
+    return bool(0 <= x < image.width and 0 <= y < image.height)
 
 
-def _snapped(
-    image: MapImage,
+def _pixel(point: tuple[float, float]) -> Point:
+    """The pixel that contains the point."""
+    return int(np.floor(point[0] + 0.5)), int(np.floor(point[1] + 0.5))
+
+
+def _outside(
+    alone: MapProblem,
     name: str,
-    point: Point,
-    radius: float,
-    said: ReadingOptions,
-    notes: list[str],
-) -> Point:
-    """The point moved to the nearest pixel that is free for the body."""
-    reading = next(readings(MapProblem.of(image, None, None, radius, said)))
-    free = body_free(clearance(reading.cells), radius)
-    moved = nearest_free(free, *point)
-    if moved is None or moved == point:
-        return point
-    notes.append(f"{name} moved from {point} to {moved}")
-    return moved
+    start: tuple[float, float] | None,
+    goal: tuple[float, float] | None,
+) -> RefusedError:
+    """The error for the start or goal, called `name`, outside the map.
+
+    Args:
+        alone: The picture without its task.
+        name: `start` or `goal`.
+        start: As given, px.
+        goal: As given, px.
+    """
+    x, y = {"start": start, "goal": goal}[name] or (0.0, 0.0)
+    image, units = alone.image, alone.units
+    reading = next(readings(alone))
+    params = _params(alone, Candidate(reading), 0.0, [])
+    params = params.model_copy(update={"start": start, "goal": goal})
+    reason = (
+        f"{name} {units.point(x, y)} lies outside the map; "
+        f"expected {extent_text(image.width, image.height, units)}"
+    )
+    return _refusal(alone, reading, params, reason)
+
+
+def extent_text(width: int, height: int, units: MapUnits) -> str:
+    """Describes which coordinates lie on a map of this size, px."""
+    if units == PIXELS:
+        return f"0 <= x < {width} and 0 <= y < {height}"
+    corners = [
+        units.coordinates(x - 0.5, y - 0.5) for x in (0, width) for y in (0, height)
+    ]
+    (left, right), (low, high) = (
+        (units.rounded(min(values)), units.rounded(max(values)))
+        for values in zip(*corners, strict=True)
+    )
+    return f"{left} <= x < {right} and {low} <= y < {high} (m, in the map's frame)"
+
+
+def _snapped(scene: MapProblem, light_free: bool) -> tuple[MapProblem, list[str]]:
+    """The scene with its ends moved to free pixels, and notes on the moves.
+
+    Args:
+        scene: The picture with the task as given.
+        light_free: The polarity by the picture alone: a start in a wall says nothing.
+    """
+    reading = _clearest(scene, light_free)
+    moved = snap(reading.cells, scene.start, scene.goal, scene.radius, scene.units)
+    ends = [None if p is None else _pixel(p) for p in (moved.start, moved.goal)]
+    pointed = tuple(scene.ends) if reading.words else ()
+    scene = replace(scene, start=ends[0], goal=ends[1], pointed=pointed)
+    return scene, list(moved.notes)
+
+
+def _clearest(scene: MapProblem, light_free: bool) -> MapReading:
+    """The plainest reading on which as few ends as possible need a move."""
+    best, most = None, (-1, -1)
+    for reading in readings(scene, light_free):
+        free = body_free(clearance(reading.cells), scene.radius)
+        fitting = sum(fits(free, end) for end in scene.ends)
+        # Thin lines and specks under a start may be obstacles, words are not.
+        if best is None or (fitting, reading.words) > most:
+            best, most = reading, (fitting, reading.words)
+        if fitting == len(scene.ends):
+            break
+    assert best is not None
+    return best
 
 
 def _changed(reading: MapReading, preset: Preset) -> list[str]:
     """Notes on the obstacles that the reading removes from the picture."""
-    if not (reading.opening or reading.cleanup):
+    if not (reading.opening or reading.cleanup or reading.words):
         return []
     if preset == "paper":
         what = f"pieces and holes under {reading.cleanup} px removed, gaps closed"
         return [f"cleaned with strength {reading.cleanup}: {what}; check the preview"]
-    what = f"specks up to {reading.cleanup} px"
+    parts = ["words over start or goal"] if reading.words else []
     if reading.opening:
-        what = f"lines under {reading.opening} px and {what}"
+        parts.append(f"lines under {reading.opening} px")
+    if reading.cleanup:
+        parts.append(f"specks up to {reading.cleanup} px")
+    what = " and ".join(parts)
     return [f"treated as free space: {what}; check the preview"]
 
 

@@ -14,66 +14,113 @@ from tdac_envs.drawing.canvas import (
     GREY,
     INK,
     PAPER,
+    RED,
     TRAIL,
-    WALL,
     Canvas,
     Colour,
 )
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.mapping.image import ColourImage
+from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.mapping.fault import Fault
+from tdac_envs.mapping.image import ColourImage, MapImage, luminance
 from tdac_envs.mapping.params import MapParams
+from tdac_envs.mapping.readings import unknown_grey
+from tdac_envs.mapping.rulers import RIGHT, TOP, Rulers
 
 Picture = NDArray[np.uint8]
 Path = NDArray[np.float64]
+Classes = NDArray[np.uint8]
+Entry = tuple[Colour, str]
 
-_FREE_TINT: Colour = (150, 214, 178)
-_WALL_TINT: Colour = (196, 84, 76)
-_LEFT, _TOP, _RIGHT, _ROW = 52, 30, 14, 22
+_NAMES = (
+    *("free", "obstacle", "unknown, not free"),
+    *("reach of the start", "reach of the goal"),
+)
+_OPEN, _SOLID, _UNKNOWN, _START_SIDE, _GOAL_SIDE = range(5)
+_TINTS: tuple[Colour, ...] = (
+    *((150, 214, 178), (196, 84, 76), (98, 104, 150)),
+    *((166, 148, 240), (240, 208, 96)),
+)
+_ROW = 22
 
 
 def draw_preview(
-    source: ColourImage, cells: BoolGrid, params: MapParams, path: Path
+    image: MapImage,
+    cells: BoolGrid,
+    params: MapParams,
+    path: Path,
+    units: MapUnits = PIXELS,
+    fault: Fault | None = None,
+    reason: str = "",
 ) -> Picture:
     """The tinted source image with task, legend and rulers, uint8 RGB.
 
     Args:
-        source: Shape (height, width, 3), uint8 RGB, as read.
+        image: The map as read.
         cells: Shape (height, width), bool, True = occupied.
         params: The parameters that preprocessing chose.
         path: Shape (n, 2), the shortest path for the body; may be empty.
+        units: Units of rulers and legend.
+        fault: Where the task fails, if it does.
+        reason: Why it fails.
     """
-    lines = _lines(params)
-    floor = (_shade(source, ~cells, _FREE_TINT), "free")
-    solid = (_shade(source, cells, _WALL_TINT), "obstacle")
-    legend = [row for row in ([floor, solid], _places(params)) if row]
+    classes = _classes(image, cells, params, fault)
+    rulers = Rulers(cells.shape, units)
+    room = Canvas.frame_width(cells)
+    kinds = [
+        (_shade(image.colour, classes == kind, _TINTS[kind]), _NAMES[kind])
+        for kind in range(len(_NAMES))
+        if kind in (_OPEN, _SOLID) or (classes == kind).any()
+    ]
+    legend = _in_rows(kinds, room) + _in_rows(_places(params, units, fault), room)
+    lines = [
+        row for text in _texts(params, units, reason) for row in _folded(text, room)
+    ]
     canvas = Canvas(cells, strip=12 + _ROW * (len(legend) + len(lines)))
-    _lay_source(canvas, source, cells)
+    _lay_source(canvas, image.colour, classes)
     _draw_task(canvas, params, path)
-    map_rows = canvas.strip_top
-    origin = np.ceil(canvas.to_frame((-0.5, -0.5))[0]).astype(int)
-    canvas.image = _framed(canvas.image)
-    _rulers(canvas, cells.shape, origin, map_rows)
-    baseline = _TOP + map_rows + 24
+    if fault is not None:
+        _draw_fault(canvas, fault)
+    framed = _framed(canvas.image, rulers.left)
+    rulers.draw(canvas, framed)
+    canvas.image = framed
+    baseline = TOP + canvas.strip_top + 24
     for entries in legend:
-        _draw_entries(canvas, baseline, entries)
+        _draw_entries(canvas, rulers.left, baseline, entries)
         baseline += _ROW
     for line in lines:
-        canvas.text(_LEFT, baseline, line, GREY)
+        canvas.text(rulers.left, baseline, line, GREY)
         baseline += _ROW
     return canvas.image
 
 
-def _lay_source(canvas: Canvas, source: ColourImage, cells: BoolGrid) -> None:
+def _classes(
+    image: MapImage, cells: BoolGrid, params: MapParams, fault: Fault | None
+) -> Classes:
+    """What each pixel is: an index of `_NAMES`, shape (height, width)."""
+    classes = cells.astype(np.uint8)
+    unknown = image.unknown
+    level = unknown_grey(params.method)
+    if level is not None:
+        unknown = np.abs(luminance(image.colour).astype(np.int16) - level) <= 3
+    if unknown is not None:
+        classes[unknown & cells] = _UNKNOWN
+    if fault is not None:
+        classes[fault.goal_side] = _GOAL_SIDE
+        classes[fault.start_side] = _START_SIDE
+    return classes
+
+
+def _lay_source(canvas: Canvas, source: ColourImage, classes: Classes) -> None:
     """Replaces the map on the canvas by the faded and tinted source."""
-    height, width = cells.shape
+    height, width = classes.shape
     size = (round(width * canvas.scale), round(height * canvas.scale))
     method = cv2.INTER_AREA if canvas.scale < 1 else cv2.INTER_NEAREST
     picture = cv2.resize(source, size, interpolation=method).astype(np.float32)
-    wall = cv2.resize(cells.astype(np.float32), size, interpolation=method)[..., None]
-    tint = wall * np.array(_WALL_TINT) + (1 - wall) * np.array(_FREE_TINT)
-    mixed = _mixed(picture, tint)
+    tints = np.array(_TINTS, np.uint8)[classes]
+    tint = cv2.resize(tints, size, interpolation=method).astype(np.float32)
     left = int(np.ceil(canvas.to_frame((-0.5, -0.5))[0][0]))
-    canvas.image[: size[1], left : left + size[0]] = mixed
+    canvas.image[: size[1], left : left + size[0]] = _mixed(picture, tint)
 
 
 def _draw_task(canvas: Canvas, params: MapParams, path: Path) -> None:
@@ -93,50 +140,24 @@ def _draw_task(canvas: Canvas, params: MapParams, path: Path) -> None:
         canvas.disc(params.goal, 4, GREEN)
 
 
-def _framed(image: Picture) -> Picture:
+def _draw_fault(canvas: Canvas, fault: Fault) -> None:
+    """Rings the place where the task fails, and points to a better one."""
+    if fault.better is not None:
+        way = np.array([fault.at, fault.better])
+        for width, ink in ((5, FREE), (2, RED)):
+            canvas.line(way, ink, width, dash=6)
+            canvas.disc(fault.better, 4, ink, width=width)
+    for width, ink in ((7, FREE), (3, RED)):
+        canvas.disc(fault.at, 18, ink, width=width)
+
+
+def _framed(image: Picture, left: int) -> Picture:
     """The picture with a margin for the rulers."""
     rows, columns = image.shape[:2]
-    framed = np.empty((rows + _TOP, columns + _LEFT + _RIGHT, 3), np.uint8)
+    framed = np.empty((rows + TOP, columns + left + RIGHT, 3), np.uint8)
     framed[...] = PAPER
-    framed[_TOP:, _LEFT : _LEFT + columns] = image
+    framed[TOP:, left : left + columns] = image
     return framed
-
-
-def _rulers(
-    canvas: Canvas, shape: tuple[int, ...], origin: NDArray[np.int64], map_rows: int
-) -> None:
-    """Ticks with pixel numbers along the top and the left, and faint grid lines."""
-    height, width = shape
-    step = _tick_step(canvas.scale)
-    image = canvas.image
-    for value in range(0, width, step // 5):
-        x = _LEFT + int(origin[0] + (value + 0.5) * canvas.scale)
-        long = value % step == 0
-        image[_TOP - (8 if long else 4) : _TOP, x] = INK
-        if long:
-            _faint(image[_TOP : _TOP + map_rows, x])
-            label = str(value)
-            canvas.text(x - canvas.text_width(label) // 2, _TOP - 12, label, INK)
-    for value in range(0, height, step // 5):
-        y = _TOP + int(origin[1] + (value + 0.5) * canvas.scale)
-        long = value % step == 0
-        image[y, _LEFT - (8 if long else 4) : _LEFT] = INK
-        if long:
-            _faint(image[y, _LEFT : _LEFT + round(width * canvas.scale) + origin[0]])
-            label = str(value)
-            canvas.text(_LEFT - 11 - canvas.text_width(label), y + 5, label, INK)
-
-
-def _faint(line: Picture) -> None:
-    line[...] = np.rint(0.8 * line + 0.2 * np.array(WALL)).astype(np.uint8)
-
-
-def _tick_step(scale: float) -> int:
-    """Distance between numbered ticks, map px; at least 70 frame px."""
-    for step in (5, 10, 25, 50, 100, 250, 500, 1000, 2500):
-        if step * scale >= 70:
-            return step
-    return 5000
 
 
 def _mixed(picture: NDArray[Any], tint: NDArray[Any]) -> Picture:
@@ -150,36 +171,66 @@ def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
     return red, green, blue
 
 
-def _places(params: MapParams) -> list[tuple[Colour, str]]:
-    """Legend entries of start, goal and path, each if it is given."""
-    entries: list[tuple[Colour, str]] = []
+def _places(params: MapParams, units: MapUnits, fault: Fault | None) -> list[Entry]:
+    """Legend entries of start, goal, path and fault, each if there is one."""
+    entries: list[Entry] = []
     if params.start is not None:
-        entries.append((TRAIL, f"start {_text(params.start)}"))
+        entries.append((TRAIL, f"start {units.point(*params.start)}"))
     if params.goal is not None:
-        entries.append((GREEN, f"goal {_text(params.goal)}"))
+        entries.append((GREEN, f"goal {units.point(*params.goal)}"))
     if params.score_terms is not None and params.score_terms.path_length:
-        entries.append((TRAIL, f"path {params.score_terms.path_length:.0f} px"))
+        length = units.length(params.score_terms.path_length, 0)
+        entries.append((TRAIL, f"path {length}"))
+    if fault is not None:
+        entries.append((RED, fault.label))
+    if fault is not None and fault.better is not None:
+        entries.append((RED, f"nearest free place {units.point(*fault.better)}"))
     return entries
 
 
+def _in_rows(entries: list[Entry], room: int) -> list[list[Entry]]:
+    """The entries in rows that are at most `room` frame px wide."""
+    rows: list[list[Entry]] = []
+    used = room
+    for entry in entries:
+        width = 34 + Canvas.text_width(entry[1])
+        if used + width > room:
+            rows.append([])
+            used = 0
+        rows[-1].append(entry)
+        used += width
+    return rows
+
+
+def _folded(text: str, room: int) -> list[str]:
+    """The text in lines that are at most `room` frame px wide, if its words are."""
+    lines: list[str] = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and Canvas.text_width(longer) <= room:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
+
+
 def _draw_entries(
-    canvas: Canvas, baseline: int, entries: list[tuple[Colour, str]]
+    canvas: Canvas, left: int, baseline: int, entries: list[Entry]
 ) -> None:
-    x = _LEFT
+    x = left
     for colour, label in entries:
         top = 6 if label.startswith("path") else 10
         canvas.image[baseline - top : baseline + 1 - (10 - top), x : x + 14] = colour
         x = canvas.text(x + 20, baseline, label, INK) + 14
 
 
-def _lines(params: MapParams) -> list[str]:
-    """Lines of text below the legend."""
+def _texts(params: MapParams, units: MapUnits, reason: str) -> list[str]:
+    """Texts below the legend."""
     size = f"{params.source}: {params.width} x {params.height} px"
     if params.resolution is not None:
         size += f", {params.resolution:g} m per px"
+    if units != PIXELS:
+        size += "; rulers: m in the map's frame"
     shade = "" if params.polarity == "given" else f"{params.polarity} "
-    return [size, f"{shade}obstacles: {params.method}"]
-
-
-def _text(point: tuple[float, float]) -> str:
-    return f"({point[0]:g}, {point[1]:g})"
+    texts = [size, f"{shade}obstacles: {params.method}"]
+    return [*texts, f"refused: {reason}"] if reason else texts

@@ -8,6 +8,7 @@ walls, so that a closed map stays closed.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -27,6 +28,7 @@ from tdac_envs.mapping.image import GreyImage, luminance
 from tdac_envs.mapping.lighting import LEVEL
 from tdac_envs.mapping.params import DEFAULT_OPTIONS
 from tdac_envs.mapping.scene import MapProblem, MapReading, decide_light_free, touches
+from tdac_envs.mapping.words import without_words
 
 SLIVER = 6.0
 """Largest width of a strip that counts as part of the outside, px."""
@@ -34,17 +36,22 @@ _FAINT = 0.3
 """Share of the distance to the floor by which a photograph's threshold is shifted."""
 
 
-def readings(scene: MapProblem) -> Iterator[MapReading]:
+def readings(scene: MapProblem, light_free: bool | None = None) -> Iterator[MapReading]:
     """Readings of the likelier polarity, the plainest first.
 
     Without start and goal there is only one, with marks ignored, because nothing shows
     whether a bolder one is needed.
+
+    Args:
+        scene: The picture with its task.
+        light_free: The polarity; by default from the picture, start and goal.
     """
     given = scene.image.occupied
     if given is not None:
         yield MapReading(given, "given", scene.image.method)
         return
-    light_free = decide_light_free(scene)
+    if light_free is None:
+        light_free = decide_light_free(scene)
     plain = plain_reading(scene, light_free)
     unmarked = _without_marks(scene, plain)
     if not scene.ends:
@@ -60,19 +67,37 @@ def _plain_to_bold(
 ) -> Iterator[MapReading]:
     mixed = _mixed(scene) if scene.said == DEFAULT_OPTIONS else None
     if mixed is not None:
-        yield mixed
+        yield from _with_words(scene, [mixed])
         for extent in (4, 8, 16):
-            yield _without(mixed, extent)
+            yield _without(_wordless(scene, mixed) or mixed, extent)
         return
-    yield plain
     base = unmarked or plain
-    if unmarked is not None:
-        yield unmarked
+    plainest = [plain] if unmarked is None else [plain, unmarked]
     if scene.unknown is not None:
         # Output of a mapping tool: its dark pixels were measured, not drawn.
+        yield from plainest
         yield _without(base, 4)
         return
-    yield from _bolder(base)
+    yield from _with_words(scene, plainest)
+    yield from _bolder(_wordless(scene, base) or base)
+
+
+def _with_words(scene: MapProblem, plainest: list[MapReading]) -> Iterator[MapReading]:
+    """The readings, then the last one without the words over start and goal."""
+    wordless = _wordless(scene, plainest[-1])
+    if wordless is None or not scene.pointed:
+        yield from plainest
+    if wordless is not None:
+        yield wordless
+
+
+def _wordless(scene: MapProblem, base: MapReading) -> MapReading | None:
+    """The reading without the words over start and goal; None if there are none."""
+    cells = without_words(base.cells, scene.pointed or scene.ends)
+    if cells is None:
+        return None
+    note = "words over start or goal ignored"
+    return replace(base, cells=cells, method=f"{base.method}, {note}", words=True)
 
 
 def _beyond_the_plan(scene: MapProblem, plain: MapReading) -> BoolGrid:
@@ -141,6 +166,12 @@ def _of_photo(scene: MapProblem, light_free: bool, method: str) -> MapReading:
     cut = scene.threshold + _FAINT * (floor - scene.threshold)
     # This threshold does not apply to the original picture.
     return replace(_cut(grey, cut, light_free, method), threshold=None)
+
+
+def unknown_grey(method: str) -> int | None:
+    """The unknown grey that a reading's `method` names, or None."""
+    found = re.search(r"unknown grey (\d+) not free", method)
+    return int(found[1]) if found else None
 
 
 def _threshold_beyond(level: int, threshold: float, light_free: bool) -> float:

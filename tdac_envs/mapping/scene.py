@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.mapping.binarize import disc, otsu, saturated, unknown_level
 from tdac_envs.mapping.image import GreyImage, MapImage, luminance
 from tdac_envs.mapping.lighting import LEVEL, evened, photographed
@@ -36,6 +37,7 @@ class MapReading:
         threshold: Luminance threshold that was applied, 0..255.
         cleanup: Strength of `cleanup.cleanings`, or largest size of dropped specks, px.
         opening: Lines thinner than this were dropped, px.
+        words: Whether words over start or goal were dropped.
     """
 
     cells: BoolGrid
@@ -44,6 +46,7 @@ class MapReading:
     threshold: float | None = None
     cleanup: int = 0
     opening: int = 0
+    words: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,9 @@ class MapProblem:
         radius: Body radius, px.
         said: The user's settings.
         photo: Whether it is a photograph whose light was evened.
+        units: Units of messages.
+        pointed: Where the user pointed, if words that cover these places are to be
+            ignored in any case; else empty.
     """
 
     image: MapImage
@@ -67,6 +73,8 @@ class MapProblem:
     radius: float
     said: ReadingOptions = DEFAULT_OPTIONS
     photo: bool = False
+    units: MapUnits = PIXELS
+    pointed: tuple[Point, ...] = ()
 
     @classmethod
     def of(
@@ -76,14 +84,16 @@ class MapProblem:
         goal: Point | None,
         radius: float,
         said: ReadingOptions = DEFAULT_OPTIONS,
+        units: MapUnits = PIXELS,
     ) -> MapProblem:
         """The scene of an image and a task; start and goal may be None."""
         grey, task = luminance(image.colour), (start, goal, radius, said)
         automatic = image.occupied is None and said.threshold is None
         even = evened(image.colour, grey) if automatic and photographed(grey) else None
         if even is None:
-            return cls(image, grey, *task)
-        return cls(replace(image, colour=even.colour), even.luminance, *task, True)
+            return cls(image, grey, *task, units=units)
+        image = replace(image, colour=even.colour)
+        return cls(image, even.luminance, *task, photo=True, units=units)
 
     @property
     def ends(self) -> list[Point]:
@@ -101,7 +111,7 @@ class MapProblem:
         """The navigation task; None unless both start and goal are given."""
         if self.start is None or self.goal is None:
             return None
-        return NavigationTask(self.start, self.goal, self.radius)
+        return NavigationTask(self.start, self.goal, self.radius, self.units)
 
     @cached_property
     def threshold(self) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.grid.astar import Guide
 from tdac_envs.grid.grid import BoolGrid, FloatGrid, body_free, clearance
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import Path, guide_between, path_length, plan_paths
 from tdac_envs.mapping.params import ScoreTerms
 
@@ -38,11 +39,15 @@ def score(terms: ScoreTerms) -> float:
 
 @dataclass(frozen=True, slots=True)
 class NavigationTask:
-    """A navigation task: start and goal pixels (x, y), and the body's radius, px."""
+    """A navigation task: start and goal pixels (x, y), and the body's radius, px.
+
+    `units` are those of messages.
+    """
 
     start: Point
     goal: Point
     radius: float
+    units: MapUnits = PIXELS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,32 +147,32 @@ def explain(cells: BoolGrid, trip: NavigationTask, inflation: int = 0) -> str:
     """
     clear = clearance(cells)
     free = body_free(clear, trip.radius + inflation)
-    start, goal, radius = trip.start, trip.goal, trip.radius
+    start, goal, units = trip.start, trip.goal, trip.units
     for name, (x, y), other in (("start", start, goal), ("goal", goal, start)):
         if free[y, x]:
             continue
         what = (
             "lies in an obstacle"
             if cells[y, x]
-            else f"is {clear[y, x]:.1f} px from an obstacle, too near"
+            else f"is {units.length(clear[y, x], 1)} from an obstacle, too near"
         )
-        near = _nearest_text(_connected_to(free, other), x, y, radius)
-        return f"{name} ({x}, {y}) {what}; {near}{_narrower(clear, trip)}"
+        near = _nearest_text(_connected_to(free, other), x, y, trip)
+        return f"{name} {units.point(x, y)} {what}; {near}{_narrower(clear, trip)}"
     widest = widest_radius(clear, start, goal)
     advice = (
         "no robot gets through: a wall blocks the way"
         if widest < 0.5
-        else f"the largest radius that gets through is {widest:.1f} px"
+        else f"the largest radius that gets through is {units.at_most(widest)}"
     )
     return (
-        f"start {start} and goal {goal} are not connected for a robot of "
-        f"{radius:g} px radius; {advice}"
+        f"start {units.point(*start)} and goal {units.point(*goal)} are not connected "
+        f"for a robot of {units.length(trip.radius)} radius; {advice}"
     )
 
 
 def _connected_to(free: BoolGrid, point: Point) -> BoolGrid:
     """The free pixels connected with a point; all if the point is not free."""
-    labels = _labels(free)
+    labels = pieces_of(free)
     label = labels[point[::-1]]
     joined: BoolGrid = labels == label
     return joined if label else free
@@ -178,14 +183,19 @@ def _narrower(clear: FloatGrid, trip: NavigationTask) -> str:
     widest = widest_radius(clear, trip.start, trip.goal)
     if widest < 0.5:
         return ""
-    return f"; from this start to this goal a radius of {widest:.1f} px gets through"
+    radius = trip.units.at_most(widest)
+    return f"; from this start to this goal a radius of {radius} gets through"
 
 
-def _nearest_text(free: BoolGrid, x: int, y: int, radius: float) -> str:
-    nearest = nearest_free(free, x, y)
+def _nearest_text(free: BoolGrid, x: int, y: int, trip: NavigationTask) -> str:
+    nearest, radius = nearest_free(free, x, y), trip.units.length(trip.radius)
     if nearest is None:
-        return f"a robot of {radius:g} px radius fits nowhere on this map"
-    return f"the nearest free pixel for a robot of {radius:g} px radius is {nearest}"
+        return f"a robot of {radius} radius fits nowhere on this map"
+    place = "pixel" if trip.units == PIXELS else "place"
+    return (
+        f"the nearest free {place} for a robot of {radius} radius is "
+        f"{trip.units.point(*nearest)}"
+    )
 
 
 def nearest_free(free: BoolGrid, x: int, y: int) -> Point | None:
@@ -202,12 +212,12 @@ def connected(free: BoolGrid, start: Point, goal: Point) -> bool:
 
     A diagonal step requires both pixels beside it, so 4-connectivity decides.
     """
-    labels = _labels(free)
+    labels = pieces_of(free)
     at_start, at_goal = labels[start[::-1]], labels[goal[::-1]]
     return bool(at_start == at_goal and at_start > 0)
 
 
-def _labels(free: BoolGrid) -> NDArray[np.int32]:
+def pieces_of(free: BoolGrid) -> NDArray[np.int32]:
     """Number of the connected piece of each free pixel, from 1; 0 for the others."""
     labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
     return labels.astype(np.int32, copy=False)

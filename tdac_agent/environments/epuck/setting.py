@@ -58,6 +58,10 @@ class EPuckSetting:
         """Metres."""
         return METRES
 
+    def told(self, length: float) -> str:
+        """Formats a length in mm."""
+        return METRES.figure(length)
+
     def remarks(self) -> list[str]:
         """Returns the floors and obstacles of the world."""
         world = self.nominal.ground.world

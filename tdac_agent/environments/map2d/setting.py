@@ -11,13 +11,15 @@ import cv2
 from tdac_agent.tasks.setting import Original, Setting
 from tdac_agent.tasks.task_file import RobotSpec, TaskFile
 from tdac_agent.tasks.units import PIXELS, Units
-from tdac_envs.core.errors import MapError, TaskError
+from tdac_envs.core.errors import MapError, RefusedError, TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
+from tdac_envs.grid.map_units import PIXELS as MAP_PIXELS
+from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.picture import ROBOT_IMAGE
-from tdac_envs.map2d.source import prepare
+from tdac_envs.map2d.source import prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.image import picture_size, read_bytes
@@ -39,12 +41,14 @@ class Map2DSetting:
         nominal: The feasible task.
         image: Map image, or None.
         robot_image: Picture of the robot.
+        shown_in: Units of what the user reads; the environment's units are pixels.
     """
 
     params: MapParams
     nominal: Map2DTask
     image: Path | None
     robot_image: Path
+    shown_in: MapUnits = MAP_PIXELS
 
     @property
     def original(self) -> Original | None:
@@ -58,6 +62,12 @@ class Map2DSetting:
         """Pixels."""
         return PIXELS
 
+    def told(self, length: float) -> str:
+        """Formats a length in `shown_in`."""
+        if self.shown_in == MAP_PIXELS:
+            return self.units.figure(length)
+        return self.shown_in.length(length)
+
     @property
     def left_out(self) -> tuple[str, ...]:
         """Empty: a map has no nodes."""
@@ -68,7 +78,13 @@ class Map2DSetting:
         params = self.params
         if params.method == "given":
             return []
-        return [f"map: {params.polarity} obstacles, {params.method}"]
+        lines = [f"map: {params.polarity} obstacles, {params.method}"]
+        if self.shown_in != MAP_PIXELS:
+            lines.append(
+                "metres of the map's frame; the controller and its tests use px "
+                f"({params.resolution:g} m each)"
+            )
+        return lines
 
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's `Map2DEnv`."""
@@ -113,7 +129,7 @@ class Map2DSetting:
         """Draws the map image with free space, start, goal and path."""
         grid = self.nominal.terrain.grid
         shown = grid.cells if self.image is None else self.image
-        return preview_of(as_image(shown).colour, grid, self.params)
+        return preview_of(as_image(shown), grid, self.params, self.shown_in)
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
@@ -151,23 +167,60 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         TaskError: The task is infeasible, or the robot's picture cannot be used.
     """
     bundled = spec.map in bundled_maps()
+    source = spec.map if bundled else str(base / spec.map)
+    if bundled and spec.metres:
+        raise TaskError(f"metres: the bundled map {spec.map} has no scale; give pixels")
+    units = units_of(source, metres=spec.metres)
+    spec = _in_pixels(spec, units)
     prepared = prepare(
-        spec.map if bundled else str(base / spec.map),
+        source,
         spec.start,
         spec.goal,
         robot_radius=spec.robot.radius,
         snap=spec.snap,
         said=ReadingOptions(spec.polarity, spec.threshold),
+        units=units,
     )
     params = _with_robot(prepared.params, spec.robot)
-    nominal = _feasible(prepared.grid, params, spec)
+    try:
+        nominal = _feasible(prepared.grid, params, spec, units)
+    except TaskError as error:
+        image = as_image(prepared.image or prepared.grid.cells)
+        picture = (image, prepared.grid, params, units)
+        message = f"{params.source}: {error}"
+        pictures = {"refused": picture}
+        raise RefusedError(message, params.source, pictures) from error
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
     if spec.robot.image is not None:
         _check_robot_image(robot_image)
     name = spec.map if bundled else Path(spec.map).stem
-    return name, Map2DSetting(params, nominal, prepared.image, robot_image)
+    return name, Map2DSetting(params, nominal, prepared.image, robot_image, units)
+
+
+def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
+    """The task file with its places and lengths converted to px."""
+    if not spec.metres:
+        return spec
+    changes: dict[str, Any] = {}
+    if spec.start is not None:
+        place = units.pixels((spec.start[0], spec.start[1]))
+        turn = [units.heading_in_pixels(heading) for heading in spec.start[2:]]
+        changes["start"] = (*place, *turn)
+    if spec.goal is not None:
+        changes["goal"] = units.pixels(spec.goal)
+    if spec.tolerance is not None:
+        changes["tolerance"] = units.length_in_pixels(spec.tolerance)
+    names = ("radius", "axle", "max_wheel_speed", "range_max")
+    lengths = {name: getattr(spec.robot, name) for name in names}
+    robot = {
+        name: units.length_in_pixels(length)
+        for name, length in lengths.items()
+        if length is not None
+    }
+    changes["robot"] = spec.robot.model_copy(update=robot)
+    return spec.model_copy(update=changes)
 
 
 def _check_robot_image(file: Path) -> None:
@@ -192,7 +245,9 @@ def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
     return params.model_copy(update={"robot": robot})
 
 
-def _feasible(grid: OccupancyGrid, params: MapParams, spec: TaskFile) -> Map2DTask:
+def _feasible(
+    grid: OccupancyGrid, params: MapParams, spec: TaskFile, units: MapUnits
+) -> Map2DTask:
     assert params.start is not None
     assert params.goal is not None
     return make_task(
@@ -203,4 +258,5 @@ def _feasible(grid: OccupancyGrid, params: MapParams, spec: TaskFile) -> Map2DTa
         dt=DT if spec.dt is None else spec.dt,
         goal_tolerance=spec.tolerance,
         horizon=spec.horizon,
+        units=units,
     )

@@ -146,7 +146,9 @@ def test_the_help_is_quick():
         ("synth --Learner builtin", "did you mean --learner?"),
         ("synth --xyzzy", "No such option: --xyzzy; see tdac synth --help"),
         ("webots run", "see tdac webots run --help"),
-        ("map x.png --start 1 2 0.5", "unexpected extra argument(s) (0.5)"),
+        ("map x.png --start 1 2 0.5 4", "unexpected extra argument(s) (4)"),
+        ("map x.png --goal 1,2 4", "unexpected extra argument(s) (4)"),
+        ("map x.png --heading 0.5", "no such file"),
         ("synth --start 330 --goal 99 100", "Invalid value for '--start'"),
         ("syth", "No such command 'syth'"),
         ("verify", "Missing argument 'CONTROLLER'; see tdac verify --help"),
@@ -161,15 +163,15 @@ def test_words_that_are_not_understood(tdac, words, expected):
     assert err.count("\n") == 1
 
 
-def is_one_clear_line(code, out, err, place):
-    """Exit 2, nothing on stdout, one line on stderr, nothing written."""
+def is_one_clear_line(code, out, err, place, *left):
+    """Exit 2, nothing on stdout, one line on stderr, nothing written but `left`."""
     assert code == 2, err
     assert out == ""
     assert err.startswith("error: ")
     assert err.count("\n") == 1, err
     assert "Traceback" not in err
     assert "/tmp/tdac" not in err
-    assert [path.name for path in Path(place).iterdir()] == []
+    assert [path.name for path in Path(place).iterdir()] == [*left]
     return True
 
 
@@ -241,6 +243,13 @@ PLACES = {
 }
 
 
+# These leave a picture.
+PICTURED = {
+    *("start outside", "start in a wall", "start near a wall", "goal in a wall"),
+    *("huge body", "too wide a body"),
+}
+
+
 @pytest.mark.parametrize("name", PLACES)
 def test_tasks_that_cannot_be_used(tdac, image, name):
     """Each is refused with its reason and the values that are wrong."""
@@ -249,8 +258,12 @@ def test_tasks_that_cannot_be_used(tdac, image, name):
         reason = "25 px"
     radius = [] if "--robot-radius" in words else ["--robot-radius", 6]
     code, out, err = tdac("synth", "--map", image, *radius, *words)
-    assert is_one_clear_line(code, out, err, Path.cwd())
+    left = ["plan-map"] if name in PICTURED else []
+    assert is_one_clear_line(code, out, err, Path.cwd(), *left)
     assert re.search(reason, err), err
+    if left:
+        assert re.search(r"^error: plan\.png: .*; look at plan-map/refused\.png$", err)
+        assert Path("plan-map/refused.png").is_file()
 
 
 def test_an_unreachable_goal(tdac, image):
@@ -259,7 +272,7 @@ def test_an_unreachable_goal(tdac, image):
     cells[:, 70:76] = True
     cv2.imwrite(str(image), np.where(cells, 0, 255).astype(np.uint8))
     code, out, err = tdac("synth", "--map", image, *ENDS)
-    assert is_one_clear_line(code, out, err, Path.cwd())
+    assert is_one_clear_line(code, out, err, Path.cwd(), "plan-map")
     assert re.search("path|room|connect|reach", err), err
 
 

@@ -21,7 +21,7 @@ from benchmarks.photos import (
 from tdac_envs.core.errors import PolarityError, TaskError
 from tdac_envs.map2d.source import prepare
 from tdac_envs.mapping.lighting import photographed
-from tdac_envs.mapping.map_folder import write_previews
+from tdac_envs.mapping.map_folder import write_pictures
 from tdac_envs.mapping.preprocessing import preprocess
 
 REAL_MAPS = Path(__file__).parents[4] / "shared" / "data" / "maps"
@@ -108,7 +108,7 @@ def test_a_close_call_is_an_error_that_names_both(tmp_path: Path) -> None:
     for words in ("dark obstacles leave", "light obstacles leave", "--polarity dark"):
         assert words in message
     caught.value.folder = tmp_path / "shown"
-    dark, light = write_previews(caught.value)
+    dark, light = write_pictures(caught.value)
     assert (dark.name, light.name) == ("preview-dark.png", "preview-light.png")
     assert (cv2.imread(str(dark)) != cv2.imread(str(light))).any()
 

@@ -1,0 +1,123 @@
+"""Units of places and lengths on a map, as the user types and reads them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tdac_envs.grid.metric import Framed, Point, resolution_of, to_metres, to_pixels
+
+
+@dataclass(frozen=True, slots=True)
+class MapFrame:
+    """The frame of a ROS map; see `metric.to_pixels`.
+
+    Attributes:
+        height: Number of rows of the map, px.
+        resolution: Metres per pixel.
+        origin: Pose (x, y, yaw) of the lower-left pixel, m and rad.
+    """
+
+    height: int
+    resolution: float
+    origin: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class MapUnits:
+    """Pixels, or metres in the map's frame.
+
+    Computations use pixels. These units are for what a user types and reads.
+
+    Attributes:
+        frame: Frame of the map, for metres; None for pixels.
+    """
+
+    frame: MapFrame | None = None
+
+    @classmethod
+    def metres(cls, framed: Framed) -> MapUnits:
+        """Metres in the frame of a map.
+
+        Raises:
+            MapError: The map has no resolution.
+        """
+        resolution = resolution_of(framed)
+        return cls(MapFrame(framed.height, resolution, framed.origin))
+
+    @property
+    def name(self) -> str:
+        """`px` or `m`."""
+        return "px" if self.frame is None else "m"
+
+    @property
+    def per_pixel(self) -> float:
+        """Size of a pixel in these units."""
+        return 1.0 if self.frame is None else self.frame.resolution
+
+    @property
+    def decimals(self) -> int:
+        """Decimals that place a point in the right pixel, to a tenth of a pixel."""
+        if self.frame is None:
+            return 0
+        return max(0, math.ceil(1 - math.log10(self.per_pixel)))
+
+    def pixels(self, point: Point) -> Point:
+        """The pixel coordinates of a place in these units."""
+        return point if self.frame is None else to_pixels(self.frame, *point)
+
+    def length_in_pixels(self, length: float) -> float:
+        """A length in these units, converted to px."""
+        return length / self.per_pixel
+
+    def heading_in_pixels(self, heading: float) -> float:
+        """A heading from the x axis towards the y axis, rad, converted to the picture.
+
+        In the picture y points down; in a map's frame it points up, and the frame may
+        be rotated.
+        """
+        return heading if self.frame is None else self.frame.origin[2] - heading
+
+    def coordinates(self, x: float, y: float) -> Point:
+        """The coordinates of a pixel in these units."""
+        return (x, y) if self.frame is None else to_metres(self.frame, x, y)
+
+    def point(self, x: float, y: float) -> str:
+        """Formats a place in px: `(12, 40)`, `(1.225, -3.05)`."""
+        if self.frame is None:
+            return f"({x:g}, {y:g})"
+        first, second = (self.rounded(value) for value in self.coordinates(x, y))
+        return f"({first}, {second})"
+
+    def length(self, length: float, decimals: int | None = None) -> str:
+        """Formats a length in px: `12 px`, `0.6 m`.
+
+        Args:
+            length: The length, px.
+            decimals: Decimals of a length that is shown in px; None for as needed.
+        """
+        return f"{self.number(length, decimals)} {self.name}"
+
+    def number(self, length: float, decimals: int | None = None) -> str:
+        """Formats a length in px as `length` does, without the unit."""
+        if self.frame is None:
+            return f"{length:g}" if decimals is None else f"{length:.{decimals}f}"
+        fewer = 0 if decimals is None else max(0, 1 - decimals)
+        return self.rounded(length * self.per_pixel, self.decimals - fewer)
+
+    def at_most(self, length: float) -> str:
+        """Formats a length in px, rounded down, so that advice about bodies holds."""
+        scale = 10 if self.frame is None else 10**self.decimals
+        floor = math.floor(length * self.per_pixel * scale + 1e-9) / scale
+        if self.frame is None:
+            return f"{floor:.1f} px"
+        return f"{self.rounded(floor)} m"
+
+    def rounded(self, value: float, decimals: int | None = None) -> str:
+        """A number in these units with some decimals, without trailing zeros."""
+        places = self.decimals if decimals is None else max(decimals, 0)
+        text = f"{value:z.{places}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+PIXELS = MapUnits()

@@ -1,0 +1,203 @@
+"""`tdac map`, and the flags of maps that other commands share with it."""
+
+import json
+import math
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from small import small_cells
+
+from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.cli.main import with_places
+from tdac_agent.tasks.task import load_task
+from tdac_envs.core.errors import RefusedError, TaskError
+
+# The small map is a ROS map of 0.1 m per px with its corner at (-2, -3) m.
+START, GOAL, RADIUS = ("1.05", "5.95"), ("11.05", "5.95"), ("--robot-radius", "0.6")
+COMMANDS = (
+    *("map", "world", "synth", "verify", "play", "evaluate", "train", "campaign"),
+    *("check-suite", "demo", "rules", "report", "runs", "webots", "webots run"),
+    *("export", "export webots", "doctor", "warm", ""),
+)
+
+
+@pytest.fixture
+def ros(tmp_path):
+    """The small map with a `map.yaml`; y grows upwards from its lower-left corner."""
+    cells = small_cells()
+    cv2.imwrite(str(tmp_path / "plan.png"), np.where(cells, 0, 254).astype(np.uint8))
+    origin = [-2.0, 9.0 - 0.1 * cells.shape[0], 0.0]
+    text = f"image: plan.png\nresolution: 0.1\norigin: {origin}\n"
+    (tmp_path / "plan.yaml").write_text(text)
+    return tmp_path / "plan.yaml"
+
+
+def test_metres_in_and_out(tdac, ros):
+    """Size, table and parameters; the parameters are in px, as the environment's."""
+    words = ("map", ros, "--metres", "--start", *START, "1.5", "--goal", *GOAL, *RADIUS)
+    code, out, err = tdac(*words)
+    assert (code, err) == (0, "")
+    assert "(16 m x 12 m)" in out
+    assert re.search(r"margin, m .*clearance, m .*path, m", out)
+    assert "highest is best" in out
+    params = json.loads(Path("plan-map/params.json").read_text())
+    assert params["start"] == [30, 30]
+    assert params["goal"] == [130, 30]
+    assert params["heading"] == pytest.approx(-1.5)
+    assert params["robot"]["radius"] == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("command", ["map", "synth --map"])
+@pytest.mark.parametrize(
+    ("start", "reason"),
+    [
+        (
+            ("-40", "-3"),
+            r"start \(-40, -3\) lies outside the map; expected -2 <= x < 14",
+        ),
+        (
+            ("5.35", "5.95"),
+            r"start \(5.35, 5.95\) lies in an obstacle; the nearest free place for a "
+            r"robot of 0.6 m radius is \(\d+\.\d+, \d+\.\d+\)",
+        ),
+    ],
+)
+def test_refusals_are_in_metres(tdac, ros, command, start, reason):
+    words = ("--metres", "--start", *start, "--goal", *GOAL, *RADIUS)
+    code, _, err = tdac(*command.split(), ros, *words)
+    assert code == 2
+    assert re.search(f"(?m)^error: plan.yaml: {reason}", err), err
+    assert " px" not in err
+    assert err.endswith("; look at plan-map/refused.png\n")
+    assert Path("plan-map/refused.png").is_file()
+
+
+def test_a_task_in_metres_is_the_one_in_pixels(ros):
+    """Start, heading, goal, radius and tolerance are converted; words stay metres."""
+    flags = {"map_image": str(ros), "metres": True}
+    ends = {"start": (1.05, 5.95), "goal": (11.05, 5.95)}
+    task = TaskFlags(**flags, **ends, heading=math.pi / 2, robot_radius=0.6).load()
+    assert task.nominal.start == pytest.approx((30, 30, -math.pi / 2))
+    assert task.nominal.goal == pytest.approx((130, 30))
+    assert task.nominal.body_radius == pytest.approx(6.0)
+    length = task.nominal.shortest
+    assert task.setting.told(length) == f"{round(0.1 * length, 2):g} m"
+    assert "metres" not in task.setting.portable()
+    with pytest.raises(RefusedError, match=r"radius of \d\.\d+ m") as caught:
+        TaskFlags(**flags, **ends, robot_radius=4.0).load()
+    assert " px" not in str(caught.value)
+
+
+def test_metres_of_a_task_file(ros):
+    """The key `metres` means what the flag means."""
+    file = ros.parent / "task.yaml"
+    file.write_text(
+        "map: plan.yaml\nmetres: true\nstart: [1.05, 5.95]\ngoal: [11.05, 5.95]\n"
+        "tolerance: 0.5\nrobot: {radius: 0.6, range_max: 5.0}\n"
+    )
+    task = load_task(file)
+    assert task.nominal.goal_tolerance == pytest.approx(5.0)
+    assert task.nominal.robot.range_max == pytest.approx(50.0)
+    assert task.nominal.robot.max_wheel_speed == 75.59
+
+
+def test_a_bundled_map_has_no_metres(tmp_path):
+    file = tmp_path / "task.yaml"
+    file.write_text("map: maze\nmetres: true\n")
+    with pytest.raises(TaskError, match="the bundled map maze has no scale"):
+        load_task(file)
+
+
+def test_a_heading_of_the_map_command(tdac, ros):
+    """Three numbers of `--start`, or `--heading`; it needs a start."""
+    picture = ros.parent / "plan.png"
+    ends = ("--goal", "130", "30", "--robot-radius", "6", "--json")
+    for words in (("--start", "30", "30", "0.5"), ("--start", "30,30,0.5")):
+        _, out, _ = tdac("map", picture, *words, *ends)
+        assert json.loads(out)["params"]["heading"] == 0.5
+    code, _, err = tdac("map", picture, "--heading", "0.5")
+    assert (code, err) == (2, "error: --heading needs --start X Y\n")
+
+
+def test_a_numpy_grid(tdac, tmp_path):
+    """What `gym.make` and `synth` read, `map` reads, too."""
+    np.save(tmp_path / "grid.npy", small_cells())
+    ends = ("--start", "30,30", "--goal=130,30", "--robot-radius", "6")
+    code, out, _ = tdac("map", tmp_path / "grid.npy", *ends)
+    assert code == 0
+    assert out.startswith("grid.npy, 160 x 120 px: obstacles as the file says")
+    np.testing.assert_array_equal(np.load("grid-map/occupancy.npy"), small_cells())
+    np.save(tmp_path / "grey.npy", small_cells().astype(np.uint8))
+    code, _, err = tdac("map", tmp_path / "grey.npy", *ends)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "expected a bool array, got uint8" in err
+
+
+@pytest.mark.parametrize(
+    ("typed", "understood"),
+    [
+        ("--start 90,302", "--start 90 302"),
+        ("--start=90,302 --goal=178,386", "--start 90 302 --goal 178 386"),
+        ("--start 90, 302 --goal (178,386)", "--start 90 302 --goal 178 386"),
+        ("--start -40,-3,1.5 --snap", "--start -40 -3 --heading 1.5 --snap"),
+        ("--start 1 2 .5 --goal 3,4 x", "--start 1 2 --heading .5 --goal 3 4 x"),
+        ("--start 1 --goal 2 3 4", "--start 1 --goal 2 3 4"),
+        ("--goal 1,2,3", "--goal 1,2,3"),
+        ("--out a=b --json", "--out a=b --json"),
+        ("--start", "--start"),
+    ],
+)
+def test_places_as_people_type_them(typed, understood):
+    assert with_places(typed.split()) == understood.split()
+
+
+def test_a_place_in_one_word():
+    assert with_places(["--start", "90, 302", "c.py"]) == [
+        "--start",
+        "90",
+        "302",
+        "c.py",
+    ]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--snap"],
+        ["--metres"],
+        ["--polarity", "dark"],
+        ["--threshold", "3"],
+        ["--robot-radius", "3"],
+        ["--robot-image", "robot.png"],
+        ["--instructions", "Slowly."],
+        ["--map", "office"],
+    ],
+    ids=" ".join,
+)
+def test_flags_beside_a_task_are_refused(tdac, words):
+    """One line names the flag, which would have no effect."""
+    code, out, err = tdac("synth", "--task", "maze", *words)
+    assert (code, out) == (2, "")
+    assert err == f"error: --task already defines the task: leave out {words[0]}\n"
+
+
+@pytest.mark.parametrize("words", [["--snap"], ["--metres"], ["--polarity", "dark"]])
+def test_flags_beside_a_run_folder_are_refused(tdac, tmp_path, words):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "controller.py").write_text("x = 1\n")
+    (tmp_path / "run" / "task.yaml").write_text("map: maze\n")
+    code, _, err = tdac("verify", tmp_path / "run", *words)
+    assert code == 2
+    assert err.endswith(f"brings its own task: leave out {words[0]}\n")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_help_names_a_python_type(tdac, command):
+    _, out, _ = tdac(*command.split(), "--help")
+    assert not re.search(
+        r"<(bool|boolean|text|path|float|integer)>", out, re.IGNORECASE
+    )
