@@ -10,14 +10,13 @@ from tdac_agent.cli.mistakes import begun
 from tdac_agent.cli.options import (
     JitterSeed,
     Json,
-    NamedTask,
     Profile,
     Suite,
     Tier,
     Trust,
     number_flag,
-    takes_task,
 )
+from tdac_agent.cli.task_flags import NamedTask, takes_task
 
 app = typer.Typer()
 

@@ -12,15 +12,14 @@ from tdac_agent.cli.options import (
     Controller,
     Delay,
     MotorLag,
-    NamedTask,
     RangeNoise,
     Speed,
     Tier,
     WheelSlip,
     file_flag,
     number_flag,
-    takes_task,
 )
+from tdac_agent.cli.task_flags import NamedTask, takes_task
 
 app = typer.Typer()
 

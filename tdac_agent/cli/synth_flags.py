@@ -17,7 +17,6 @@ from tdac_agent.cli.options import (
     MaxCost,
     MaxOutput,
     MaxTokens,
-    NamedTask,
     Optimizer,
     Profile,
     Suite,
@@ -26,8 +25,8 @@ from tdac_agent.cli.options import (
     dir_flag,
     file_flag,
     number_flag,
-    takes_task,
 )
+from tdac_agent.cli.task_flags import NamedTask, takes_task
 
 app = typer.Typer()
 ALLOWED = (

@@ -14,7 +14,6 @@ from tdac_agent.cli.options import (
     JitterSeed,
     Json,
     MotorLag,
-    NamedTask,
     Profile,
     RangeNoise,
     Suite,
@@ -24,8 +23,8 @@ from tdac_agent.cli.options import (
     dir_flag,
     file_flag,
     number_flag,
-    takes_task,
 )
+from tdac_agent.cli.task_flags import NamedTask, takes_task
 
 app = typer.Typer()
 

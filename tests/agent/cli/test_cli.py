@@ -18,7 +18,7 @@ import typer
 from small import SHORT, small_cells, write_small_task
 
 from tdac_agent.cli.main import PARTS, command_line
-from tdac_agent.cli.options import task_flags
+from tdac_agent.cli.task_flags import task_flags
 from tdac_agent.runs.resume import resume_arguments
 from tdac_envs.mapping.bundled import bundled_map
 
