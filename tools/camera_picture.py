@@ -36,8 +36,8 @@ def picture() -> NDArray[np.uint8]:
     """The picture: blue, green, red, 255; shape (height, width, 4)."""
     stage = open_stage(world_file(WORLD))
     (own,) = stage.cameras
-    size = {"width": ENLARGED * own.width, "height": ENLARGED * own.height}
-    coarse, fine = (_image(camera) for camera in (own, replace(own, **size)))
+    large = replace(own, width=ENLARGED * own.width, height=ENLARGED * own.height)
+    coarse, fine = _image(own), _image(large)
     coarse = coarse.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1)
     white = np.full((len(fine), GAP, 4), 255, np.uint8)
     return np.concatenate([coarse, white, fine], axis=1)

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tdac_envs.core.errors import WorldError
 from tdac_envs.webots.cameras import MOST_PIXELS, Cameras
 from tdac_envs.webots.controller.png import png
 from tdac_envs.webots.rendering import brightness, look_through
@@ -260,6 +261,20 @@ class TestCameras:
         assert stage.cameras == ()
         assert "camera" in stage.absent
         assert "camera" not in {device.name for device in stage.devices}
+
+    def test_a_camera_without_a_direction(self, camera):
+        """A Robot that is scaled to a point is refused, with the place in the file."""
+        eye = 'Camera { name "eye" }'
+        robot = f'Robot {{ model "epuck" children [ {eye} ] }}'
+        world = f"{HEAD}Transform {{ scale 1e-9 1e-9 1e-9 children [ {robot} ] }}\n"
+        with pytest.raises(WorldError, match="the camera 'eye' is scaled to nothing"):
+            camera(world)
+
+    def test_odd_fields(self, camera):
+        """Those that no camera can have are replaced by the PROTO's."""
+        fields = "camera_width 0 camera_height -3 camera_fieldOfView 4"
+        (facts,) = camera(f"{HEAD}E-puck {{ {fields} }}\n")[0].cameras
+        assert (facts.width, facts.height, facts.field_of_view) == (52, 39, 0.84)
 
     def test_nothing_before_the_first_sample(self, camera):
         """Then the image of the sample, however far the robot has moved since."""
