@@ -9,7 +9,8 @@ import numpy as np
 
 from tdac_envs.drive.env import Observation
 from tdac_envs.epuck.env import EPuckEnv
-from tdac_envs.webots.devices import DARK, WHEELS
+from tdac_envs.webots.devices import WHEELS
+from tdac_envs.webots.instruments import Readings
 from tdac_envs.webots.log import Log, turn_rate, velocity
 from tdac_envs.webots.motors import MotorState
 from tdac_envs.webots.requests import CHANGES, RequestError, checked, real
@@ -40,7 +41,7 @@ class StepServer:
         self._observation: Observation = {}
         limit = stage.world.robot.max_wheel_speed
         self._motors = {name: MotorState(limit) for name, _ in WHEELS}
-        self._sampler = Sampler(stage)
+        self._sampler = Sampler(stage, Readings(stage.instruments, env))
         self._warnings: list[str] = []
         self._warned: set[str] = set()
         self._late_requests = 0
@@ -157,10 +158,6 @@ class StepServer:
     def _enable(self, device: str, period: Any) -> None:
         if type(period) is not int or period < 0:
             raise RequestError("invalid sampling period")
-        if device.startswith("ls"):
-            self._warn(
-                f"tdac: light is not modelled; ls0 to ls7 read {DARK:g}, as in the dark"
-            )
         self._sampler.enable(device, period, self._now())
 
     def _handle_event(self, call: str, node: int | None, field_name: str) -> None:

@@ -68,6 +68,15 @@ class Camera(_Mute):
     )
 
 
+class Unknown(_Mute):
+    """A device that is not modelled; all its calls print once and do nothing."""
+
+    def __getattr__(self, call: str) -> Any:
+        if call.startswith("_"):
+            raise AttributeError(call)
+        return unsupported(f"{self.name}.{call}")
+
+
 class Emitter(_Mute):
     """An emitter without receivers."""
 

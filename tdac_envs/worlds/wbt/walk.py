@@ -7,7 +7,7 @@ from contextlib import suppress
 from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.wbt.appearance import reflectance
 from tdac_envs.worlds.wbt.arenas import ARENAS, arena
-from tdac_envs.worlds.wbt.fields import child, children
+from tdac_envs.worlds.wbt.fields import StrayError, child, children
 from tdac_envs.worlds.wbt.found import WorldContent, is_goal, name_of
 from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.wbt.geometry import GROUPS, Pieces, bounds, geometry
@@ -44,6 +44,13 @@ def walk(node: Node, frame: Frame, found: WorldContent) -> None:
     """
     if node.kind in _NEVER_SOLID:
         return
+    try:
+        _walk(node, frame, found)
+    except StrayError as error:
+        found.left_out(node, frame, str(error))
+
+
+def _walk(node: Node, frame: Frame, found: WorldContent) -> None:
     if is_epuck(node):
         found.robots.append(epuck(node, frame))
     elif node.kind in ROBOTS:
