@@ -8,7 +8,8 @@ from typing import Any
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.webots.instruments import Instruments
 from tdac_envs.webots.mounts import Mount
-from tdac_envs.worlds.wbt.fields import text
+from tdac_envs.worlds.wbt.fields import number, text
+from tdac_envs.worlds.wbt.tree import Node
 
 Offset = tuple[float, ...]
 
@@ -80,20 +81,45 @@ def find_devices(
             devices.append(DeviceFacts(beam.name, "DistanceSensor", 42, beam.plain()))
         for cell in instruments.cells:
             devices.append(DeviceFacts(cell.name, "LightSensor", 49, cell.plain()))
+    devices += [
+        DeviceFacts(node_name, "PositionSensor", 52, {"motor": WHEELS[wheel][0]})
+        for node_name, wheel in renamed_sensors(mounted)
+    ]
     known = {device.name for device in devices}
     absent: list[str] = []
     for node, frame in mounted:
-        default, number = _PLACED.get(node.kind, (_DEFAULTS.get(node.kind, ""), 0))
+        default, node_type = _PLACED.get(node.kind, (_DEFAULTS.get(node.kind, ""), 0))
         name = text(node, "name", default)
-        if name in known or not (number or node.kind in _DEFAULTS):
+        if name in known or not (node_type or node.kind in _DEFAULTS):
             continue
         known.add(name)
-        kind = node.kind if number or node.kind in _MUTE_KINDS else "Unknown"
+        kind = node.kind if node_type or node.kind in _MUTE_KINDS else "Unknown"
         offset = tuple(frame.origin.tolist())
-        devices.append(DeviceFacts(name, kind, number, {}, offset))
-        if not number:
+        more = {} if node_type else _facts_of(node)
+        devices.append(DeviceFacts(name, kind, node_type, more, offset))
+        if not node_type:
             absent.append(name)
     return tuple(devices), tuple(absent)
+
+
+def renamed_sensors(mounted: tuple[Mount, ...]) -> list[tuple[str, int]]:
+    """Names of wheel sensors that a Robot node calls otherwise, and their wheels."""
+    usual = {sensor for _, sensor in WHEELS}
+    names = [text(n, "name") for n, _ in mounted if n.kind == "PositionSensor"]
+    return [
+        (name, wheel)
+        for name in dict.fromkeys(names)
+        for wheel, side in enumerate(("left", "right"))
+        if name not in usual and side in name.lower()
+    ]
+
+
+def _facts_of(node: Node) -> dict[str, Any]:
+    """Facts about a device that is not modelled."""
+    if node.kind == "Lidar":
+        rows = number(node, "numberOfLayers", 4.0)
+        return {"width": int(number(node, "horizontalResolution", 512.0) * rows)}
+    return {"width": int(number(node, "width", 64.0))}
 
 
 def _standard(max_velocity: float) -> list[DeviceFacts]:

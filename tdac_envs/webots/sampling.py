@@ -72,8 +72,6 @@ class Sampler:
         readers: dict[str, Reader] = {}
         for k in range(8):
             readers[f"ps{k}"] = partial(self._observed, "ps", k)
-        for k, (_, sensor) in enumerate(WHEELS):
-            readers[sensor] = partial(self._encoder, k)
         readers["accelerometer"] = self._acceleration
         readers["gyro"] = self._turning
         for device in stage.devices:
@@ -83,6 +81,10 @@ class Sampler:
                 readers[device.name] = self._north
             elif device.kind == "InertialUnit":
                 readers[device.name] = self._attitude
+        for device in stage.devices:
+            if device.kind == "PositionSensor":
+                wheel = [motor for motor, _ in WHEELS].index(device.more["motor"])
+                readers[device.name] = partial(self._encoder, wheel)
         for beam in stage.instruments.beams:
             readers[beam.name] = partial(self._here, readings.distance, beam.name)
         for cell in stage.instruments.cells:
