@@ -109,6 +109,8 @@ def _show(report: WebotsReport, console: Console) -> None:
     if report.error is not None:
         console.print("[red]the controller failed[/]")
         console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)
+    for note in report.notes:
+        console.print(Text(f"note: {note}"), soft_wrap=True)
     console.print(_table(report))
     colour, word = ("green", "passed") if report.passed else ("red", "not passed")
     why = f": {escape(report.why_not)}" if report.why_not else ""

@@ -15,6 +15,7 @@ from tdac_agent.sandbox.errors import (
     EnvRefusalError,
     SandboxError,
 )
+from tdac_agent.sandbox.exposure import installed_packages
 from tdac_agent.sandbox.inner.wire import Handle
 from tdac_agent.sandbox.launch import (
     available_tiers,
@@ -55,6 +56,7 @@ __all__ = [
     "best_tier",
     "find_tier",
     "fork_child",
+    "installed_packages",
     "no_confining_tier_error",
     "start",
     "start_zygote",

@@ -10,7 +10,11 @@ from tdac_agent.sandbox.exposure import exposure
 
 
 def bubblewrap_command(
-    parent: Path, scratch: list[str], lifeline: int, scratch_bytes: int
+    parent: Path,
+    scratch: list[str],
+    lifeline: int,
+    scratch_bytes: int,
+    installed: tuple[str, ...] = (),
 ) -> list[str]:
     """Return the arguments that come before the zygote's own command.
 
@@ -20,6 +24,7 @@ def bubblewrap_command(
         lifeline: Descriptor that bubblewrap's first process keeps open, out of the
             controllers' reach.
         scratch_bytes: Size limit of each scratch folder.
+        installed: Folders of installed packages that controllers may import.
 
     Raises:
         SandboxError: bubblewrap is not installed.
@@ -41,7 +46,7 @@ def bubblewrap_command(
     for path in seen.hidden:
         words += ["--tmpfs", path]
     # numpy may be in a hidden folder, which can become read-only only afterwards.
-    words += _each("--ro-bind", (*seen.packages, str(parent)))
+    words += _each("--ro-bind", (*installed, *seen.packages, str(parent)))
     for path in seen.hidden:
         words += ["--remount-ro", path]
     words += _each("--dev-bind", seen.devices)

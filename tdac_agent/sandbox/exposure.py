@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import sys
+import sysconfig
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,6 +59,13 @@ def exposure() -> Exposure:
             if os.path.islink(path)
         ),
     )
+
+
+def installed_packages() -> tuple[str, ...]:
+    """Return the folders of the packages installed for the running interpreter."""
+    paths = sysconfig.get_paths()
+    folders = dict.fromkeys(os.path.realpath(paths[k]) for k in ("purelib", "platlib"))
+    return tuple(folder for folder in folders if os.path.isdir(folder))
 
 
 def numpy_folders() -> tuple[str, ...]:

@@ -25,6 +25,7 @@ def start(
     *,
     tier: str = "auto",
     limits: Limits | None = None,
+    installed: tuple[str, ...] = (),
 ) -> Child:
     """Start a child in a sandbox, with numpy loaded and no controller imported yet.
 
@@ -33,13 +34,14 @@ def start(
         controller_source: Text of `controller.py`; None to copy it later.
         tier: Name of a tier, or "auto" for the best one that works on this machine.
         limits: Resource limits of the child.
+        installed: Folders of installed packages that the controller may import.
 
     Raises:
         ControllerError: The source is larger than 200 kB.
         SandboxError: The tier does not work on this machine or the child did not start.
     """
     limits = limits or Limits()
-    child = start_blank(find_tier(tier), limits)
+    child = start_blank(find_tier(tier), limits, installed)
     try:
         if controller_source is not None:
             child.copy_files(workdir, controller_source)
@@ -49,32 +51,35 @@ def start(
     return child
 
 
-def start_blank(tier: Tier, limits: Limits) -> Child:
+def start_blank(tier: Tier, limits: Limits, installed: tuple[str, ...] = ()) -> Child:
     """Start a child without files, from a zygote of its own.
 
     Raises:
         SandboxError: It did not start, or a promise of the tier does not hold.
     """
-    zygote = start_zygote(tier, limits, 1)
+    zygote = start_zygote(tier, limits, 1, installed)
     try:
         return fork_child(zygote, tier, limits)
     finally:
         zygote.close()
 
 
-def start_zygote(tier: Tier, limits: Limits, slots: int = SLOTS) -> Zygote:
+def start_zygote(
+    tier: Tier, limits: Limits, slots: int = SLOTS, installed: tuple[str, ...] = ()
+) -> Zygote:
     """Start a zygote, which loads numpy while the caller continues.
 
     Args:
         tier: Tier of its children.
         limits: Limits of its children's scratch folders.
         slots: Maximum number of children.
+        installed: Folders of installed packages that its children may import.
 
     Raises:
         SandboxError: It cannot be started.
     """
     try:
-        return Zygote(tier.name, limits, slots)
+        return Zygote(tier.name, limits, slots, installed)
     except OSError as error:
         raise SandboxError(f"{tier.name}: cannot start a child: {error}") from error
 
@@ -172,7 +177,8 @@ def _setup(
         "links": list(seen.links),
         "system": list(seen.system),
         "hidden": list(seen.hidden),
-        "packages": list(seen.packages),
+        "packages": [*zygote.installed, *seen.packages],
+        "installed": list(zygote.installed),
         "devices": list(seen.devices),
         "readable": readable,
         "listable": listable,

@@ -88,14 +88,21 @@ class Zygote:
         tier: Name of the tier.
         limits: Limits of the scratch folders.
         slots: Maximum number of children.
+        installed: Folders of installed packages that its children may import.
 
     Raises:
         SandboxError: The tier cannot be used.
         OSError: The program cannot be started.
     """
 
-    def __init__(self, tier: str, limits: Limits, slots: int = SLOTS) -> None:
-        self.tier = tier
+    def __init__(
+        self,
+        tier: str,
+        limits: Limits,
+        slots: int = SLOTS,
+        installed: tuple[str, ...] = (),
+    ) -> None:
+        self.tier, self.installed = tier, installed
         self.scratch_bytes = limits.scratch_bytes
         separate = tier == "namespaces" or landlock.is_offered()
         slots = slots if separate and tier != "rlimits" else 1
@@ -228,7 +235,11 @@ class Zygote:
             if self.tier == "bubblewrap":
                 scratch = [str(folder.scratch) for folder in self._folders]
                 wrapper = bubblewrap_command(
-                    self.parent, scratch, lifeline, self.scratch_bytes
+                    self.parent,
+                    scratch,
+                    lifeline,
+                    self.scratch_bytes,
+                    self.installed,
                 )
                 command = wrapper + command
             process = subprocess.Popen(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,6 +12,7 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.log import Log, driven_length
 from tdac_envs.webots.stage import ControllerWorld
 
+_MISSING = re.compile(r"No module named '([\w.]+)'")
 Outcome = Literal[
     "reached", "out of time", "teleport", "quit", "controller ended", "error"
 ]
@@ -41,6 +43,7 @@ class WebotsReport:
         error: How the controller failed, or None.
         traceback: The controller's own lines of the traceback.
         left_out: Nodes that may be solid and were ignored.
+        notes: What was changed or assumed so that the world could be used.
         sandbox: Sandbox tier.
         output: Output of the controller; of long output, its beginning and end.
     """
@@ -65,6 +68,7 @@ class WebotsReport:
     error: str | None
     traceback: str
     left_out: tuple[str, ...]
+    notes: tuple[str, ...]
     sandbox: str
     output: str
 
@@ -102,11 +106,33 @@ def report_of(
         start=log.poses[0],
         end=log.poses[-1],
         teleport=log.teleport,
-        error=None if error is None else str(error),
+        error=None if error is None else _described(error),
         traceback=error.traceback if isinstance(error, ControllerError) else "",
         left_out=stage.left_out,
+        notes=stage.notes,
         sandbox=tier,
         output=usage.printed,
+    )
+
+
+_INSTALLED_AS = {
+    "cv2": "opencv-python-headless", "PIL": "pillow", "skimage": "scikit-image",
+    "skfuzzy": "scikit-fuzzy", "sklearn": "scikit-learn", "yaml": "pyyaml",
+}  # fmt: skip
+
+
+def _described(fault: ControllerFault) -> str:
+    """The fault; for a missing package, with the command that installs it."""
+    text = str(fault)
+    if not isinstance(fault, ControllerError):
+        return text
+    missing = _MISSING.search(fault.text)
+    if fault.type_name != "ModuleNotFoundError" or missing is None:
+        return text
+    name = missing[1].partition(".")[0]
+    package = _INSTALLED_AS.get(name, name)
+    return (
+        f"{text}; if it is a package: pip install {package}, in the environment of tdac"
     )
 
 
@@ -116,7 +142,7 @@ def _why_not(
     if log.teleport is not None:
         return f"teleport: {log.teleport}"
     if error is not None:
-        return f"the controller failed: {error}"
+        return f"the controller failed: {_described(error)}"
     reasons = []
     if log.first_contact is not None:
         step, x, y = log.first_contact

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from tdac_agent.sandbox import (
     EnvRefusalError,
     Limits,
     SandboxError,
+    installed_packages,
     start,
 )
 from tdac_agent.verification.verify import read_source
@@ -36,6 +37,7 @@ GRACE_SECONDS = 1.0
 """Time for a controller after the end of a run, as in Webots."""
 START_SECONDS = 10.0
 LARGEST_FOLDER = 64 << 20
+_NOT_COPIED = (PACKAGE.name, "__pycache__", "build")
 Watch = Callable[[int], None]
 
 
@@ -100,10 +102,17 @@ def run_controller(
     server = StepServer(env, stage)
     seconds = START_SECONDS + env.nominal.horizon * env.nominal.dt
     fault: ControllerFault | None = None
+    left_out: tuple[str, ...] = ()
     with tempfile.TemporaryDirectory(prefix="tdac-webots-") as folder:
         _copy_files(Path(folder), controller, stage)
         try:
-            child = start(Path(folder), source, tier=tier, limits=limits)
+            child = start(
+                Path(folder),
+                source,
+                tier=tier,
+                limits=limits,
+                installed=installed_packages(),
+            )
         except ControllerError as error:
             raise ControllerFileError(f"{controller}: {error}") from error
         except SandboxError as error:
@@ -114,6 +123,7 @@ def run_controller(
                 child.folder.work / PACKAGE.name,
                 ignore=shutil.ignore_patterns("__pycache__"),
             )
+            left_out = _copy_folders(child.folder.work, controller)
             arguments = list(stage.arguments())
             child.run_program(_World(server, watch), arguments, seconds, GRACE_SECONDS)
         except RunEnded:
@@ -127,6 +137,8 @@ def run_controller(
     if not server.log.poses:
         server.reset()
     report = report_of(controller, stage, server.log, env, fault, usage, child.tier)
+    if left_out:
+        report = replace(report, notes=(*report.notes, *left_out))
     return WebotsRun(report, server.log)
 
 
@@ -175,3 +187,29 @@ def _copy_files(folder: Path, controller: Path, stage: ControllerWorld) -> None:
             f"cannot copy the folder of {controller}: {error}"
         ) from error
     (folder / stage.name).write_text(stage.text, encoding="utf-8")
+
+
+def _copy_folders(work: Path, controller: Path) -> tuple[str, ...]:
+    """Copies the subfolders beside the controller; returns notes on those left out."""
+    room, notes = LARGEST_FOLDER, list[str]()
+    for folder in sorted(controller.resolve().parent.iterdir()):
+        if not folder.is_dir() or folder.name in _NOT_COPIED or folder.name[0] == ".":
+            continue
+        try:
+            size = sum(part.stat().st_size for part in folder.rglob("*"))
+            if size > room:
+                notes.append(
+                    f"the folder {folder.name} beside the controller is not copied: "
+                    f"more than {LARGEST_FOLDER >> 20} MB"
+                )
+                continue
+            room -= size
+            shutil.copytree(
+                folder,
+                work / folder.name,
+                ignore=shutil.ignore_patterns("__pycache__", ".*"),
+                ignore_dangling_symlinks=True,
+            )
+        except (OSError, shutil.Error) as error:
+            notes.append(f"the folder {folder.name} cannot be copied: {error}")
+    return tuple(notes)

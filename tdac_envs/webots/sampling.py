@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -10,7 +11,8 @@ import numpy as np
 
 from tdac_envs.drive.env import Observation
 from tdac_envs.webots.cameras import Cameras
-from tdac_envs.webots.devices import DARK, ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
+from tdac_envs.webots.devices import ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
+from tdac_envs.webots.instruments import Readings
 from tdac_envs.webots.log import Pose, turn_rate, velocity
 from tdac_envs.webots.stage import ControllerWorld
 
@@ -23,15 +25,18 @@ class Sampler:
 
     Args:
         stage: Stage with the world and the robot.
+        readings: Readings of its instruments.
         cameras: Cameras of the robot.
     """
 
-    def __init__(self, stage: ControllerWorld, cameras: Cameras) -> None:
+    def __init__(
+        self, stage: ControllerWorld, readings: Readings, cameras: Cameras
+    ) -> None:
         self._frame = stage.frame
         self._observation: Observation = {}
         self._poses: list[Pose] = []
         self._dt = stage.world.time_step / 1e3
-        self._readers = self._make_readers(stage)
+        self._readers = self._make_readers(stage, readings)
         for camera in stage.cameras:
             self._readers[camera.name] = partial(cameras.expose, camera.name)
         # Sampling period and time of the last sample, ms.
@@ -67,13 +72,12 @@ class Sampler:
         fresh, self._fresh = self._fresh, {}
         return fresh
 
-    def _make_readers(self, stage: ControllerWorld) -> dict[str, Reader]:
+    def _make_readers(
+        self, stage: ControllerWorld, readings: Readings
+    ) -> dict[str, Reader]:
         readers: dict[str, Reader] = {}
         for k in range(8):
             readers[f"ps{k}"] = partial(self._observed, "ps", k)
-            readers[f"ls{k}"] = partial(float, DARK)
-        for k, (_, sensor) in enumerate(WHEELS):
-            readers[sensor] = partial(self._encoder, k)
         readers["accelerometer"] = self._acceleration
         readers["gyro"] = self._turning
         for device in stage.devices:
@@ -83,10 +87,14 @@ class Sampler:
                 readers[device.name] = self._north
             elif device.kind == "InertialUnit":
                 readers[device.name] = self._attitude
-            elif device.name.startswith("gs"):
-                readers[device.name] = partial(
-                    self._observed, "ground", int(device.name[2])
-                )
+        for device in stage.devices:
+            if device.kind == "PositionSensor":
+                wheel = [motor for motor, _ in WHEELS].index(device.more["motor"])
+                readers[device.name] = partial(self._encoder, wheel)
+        for beam in stage.instruments.beams:
+            readers[beam.name] = partial(self._here, readings.distance, beam.name)
+        for cell in stage.instruments.cells:
+            readers[cell.name] = partial(self._here, readings.light, cell.name)
         return readers
 
     def _observed(self, key: str, index: int) -> float:
@@ -95,6 +103,9 @@ class Sampler:
     def _encoder(self, wheel: int) -> float:
         angle = self._observed("wheel_positions", wheel)
         return ENCODER_STEP * round(angle / ENCODER_STEP)
+
+    def _here(self, read: Callable[[str, Pose], float], name: str) -> float:
+        return read(name, self._poses[-1])
 
     def _north(self) -> list[float]:
         return self._frame.north(self._poses[-1][2])
@@ -121,6 +132,11 @@ class Sampler:
 
     def _position(self, offset: Offset) -> list[float]:
         x, y, heading = self._poses[-1]
+        cos, sin = math.cos(heading), math.sin(heading)
+        ahead, left, up = offset
         frame = self._frame
-        at = np.add(frame.point(x, y), frame.rotation(heading) @ offset)
-        return [float(value) for value in at]
+        return frame.vector(
+            x + cos * ahead - sin * left,
+            y + sin * ahead + cos * left,
+            frame.height + up,
+        )

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from tdac_envs.worlds.wbt.household import HOUSEHOLD
 from tdac_envs.worlds.wbt.robots import ROBOTS, is_epuck
 from tdac_envs.worlds.wbt.tree import Field, Item, Node
 
@@ -160,7 +161,7 @@ def base_type(node: Node) -> str:
     """Node type; for a PROTO, its base type."""
     if is_epuck(node) or node.kind in ROBOTS:
         return "Robot"
-    if node.kind in _SOLID_PROTOS:
+    if node.kind in _SOLID_PROTOS or node.kind in HOUSEHOLD:
         return "Solid"
     return _BACKGROUNDS.get(node.kind, node.kind)
 

@@ -10,7 +10,8 @@ import numpy as np
 from tdac_envs.drive.env import Observation
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.cameras import Cameras
-from tdac_envs.webots.devices import DARK, WHEELS
+from tdac_envs.webots.devices import WHEELS
+from tdac_envs.webots.instruments import Readings
 from tdac_envs.webots.log import Log, turn_rate, velocity
 from tdac_envs.webots.motors import MotorState
 from tdac_envs.webots.requests import CHANGES, RequestError, checked, real
@@ -43,7 +44,8 @@ class StepServer:
         self._motors = {name: MotorState(limit) for name, _ in WHEELS}
         self._cameras = Cameras(stage.cameras, stage.world, stage.sky, stage.robot, env)
         self._images: dict[str, bytes] = {}
-        self._sampler = Sampler(stage, self._cameras)
+        readings = Readings(stage.instruments, env)
+        self._sampler = Sampler(stage, readings, self._cameras)
         self._warnings: list[str] = []
         self._warned: set[str] = set()
         self._late_requests = 0
@@ -166,10 +168,6 @@ class StepServer:
     def _enable(self, device: str, period: Any) -> None:
         if type(period) is not int or period < 0:
             raise RequestError("invalid sampling period")
-        if device.startswith("ls"):
-            self._warn(
-                f"tdac: light is not modelled; ls0 to ls7 read {DARK:g}, as in the dark"
-            )
         self._sampler.enable(device, period, self._now())
 
     def _handle_event(self, call: str, node: int | None, field_name: str) -> None:

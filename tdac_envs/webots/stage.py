@@ -18,12 +18,22 @@ from tdac_envs.epuck.source import with_start
 from tdac_envs.webots.cameras import CameraFacts, find_cameras
 from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
 from tdac_envs.webots.devices import DeviceFacts, find_devices
+from tdac_envs.webots.floors import find_floors
+from tdac_envs.webots.instruments import Instruments, find_instruments
+from tdac_envs.webots.lights import find_lights
+from tdac_envs.webots.mounts import mounts
 from tdac_envs.webots.movable import Movable, find_movables
+from tdac_envs.webots.reach import (
+    beside_obstacles,
+    why_unreachable,
+    without_far_nodes,
+)
 from tdac_envs.webots.scene import NodeTable
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.wbt.colours import BLACK_SKY, Sky, sky_of
 from tdac_envs.worlds.wbt.fields import flag, text
 from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.protofiles import ProtoFolder
 from tdac_envs.worlds.wbt.reader import frame_of, read_text, read_world, with_goal
 from tdac_envs.worlds.wbt.robots import is_epuck
 from tdac_envs.worlds.wbt.tree import Node, parse
@@ -42,12 +52,14 @@ class ControllerWorld:
         has_goal: Whether a goal is given; else that of `world` is a placeholder, the
             farthest reachable point.
         left_out: Names or types of unmodelled nodes that are left out.
+        notes: What was changed or assumed so that the world can be used.
         scene: Nodes of the file.
         robot: Node of the robot.
         frame: Conversion of the robot's pose to the file's coordinates.
         movables: Objects that can be pushed, in the environment's order.
         devices: Modelled devices of the robot.
         absent: Names of the devices that are not modelled.
+        instruments: Distance and light sensors beside ps0 to ps7.
         cameras: Cameras of the robot.
         sky: What cameras see beyond the world.
     """
@@ -58,12 +70,14 @@ class ControllerWorld:
     is_moved: bool
     has_goal: bool
     left_out: tuple[str, ...]
+    notes: tuple[str, ...]
     scene: NodeTable
     robot: Node
     frame: FileFrame
     movables: tuple[Movable | None, ...]
     devices: tuple[DeviceFacts, ...]
     absent: tuple[str, ...]
+    instruments: Instruments
     cameras: tuple[CameraFacts, ...] = ()
     sky: Sky = BLACK_SKY
 
@@ -118,7 +132,6 @@ class ControllerWorld:
             self.world,
             horizon=steps,
             on_collision="block",
-            ground_sensors=any(device.name == "gs0" for device in self.devices),
             ignore=self.left_out,
             **sensors,
             **options,
@@ -144,24 +157,39 @@ def open_stage(
         TaskError: Start or goal is invalid.
     """
     content = read_text(path)
-    world = read_world(content, path.name)
+    world = read_world(content, path.name, folder=path.parent)
     if not world.robots:
         raise WorldError(f"{path.name}: there is no e-puck in it")
     names = tuple(ignore)
+    world, notes = without_far_nodes(world)
     check_modelled(world, names)
     if goal is not None:
         world = with_goal(world, finite_point("goal", goal))
     in_file = world.robot
     if start is not None:
         world = with_start(world, start)
+    else:
+        world, moved = beside_obstacles(world)
+        notes += moved
     has_goal = world.goal is not None
+    if has_goal and goal is None and (why := why_unreachable(world)) is not None:
+        notes += (f"the file's GOAL is not used: {why}",)
+        marks = tuple(replace(thing, is_goal=False) for thing in world.obstacles)
+        world, has_goal = replace(world, goal=None, obstacles=marks), False
     if not has_goal:
         world = replace(world, goal=_farthest(world))
     document = parse(content, path.name)
     top = frame_of(document)
     robot, own = _find_robot(document.nodes, top, path.name)
+    mounted = tuple(mounts(robot, own, in_file))
+    all_nodes = ProtoFolder(path.parent, document.version).expanded(document).nodes
+    floors = find_floors(all_nodes, top, path.parent)
+    lights = find_lights(document.nodes, top)
+    instruments = find_instruments(robot, mounted, lights, floors)
+    notes += instruments.notes()
     cameras, too_large = find_cameras(robot, own, in_file)
-    devices, absent = find_devices(robot, world.robot.max_wheel_speed, cameras)
+    limit = world.robot.max_wheel_speed
+    devices, absent = find_devices(limit, mounted, instruments, cameras)
     frame = FileFrame.of(top, own, in_file.heading)
     scene = NodeTable(document.nodes)
     return ControllerWorld(
@@ -171,12 +199,14 @@ def open_stage(
         is_moved=start is not None,
         has_goal=has_goal,
         left_out=names,
+        notes=notes,
         scene=scene,
         robot=robot,
         frame=frame,
         movables=find_movables(Ground.of(world), document.nodes, top),
         devices=devices,
-        absent=(*absent, *too_large),
+        absent=tuple(dict.fromkeys((*absent, *too_large))),
+        instruments=instruments,
         cameras=cameras,
         sky=sky_of(document.nodes),
     )

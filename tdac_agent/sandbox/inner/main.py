@@ -28,7 +28,7 @@ def main(requests: int, answers: int, lifeline: int, site: str) -> None:
     ours = {"descriptors": [requests, answers], "lifeline": lifeline}
     sys.argv = ["controller.py"]
     os.environ.update(HOME=setup["scratch"], TMPDIR=setup["scratch"])
-    sys.path[:] = [setup["work"], *sys.path[1:-1], site]
+    sys.path[:] = [setup["work"], *sys.path[1:-1], site, *setup["installed"]]
     try:
         facts = confine({**setup, **ours})
     except OSError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from typing import Any, Protocol
 
+from . import libraries
 from .messages import complain
 
 
@@ -106,6 +107,7 @@ connection = Connection()
 
 def connect(world: World) -> None:
     """Connects to the simulation; called before the controller starts."""
+    libraries.prepare()
     connection.open(world)
 
 

@@ -9,7 +9,7 @@ from . import camera, led, motor, sensors, unmodelled
 from .connection import c_int, connection
 from .device import Device
 from .input import Joystick, Keyboard, Mouse
-from .messages import complain, once, unsupported
+from .messages import complain, unsupported
 
 _KINDS: dict[str, type[Device]] = {
     "Motor": motor.Motor,
@@ -26,6 +26,7 @@ _KINDS: dict[str, type[Device]] = {
     "Receiver": unmodelled.Receiver,
     "Speaker": unmodelled.Speaker,
     "LED": led.LED,
+    "Unknown": unmodelled.Unknown,
 }
 
 
@@ -85,8 +86,6 @@ class Robot:
         """The device called `name`, or None."""
         if name in self.devices:
             return self.devices[name]
-        if name in connection.facts["not_modelled"]:
-            once(f'tdac: the device "{name}" is not modelled')
         complain(f'Device "{name}" was not found on robot "{self.name}"')
         return None
 

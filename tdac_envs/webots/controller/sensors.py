@@ -95,7 +95,7 @@ class _Table(_Scalar):
 
 
 class DistanceSensor(_Table):
-    """An infra-red sensor."""
+    """Measures the distance along one ray."""
 
     GENERIC, INFRA_RED, SONAR, LASER = 0, 1, 2, 3
     _c_name = "distance_sensor"
@@ -113,7 +113,7 @@ class DistanceSensor(_Table):
         return self.aperture
 
     def getType(self) -> int:
-        """Always INFRA_RED."""
+        """Type: GENERIC, INFRA_RED, SONAR or LASER."""
         return self.type
 
     @property
@@ -134,11 +134,11 @@ class DistanceSensor(_Table):
     @property
     def type(self) -> int:
         """See `getType`."""
-        return self.INFRA_RED
+        return int(self._facts.get("type", self.INFRA_RED))
 
 
 class LightSensor(_Table):
-    """A light sensor; light is not modelled, so it reads darkness."""
+    """Measures the irradiance in one direction."""
 
     _c_name = "light_sensor"
 

@@ -6,6 +6,7 @@ exist only so that they can be imported.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from .connection import c_int
@@ -32,6 +33,26 @@ class _Mute(Device):
     def getSamplingPeriod(self) -> int:
         """Sampling period given to `enable`, ms."""
         return self._period
+
+
+class Unknown(_Mute):
+    """A device that is not modelled; all its calls print once and do nothing."""
+
+    def __getattr__(self, call: str) -> Any:
+        if call.startswith("_"):
+            raise AttributeError(call)
+        return unsupported(f"{self.name}.{call}", self._neutral(call))
+
+    def _neutral(self, call: str) -> Any:
+        """What a call returns: NaN or nothing, and a scan that meets nothing."""
+        if call == "getRangeImage":
+            return [math.inf] * self._width()
+        if call in ("getWidth", "getHorizontalResolution"):
+            return self._width()
+        return {"getValue": math.nan, "getValues": [math.nan] * 3}.get(call)
+
+    def _width(self) -> int:
+        return int(self._facts.get("width", 0))
 
 
 class Emitter(_Mute):
@@ -90,11 +111,11 @@ class Speaker(Device):
     isSpeaking: Any = unsupported("Speaker.isSpeaking", False)
 
 
-class Altimeter(Device):
+class Altimeter(Unknown):
     """Not modelled."""
 
 
-class Brake(Device):
+class Brake(Unknown):
     """Not modelled."""
 
 
@@ -102,15 +123,15 @@ class CameraRecognitionObject:
     """Not modelled."""
 
 
-class Connector(Device):
+class Connector(Unknown):
     """Not modelled."""
 
 
-class Display(Device):
+class Display(Unknown):
     """Not modelled."""
 
 
-class Lidar(Device):
+class Lidar(Unknown):
     """Not modelled."""
 
 
@@ -118,11 +139,11 @@ class LidarPoint:
     """Not modelled."""
 
 
-class Pen(Device):
+class Pen(Unknown):
     """Not modelled."""
 
 
-class Radar(Device):
+class Radar(Unknown):
     """Not modelled."""
 
 
@@ -130,17 +151,17 @@ class RadarTarget:
     """Not modelled."""
 
 
-class RangeFinder(Device):
+class RangeFinder(Unknown):
     """Not modelled."""
 
 
-class Skin(Device):
+class Skin(Unknown):
     """Not modelled."""
 
 
-class TouchSensor(Device):
+class TouchSensor(Unknown):
     """Not modelled."""
 
 
-class VacuumGripper(Device):
+class VacuumGripper(Unknown):
     """Not modelled."""

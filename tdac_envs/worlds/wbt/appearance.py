@@ -26,12 +26,12 @@ def reflectance(shape: Node) -> float:
         return 1.0
     if look.kind == "PBRAppearance" and not any(name in look.fields for name in _MAPS):
         red = numbers(look, "baseColor", (1.0, 1.0, 1.0))[0]
-        red *= 1.0 - _share(number(look, "transparency", 0.0))
-        return _factor(red * (1.0 - 0.5 * _share(number(look, "roughness", 0.0))))
+        red *= 1.0 - share(number(look, "transparency", 0.0))
+        return factor_of_red(red * (1.0 - 0.5 * share(number(look, "roughness", 0.0))))
     material = child(look, "material") if look.kind == "Appearance" else None
     if material is not None and "texture" not in look.fields:
         red = numbers(material, "diffuseColor", (0.8, 0.8, 0.8))[0]
-        return _factor(red * (1.0 - _share(number(material, "transparency", 0.0))))
+        return factor_of_red(red * (1.0 - share(number(material, "transparency", 0.0))))
     return 1.0
 
 
@@ -40,9 +40,11 @@ def red_of(factor: float) -> float:
     return (factor - DARKEST) / (1.0 - DARKEST)
 
 
-def _factor(red: float) -> float:
-    return DARKEST + (1.0 - DARKEST) * _share(red)
+def factor_of_red(red: float) -> float:
+    """The factor of a surface that returns this share of red light."""
+    return DARKEST + (1.0 - DARKEST) * share(red)
 
 
-def _share(value: float) -> float:
+def share(value: float) -> float:
+    """The value, clipped to [0, 1]."""
     return min(max(value, 0.0), 1.0)

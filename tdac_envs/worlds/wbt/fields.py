@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from tdac_envs.core.errors import WorldFileError
 from tdac_envs.worlds.wbt.tree import Node
 
 LARGEST = 1e6
 """Largest absolute value of a number; real worlds span only a few metres."""
+
+
+class StrayError(WorldFileError):
+    """A number beyond `LARGEST`."""
 
 
 def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
@@ -22,7 +27,8 @@ def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, .
         wanted = "1 number" if len(default) == 1 else f"{len(default)} numbers"
         raise node.error(f"expected {wanted} for {name} of {node.kind}", name)
     if any(abs(number) > LARGEST for number in found):
-        raise node.error(f"{name} of {node.kind} is beyond {LARGEST:g}", name)
+        message = f"{name} of {node.kind} is beyond {LARGEST:g}"
+        raise StrayError(str(node.error(message, name)))
     return found
 
 

@@ -9,7 +9,7 @@ from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.wbt.tree import Node
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Unmodelled
 
-MOST_PARTS = 5_000
+MOST_PARTS = 20_000
 """Maximum number of convex pieces in a world."""
 _GOAL = "goal"
 

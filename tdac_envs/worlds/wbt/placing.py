@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tdac_envs.worlds.wbt.fields import LARGEST, numbers
+from tdac_envs.worlds.wbt.fields import LARGEST, StrayError, numbers
 from tdac_envs.worlds.wbt.frames import Frame, own_axes
 from tdac_envs.worlds.wbt.tree import Node
 
@@ -35,5 +35,6 @@ def placed(
     found = frame.inside(translation, rotation, scale)
     reach = max(np.abs(found.matrix).max(), np.abs(found.origin).max())
     if not reach <= LARGEST:
-        raise node.error(f"{node.kind} is placed or scaled beyond {LARGEST:g} m")
+        message = f"{node.kind} is placed or scaled beyond {LARGEST:g} m"
+        raise StrayError(str(node.error(message)))
     return found

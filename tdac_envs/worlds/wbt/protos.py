@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from tdac_envs.worlds.footprint import THINNEST, ring
 from tdac_envs.worlds.wbt.appearance import reflectance
+from tdac_envs.worlds.wbt.body import Body
 from tdac_envs.worlds.wbt.fields import flag, number, numbers, text
 from tdac_envs.worlds.wbt.frames import Frame, flu_size, own_axes
+from tdac_envs.worlds.wbt.household import HOUSEHOLD
 from tdac_envs.worlds.wbt.physics import mass_of
 from tdac_envs.worlds.wbt.placing import Point, placed
 from tdac_envs.worlds.wbt.prisms import Vectors, box, capsule, cone, cylinder, hull
@@ -54,25 +55,6 @@ _ROCKS: dict[str, tuple[list[tuple[float, float]], float, float]] = {
         0.176,
     ),
 }  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A PROTO converted to prisms.
-
-    Attributes:
-        frame: Frame of the PROTO.
-        solid: Parts that can be hit.
-        visible: Parts that sensors see.
-        mass: Mass, kg; None if it is fixed.
-        reflectance: Reflectance of all parts.
-    """
-
-    frame: Frame
-    solid: tuple[Part, ...]
-    visible: tuple[Part, ...]
-    mass: float | None = None
-    reflectance: float = 1.0
 
 
 def _wooden_box(node: Node, frame: Frame) -> Body:
@@ -193,6 +175,7 @@ PROTOS: dict[str, Callable[[Node, Frame], Body]] = {
     "Wall": _wall,
     "WoodenBox": _wooden_box,
     "WoodenPallet": _wooden_pallet,
+    **HOUSEHOLD,
 }
 """The reader of each type."""
 

@@ -13,11 +13,12 @@ from tdac_envs.worlds.bodies import bodies, floor_under
 from tdac_envs.worlds.wbt.fields import children, number, number_list, numbers, text
 from tdac_envs.worlds.wbt.found import WorldContent
 from tdac_envs.worlds.wbt.frames import Frame, world_frame
+from tdac_envs.worlds.wbt.protofiles import ProtoFolder
 from tdac_envs.worlds.wbt.tree import Document, Node, parse
 from tdac_envs.worlds.wbt.walk import walk
 from tdac_envs.worlds.world import INFINITE_FRICTION, EPuck, World
 
-LARGEST_FILE = 2_000_000
+LARGEST_FILE = 8_000_000
 """Maximum size of a world file, bytes."""
 
 _FLU_SINCE = (2022, 1)
@@ -48,7 +49,8 @@ def load_world(
             reported with line and column.
     """
     file = Path(path)
-    return read_world(read_text(file), printable(file.name), robot=robot, goal=goal)
+    name = printable(file.name)
+    return read_world(read_text(file), name, robot=robot, goal=goal, folder=file.parent)
 
 
 def read_world(
@@ -57,9 +59,20 @@ def read_world(
     *,
     robot: str | None = None,
     goal: Sequence[float] | None = None,
+    folder: Path | None = None,
 ) -> World:
-    """Reads the text of a `.wbt` file; see `load_world`."""
+    """Reads the text of a `.wbt` file; see `load_world`.
+
+    Args:
+        content: The text.
+        name: Name of the file.
+        robot: See `load_world`.
+        goal: See `load_world`.
+        folder: Folder of the file, for the project's PROTOs; None to use none.
+    """
     document = parse(content, name)
+    if folder is not None:
+        document = ProtoFolder(folder, document.version).expanded(document)
     info, frame = _world_info(document), frame_of(document)
     found = WorldContent()
     for node in document.nodes:

@@ -11,7 +11,7 @@ from tdac_envs.worlds.wbt.tokens import Kind, Source, Token, tokens
 
 DEEPEST = 100
 """Maximum depth of nested nodes, so that no file exhausts the stack."""
-MOST_NODES = 5_000
+MOST_NODES = 20_000
 """Maximum number of nodes; a USE counts as much as the node that it refers to."""
 
 _HEADER = re.compile(r"#VRML(?:_\w+)? +(\S+)(?: +utf8)?[^\S\n]*(?:\n|$)")

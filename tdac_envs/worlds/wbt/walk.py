@@ -9,7 +9,7 @@ from tdac_envs.worlds.looks import Look
 from tdac_envs.worlds.wbt.appearance import reflectance
 from tdac_envs.worlds.wbt.arenas import ARENAS, arena
 from tdac_envs.worlds.wbt.colours import look, proto_look
-from tdac_envs.worlds.wbt.fields import child, children
+from tdac_envs.worlds.wbt.fields import StrayError, child, children
 from tdac_envs.worlds.wbt.found import WorldContent, is_goal, name_of
 from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.wbt.geometry import GROUPS, Pieces, bounds, geometry
@@ -49,6 +49,13 @@ def walk(node: Node, frame: Frame, found: WorldContent) -> None:
     """
     if node.kind in _NEVER_SOLID:
         return
+    try:
+        _walk(node, frame, found)
+    except StrayError as error:
+        found.left_out(node, frame, str(error))
+
+
+def _walk(node: Node, frame: Frame, found: WorldContent) -> None:
     if is_epuck(node):
         found.robots.append(epuck(node, frame))
     elif node.kind in ROBOTS:

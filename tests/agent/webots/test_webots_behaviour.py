@@ -42,16 +42,33 @@ class TestDevices:
         assert out == ['Device "nose" was not found on robot "e-puck"', "None"]
 
     def test_device_without_a_model(self, printed):
-        """It is missing like an unknown one; why, is said once."""
+        """It is there; each of its calls is said once and returns nothing."""
+        world = OPEN.replace("turretSlot [", 'turretSlot [ Pen { name "ink" }')
+        out = printed(
+            'pen = robot.getDevice("ink")\n'
+            "print([pen.write(True) for _ in range(3)], pen.getName())\n",
+            world,
+        )
+        assert out == [
+            "tdac: ink.write() is not supported; it has no effect",
+            "[None, None, None] ink",
+        ]
+
+    def test_time_of_flight(self, printed):
+        """An e-puck 2 measures the distance ahead, in mm, up to 2 m."""
         world = OPEN.replace("supervisor TRUE", 'supervisor TRUE version "2"')
         out = printed(
-            'print([robot.getDevice("tof") for _ in range(3)], '
+            'tof = robot.getDevice("tof"); tof.enable(32); robot.step(32)\n'
+            "print(tof.getValue(), tof.getType() == tof.GENERIC, "
             "left.getMaxVelocity())\n",
             world,
         )
-        assert out[0] == 'tdac: the device "tof" is not modelled'
-        assert out[1:4] == ['Device "tof" was not found on robot "e-puck"'] * 3
-        assert out[4:] == ["[None, None, None] 7.536"]
+        reading, *rest = out[-1].split()
+        # The wall is at x = 0.7, the sensor 34 mm ahead of x = -0.4.
+        table = (0.5, 1.0), (531.9, 1052.0), (1.0, 1.7), (1052.0, 1780.5)
+        expected = np.interp(1.066, table[2], table[3])
+        assert float(reading) == pytest.approx(expected, abs=0.1)
+        assert rest == ["True", "7.536"]
 
     def test_devices_that_give_nothing(self, printed):
         """Radio and speaker are there and mute, each said once."""
@@ -353,15 +370,20 @@ class TestSensors:
             assert value / 0.00628 == pytest.approx(round(value / 0.00628), abs=1e-6)
             assert value == pytest.approx(0.032 * k, abs=0.0032)
 
-    def test_light_sensors_are_in_the_dark(self, printed):
-        """Light is not modelled, which is said once."""
-        out = printed(
-            'a, b = robot.getDevice("ls0"), robot.getDevice("ls7")\n'
+    def test_light_sensors(self, printed):
+        """Dark without a light; a light in front lowers the reading of the front."""
+        lines = (
+            'a, b = robot.getDevice("ls0"), robot.getDevice("ls4")\n'
             "a.enable(32); b.enable(32); robot.step(32)\n"
             "print(a.getValue(), b.value)\n"
         )
-        assert [line.startswith("tdac: light") for line in out] == [True, False]
-        assert out[-1] == "4095.0 4095.0"
+        assert printed(lines) == ["4095.0 4095.0"]
+        lamp = "PointLight { location 10 0 0.0329 intensity 2 }\n"
+        (line,) = printed(lines, OPEN + lamp)
+        front, back = map(float, line.split())
+        # 2 cos(0.3008) of irradiance, mapped from [1, 2] to [4095, 0].
+        assert front == pytest.approx(4095.0 * (2.0 - 2.0 * math.cos(0.3008)), abs=5)
+        assert back == 4095.0
 
     def test_accelerometer_and_gyro(self, drive):
         """Gravity at rest, the change of the velocity, and the rate of turn."""

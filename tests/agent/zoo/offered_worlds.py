@@ -21,7 +21,7 @@ def _offer(name: str, make: Maker, says: str, endless: bool = False) -> Offer:
 OFFERS = [
     _offer("endless", link("w.wbt", "/dev/zero"), "not a regular file", True),
     _offer("pipe", pipe("w.wbt"), "not a regular file", True),
-    _offer("large", text("w.wbt", b" " * 2_000_001), "larger than 2 MB"),
+    _offer("large", text("w.wbt", b" " * 8_000_001), "larger than 8 MB"),
     _offer("deep", world("Group { children [ " * 3000), "at most 100 nested nodes"),
     _offer("digits", world(f"WorldInfo {{ basicTimeStep {'9' * 5000} }}"), "number"),
     _offer("far", world("E-puck { translation 1e300 0 0 }"), "beyond 1e\\+06"),

@@ -9,7 +9,8 @@ from world_texts import EVERYTHING, OLD, mutated, text
 
 from tdac_envs import write_world
 from tdac_envs.core.errors import WorldError
-from tdac_envs.worlds.wbt.reader import load_world, read_world
+from tdac_envs.worlds.wbt.found import MOST_PARTS
+from tdac_envs.worlds.wbt.reader import LARGEST_FILE, load_world, read_world
 from tdac_envs.worlds.wbt.tree import DEEPEST, MOST_NODES, Node, parse
 from tdac_envs.worlds.world import World
 
@@ -202,7 +203,6 @@ def test_a_broken_file_says_where(content):
 WRONG = {
     "WoodenBox { size 1 2 }": "18: expected 3 numbers for size of WoodenBox",
     'WoodenBox { size "x" }': "18: expected 3 numbers for size of WoodenBox",
-    "Solid { translation 1 2 1e9 }": "21: translation of Solid is beyond",
     "Solid { name 3 }": "14: expected a string for name of Solid",
     "Solid { boundingObject 3 }": "24: expected nodes for boundingObject of Solid",
     "Solid { boundingObject [ Box { } Box { } ] }": "expected one node for boundingOb",
@@ -210,7 +210,6 @@ WRONG = {
     'Rock { type "round" }': "expected type 'regular' or 'flat' for Rock, got 'ro",
     "Rock { scale 0 }": "14: expected a scale above 0 for Rock, got 0",
     "Group { children 1 }": "18: expected nodes for children of Group",
-    "Transform { scale 1e6 1e6 1e6 children Pose { translation 9e5 0 0 } }": "beyond",
     "Solid { boundingObject IndexedFaceSet { coord Coordinate { point [ 1 2 ] } } }": (
         "expected x, y and z of each point"
     ),
@@ -226,6 +225,23 @@ def test_a_wrong_value_says_where(content):
     with pytest.raises(WorldError, match=r"^w\.wbt, line 3, column \d+: ") as caught:
         read_world(text(content), "w.wbt")
     assert WRONG[content] in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "Solid { translation 1 2 1e9 }",
+        "Transform { scale 1e6 1e6 1e6 children Pose { translation 9e5 0 0 } }",
+    ],
+)
+def test_a_stray_node_can_be_ignored(content):
+    """A node beyond all bounds is named with its place; the rest is read."""
+    world = read_world(text(content, "WoodenBox { }"), "w.wbt")
+    (stray,) = world.unmodelled
+    assert stray.may_be_solid
+    assert stray.why.startswith("w.wbt, line 3, column ")
+    assert "beyond 1e+06" in stray.why
+    assert [thing.kind for thing in world.obstacles] == ["WoodenBox"]
 
 
 @pytest.mark.slow_after(1)
@@ -271,8 +287,8 @@ def test_nesting_and_size_are_bounded():
     laughs += ["DEF A Group { children [ " + "USE A " * 10 + "] }"] * 9
     with pytest.raises(WorldError, match=f"expected at most {MOST_NODES} nodes, got"):
         read_world(text(*laughs), "w.wbt")
-    with pytest.raises(WorldError, match="more than 5000 convex pieces"):
-        read_world(text(*["SolidPipe { subdivision 200 }"] * 15), "w.wbt")
+    with pytest.raises(WorldError, match=f"more than {MOST_PARTS} convex pieces"):
+        read_world(text(*["SolidPipe { subdivision 200 }"] * 51), "w.wbt")
 
 
 def test_files_that_cannot_be_read(tmp_path):
@@ -282,8 +298,8 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(WorldError, match=r"is a folder; give the \.wbt file in it"):
         load_world(tmp_path)
     large = tmp_path / "large.wbt"
-    large.write_bytes(b"#VRML_SIM R2025a utf8\n" + b" " * 2_000_000)
-    with pytest.raises(WorldError, match=r"larger than 2 MB"):
+    large.write_bytes(b"#VRML_SIM R2025a utf8\n" + b" " * LARGEST_FILE)
+    with pytest.raises(WorldError, match=r"larger than 8 MB"):
         load_world(large)
 
 
