@@ -172,7 +172,8 @@ def open_stage(
         world, moved = beside_obstacles(world)
         notes += moved
     has_goal = world.goal is not None
-    if has_goal and goal is None and (why := why_unreachable(world)) is not None:
+    why = why_unreachable(world) if has_goal and not (goal or start) else None
+    if why is not None:
         notes += (f"the file's GOAL is not used: {why}",)
         marks = tuple(replace(thing, is_goal=False) for thing in world.obstacles)
         world, has_goal = replace(world, goal=None, obstacles=marks), False
