@@ -33,15 +33,15 @@ def prepare() -> None:
 
 def _tolerate_timers() -> None:
     """Lets a timer that cannot start be ignored: matplotlib only warns with it."""
-    start = threading.Timer.start
+    original: Callable[[Any], None] = threading.Timer.start
 
-    def start_if_possible(timer: threading.Timer) -> None:
+    def start_if_possible(timer: threading.Thread) -> None:
         try:
-            start(timer)
+            original(timer)
         except RuntimeError:
             return
 
-    threading.Timer.start = start_if_possible  # type: ignore[method-assign]
+    threading.Timer.start = start_if_possible  # type: ignore[assignment, method-assign]
 
 
 def _without_windows(cv2: ModuleType) -> None:
