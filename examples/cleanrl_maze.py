@@ -28,8 +28,8 @@ class TransformObservation(gym.wrappers.TransformObservation):
         super().__init__(env, func, observation_space or env.observation_space)
 
 
-def main() -> int:
-    """Runs CleanRL's file; returns 0 if its policy has learnt the maze."""
+def main() -> None:
+    """Runs CleanRL's file and prints whether its policy has learnt the maze."""
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     file = sys.argv[1]
@@ -37,8 +37,8 @@ def main() -> int:
     gym.wrappers.TransformObservation = TransformObservation
     sys.argv = [file, *ARGUMENTS, *sys.argv[2:]]
     runpy.run_path(file, run_name="__main__")
-    return ended()
+    print(ended())
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

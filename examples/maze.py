@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 
@@ -18,7 +18,7 @@ class Successes(gym.Wrapper[Any, Any, Any, Any]):
 
     steps = 0
     episodes = 0
-    last: deque[bool] = deque(maxlen=LAST)
+    last: ClassVar[deque[bool]] = deque(maxlen=LAST)
 
     def step(self, action: Any) -> Any:
         """Steps once, and prints a line every 10,000 steps."""
@@ -62,8 +62,6 @@ def told() -> str:
     )
 
 
-def ended() -> int:
-    """Prints how the training ended; returns 0 if the policy has learnt the maze."""
-    learnt = success() >= ENOUGH
-    print(f"{told()}: {'learnt' if learnt else 'not learnt'}")
-    return 0 if learnt else 1
+def ended() -> str:
+    """One line about the whole training: whether the policy has learnt the maze."""
+    return f"{told()}: {'learnt' if success() >= ENOUGH else 'not learnt'}"
