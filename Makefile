@@ -9,6 +9,9 @@
 #                     other Pythons, another user, other processors, a busy machine. The
 #                     table also lists what could not run, and why. Selected rows:
 #                     make portability ROWS="lowest wheel-user"
+#   make clients      Short trainings with other people's RL libraries, each installed in
+#                     its own environment; prints the table of docs/clients.md. Selected
+#                     ones: make clients CLIENTS="sb3 skrl"
 #   make lint         Style, types and import rules.
 PYTHON ?= python3
 VENV ?= .venv
@@ -19,7 +22,7 @@ SAMPLE ?= 1
 # files with short tests last, so that both processes end at about the same time.
 PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: synth test test-all slow slow-sample lint bench portability clean
+.PHONY: synth test test-all slow slow-sample lint bench portability clients clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
@@ -37,6 +40,9 @@ slow-sample: $(VENV)/.test-installed
 
 portability:
 	$(PYTHON) tools/portability $(ROWS)
+
+clients:
+	$(PYTHON) tools/clients $(CLIENTS)
 
 bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[bench]"

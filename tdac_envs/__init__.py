@@ -14,6 +14,7 @@ from tdac_envs.core.errors import MapError, TaskError, TdacError, WorldError
 
 if TYPE_CHECKING:
     from tdac_envs.grid.grid import OccupancyGrid
+    from tdac_envs.learning.wrapping import wrap_for_rl
     from tdac_envs.mapping.bundled import bundled_map, bundled_maps
     from tdac_envs.mapping.params import MapParams, RobotParams
     from tdac_envs.mapping.preprocessing import preprocess
@@ -37,6 +38,7 @@ __all__ = [
     "load_world",
     "preprocess",
     "read_world",
+    "wrap_for_rl",
     "write_world",
 ]
 
@@ -51,6 +53,7 @@ _MODULE_OF = {
     "load_world": "tdac_envs.worlds.wbt.reader",
     "preprocess": "tdac_envs.mapping.preprocessing",
     "read_world": "tdac_envs.worlds.wbt.reader",
+    "wrap_for_rl": "tdac_envs.learning.wrapping",
     "write_world": "tdac_envs.worlds.wbt.writer",
 }
 
@@ -68,6 +71,8 @@ def __dir__() -> list[str]:
 
 
 # No TimeLimit: the horizon depends on the task, and the envs truncate themselves.
+# What needs `max_episode_steps` in the spec gets it from
+# `gym.make(..., horizon=1000, max_episode_steps=1000)`.
 gym.register(
     "TDAC-Map2D-v0",
     entry_point="tdac_envs.map2d.env:Map2DEnv",

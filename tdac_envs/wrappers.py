@@ -1,8 +1,10 @@
-"""Observation wrappers for learning: map-independent observations, and guidance.
+"""Wrappers for learning: map-independent observations, guidance, and a goal view.
 
-Re-exports the public names of `tdac_envs.learning.wrappers`.
+Re-exports the public names of `wrappers`, `goal_view` and `wrapping` in
+`tdac_envs.learning`.
 """
 
+from tdac_envs.learning.goal_view import GoalView
 from tdac_envs.learning.wrappers import (
     MIDDLE,
     WRAPPERS,
@@ -14,15 +16,19 @@ from tdac_envs.learning.wrappers import (
     guided_space,
     wrap,
 )
+from tdac_envs.learning.wrapping import FOR_RL, wrap_for_rl
 
 __all__ = [
+    "FOR_RL",
     "MIDDLE",
     "WRAPPERS",
     "Env",
     "Frame",
     "GoalRelativeObservation",
+    "GoalView",
     "Guidance",
     "check_wrappers",
     "guided_space",
     "wrap",
+    "wrap_for_rl",
 ]

@@ -9,7 +9,7 @@ import gymnasium as gym
 import tdac_envs  # noqa: F401 - registers the environments
 from tdac_agent.tasks.registry import environment
 from tdac_agent.verification.suite.reference import steer
-from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
+from tdac_envs.learning.wrapping import wrap_for_rl
 
 
 def use_robot(env_id: str, **options: Any) -> Any:
@@ -23,7 +23,7 @@ def use_robot(env_id: str, **options: Any) -> Any:
     steer((start.x, start.y, start.heading), path[-1], 1.0, 1.0)
     env.reset(options={"start": start[:2], "goal": goal})
     batch = gym.make_vec(env_id, 2, "vector_entry_point", **options)
-    wrapped = WrappedVectorEnv(batch, ("goal-relative", "guidance", "flatten"))
+    wrapped = wrap_for_rl(batch)
     wrapped.reset(seed=0)
     wrapped.step(wrapped.action_space.sample())
     return env

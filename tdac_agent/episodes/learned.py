@@ -30,7 +30,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
 from tdac_envs.core.intake import one_line
 from tdac_envs.drive.env import Observation
-from tdac_envs.learning.wrappers import wrap
+from tdac_envs.learning.wrapping import wrap_for_rl
 
 _NETWORKS = {
     "stable_baselines3.common.policies": "ActorCriticPolicy",
@@ -57,7 +57,7 @@ class Learned:
     def __init__(self, file: Path, wrappers: tuple[str, ...], env: JudgedEnv) -> None:
         plain: Any = env
         try:
-            self._env: Any = wrap(plain, wrappers)
+            self._env: Any = wrap_for_rl(plain, wrappers)
         except TaskError as error:
             raise ControllerFault(str(error), "import") from error
         space, actions = self._env.observation_space, env.action_space

@@ -174,7 +174,7 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
         TaskError: A task has changed since the plan was made, or cannot be used.
     """
     from tdac_envs.learning.sb3 import SB3VecEnv
-    from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
+    from tdac_envs.learning.wrapping import wrap_for_rl
 
     each = []
     tasks = tasks_of(plan)
@@ -191,7 +191,7 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
     except TypeError as error:
         reason = str(error).partition("() ")[2]
         raise TaskError(f"env_kwargs of the hyperparameters: {reason}") from error
-    return SB3VecEnv(WrappedVectorEnv(batch, plan.wrappers))
+    return SB3VecEnv(wrap_for_rl(batch, plan.wrappers))
 
 
 def _env_kwargs(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -100,19 +101,6 @@ def make_envs(
     return envs
 
 
-def check_no_rendering(render_mode: object) -> None:
-    """Checks that `render_mode` is None.
-
-    Raises:
-        TaskError: It is not None.
-    """
-    if render_mode is not None:
-        raise TaskError(
-            f"a batch cannot render; expected render_mode None, or "
-            f"vectorization_mode='sync', got {render_mode!r}"
-        )
-
-
 def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
     """The smallest observation space that contains those of all environments.
 
@@ -157,17 +145,62 @@ def seeds_of(seed: Any, count: int) -> Sequence[int | None]:
 
 
 def mask_of(given: Any, count: int) -> Flags:
-    """The mask of robots to reset, shape (count,), bool; all robots for None.
+    """The mask of robots to reset, shape (count,), bool.
+
+    Args:
+        given: `options["reset_mask"]`.
+        count: Number of robots.
 
     Raises:
-        ValueError: The mask is not one bool for each robot, or all are False.
+        TypeError: The mask is not an array of bools.
+        ValueError: It is not one bool for each robot, or all are False.
     """
-    if given is None:
-        return np.ones(count, np.bool_)
-    mask = np.asarray(given)
-    if mask.dtype != np.bool_ or mask.shape != (count,) or not mask.any():
+    # The same types of errors and the same words as in Gymnasium's `SyncVectorEnv`.
+    name = "`options['reset_mask']` must"
+    if not isinstance(given, np.ndarray):
+        raise TypeError(f"{name} be a numpy array, got {type(given)}")
+    if given.shape != (count,):
+        raise ValueError(f"{name} have shape `({count},)`, got {given.shape}")
+    if given.dtype != np.bool_:
+        raise TypeError(f"{name} have `dtype=np.bool_`, got {given.dtype}")
+    if not given.any():
         raise ValueError(
-            f"expected options['reset_mask'] to be {count} bools, at least one of them "
-            f"True, got {given!r}"
+            f"{name} contain a boolean array with at least one True value, got "
+            f"reset_mask={given}"
         )
-    return mask
+    return given
+
+
+def store_actions(actions: Any, commands: Array) -> None:
+    """Stores the actions of a batch as commands for the kernel, which clips them.
+
+    Args:
+        actions: Wheel speeds, shape (num_envs, 2), as an array or as lists.
+        commands: Overwritten, shape (num_envs, 2).
+
+    Raises:
+        ValueError: The actions are not two finite numbers for each robot.
+    """
+    try:
+        given = np.asarray(actions)
+        if given.shape == commands.shape:
+            commands[:] = given
+            if np.isfinite(commands).all():
+                return
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(
+        f"expected actions of two finite numbers in [-1, 1] for each of "
+        f"{len(commands)} robots, got {_fault_in(actions, commands.shape)}"
+    )
+
+
+def _fault_in(actions: Any, expected: tuple[int, ...]) -> str:
+    """A short description of invalid actions, for the error message."""
+    shape = np.shape(actions) if isinstance(actions, np.ndarray) else None
+    if shape is not None and shape != expected:
+        return f"an array of shape {shape}"
+    if shape is None or actions.dtype.kind not in "fiu":
+        return reprlib.repr(actions)
+    robot = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
+    return f"{actions[robot].tolist()} for robot {robot}"

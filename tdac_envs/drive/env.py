@@ -45,10 +45,13 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     Attributes:
         title: Title of the window.
         robot: Arrays of the robot; see `tdac_envs.drive.stepping`.
+        task: The task of the current episode.
     """
 
     title: str
     robot: Any
+    task: Any
+    _scene: Any
     _call_drive: Callable[[], None]
     _steps: int
     _trail: list[tuple[float, float]]
@@ -95,7 +98,6 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
         info = info_of(outcome)
         if self.render_mode is not None:
-            self._steps += 1
             self._note(info["is_success"], info["collision"], truncated)
         return self._observation(), reward, terminated, truncated, info
 
@@ -131,7 +133,16 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     def _frame(self) -> NDArray[np.uint8]:
         raise NotImplementedError
 
+    def _begin_trail(self) -> None:
+        """Begins the picture of an episode at the start of the task."""
+        self._steps = 0
+        self._trail = [self.task.start[:2]]
+        self._status = ""
+        self._scene = None
+
     def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
+        """Adds a step to the picture of the episode."""
+        self._steps += 1
         x, y, _ = self.pose().tolist()
         self._trail.append((x, y))
         self._status = outcome_of(reached, collided, truncated) or self._status

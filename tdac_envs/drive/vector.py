@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Addresses, words_of
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.slices import Rows, Slices
+from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive import stepping
 from tdac_envs.drive.batching import (
     Array,
@@ -27,13 +27,16 @@ from tdac_envs.drive.batching import (
     joint_space,
     mask_of,
     seeds_of,
+    store_actions,
 )
+from tdac_envs.drive.frames import frames_of
 
 Observations = dict[str, NDArray[np.float32]]
+Actions = NDArray[np.float32]
 Result = tuple[Observations, Array, Flags, Flags, dict[str, Any]]
 
 
-class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
+class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
     """Base class of the vector environments: many independent robots.
 
     Robot i behaves bit for bit as `envs[i % len(envs)]` does with the same seed and
@@ -45,6 +48,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         num_envs: Number of robots.
         autoreset_mode: When the next episode begins after one has ended.
         threads: Number of threads; by default the number of cores.
+        render_mode: `"rgb_array"`, for up to 64 robots, or None.
 
     Attributes:
         step_rows: The compiled loop over robots; see
@@ -64,12 +68,14 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         *,
         autoreset_mode: str | AutoresetMode,
         threads: int | None,
+        render_mode: str | None,
     ) -> None:
         self.num_envs = num_envs
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         self.threads = None if threads is None else whole_number("threads", threads, 1)
         first = envs[0]
-        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**first.metadata, "render_modes": ["rgb_array"]}
+        self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_action_space = first.action_space
         self.action_space = batch_space(first.action_space, num_envs)
         self.single_observation_space = joint_space(envs)
@@ -82,6 +88,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         for constants, setup in zip(self.robots.constants, self.setups, strict=True):
             constants[:] = setup.constants()
         self.last_poses = self.pose()
+        self.render_mode = render_mode
+        self._frames = frames_of(render_mode, envs, self.robots, num_envs)
         self._slices = Slices(self.threads)
         self._all = np.arange(num_envs)
         self._everyone = np.ones(num_envs, np.bool_)
@@ -115,12 +123,15 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         Raises:
             ValueError: The number of seeds is wrong, the mask is not one bool for each
                 robot, or `options` is not a dict.
+            TypeError: The mask is not an array of bools.
             TaskError: An option is unknown, or the start or goal is not feasible.
         """
         if not isinstance(options, Mapping | None):
             raise ValueError(f"expected options to be a dict, got {options!r}")
         rest = dict(options or {})
-        mask = mask_of(rest.pop("reset_mask", None), self.num_envs)
+        mask = self._everyone
+        if "reset_mask" in rest:
+            mask = mask_of(rest.pop("reset_mask"), self.num_envs)
         for i, one in enumerate(seeds_of(seed, self.num_envs)):
             if one is not None and mask[i]:
                 self._randoms[i], self._seeds[i] = seeding.np_random(one)
@@ -131,7 +142,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         self._complete(observations, np.flatnonzero(mask).tolist())
         return observations, self._infos(mask)
 
-    def step(self, actions: NDArray[np.float32]) -> Result:
+    def step(self, actions: Actions) -> Result:
         """Runs one time step with wheel speeds of shape (num_envs, 2).
 
         Raises:
@@ -141,7 +152,7 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         """
         if not self._begun:
             raise gym.error.ResetNeeded("call reset() of all robots before step()")
-        self._command(actions)
+        store_actions(actions, self._commands)
         if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
             ended = np.flatnonzero(self._over)
             raise gym.error.ResetNeeded(
@@ -154,6 +165,9 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
             self._draw(np.flatnonzero(self._over), {})
         observations, outcome = self._results()
         self._act(self._all, observations, outcome)
+        if self._frames is not None:
+            self._frames.begin(np.flatnonzero(self._over).tolist(), self.tasks)
+            self._frames.note(np.flatnonzero(~self._over).tolist())
         rewards, terminated, truncated = ends_of(outcome)
         infos = infos_of(outcome, self._everyone)
         np.logical_or(terminated, truncated, out=self._over)
@@ -161,6 +175,31 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
             infos |= self._restart(observations, infos)
         return observations, rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[Image, ...] | None:
+        """A frame of each robot, uint8 (height, width, 3), all of one size.
+
+        The more robots, the smaller: together they fit on 1280 x 1280 pixels.
+
+        Raises:
+            ResetNeeded: Not all robots have been reset yet.
+        """
+        if self._frames is None:
+            gym.logger.warn("render() needs gym.make_vec(..., render_mode='rgb_array')")
+            return None
+        if not self._begun:
+            raise gym.error.ResetNeeded("call reset() of all robots before render()")
+        return self._frames.drawn()
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """What a method or attribute of the batch gives for each robot.
+
+        Libraries call `render` in this way, since `SyncVectorEnv` supports it.
+        """
+        found = getattr(self, name)
+        values = found(*args, **kwargs) if callable(found) else found
+        one_each = isinstance(values, tuple | np.ndarray)
+        return tuple(values) if one_each else (values,) * self.num_envs
 
     def close_extras(self, **_: Any) -> None:
         """Stops the threads."""
@@ -180,7 +219,9 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     @property
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
-        """Seed of each robot."""
+        """Seed of each robot; drawn if it has none yet."""
+        for i in range(self.num_envs):
+            self._random(i)
         return tuple(self._seeds)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -189,6 +230,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._slices = Slices(self.threads)
+        if self._frames is not None:
+            self._frames.bind(self.robots)
         self._bind()
 
     def _seen(self) -> Observations:
@@ -239,6 +282,8 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
         # The caller reads the robots' own arrays, not these copies.
         self._act(chosen, *self._scratch)
         self._over[chosen] = False
+        if self._frames is not None:
+            self._frames.begin(chosen.tolist(), self.tasks)
 
     def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
         """Draws the next tasks of some robots."""
@@ -303,28 +348,3 @@ class DrivenVectorEnv(VectorEnv[Observations, NDArray[np.float32], Any]):
 
     def _infos(self, mask: Flags) -> dict[str, Any]:
         return infos_of(np.where(mask[:, None], self.robots.outcome, 0.0), mask)
-
-    def _command(self, actions: Any) -> None:
-        """Stores the actions as commands for the kernel, which clips them."""
-        try:
-            commands = np.asarray(actions)
-            if commands.shape == self._commands.shape:
-                self._commands[:] = commands
-                if np.isfinite(self._commands).all():
-                    return
-        except (TypeError, ValueError):
-            pass
-        raise ValueError(
-            f"expected actions of two finite numbers in [-1, 1] for each of "
-            f"{self.num_envs} robots, got {self._fault_in(actions)}"
-        )
-
-    def _fault_in(self, actions: Any) -> str:
-        """A short description of invalid actions, for the error message."""
-        shape = np.shape(actions) if isinstance(actions, np.ndarray) else None
-        if shape is not None and shape != self._commands.shape:
-            return f"an array of shape {shape}"
-        if shape is None or actions.dtype.kind not in "fiu":
-            return reprlib.repr(actions)
-        robot = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
-        return f"{actions[robot].tolist()} for robot {robot}"

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
 
 
-class EPuckEnv(DrivenEnv):
+class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     """An e-puck drives through a Webots world to a goal without touching anything.
 
     ## Description
@@ -244,10 +245,7 @@ class EPuckEnv(DrivenEnv):
         self.robot.place(task)
         self._goal[:] = task.goal
         self._call_begin()
-        self._steps = 0
-        self._trail = [task.start[:2]]
-        self._status = ""
-        self._scene = None
+        self._begin_trail()
         info = info_of(self.robot.outcome.tolist())
         if self.render_mode == "human":
             self.render()

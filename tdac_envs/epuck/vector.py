@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.drive.batching import check_no_rendering, make_envs
-from tdac_envs.drive.vector import DrivenVectorEnv, Observations
+from tdac_envs.drive.batching import make_envs
+from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import step_rows
 from tdac_envs.epuck.observed import Observed, ground_readings, noisy, north, position
 
 
-class EPuckVectorEnv(DrivenVectorEnv):
+class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     """A vector of `EPuckEnv` that steps in one compiled call on all cores.
 
     Made by `gym.make_vec("TDAC-EPuck-v0", num_envs=1024)`. Robot i behaves bit for bit
@@ -35,7 +35,7 @@ class EPuckVectorEnv(DrivenVectorEnv):
         each: Arguments that differ between robots, such as `[{"world": "maze"},
             {"world": "yard"}]`; robot i takes entry `i % len(each)`. All robots need
             the same `delay` and the same sensors.
-        render_mode: None; a vector environment cannot render.
+        render_mode: `"rgb_array"`, for up to 64 robots, or None.
         **options: Arguments of `EPuckEnv` for all robots.
 
     Raises:
@@ -55,7 +55,6 @@ class EPuckVectorEnv(DrivenVectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        check_no_rendering(render_mode)
         num_envs = whole_number("num_envs", num_envs, 1)
         envs = make_envs(EPuckEnv, each, options, num_envs)
         if any(env.setup.pushes for env in envs):
@@ -68,6 +67,7 @@ class EPuckVectorEnv(DrivenVectorEnv):
             num_envs,
             autoreset_mode=autoreset_mode,
             threads=threads,
+            render_mode=render_mode,
         )
         self._envs = [envs[i % len(envs)] for i in range(num_envs)]
         self._factors = np.array([env.sensor_noise for env in self._envs])

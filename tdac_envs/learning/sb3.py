@@ -58,6 +58,8 @@ class SB3VecEnv(VecEnv):
         super().__init__(
             batch.num_envs, batch.single_observation_space, batch.single_action_space
         )
+        # For Stable-Baselines3's `VecVideoRecorder`.
+        self.metadata["render_fps"] = batch.metadata["render_fps"]
 
     def reset(self) -> Seen:
         """Starts all episodes with the values of `seed` and `set_options`."""
@@ -103,6 +105,11 @@ class SB3VecEnv(VecEnv):
             infos[i]["TimeLimit.truncated"] = bool(truncated[i])
             infos[i]["terminal_observation"] = info["final_obs"][i]
         return observations, rewards.astype(np.float32), over, infos
+
+    def get_images(self) -> Sequence[NDArray[np.uint8]]:
+        """A frame of each robot, which `render` tiles."""
+        frames: Any = self.batch.render()
+        return list(frames)
 
     def close(self) -> None:
         """Stops the threads."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import ReadingOptions, Shade
 
 
-class Map2DEnv(DrivenEnv):
+class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     """A disc-shaped robot drives across a map to a goal without touching anything.
 
     ## Description
@@ -233,10 +234,7 @@ class Map2DEnv(DrivenEnv):
         robot.place(task)
         self._goal[:] = task.goal
         self._call_begin()
-        self._steps = 0
-        self._trail = [task.start[:2]]
-        self._status = ""
-        self._scene = None
+        self._begin_trail()
         if self.render_mode == "human":
             self.render()
         return self._observation(), info_of(robot.outcome.tolist())

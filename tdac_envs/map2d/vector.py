@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from tdac_envs.core.arguments import whole_number
-from tdac_envs.drive.batching import check_no_rendering, make_envs
-from tdac_envs.drive.vector import DrivenVectorEnv, Observations
+from tdac_envs.drive.batching import make_envs
+from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations
 from tdac_envs.map2d.env import Map2DEnv, noisy
 from tdac_envs.map2d.kernels import step_rows
 
 
-class Map2DVectorEnv(DrivenVectorEnv):
+class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     """A vector of `Map2DEnv` that steps in one compiled call on all cores.
 
     Made by `gym.make_vec("TDAC-Map2D-v0", num_envs=1024)`. Robot i behaves bit for bit
@@ -31,7 +31,7 @@ class Map2DVectorEnv(DrivenVectorEnv):
         each: Arguments that differ between robots, such as `[{"map": "maze"},
             {"map": "office"}]`; robot i takes entry `i % len(each)`. All robots need
             the same `n_rays` and `delay`.
-        render_mode: None; a vector environment cannot render.
+        render_mode: `"rgb_array"`, for up to 64 robots, or None.
         **options: Arguments of `Map2DEnv` for all robots.
     """
 
@@ -48,13 +48,13 @@ class Map2DVectorEnv(DrivenVectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        check_no_rendering(render_mode)
         num_envs = whole_number("num_envs", num_envs, 1)
         super().__init__(
             make_envs(Map2DEnv, each, options, num_envs),
             num_envs,
             autoreset_mode=autoreset_mode,
             threads=threads,
+            render_mode=render_mode,
         )
         noises = [setup.range_noise for setup in self.setups]
         self._noisy = np.flatnonzero(noises)

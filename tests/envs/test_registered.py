@@ -195,6 +195,21 @@ def test_an_episode_ends_at_its_horizon_without_a_time_limit(name):
     assert [env.step(still)[3] for _ in range(5)] == [False] * 4 + [True]
 
 
+@every_env
+def test_with_a_time_limit_observations_may_have_the_time(name):
+    """Wrappers that ask the spec for it find the horizon that `make` was given."""
+    env = gym.make(name, horizon=5, max_episode_steps=5)
+    env = gym.wrappers.TimeAwareObservation(env, flatten=False, normalize_time=True)
+    times = [env.reset(seed=0)[0]["time"].item()]
+    ends = []
+    for _ in range(5):
+        observation, _, terminated, truncated, _ = env.step(np.zeros(2, np.float32))
+        times.append(observation["time"].item())
+        ends.append((terminated, truncated))
+    np.testing.assert_allclose(times, np.arange(6) / 5)
+    assert ends == [(False, False)] * 4 + [(False, True)]
+
+
 @pytest.mark.slow
 @every_env
 def test_ppo_learns_for_2000_steps(name):

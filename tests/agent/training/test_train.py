@@ -32,6 +32,7 @@ from tdac_agent.training.plan import make_batch, make_plan, read_plan, write_pla
 from tdac_agent.training.train import train
 from tdac_envs.core.errors import TaskError
 from tdac_envs.learning.wrappers import wrap
+from tdac_envs.learning.wrapping import FOR_RL
 
 pytest.importorskip("stable_baselines3")
 torch = pytest.importorskip("torch")
@@ -303,7 +304,7 @@ def test_the_shipped_hyperparameters_are_whole(algo, env):
     import stable_baselines3
 
     found = read_hyperparameters(config_file(algo), env)
-    assert found.wrappers == WRAPPERS
+    assert found.wrappers == WRAPPERS == FOR_RL
     arguments = model_arguments(found.model)
     rate = arguments["learning_rate"]
     assert rate(0.0) == 0.0

@@ -199,7 +199,7 @@ def test_a_pickle_goes_on_where_the_batch_was():
     [
         ({"world": "crates", "on_collision": "block"}, "a batch cannot push objects"),
         ({"num_envs": 0}, "num_envs to be a whole number from 1"),
-        ({"render_mode": "rgb_array"}, "expected render_mode None"),
+        ({"render_mode": "human"}, "expected render_mode None"),
         ({"each": [{"gps": True}, {}]}, "the same sensors"),
         ({"each": [{"delay": 1}, {}]}, "the same"),
         ({"world": "mase"}, "mase"),

@@ -12,7 +12,11 @@ from tdac_envs.map2d.env import Map2DEnv
 
 sb3 = pytest.importorskip("stable_baselines3")
 from stable_baselines3.common.evaluation import evaluate_policy  # noqa: E402
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor  # noqa: E402
+from stable_baselines3.common.vec_env import (  # noqa: E402
+    DummyVecEnv,
+    VecMonitor,
+    VecVideoRecorder,
+)
 
 from tdac_envs.learning.sb3 import SB3VecEnv  # noqa: E402
 
@@ -121,3 +125,18 @@ def test_importing_the_environments_imports_neither_sb3_nor_torch():
     run = [sys.executable, "-c", script]
     done = subprocess.run(run, check=True, capture_output=True, text=True)
     assert done.stdout.strip() == "set()"
+
+
+@pytest.mark.filterwarnings("default")
+def test_its_videos_show_all_robots(tmp_path):
+    """In real time, by Stable-Baselines3's own recorder."""
+    pytest.importorskip("moviepy")
+    envs = batch(4, render_mode="rgb_array")
+    envs = VecVideoRecorder(envs, str(tmp_path), lambda k: k == 0, video_length=5)
+    assert envs.frames_per_sec == 20
+    envs.reset()
+    assert envs.render().shape[1] > 1000
+    for _ in range(6):
+        envs.step(np.ones((4, 2), np.float32))
+    envs.close()
+    assert len(list(tmp_path.glob("*.mp4"))) == 1

@@ -222,7 +222,8 @@ def test_without_autoreset_an_ended_episode_is_not_stepped():
         ({"num_envs": 0}, "num_envs to be a whole number from 1"),
         ({"autoreset_mode": "Never"}, "autoreset_mode to be one of 'NextStep'"),
         ({"threads": 0}, "threads to be a whole number from 1"),
-        ({"render_mode": "rgb_array"}, "expected render_mode None"),
+        ({"render_mode": "human"}, "expected render_mode None"),
+        ({"render_mode": "rgb_array", "num_envs": 65}, "more than 64 robots"),
         ({"each": {"map": "maze"}}, "expected each to be a list of dicts"),
         ({"each": ["maze"]}, "expected each to be a list of dicts"),
         ({"each": [{}, {}, {}]}, "each has 3 entries for 2 robots"),
@@ -242,8 +243,6 @@ def test_wrong_arguments_are_named(options, message):
         ({"seed": [1, 2]}, "expected 3 seeds"),
         ({"seed": 1.5}, "expected a whole number as seed, or 3 of them"),
         ({"options": "start"}, "expected options to be a dict"),
-        ({"options": {"reset_mask": np.zeros(3, bool)}}, "reset_mask"),
-        ({"options": {"reset_mask": [True]}}, "to be 3 bools"),
     ],
 )
 def test_wrong_seeds_and_masks_are_named(arguments, message):

@@ -1,0 +1,44 @@
+"""Trains CleanRL's PPO on the maze, with CleanRL's own unmodified file.
+
+    python examples/cleanrl_maze.py cleanrl/cleanrl/ppo_continuous_action.py --seed 1
+
+Further arguments are those of CleanRL's file. It needs torch, tyro and tensorboard.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from typing import Any
+
+import gymnasium as gym
+from maze import STEPS, ended, maze
+
+ARGUMENTS = [
+    *("--env-id", "Maze-v0", "--total-timesteps", str(STEPS)),
+    *("--num-envs", "8", "--num-steps", "256", "--num-minibatches", "8"),
+    *("--learning-rate", "1e-3", "--gamma", "0.995"),
+]
+
+
+class TransformObservation(gym.wrappers.TransformObservation):
+    """Gymnasium's wrapper as of 0.29, for which CleanRL's file is written."""
+
+    def __init__(self, env: Any, func: Any, observation_space: Any = None) -> None:
+        super().__init__(env, func, observation_space or env.observation_space)
+
+
+def main() -> None:
+    """Runs CleanRL's file and prints whether its policy has learnt the maze."""
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    file = sys.argv[1]
+    gym.register("Maze-v0", entry_point=maze)
+    gym.wrappers.TransformObservation = TransformObservation
+    sys.argv = [file, *ARGUMENTS, *sys.argv[2:]]
+    runpy.run_path(file, run_name="__main__")
+    print(ended())
+
+
+if __name__ == "__main__":
+    main()

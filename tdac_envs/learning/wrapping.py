@@ -1,0 +1,59 @@
+"""The observations for reinforcement learning, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, overload
+
+from gymnasium.vector import VectorEnv
+
+from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
+from tdac_envs.learning.wrappers import Env, wrap
+
+FOR_RL = ("goal-relative", "guidance", "flatten")
+"""The wrappers of `tdac train`, innermost first."""
+
+
+@overload
+def wrap_for_rl(
+    env: VectorEnv[Any, Any, Any], names: Sequence[str] = FOR_RL
+) -> WrappedVectorEnv: ...
+
+
+@overload
+def wrap_for_rl(env: Env, names: Sequence[str] = FOR_RL) -> Env: ...
+
+
+def wrap_for_rl(
+    env: Env | VectorEnv[Any, Any, Any], names: Sequence[str] = FOR_RL
+) -> Env | WrappedVectorEnv:
+    """Makes observations flat, scaled to [-1, 1], and relative to robot and goal.
+
+        env = wrap_for_rl(gym.make("TDAC-Map2D-v0"))
+        envs = wrap_for_rl(gym.make_vec("TDAC-Map2D-v0", 64))
+        envs = gym.make_vec("TDAC-Map2D-v0", 8, "async", wrappers=[wrap_for_rl])
+
+    An observation is one float32 array, with these parts in alphabetical order:
+
+    | part | size | content |
+    |---|---|---|
+    | `goal` | 3 | direction of the goal in the robot's frame, and its distance |
+    | `guidance` | 2 | the next waypoint of the shortest path with a margin |
+    | `ranges` or `ps` | n | reading / largest possible reading |
+    | `wheel_speeds` | 2 | left, right, as last applied |
+
+    Guidance is computed from the whole map. A policy for sensors alone does without:
+    `names=("goal-relative", "flatten")`. Rewards, actions and ends of episodes stay as
+    they are. `tdac train` uses this function.
+
+    Args:
+        env: Either environment, single or batched, with its original observations.
+        names: Names in `tdac_envs.wrappers.WRAPPERS`, innermost first.
+
+    Raises:
+        TaskError: It is not an environment of `tdac_envs`, a name is unknown, or a
+            wrapper does not support the observations.
+    """
+    if isinstance(env, VectorEnv):
+        return WrappedVectorEnv(env, names)
+    return wrap(env, names)
