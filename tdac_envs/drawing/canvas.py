@@ -31,6 +31,8 @@ ENLARGE_TO = 900
 NARROWEST = 320
 TEXT_SIZE = 0.45
 _SHIFT = 4
+# Points beyond are drawn here: OpenCV's coordinates are 32-bit integers.
+_FARTHEST = 1 << 28
 _ENTRIES_PER_PX = 8.0
 _TEXT_ZOOM = 4
 
@@ -243,7 +245,8 @@ def write_text(image: Image, x: int, baseline: int, text: str, colour: Colour) -
 
 def _fixed(points: NDArray[np.float64]) -> NDArray[np.int32]:
     """OpenCV's fixed-point coordinates."""
-    return np.rint(points * (1 << _SHIFT)).astype(np.int32)
+    fixed = np.clip(np.rint(points * (1 << _SHIFT)), -_FARTHEST, _FARTHEST)
+    return fixed.astype(np.int32)
 
 
 def _map_picture(cells: BoolGrid, scale: float) -> Image:

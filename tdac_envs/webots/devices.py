@@ -36,6 +36,7 @@ _DEFAULTS = {
 }  # fmt: skip
 _MUTE_KINDS = {"Emitter", "Receiver", "Speaker", "LED"}
 _MUTE = (("Emitter", 43), ("Receiver", 56), ("Speaker", 59))
+_MOST_VALUES = 2_000_000
 GYRO_SCALE = 100000.0 / 13.3158
 """Gyro reading per rad/s."""
 _MAX_RATE, _MAX_ACCEL = 13.3158, 100.0
@@ -124,10 +125,13 @@ def renamed_sensors(mounted: tuple[Mount, ...]) -> list[tuple[str, int]]:
 
 def _facts_of(node: Node) -> dict[str, Any]:
     """Facts about a device that is not modelled."""
-    if node.kind == "Lidar":
-        rows = number(node, "numberOfLayers", 4.0)
-        return {"width": int(number(node, "horizontalResolution", 512.0) * rows)}
-    return {"width": int(number(node, "width", 64.0))}
+    names = ("horizontalResolution", "numberOfLayers"), (512.0, 4.0)
+    if node.kind != "Lidar":
+        names = ("width", "height"), (64.0, 64.0)
+    width, height = (int(number(node, *each)) for each in zip(*names, strict=True))
+    if not (0 <= width and 0 <= height and width * height <= _MOST_VALUES):
+        width = height = 0
+    return {"width": width, "height": height}
 
 
 def _standard(max_velocity: float) -> list[DeviceFacts]:

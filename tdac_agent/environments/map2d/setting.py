@@ -22,6 +22,7 @@ from tdac_envs.map2d.picture import ROBOT_IMAGE
 from tdac_envs.map2d.source import prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.bundled import bundled_maps
+from tdac_envs.mapping.fault import fault_of
 from tdac_envs.mapping.image import picture_size, read_bytes
 from tdac_envs.mapping.map_folder import preview_of, write_grid
 from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
@@ -185,6 +186,8 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     try:
         nominal = _feasible(prepared.grid, params, spec, units)
     except TaskError as error:
+        if fault_of(prepared.grid.cells, params, units) is None:
+            raise
         image = as_image(prepared.image or prepared.grid.cells)
         picture = (image, prepared.grid, params, units)
         message = f"{params.source}: {error}"

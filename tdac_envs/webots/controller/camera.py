@@ -25,10 +25,16 @@ class Camera(Sensor):
         self._sampled: Any = None
         self._image: bytes | None = None
 
+    def enable(self, p: int) -> None:
+        """Takes an image every `p` ms, first after `p` ms; 0 disables the camera."""
+        self._enabled_at = connection.time
+        super().enable(p)
+
     def getImage(self) -> bytes | None:
         """The last image: blue, green, red and 255 of each pixel, row by row.
 
-        None before the first sample, and with an error if the camera is disabled.
+        Black before the first sample, as in Webots; None before the first step, and
+        with an error if the camera is disabled.
         """
         return self._last("get_image")
 
@@ -141,7 +147,8 @@ class Camera(Sensor):
         """The image of the last sample, asked for once; None if there is none."""
         sampled = self._sample(getter, None)
         if sampled is None:
-            return None
+            is_stepped = self._period > 0 and connection.time > self._enabled_at
+            return bytes(4 * self.width * self.height) if is_stepped else None
         if sampled != self._sampled:
             self._sampled, self._image = sampled, connection.image(self.name)
         return self._image

@@ -45,14 +45,17 @@ class Unknown(_Mute):
 
     def _neutral(self, call: str) -> Any:
         """What a call returns: NaN or nothing, and a scan that meets nothing."""
-        if call == "getRangeImage":
-            return [math.inf] * self._width()
-        if call in ("getWidth", "getHorizontalResolution"):
-            return self._width()
-        return {"getValue": math.nan, "getValues": [math.nan] * 3}.get(call)
-
-    def _width(self) -> int:
-        return int(self._facts.get("width", 0))
+        width, height = (int(self._facts.get(k, 0)) for k in ("width", "height"))
+        results: dict[str, Any] = {
+            "getRangeImage": [math.inf] * (width * height),
+            "getWidth": width,
+            "getHeight": height,
+            "getHorizontalResolution": width,
+            "getNumberOfLayers": height,
+            "getValue": math.nan,
+            "getValues": [math.nan] * 3,
+        }
+        return results.get(call)
 
 
 class Emitter(_Mute):
@@ -153,6 +156,11 @@ class RadarTarget:
 
 class RangeFinder(Unknown):
     """Not modelled."""
+
+    @staticmethod
+    def rangeImageGetDepth(image: list[float], width: int, x: int, y: int) -> float:
+        """A pixel of a range image."""
+        return image[y * width + x]
 
 
 class Skin(Unknown):

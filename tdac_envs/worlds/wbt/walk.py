@@ -52,6 +52,8 @@ def walk(node: Node, frame: Frame, found: WorldContent) -> None:
     try:
         _walk(node, frame, found)
     except StrayError as error:
+        if is_epuck(node):
+            raise
         found.left_out(node, frame, str(error))
 
 

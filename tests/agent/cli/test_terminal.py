@@ -169,11 +169,12 @@ def test_a_process_on_a_terminal(tmp_path):
 
 
 NAMES_OF_ITS_OWN = """
-import sys
+import functools
 
 
 def policy(obs):
-    for module in list(sys.modules.values()):
+    modules = functools.__spec__.loader.load_module.__globals__["sys"].modules
+    for module in list(modules.values()):
         if hasattr(module, "type_name"):
             module.type_name = lambda value: "\\ud800\\x1b[2J\\nverified: 41 of 41"
     return object()
@@ -189,7 +190,7 @@ def test_a_name_that_nothing_can_print_is_no_fault_of_ours(tdac, tmp_path, kind)
     for expected, command, *flags in (
         (1, "verify", "--profile", "policy"),
         (1, "play", "--video", "a.gif"),
-        (0, "evaluate", "--episodes", "2"),
+        (1, "evaluate", "--episodes", "2"),
     ):
         code, out, err = tdac(command, evil, "--task", place, *flags)
         assert (code, err) == (expected, "")

@@ -131,7 +131,7 @@ def use_run(folder: Path) -> None:
     json.dumps(row).encode()
     with contextlib.redirect_stdout(io.StringIO()):
         console = Console()
-        console.print(runs_command._table([row], 120))
+        console.print(runs_command._table([row], folder, 120))
         show_run(load_run(folder), console)
     told = gather_run(folder)
     for tried in told.tried:
