@@ -129,7 +129,7 @@ def _facts_of(node: Node) -> dict[str, Any]:
     if node.kind != "Lidar":
         names = ("width", "height"), (64.0, 64.0)
     width, height = (int(number(node, *each)) for each in zip(*names, strict=True))
-    if not (0 <= width and 0 <= height and width * height <= _MOST_VALUES):
+    if not (width >= 0 and height >= 0 and width * height <= _MOST_VALUES):
         width = height = 0
     return {"width": width, "height": height}
 
