@@ -9,9 +9,9 @@
 #                     other Pythons, another user, other processors, a busy machine. The
 #                     table also lists what could not run, and why. Selected rows:
 #                     make portability ROWS="lowest wheel-user"
-#   make clients      Short trainings with other people's RL libraries, each installed in
-#                     its own environment; prints the table of docs/clients.md. Selected
-#                     ones: make clients CLIENTS="sb3 skrl"
+#   make clients      A short training with each RL library of docs/clients.md, installed
+#                     in its own environment; prints a table. Selected libraries:
+#                     make clients CLIENTS="sb3 skrl"
 #   make lint         Style, types and import rules.
 PYTHON ?= python3
 VENV ?= .venv

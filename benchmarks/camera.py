@@ -1,8 +1,8 @@
-"""Times camera images of Webots controllers, in bundled worlds.
+"""Times the camera images of Webots controllers in bundled worlds.
 
     python -m benchmarks.camera [--rounds N]
 
-Each case takes a new sample and renders it, from the robot's start.
+Each case takes a new sample at the robot's start and renders it.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
     python -m benchmarks.real_controllers DIR [--only NAME] [--steps N] [--json FILE]
 
 DIR contains a folder OWNER+NAME for each repository of `real_controllers.yaml`, at the
-commit given there. Nothing is fetched. Every controller runs in the sandbox, in the
-world file that its repository has for it, without a goal.
+commit given there; the program downloads nothing. Every controller runs in the
+sandbox, in the world file of its own repository, without a goal.
 
 A controller *runs* if it raises no error and moves nothing as a supervisor, commands
 the wheels, and the robot gets farther than its radius from the start. A world that is
@@ -53,9 +53,9 @@ class Entry:
         commit: Commit that was measured.
         controller: Path of the controller in the repository.
         world: Path of its world in the repository.
-        licence: Licence that the repository states.
+        licence: Licence as stated by the repository.
         expected: `runs`, `ignore` (runs with `--ignore`) or `refused`.
-        reason: Why it is refused; else empty.
+        reason: Why it is refused; otherwise empty.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Row:
 
     Attributes:
         name: Name in the index.
-        result: `runs` as it is, runs with `--ignore`, or `fails`.
+        result: `runs`, `ignore` (runs with `--ignore`) or `fails`.
         expected: As in the index.
         ignored: Types of nodes that were ignored.
         moved: Greatest distance from the start, m.
@@ -101,7 +101,7 @@ def read_index(path: Path = INDEX) -> list[Entry]:
 
 
 def measure(entry: Entry, folder: Path, steps: int) -> Row:
-    """Runs a controller as it is, and with `--ignore` if its world is refused."""
+    """Runs a controller, again with `--ignore` if its world is refused."""
     tree = folder / entry.repository.replace("/", "+")
     controller, world = tree / entry.controller, tree / entry.world
     ignored: tuple[str, ...] = ()
@@ -184,7 +184,7 @@ def show(rows: Sequence[Row], console: Console) -> None:
     total = max(len(counted), 1)
     as_is, all_ = found["runs"], found["runs"] + found["ignore"]
     console.print(
-        f"{len(rows)} controllers, {len(counted)} should run: {as_is} as they are "
+        f"{len(rows)} controllers, {len(counted)} should run: {as_is} run unchanged "
         f"({as_is / total:.0%}), {all_} with --ignore ({all_ / total:.0%})"
     )
 

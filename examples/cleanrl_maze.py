@@ -1,8 +1,9 @@
-"""Trains CleanRL's PPO on the maze, with CleanRL's own unmodified file.
+"""Trains CleanRL's PPO on the maze with CleanRL's own, unmodified file.
 
     python examples/cleanrl_maze.py cleanrl/cleanrl/ppo_continuous_action.py --seed 1
 
-Further arguments are those of CleanRL's file. It needs torch, tyro and tensorboard.
+Further arguments are passed to CleanRL's file. This program needs torch, tyro and
+tensorboard.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import sys
 from typing import Any
 
 import gymnasium as gym
-from maze import STEPS, ended, maze
+from maze import STEPS, make_maze, result_line
 
 ARGUMENTS = [
     *("--env-id", "Maze-v0", "--total-timesteps", str(STEPS)),
@@ -22,7 +23,7 @@ ARGUMENTS = [
 
 
 class TransformObservation(gym.wrappers.TransformObservation):
-    """Gymnasium's wrapper as of 0.29, for which CleanRL's file is written."""
+    """The wrapper with the signature of Gymnasium 0.29, which CleanRL's file uses."""
 
     def __init__(self, env: Any, func: Any, observation_space: Any = None) -> None:
         super().__init__(env, func, observation_space or env.observation_space)
@@ -33,11 +34,11 @@ def main() -> None:
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     file = sys.argv[1]
-    gym.register("Maze-v0", entry_point=maze)
+    gym.register("Maze-v0", entry_point=make_maze)
     gym.wrappers.TransformObservation = TransformObservation
     sys.argv = [file, *ARGUMENTS, *sys.argv[2:]]
     runpy.run_path(file, run_name="__main__")
-    print(ended())
+    print(result_line())
 
 
 if __name__ == "__main__":

@@ -2,14 +2,14 @@
 
     python examples/rllib_maze.py --seed 1
 
-It needs `ray[rllib]` and torch.
+This program needs `ray[rllib]` and torch.
 """
 
 from __future__ import annotations
 
 import argparse
 
-from maze import STEPS, Successes, ended, maze
+from maze import STEPS, Successes, make_maze, result_line
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
 from ray.tune.registry import register_env
@@ -23,10 +23,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--steps", type=int, default=STEPS)
     given = parser.parse_args()
-    register_env("maze", lambda _: maze())
+    register_env("maze", lambda _: make_maze())
     config = (
         PPOConfig()
-        # RLlib would stretch actions to their range, and the exploration with them.
+        # Otherwise RLlib scales actions, and with them the exploration noise.
         .environment("maze", normalize_actions=False, clip_actions=True)
         .env_runners(num_env_runners=0, num_envs_per_env_runner=8)
         .training(
@@ -53,7 +53,7 @@ def main() -> None:
     while Successes.steps < given.steps:
         algorithm.train()
     algorithm.stop()
-    print(ended())
+    print(result_line())
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ def test_every_program_is_there(tool):
     [
         ("print('first'); print('7 steps')", 60.0, "passed", "7 steps"),
         ("raise ValueError('too short')", 60.0, "failed", "ValueError: too short"),
-        ("while True: pass", 0.5, "failed", "no end within 0.5 s"),
+        ("while True: pass", 0.5, "failed", "did not end within 0.5 s"),
     ],
 )
 def test_an_outcome_says_what_happened(tool, tmp_path, program, timeout, result, said):

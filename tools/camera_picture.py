@@ -1,9 +1,9 @@
-"""Draws docs/camera.png: a camera image of the e-puck in the bundled world `room`.
+"""Draws `docs/camera.png`: a camera image of the e-puck in the bundled world `room`.
 
     python tools/camera_picture.py [FILE]
 
-On the left the image of the e-puck's own camera, enlarged; on the right the same view
-with six times as many columns and rows.
+The left half is the image of the e-puck's own camera, enlarged. The right half is the
+same view with six times as many columns and rows.
 """
 
 from __future__ import annotations

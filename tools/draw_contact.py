@@ -22,7 +22,7 @@ FREE, TOUCHING, WALL = "#3B6EA5", "#C8641E", "#3A3F45"
 
 
 def drive() -> tuple[np.ndarray, list[bool], np.ndarray, float]:
-    """Poses, shape (n, 3), whether each is a contact, the map, and the body radius."""
+    """Poses, shape (n, 3); whether each is a contact; the map; the body radius, px."""
     cells = np.zeros((150, 260), np.bool_)
     cells[120:], cells[:, 220:] = True, True
     env = Map2DEnv(

@@ -1,12 +1,13 @@
-"""Trains with other people's reinforcement-learning libraries for a few minutes.
+"""Runs a short training with each of several reinforcement-learning libraries.
 
 python3 tools/clients [NAME ...] [--work DIR] [--timeout SECONDS]
 
-Each library gets a virtual environment of its own. Prints a Markdown table for
-`docs/clients.md`. A library that cannot be installed is "not run", with the reason; one
-that fails does not stop the others. Exit 0 if none of them failed.
+Each library is installed in its own virtual environment. The program prints a Markdown
+table. A library that cannot be installed is "not run", with the reason; the others
+still run if one fails. The exit code is 0 if none of them failed.
 
-`CLEANRL=PATH` names CleanRL's `ppo_continuous_action.py`, which is used as it is.
+The environment variable `CLEANRL=PATH` names CleanRL's `ppo_continuous_action.py`,
+which is used unmodified.
 """
 
 from __future__ import annotations
@@ -55,15 +56,15 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(LIBRARIES))
     parser.add_argument(
-        "--work", type=Path, help="folder of the virtual environments, which is kept"
+        "--work", type=Path, help="folder for the virtual environments; it is kept"
     )
     parser.add_argument(
-        "--timeout", type=float, default=1800.0, help="of each training, seconds"
+        "--timeout", type=float, default=1800.0, help="time limit of each training, s"
     )
     return parser.parse_args()
 
 
 if __name__ == "__main__":
-    # Threads of one training would only wait for those of another.
+    # One thread is faster for small networks.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     sys.exit(main())

@@ -20,11 +20,11 @@ _VERSIONS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one library.
+    """The result for one library.
 
     Attributes:
         name: Name of the library.
-        trained: What was to be trained.
+        trained: What the program trains.
         versions: Versions of the library and of Gymnasium, if it was installed.
         result: `PASSED`, `FAILED` or `NOT_RUN`.
         said: Last line of the program, or the reason.
@@ -38,7 +38,7 @@ class Outcome:
 
 
 def attempt(name: str, library: Library, work: Path, timeout: float) -> Outcome:
-    """Tries one library; whatever goes wrong is in the outcome."""
+    """Tries one library; the outcome states any error."""
     if library.missing:
         return Outcome(name, library.trained, "", NOT_RUN, library.missing)
     folder = work / name
@@ -57,7 +57,7 @@ def attempt(name: str, library: Library, work: Path, timeout: float) -> Outcome:
 def _install(python: Path, library: Library) -> str:
     """Installs a library and tdac; returns why it failed, or an empty string."""
     pip = [python, "-m", "pip", "install", "--quiet"]
-    # First torch: a library would select the newest build, which may be much larger.
+    # torch first: otherwise a library selects its newest build, which may be larger.
     if library.torch:
         reason = _run([*pip, _torch()])[1]
         if reason:
@@ -67,7 +67,7 @@ def _install(python: Path, library: Library) -> str:
 
 
 def _torch() -> str:
-    """The requirement of torch that the tests use."""
+    """The requirement for torch from the extra `test`."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     test: list[str] = project["project"]["optional-dependencies"]["test"]
     return next(line for line in test if line.startswith("torch"))
@@ -90,7 +90,7 @@ def _run(
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return 1, f"no end within {timeout:g} s", ""
+        return 1, f"did not end within {timeout:g} s", ""
     said, wrong = _last(done.stdout), _last(done.stderr)
     if done.returncode == 0:
         return 0, "", said

@@ -1,4 +1,4 @@
-"""The libraries, what each of them needs, and the program that trains with it."""
+"""The libraries, their requirements, and the program that trains with each."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Library:
     Attributes:
         trained: What the program trains, for the table.
         program: The program and its arguments.
-        needs: What pip installs, in addition to tdac.
+        needs: Requirements that pip installs in addition to tdac.
         shown: Distributions whose versions the table shows.
-        torch: Whether it needs torch.
+        torch: Whether the library needs torch.
         missing: Why it cannot run; empty if it can.
     """
 

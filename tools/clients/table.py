@@ -1,4 +1,4 @@
-"""The table of outcomes, for `docs/clients.md`."""
+"""The table of outcomes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _LONGEST = 160
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """A Markdown table, a row for each library, and the version of Python."""
+    """A Markdown table with a row for each library, and the version of Python."""
     rows = ["| library | versions | trained | result |", "|---|---|---|---|"]
     rows += [_row(outcome) for outcome in outcomes]
     python = f"Python {platform.python_version()}, {platform.machine()}"

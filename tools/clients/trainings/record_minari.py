@@ -1,4 +1,4 @@
-"""Minari: records three episodes as a data set, and reads them."""
+"""Minari: records three episodes as a data set and reads it."""
 
 import os
 import tempfile
@@ -9,7 +9,7 @@ STEPS = 40
 
 
 def main():
-    """Records, reads, and prints how much."""
+    """Records and reads the data set; prints its numbers of episodes and steps."""
     with tempfile.TemporaryDirectory() as folder:
         os.environ["MINARI_DATASETS_PATH"] = folder
         import minari

@@ -22,7 +22,7 @@ def batch(count, **options):
 
 
 def main():
-    """Trains, and prints how much."""
+    """Trains, and prints the numbers of steps."""
     check_env(gym.make(MAZE))
     check_env(GoalView(gym.make(MAZE)))
     envs = VecMonitor(batch(16, variation="mixed"))

@@ -16,7 +16,7 @@ def batch(count):
 
 
 def main():
-    """Trains, and prints how much."""
+    """Trains, and prints the numbers of steps."""
     models = [
         TRPO("MlpPolicy", batch(16), n_steps=64, batch_size=256, seed=0),
         RecurrentPPO("MlpLstmPolicy", batch(8), n_steps=32, batch_size=64, seed=0),

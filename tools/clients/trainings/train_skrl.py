@@ -16,7 +16,7 @@ NETWORK = [
 
 
 def main():
-    """Trains, and prints how much."""
+    """Trains, and prints the numbers of steps."""
     plain = wrap_env(gym.make_vec("TDAC-Map2D-v0", 2, render_mode="rgb_array"))
     plain.reset()
     assert len(plain.render()) == 2

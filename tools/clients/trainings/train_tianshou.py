@@ -22,7 +22,7 @@ def make():
 
 
 def main():
-    """Trains, and prints how much."""
+    """Trains, and prints the numbers of steps."""
     torch.manual_seed(0)
     envs, env = DummyVectorEnv([make] * COUNT), make()
     shape, actions = env.observation_space.shape, env.action_space.shape

@@ -21,7 +21,7 @@ def network(inputs, outputs):
 
 
 def main():
-    """Trains, and prints how much."""
+    """Trains, and prints the numbers of steps."""
     torch.manual_seed(0)
     env = GymWrapper(wrap_for_rl(gym.make("TDAC-Map2D-v0", variation="mixed")))
     check_env_specs(env)
