@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 LONGEST_SECONDS = 60.0
-"""A video at real time is at most this long; of a longer episode it plays faster."""
+"""Longest video in real time, s; the video of a longer episode plays faster."""
 MOST_FPS = 25.0
 
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """How an episode is filmed.
+    """How a video shows an episode.
 
     Attributes:
         speed: Simulated time / playing time.

@@ -10,7 +10,7 @@ from rich.text import Text
 from tdac_agent.cli.console import Console
 from tdac_agent.storage.plain import printable
 
-# A line that a controller prints more often is shown once, with its count.
+# A line that a controller prints more often than this is shown once, with its count.
 REPEATS = 5
 _CONTROL_SEQUENCES = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\r")
 
@@ -24,7 +24,7 @@ def show_printed(text: str, console: Console) -> None:
 
 
 def _without_repeats(text: str) -> str:
-    """The text with each often repeated line once, followed by its count."""
+    """The text, in which a frequent line occurs once, followed by its count."""
     lines = text.rstrip().splitlines()
     counts = Counter(lines)
     kept: list[str] = []

@@ -1,4 +1,4 @@
-"""The flags by which a command's user names a task, as one parameter of the command."""
+"""The flags that name the task of a command, as one parameter of its function."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class NamedTask(Protocol):
-    """A command's parameter for the flags of its task; `TaskFlags` imports slowly."""
+    """Type of the parameter `named_task`; a call imports `TaskFlags`, which is slow."""
 
     def __call__(self) -> TaskFlags:
         """The flags of the task."""
@@ -106,7 +106,7 @@ def takes_task(
 
 
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
-    """The parameters of a function, their annotations evaluated."""
+    """The parameters of a function, with evaluated annotations."""
     # `TaskFlags` is not imported at run time; only the return annotation names it.
     hints = get_type_hints(function, localns={"TaskFlags": object}, include_extras=True)
     return [

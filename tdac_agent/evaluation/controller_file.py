@@ -15,7 +15,7 @@ MOST_PROBLEMS = 3
 
 
 def check_controller(name: str, source: bytes) -> None:
-    """Refuses a file that cannot be a controller, or imports what none may import.
+    """Refuses a file that is not a controller or that imports a forbidden module.
 
     An evaluation does not run the tests of the contract. Without this check, a
     controller could be compared with others although `tdac verify` refuses it.
@@ -25,8 +25,8 @@ def check_controller(name: str, source: bytes) -> None:
         source: Its bytes.
 
     Raises:
-        ControllerFileError: It is no Python file, defines no `policy`, or imports a
-            module that is not allowed.
+        ControllerFileError: The file is not a Python file, defines no `policy`, or
+            imports a module that is not allowed.
     """
     try:
         tree = parse_source(source)

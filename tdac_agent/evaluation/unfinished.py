@@ -1,4 +1,4 @@
-"""Where an evaluation keeps finished episodes until its results are written."""
+"""The folder that keeps finished episodes until an evaluation writes its results."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ FOLDER = "unfinished"
 def open_store(out: Path | None) -> Generator[Path]:
     """Opens the folder of finished episodes; removes it if the block succeeds.
 
-    An interrupted evaluation leaves it in `out`; without `out` it is temporary.
+    An interrupted evaluation leaves the folder in `out`; without `out` it is temporary.
 
     Raises:
-        RunError: It cannot be written, or another evaluation writes to it.
+        RunError: The folder cannot be written, or another evaluation writes to it.
     """
     with ExitStack() as stack:
         if out is None:
@@ -54,7 +54,7 @@ def count_kept(out: Path) -> int:
 
 
 def folder_of(store: Path, task: Task, job: SeededJob, sha256: str | None) -> Path:
-    """The folder, made if missing, of a policy's episodes on a task.
+    """The folder of a policy's episodes on a task; created if it is missing.
 
     Its name depends on everything that determines an episode, except its seed.
 

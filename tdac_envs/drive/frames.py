@@ -1,4 +1,4 @@
-"""Frames of a batch: one picture for each robot, all of one size."""
+"""Frames of a batch: one picture for each robot, all of the same size."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tdac_envs.drive.env import DrivenEnv
 from tdac_envs.drive.stepping import REACHED, TOUCHED, TRUNCATED
 
 MOST_DRAWN = 64
-"""Number of robots in the largest batch that can be rendered."""
+"""Largest number of robots in a batch that can be rendered."""
 SIDE = 1280
-"""Side of a square on which the frames of all robots fit beside each other, px."""
+"""Side of a square into which the frames of all robots fit side by side, px."""
 
 
 class Frames:
@@ -31,18 +31,18 @@ class Frames:
     """
 
     def __init__(self, envs: Sequence[DrivenEnv], robots: Any, count: int) -> None:
-        # Copies that draw; they are never stepped.
+        # These copies only draw; they are never stepped.
         self._viewers = [copy.copy(envs[i % len(envs)]) for i in range(count)]
         self._largest = SIDE // math.ceil(math.sqrt(count))
         self.bind(robots)
 
     def bind(self, robots: Any) -> None:
-        """Draws the robots with these arrays from now on."""
+        """From now on, draws the robots of these arrays."""
         for i, viewer in enumerate(self._viewers):
             viewer.robot = robots.row(i)
 
     def begin(self, which: Iterable[int], tasks: Sequence[Any]) -> None:
-        """Begins the trails of some robots, which have been reset.
+        """Begins new trails for robots that have been reset.
 
         Args:
             which: Indices of these robots.
@@ -64,7 +64,7 @@ class Frames:
 
     def drawn(self) -> tuple[Image, ...]:
         """A frame of each robot, uint8 (height, width, 3), all of one even size."""
-        # Robots with the same task share the map, which takes longest to draw.
+        # Robots with the same task share the map, which takes the longest to draw.
         scenes = {id(v.task): v._scene for v in self._viewers if v._scene is not None}
         frames = []
         for viewer in self._viewers:
@@ -78,10 +78,10 @@ class Frames:
 def frames_of(
     mode: object, envs: Sequence[DrivenEnv], robots: Any, count: int
 ) -> Frames | None:
-    """The frames of a batch with this render mode, or None for None.
+    """The frames of a batch with this render mode; None if the mode is None.
 
     Raises:
-        TaskError: A batch does not have this mode, or has too many robots.
+        TaskError: Batches do not have this mode, or the batch has too many robots.
     """
     if mode is None:
         return None

@@ -1,11 +1,12 @@
-"""Compiled motion of a disc that is not stopped by obstacles but slides along them.
+"""Compiled motion of a disc that slides along obstacles instead of stopping.
 
-The rule is the limit of slow motion with dry friction. Up to a contact, the robot
-follows its arc exactly. In contact, its wheels slip: the body keeps turning as
-commanded, loses its velocity into the obstacle, and friction between its rim and the
-obstacle changes its velocity along the obstacle by at most `friction` times the lost
-velocity, until the rim no longer slides. It never gets faster than commanded. In a
-corner that it can only enter, it turns on the spot.
+The motion is the limit of rigid-body dynamics with dry friction in which the tyres
+reach their speed immediately. Up to a contact, the robot follows its arc exactly. In
+contact, its wheels slip: the body keeps turning as commanded and loses its velocity
+component into the obstacle. Friction between its rim and the obstacle changes its
+tangential velocity by at most `friction` times the lost component, until the rim no
+longer slides. The body never moves faster than commanded. In a corner, where every
+velocity would lead into an obstacle, it turns on the spot.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from tdac_envs.core.compiled import subkernel
 from tdac_envs.drive.stepping import HEADING, Array, X, Y, move, wrap_angle
 
 MOST_NORMALS = 16
-"""Contacts considered at a time."""
+"""Largest number of contacts considered at a time."""
 _FEWEST_PIECES, _MOST_PIECES, _TURN_OF_A_PIECE = 8, 32, 0.1
 _INTO = -1e-9
 
 
 def sliding(find_contact: Any, find_normals: Any) -> Any:
-    """Returns the subkernel `slide` for one kind of obstacles.
+    """Returns the subkernel `slide` for one kind of obstacle.
 
     Args:
         find_contact: Subkernel `(obstacles, x, y, heading, forward, turn, radius)` that
@@ -47,7 +48,7 @@ def sliding(find_contact: Any, find_normals: Any) -> Any:
         friction: float,
         gap: float,
     ) -> bool:
-        """Moves a disc for one step, along obstacles where they are in its way.
+        """Moves a disc for one step; it slides along obstacles that are in its way.
 
         Args:
             obstacles: First argument of `find_contact` and `find_normals`.

@@ -1,4 +1,4 @@
-"""Units of places and lengths on a map, as the user types and reads them."""
+"""Units in which a user types and reads places and lengths on a map."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class MapFrame:
 class MapUnits:
     """Pixels, or metres in the map's frame.
 
-    Computations use pixels. These units are for what a user types and reads.
+    Computations use pixels; these units are only for input and output.
 
     Attributes:
         frame: Frame of the map, for metres; None for pixels.
@@ -57,7 +57,7 @@ class MapUnits:
 
     @property
     def decimals(self) -> int:
-        """Decimals that place a point in the right pixel, to a tenth of a pixel."""
+        """Number of decimals that gives a place to a tenth of a pixel or better."""
         if self.frame is None:
             return 0
         return max(0, math.ceil(1 - math.log10(self.per_pixel)))
@@ -71,9 +71,9 @@ class MapUnits:
         return length / self.per_pixel
 
     def heading_in_pixels(self, heading: float) -> float:
-        """A heading from the x axis towards the y axis, rad, converted to the picture.
+        """Converts a heading from the x axis towards the y axis, rad, to the picture.
 
-        In the picture y points down; in a map's frame it points up, and the frame may
+        In the picture, y points down. In a map's frame, y points up, and the frame may
         be rotated.
         """
         return heading if self.frame is None else self.frame.origin[2] - heading
@@ -106,7 +106,7 @@ class MapUnits:
         return self.rounded(length * self.per_pixel, self.decimals - fewer)
 
     def at_most(self, length: float) -> str:
-        """Formats a length in px, rounded down, so that advice about bodies holds."""
+        """Formats a length in px, rounded down, so that a body of this radius fits."""
         scale = 10 if self.frame is None else 10**self.decimals
         floor = math.floor(length * self.per_pixel * scale + 1e-9) / scale
         if self.frame is None:
@@ -114,7 +114,7 @@ class MapUnits:
         return f"{self.rounded(floor)} m"
 
     def rounded(self, value: float, decimals: int | None = None) -> str:
-        """A number in these units with some decimals, without trailing zeros."""
+        """A number in these units, rounded to `decimals`, without trailing zeros."""
         places = self.decimals if decimals is None else max(decimals, 0)
         text = f"{value:z.{places}f}"
         return text.rstrip("0").rstrip(".") if "." in text else text

@@ -30,8 +30,8 @@ class GoalView(
 ):
     """Either environment as a goal environment, as gymnasium-robotics defines it.
 
-    Any place that the robot reached can be taken as the goal afterwards:
-    `compute_reward`, `compute_terminated` and `compute_truncated` then say what the
+    Afterwards, any place that the robot reached can replace the goal:
+    `compute_reward`, `compute_terminated` and `compute_truncated` return what the
     step would have returned. Stable-Baselines3's `HerReplayBuffer` uses the first.
 
     Observations are a `Dict`:
@@ -43,21 +43,21 @@ class GoalView(
     | `observation` | (n + 4,) | [-1, 1] | cosine and sine of the heading; left and |
     | | | | right wheel speed; the n readings / largest reading |
 
-    Positions are relative to the centre of the map or world, as shares of half of its
-    longer side.
+    Positions are relative to the centre of the map or world and divided by half the
+    length of its longer side.
 
     The reward is sparse: 0 at the goal and -1 elsewhere. A contact that ends the
-    episode costs `contact_cost` in addition, since otherwise it would save the rest of
-    the steps. It is known from `info["collision"]`, so replay with hindsight needs
-    `HerReplayBuffer(..., copy_info_dict=True)`; with `on_collision="block"` no contact
-    ends an episode, and it is not needed.
+    episode also costs `contact_cost`; otherwise it would save the cost of the remaining
+    steps. `info["collision"]` reports the contact, so hindsight replay needs
+    `HerReplayBuffer(..., copy_info_dict=True)`. With `on_collision="block"`, no contact
+    ends an episode, and this argument is not needed.
 
     Args:
         env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0` with its original observations.
         contact_cost: Cost of a contact that ends the episode, in steps.
 
     Raises:
-        TaskError: It is not such an environment, or the cost is negative.
+        TaskError: `env` is not such an environment, or the cost is negative.
     """
 
     def __init__(self, env: Env, contact_cost: float = 100.0) -> None:
@@ -101,7 +101,7 @@ class GoalView(
     def compute_reward(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any
     ) -> Any:
-        """The reward of a step that led to a place, for a goal.
+        """The reward of a step that reached a place, given a goal.
 
         Args:
             achieved_goal: Place or places, shape (2,) or (n, 2), as observed.
@@ -124,7 +124,7 @@ class GoalView(
 
     def compute_truncated(
         self,
-        achieved_goal: ArrayLike,  # noqa: ARG002 - the horizon is that of any goal
+        achieved_goal: ArrayLike,  # noqa: ARG002 - the horizon holds for any goal
         desired_goal: ArrayLike,  # noqa: ARG002
         info: Any,
     ) -> Any:
@@ -158,7 +158,7 @@ class GoalView(
             np.asarray(given, float) * self._scale + self._centre
             for given in (achieved, desired)
         )
-        # A little more than the tolerance; `_at_goal` decides.
+        # Preselects with a slightly larger tolerance; `_at_goal` decides.
         gaps = np.linalg.norm(places - goals, axis=-1)
         near = np.asarray(gaps <= task.goal_tolerance * 1.01)
         for index in np.argwhere(near):

@@ -1,4 +1,4 @@
-"""The observations for reinforcement learning, in one call."""
+"""Wraps an environment for reinforcement learning in one call."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ def wrap_for_rl(
     | `ranges` or `ps` | n | reading / largest possible reading |
     | `wheel_speeds` | 2 | left, right, as last applied |
 
-    Guidance is computed from the whole map. A policy for sensors alone does without:
-    `names=("goal-relative", "flatten")`. Rewards, actions and ends of episodes stay as
-    they are. `tdac train` uses this function.
+    Guidance is computed from the whole map; `names=("goal-relative", "flatten")` omits
+    it, for policies that use only sensors and the goal. Rewards, actions and the ends
+    of episodes do not change. `tdac train` uses this function.
 
     Args:
         env: Either environment, single or batched, with its original observations.
         names: Names in `tdac_envs.wrappers.WRAPPERS`, innermost first.
 
     Raises:
-        TaskError: It is not an environment of `tdac_envs`, a name is unknown, or a
+        TaskError: `env` is not from `tdac_envs`, a name is unknown, or a
             wrapper does not support the observations.
     """
     if isinstance(env, VectorEnv):

@@ -1,4 +1,4 @@
-"""Where a task on a map fails, for a picture of it."""
+"""Finds the place on a map where a task is infeasible, for a picture."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Pixel = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fault:
-    """The place on a map where a task fails.
+    """The place on a map where a task is infeasible.
 
     Attributes:
         label: What is wrong there, for the legend.
         at: The place, px.
-        better: The nearest place that would do, px, or None.
+        better: The nearest suitable place, px, or None.
         start_side: Shape (height, width), bool: where the body can get from the start;
             all False if it does not fit there.
         goal_side: The same, from the goal.
@@ -77,7 +77,7 @@ def _pixel(point: Point) -> Pixel:
 
 
 def _outside(cells: BoolGrid, ends: dict[str, Point]) -> Fault | None:
-    """The fault of the first end outside the map, at the border next to it."""
+    """The fault of the first end outside the map, at the nearest border."""
     height, width = cells.shape
     none = np.zeros_like(cells)
     for name, (x, y) in ends.items():
@@ -91,8 +91,8 @@ def _outside(cells: BoolGrid, ends: dict[str, Point]) -> Fault | None:
 def _gap(clear: FloatGrid, widest: float, start: Pixel, goal: Pixel) -> Point:
     """The narrowest place between two pixels that a body of `widest` px gets through.
 
-    A slightly wider body cannot leave the part of the map around the start; the gap is
-    where a path for the narrower one leaves it.
+    A slightly wider body cannot leave the part of the map around the start. The gap is
+    the place where a path for the narrower body leaves this part.
     """
     path = plan_path(body_free(clear, widest), start, goal).astype(np.intp)
     labels = pieces_of(body_free(clear, widest + 0.2))
@@ -109,7 +109,7 @@ def _gap(clear: FloatGrid, widest: float, start: Pixel, goal: Pixel) -> Point:
 def _wall(clear: FloatGrid, start: Pixel, goal: Pixel) -> Point:
     """The middle of the thinnest wall between the parts around two pixels.
 
-    Of equally thin places, it is the one nearest to the middle between the pixels.
+    Of equally thin places, the one nearest to the midpoint of the pixels is chosen.
     """
     labels = pieces_of(body_free(clear, 0.0))
     here, there = (labels == labels[end[::-1]] for end in (start, goal))

@@ -71,7 +71,7 @@ class Rulers:
                 self._mark(framed, pixels, self.left + int(low[0]), label, taken)
 
     def _ticks(self, axis: int) -> range:
-        """Multiples of a fifth of a step on the map; every fifth has a number."""
+        """Indices of the ticks on the map, a fifth of a step apart."""
         low, high, minor = self._low[axis], self._high[axis], self._step / 5
         return range(math.ceil(low / minor - 1e-9), math.floor(high / minor + 1e-9) + 1)
 
@@ -101,8 +101,8 @@ class Rulers:
             framed: Where to draw.
             ends: Both ends of the line, frame px.
             border: Column of the left border of the map, frame px.
-            label: The number, or nothing.
-            taken: Places of labels, to be extended.
+            label: The number, or an empty string.
+            taken: Places of labels; the new one is added.
         """
         begin, end = ends
         across, down = np.abs(end - begin)
@@ -129,7 +129,7 @@ class Rulers:
         is_top: bool,
         taken: list[tuple[int, int, int]],
     ) -> None:
-        """Writes a number beside its tick, unless another one is there."""
+        """Writes a number beside its tick, unless another number is there."""
         width = Canvas.text_width(label)
         x = at[0] - width // 2 if is_top else self.left - 11 - width
         baseline = TOP - 12 if is_top else at[1] + 5
@@ -144,7 +144,7 @@ class Rulers:
 
 
 def tick_step(scale: float, units: MapUnits) -> float:
-    """Distance between numbered ticks in the units; at least 70 frame px.
+    """Distance between numbered ticks, in the units; at least 70 frame px.
 
     Args:
         scale: Frame px per map px.

@@ -38,10 +38,11 @@ def snap(
     radius: float,
     units: MapUnits = PIXELS,
 ) -> Snapped:
-    """Moves start and goal, where the body does not fit, to the nearest free pixels.
+    """Moves a start or goal where the body does not fit to the nearest free pixel.
 
-    A point where the body fits stays. Others move only to places that are connected
-    with the other point, unless there are none: never into a closed pocket.
+    A point where the body fits stays. Any other point moves only to a place that is
+    connected with the other point, never into a closed pocket, unless no such place
+    exists.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
@@ -71,7 +72,7 @@ def fits(free: BoolGrid, point: Point) -> bool:
 
 
 def _places(free: BoolGrid, ends: dict[str, Point]) -> dict[str, Point]:
-    """The place of each point, in one connected piece if there is such a piece."""
+    """The places of the points, in one connected piece if there is such a piece."""
     stay = {name: point for name, point in ends.items() if fits(free, point)}
     rows, columns = np.nonzero(free)
     if len(stay) == len(ends) or rows.size == 0:
@@ -114,7 +115,7 @@ def _nearest_by_piece(
 
 
 def _cheapest(nearest: dict[str, _Nearest], homes: set[int]) -> int | None:
-    """The piece that both points reach with the shortest moves; None if none does."""
+    """The piece with the shortest total move of the points; None if there is none."""
     total = np.sum([gaps for gaps, _ in nearest.values()], axis=0)
     if len(nearest) > 1:
         first, second = (pixels for _, pixels in nearest.values())
@@ -145,9 +146,9 @@ def _remark(cells: BoolGrid, point: Point, moved: Point | None) -> str:
 
 
 def _is_across_wall(cells: BoolGrid, point: Point, moved: Point) -> bool:
-    """Whether an obstacle lies between a point, or the free pixel next to it, and it.
+    """Whether an obstacle lies between a point and the place to which it moved.
 
-    A point in an obstacle counts as being on the side of the nearest free pixel.
+    For a point in an obstacle, the nearest free pixel takes its place.
     """
     begin = point
     if not fits(~cells, point):

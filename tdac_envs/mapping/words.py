@@ -13,10 +13,10 @@ from tdac_envs.grid.grid import BoolGrid
 Boxes = NDArray[np.int64]
 
 HIGHEST, WIDEST, ALONE = 0.12, 0.3, 0.08
-"""Largest height and width of a letter, or of letters that touch each other, and the
-largest size of a single one, as shares of the map's shorter side."""
+"""Largest height and width of a letter or of touching letters, and largest size of a
+word of one letter, as shares of the map's shorter side."""
 _SOLID, _HOLLOW = 0.75, 0.62
-"""Pieces that fill, or whose hole fills, more of their box are no letters."""
+"""A piece that fills more of its box, or whose hole does, is not a letter."""
 _GAP = 0.6
 """Largest gap between the letters of a word, as a share of their height."""
 
@@ -26,9 +26,9 @@ def without_words(
 ) -> BoolGrid | None:
     """Removes the words that cover any of the places.
 
-    Letters are separate obstacle pieces of a few strokes: neither solid like pillars,
-    nor a frame around an empty box. Letters side by side and of a similar size form a
-    word, and a word covers the places in its box. Straight bars alone are no word.
+    Letters are separate obstacle pieces that consist of a few strokes: neither solid
+    like pillars, nor frames around an empty box. Adjacent letters of similar size form
+    a word. A word covers the places in its box. Straight bars alone are not a word.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
@@ -71,7 +71,7 @@ def _word_over(
         for k in np.flatnonzero(begun).tolist()
         if _is_letter(labels, numbers[k], boxes[k])
     ]
-    for k in members:  # grows while it is read
+    for k in members:  # the loop extends the list
         size = heights[k]
         like = (heights >= 0.5 * size) & (heights <= 2 * size)
         near = _gaps(boxes, boxes[k]) <= _GAP * np.maximum(heights, size)
@@ -89,13 +89,13 @@ def _word_over(
 
 
 def _gaps(boxes: Boxes, box: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number of pixels between each box and another one, along the farther axis."""
+    """Distance of each box from one box, px, along the axis of the larger gap."""
     before, after = boxes[:, :2] - box[2:], box[:2] - boxes[:, 2:]
     return np.asarray(np.maximum(np.maximum(before, after), 0).max(axis=1))
 
 
 def _is_letter(labels: NDArray[np.int32], number: int, box: NDArray[np.int64]) -> bool:
-    """Whether a piece consists of strokes, and is no frame around an empty box."""
+    """Whether a piece consists of strokes and is not a frame around an empty box."""
     x0, y0, x1, y1 = box.tolist()
     piece = labels[y0:y1, x0:x1] == number
     if piece.mean() > _SOLID:

@@ -1,9 +1,9 @@
-"""Distance sensors that a world file mounts on the robot, and those of the PROTO.
+"""Distance sensors that a world file mounts on the robot, and those of its PROTO.
 
-A sensor measures along one ray, whatever its aperture and number of rays. Its ray meets
-the visible parts of the world and the floor. An infra-red sensor measures the distance
-divided by the reflectance of the surface, as in Webots; textured floors have the
-reflectance of their picture.
+A sensor measures along one ray, whatever its aperture and number of rays. The ray can
+hit the visible parts of the world and the floor. An infra-red sensor measures the
+distance divided by the reflectance of the surface, as in Webots; on a textured floor,
+the image determines the reflectance.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Beam:
 
     @property
     def looks_down(self) -> bool:
-        """Whether it looks at the ground."""
+        """Whether it points down, at less than 60 degrees from the vertical."""
         return bool(self.direction[2] < -0.5)
 
     def plain(self) -> dict[str, object]:
@@ -149,7 +149,7 @@ def reading(
     seen: Prisms,
     floors: Floors,
 ) -> float:
-    """What a sensor reads, without noise.
+    """The reading of a sensor, without noise.
 
     Args:
         beam: The sensor.
@@ -157,7 +157,7 @@ def reading(
         base: Height of the robot's origin, m.
         floor: Height of the ground, m.
         seen: Visible parts of the world.
-        floors: Textured floors, which decide the reflectance where they are.
+        floors: Textured floors; their images determine the reflectance.
     """
     x, y, heading = pose
     cos, sin = math.cos(heading), math.sin(heading)
@@ -194,7 +194,7 @@ def nearest_hit(
     dir_z: float,
     longest: float,
 ) -> tuple[float, int]:
-    """The first part that a ray meets.
+    """The first part that a ray hits.
 
     Args:
         points: Vertices of the parts; see `tdac_envs.epuck.gaps`.

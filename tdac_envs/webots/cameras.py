@@ -1,4 +1,4 @@
-"""The cameras of a robot: their facts, and their images."""
+"""The cameras of a robot: their properties and their images."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CAMERA_TYPE = 38
 """Webots' number of the node type."""
 _EYE, _TURRET = (0.03, 0.0, 0.028), (-0.0095, 0.0, 0.0486)
 _NEAR = 0.0055
-# Width, height, pixels, and field of view, rad: of the PROTO, and of a Camera node.
+# Width and height, pixels, and field of view, rad, of the PROTO and of a Camera node.
 _EPUCK_SIZE, _CAMERA_SIZE = ((52, 39), 0.84), ((64, 64), math.pi / 4.0)
 _NARROWEST, _CLOSEST = 0.01, 1e-6
 _NO_FRAME = ("Group", "HingeJoint", "SliderJoint", "Slot")
@@ -46,8 +46,8 @@ class CameraFacts:
         field_of_view: Horizontal field of view, rad; the pixels are squares.
         near: Distance of the near plane, m.
         place: Shape (3,): position relative to the robot (forward, left, up), m.
-        axes: Shape (3, 3): its directions forwards, left and up as columns, relative to
-            the robot's.
+        axes: Shape (3, 3): its forward, left and up directions as columns, in the
+            robot's axes.
     """
 
     name: str
@@ -59,7 +59,7 @@ class CameraFacts:
     axes: Array
 
     def plain(self) -> dict[str, float]:
-        """The facts that are sent to the controller."""
+        """The properties that are sent to the controller."""
         return {
             "width": self.width,
             "height": self.height,
@@ -93,7 +93,7 @@ def find_cameras(
 
 
 class Cameras:
-    """Takes images: remembers what a camera would see, and renders it when asked.
+    """Takes images: a sample records the poses, and `image` renders it.
 
     Args:
         cameras: The cameras.
@@ -126,7 +126,7 @@ class Cameras:
         return name in self._cameras
 
     def expose(self, name: str) -> int:
-        """Takes a sample, which is not rendered yet; returns its number."""
+        """Takes a sample without rendering it; returns its number."""
         self._seen[name] = self._env.pose(), self._env.things()
         self._images.pop(name, None)
         self._count += 1
@@ -157,7 +157,7 @@ _Found = tuple[str, Node, str, Frame]
 
 
 def _own_frame(robot: Node, own: Frame, epuck: EPuck) -> Frame:
-    """The frame of the robot's node relative to the robot: forward, left, up.
+    """The frame of the robot's node in the robot's axes (forward, left, up).
 
     An e-puck in a file is often saved with a slight tilt, but drives upright. The axes
     and the origin of a Robot node may differ from those of the PROTO.
@@ -170,7 +170,7 @@ def _own_frame(robot: Node, own: Frame, epuck: EPuck) -> Frame:
 
 
 def _nodes(robot: Node, own: Frame) -> Iterator[_Found]:
-    """Default name, node, prefix of the fields, and frame of each camera."""
+    """Default name, node, prefix of the field names, and frame of each camera."""
     if robot.kind in ROBOTS:
         yield from _within(robot, own)
         return
@@ -195,7 +195,7 @@ def _mounted(node: Node, frame: Frame) -> Iterator[_Found]:
         except WorldError:
             if node.kind == "Camera":
                 raise
-            return  # fields of an unknown node may mean something else
+            return  # fields of an unknown node may have another meaning
     if node.kind == "Camera":
         yield text(node, "name", "camera"), node, "", frame
     yield from _within(node, frame)
@@ -208,7 +208,7 @@ def _read(name: str, node: Node, prefix: str, frame: Frame) -> CameraFacts:
     axes = frame.flu().matrix
     lengths = np.linalg.norm(axes, axis=0)
     if lengths.min() < 1e-6:
-        raise node.error(f"the camera {name!r} is scaled to nothing")
+        raise node.error(f"the camera {name!r} has the scale 0")
     return CameraFacts(
         name,
         _length(node, f"{prefix}width", width),
@@ -221,6 +221,6 @@ def _read(name: str, node: Node, prefix: str, frame: Frame) -> CameraFacts:
 
 
 def _length(node: Node, field: str, usual: int) -> int:
-    """A number of pixels; the usual one if it is below 1."""
+    """A number of pixels; the default if the given number is below 1."""
     length = int(number(node, field, usual))
     return length if length >= 1 else usual

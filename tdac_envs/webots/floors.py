@@ -1,8 +1,8 @@
-"""Floors with pictures, as infra-red sensors see them from above.
+"""Floors with images, as infra-red sensors see them from above.
 
-Pictures are read from the folder of the world file; none is fetched. Level surfaces
-with a picture are RectangleArena, Floor, and Shapes with a Plane, a Box or a flat
-IndexedFaceSet that has texture coordinates.
+Images are read from folders near the world file; none is downloaded. Level surfaces
+with an image are RectangleArena, Floor, SolidBox, and Shapes with a Plane, a Box or a
+flat IndexedFaceSet that has texture coordinates.
 """
 
 from __future__ import annotations
@@ -36,19 +36,19 @@ from tdac_envs.worlds.wbt.tree import Node
 _LEVEL = 0.02
 """Largest tilt of a floor, rad."""
 _NEAR = 0.002
-"""Largest distance of a point from the floor that it lies on, m."""
+"""Largest height of a point above or below the floor on which it lies, m."""
 _MAPS = ("baseColorMap", "texture")
 
 
 class Texture(NamedTuple):
-    """A picture on a surface.
+    """An image on a surface.
 
     Attributes:
-        red: Shape (height, width): red of the picture and its base colour, in [0, 1];
-            the first row is the upper one.
+        red: Shape (height, width): red of the image times that of the base colour, in
+            [0, 1]; the first row is the top row.
         dimmed: Share of the red light that the material returns.
-        transform: Shape (2, 3): from the surface's (u, v, 1) to the picture's.
-        repeats: Whether the picture is repeated along u and v.
+        transform: Shape (2, 3): from the surface's (u, v, 1) to the image's (u, v).
+        repeats: Whether the image is repeated along u and v.
     """
 
     red: NDArray[np.float32]
@@ -59,15 +59,15 @@ class Texture(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """A level surface with a picture.
+    """A level surface with an image.
 
     Attributes:
-        corners: Shape (n, 2): bounds of the surface, x and y, m, (least, greatest) in
-            its own axes.
+        corners: Shape (2, 2): least and greatest (x, y) of the surface in its own axes,
+            m.
         inverse: Shape (2, 3): from (x, y, 1) in the world to the surface's axes.
         uv: Shape (2, 3): from the surface's (x, y, 1) to (u, v).
         z: Height, m.
-        texture: Its picture.
+        texture: Its image.
     """
 
     corners: Array
@@ -104,8 +104,8 @@ class Floors:
     """The textured floors of a world.
 
     Attributes:
-        patches: The surfaces; of two at the same place the later one is seen.
-        missing: Pictures that are not in the folder.
+        patches: The surfaces; of two at the same place, the later one is visible.
+        missing: URLs of the images that were not found or cannot be read.
     """
 
     patches: list[Patch] = field(default_factory=list)
@@ -132,7 +132,7 @@ def find_floors(nodes: Iterable[Node], top: Frame, folder: Path) -> Floors:
     for node, frame in _surfaces(nodes, top):
         try:
             _add(floors, node, frame, folder)
-        except WorldError:  # an appearance decides nothing else
+        except WorldError:  # an invalid appearance affects nothing else
             continue
     return floors
 
@@ -176,7 +176,7 @@ _Laid = tuple[Frame, list[list[float]], Array]
 
 
 def _laid(node: Node, frame: Frame) -> _Laid | None:
-    """Frame (FLU) of a surface's middle, its bounds, and its map to (u, v)."""
+    """Frame (FLU) of a surface's centre, its bounds, and its transform to (u, v)."""
     if node.kind in ("RectangleArena", "Floor"):
         arena = node.kind == "RectangleArena"
         usual = 1.0 if arena else 10.0
@@ -212,9 +212,9 @@ def _box(frame: Frame, size: tuple[float, ...]) -> _Laid | None:
 def _rectangle(
     frame: Frame, size: tuple[float, ...], tile: tuple[float, ...]
 ) -> _Laid | None:
-    """A rectangle; u and v begin at its corner and grow by 1 per tile.
+    """A rectangle; u and v are 0 at its corner and increase by 1 per tile.
 
-    They grow along x and y, or along x and -z if y is up.
+    They increase along x and y, or along x and -z if y is up.
     """
     if min(*size, *tile) <= 0.0:
         return None
@@ -231,7 +231,7 @@ def _rectangle(
 
 
 def _faces(shape: Node, frame: Frame) -> _Laid | None:
-    """A flat mesh whose texture coordinates are an affine map of its points."""
+    """A flat mesh whose texture coordinates are an affine function of its points."""
     coord, texture = child(shape, "coord"), child(shape, "texCoord")
     if coord is None or texture is None or not frame.flu().matrix[:2, :2].any():
         return None
@@ -264,7 +264,7 @@ def _indices(shape: Node, name: str) -> list[int]:
 
 
 def _texture(look: Node, folder: Path, missing: list[str]) -> Texture | None:
-    """The picture of an appearance; None if it has none that can be read."""
+    """The image of an appearance; None if it has none that can be read."""
     picture = next((child(look, name) for name in _MAPS if name in look.fields), None)
     if picture is None or picture.kind != "ImageTexture":
         return None
@@ -309,10 +309,10 @@ def _strings(node: Node, name: str) -> list[str]:
 
 
 def _file_of(url: str, folder: Path) -> Path | None:
-    """The file of a picture: as the URL says, else one of its name nearby.
+    """The file of an image; None if there is none.
 
-    A picture of another machine or of the web is found under its own name beside the
-    world file, in `textures` there, or in the project's folder.
+    It is the file at the URL if this is a relative path, otherwise a file of the same
+    name in the folder of the world file, in `textures` there, or in the parent folder.
     """
     name = PurePosixPath(url.replace("\\", "/")).name
     places = [folder / name, folder / "textures" / name, folder.parent / name]

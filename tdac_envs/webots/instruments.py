@@ -1,4 +1,4 @@
-"""The distance and light sensors of a robot, and what they read in a run."""
+"""The distance and light sensors of a robot, and their readings in a run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LARGEST = 4200.0
 
 @dataclass(frozen=True, slots=True)
 class Instruments:
-    """The distance and light sensors that a robot has beside ps0 to ps7.
+    """The distance and light sensors of a robot, except ps0 to ps7.
 
     Attributes:
         beams: Distance sensors.
@@ -47,14 +47,14 @@ class Instruments:
     on_ground: bool = True
 
     def notes(self) -> tuple[str, ...]:
-        """What is missing for these sensors."""
+        """A note on missing floor images, if a sensor needs them."""
         looks_down = any(beam.is_infrared and beam.looks_down for beam in self.beams)
         if not looks_down or not self.floors.missing:
             return ()
         names = ", ".join(dict.fromkeys(self.floors.missing))
         return (
-            f"no picture of the floor: {names} is not here, and nothing is fetched; "
-            "put the file beside the world file",
+            f"the image of the floor is missing: {names}; tdac downloads nothing: put "
+            "the file beside the world file",
         )
 
 
@@ -65,7 +65,7 @@ def find_instruments(
 
     Args:
         robot: Node of the e-puck: the PROTO or a plain Robot.
-        mounted: Nodes in its slots, or in the Robot node.
+        mounted: Nodes in its slots or in the Robot node.
         lights: The lights of the world.
         floors: The textured floors of the world.
 
@@ -112,14 +112,14 @@ class Readings:
         self._beams = {beam.name: beam for beam in instruments.beams}
         self._cells = {cell.name: cell for cell in instruments.cells}
         self._seen: dict[bool, tuple[Prisms, Prisms]] = {}
-        # Noise, materials and the goal's mark come together; see `make_env`.
+        # Noise, materials and the goal marker are enabled together; see `make_env`.
         self._webots = env.sensor_noise > 0.0
         self._random = np.random.default_rng(0)
 
     def distance(self, name: str, pose: tuple[float, float, float]) -> float:
         """Reading of a distance sensor at a pose of the robot, m and rad."""
         beam = self._beams[name]
-        # What is painted on the ground has its own reflectance in any case.
+        # Markings on the ground have their own reflectance in any case.
         webots = self._webots or beam.looks_down
         value = reading(
             beam,
@@ -139,7 +139,7 @@ class Readings:
         return self._cells[name].reading(pose, self._base, self._instruments.lights)
 
     def _parts(self, webots: bool) -> Prisms:
-        """The visible parts at their current places."""
+        """The visible parts at their current positions."""
         if webots not in self._seen:
             origin = self._ground.visible(webots, self._webots)
             self._seen[webots] = origin, origin.copy()

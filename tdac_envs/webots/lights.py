@@ -1,10 +1,10 @@
-"""Light sensors, after the reference of Webots' LightSensor.
+"""Light sensors, as the reference of Webots' LightSensor describes them.
 
 The irradiance at a sensor is the sum over all lights that are on of
-(F . C) (Ia + spot I cos phi) attenuation: F is the sensor's colour filter, C the
-light's colour, Ia its ambient intensity, I its intensity and phi the angle between the
-sensor's axis and the direction to the light. Nothing casts a shadow. The result is
-mapped by the sensor's table, without noise.
+(F . C) / 3 (Ia + spot I cos phi) attenuation. F is the sensor's colour filter; C, Ia
+and I are the light's colour, ambient intensity and intensity; phi is the angle between
+the sensor's axis and the direction to the light. Nothing casts a shadow. The sensor's
+table maps the irradiance to a reading, without noise.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _USUAL = (0.0, 0.0, 0.0, 1000.0, 1000.0, 0.0)
 _KINDS = ("DirectionalLight", "PointLight", "SpotLight")
 _CUT_OFF, _BEAM = 0.785398, 1.570796
 _AMBIENT = 1.0
-"""Ambient intensity of a TexturedBackgroundLight; its direction depends on pictures
+"""Ambient intensity of a TexturedBackgroundLight; its direction depends on images
 and is not modelled."""
 
 
@@ -48,7 +48,8 @@ class Light:
     Attributes:
         kind: Its node type.
         place: Position, m, shape (3,); not used for a DirectionalLight.
-        direction: Where it shines, of length 1, shape (3,); not used for a PointLight.
+        direction: Direction of its rays, of length 1, shape (3,); not used for a
+            PointLight.
         colour: Its colour, shape (3,).
         intensity: Its intensity.
         ambient: Its ambient intensity.
@@ -115,7 +116,7 @@ def _lights(nodes: Iterable[Node], frame: Frame) -> Iterator[Light]:
             elif node.kind in GROUPS or node.kind == "Solid":
                 inner = frame if node.kind == "Group" else placed(node, frame)
                 yield from _lights(children(node), inner)
-        except WorldError:  # a light decides nothing else
+        except WorldError:  # an invalid light affects nothing else
             continue
 
 
@@ -155,7 +156,7 @@ class LightCell:
     Attributes:
         name: Device name.
         place: Position relative to the robot: forward, left, up, m, shape (3,).
-        axis: Direction that it looks in, in these axes, of length 1, shape (3,).
+        axis: Direction in which it points, in these axes, of length 1, shape (3,).
         table: Shape (n, 3): irradiance; reading; relative noise.
         colours: Colour filter, shape (3,).
     """
@@ -176,7 +177,7 @@ class LightCell:
         base: float,
         lights: Iterable[Light],
     ) -> float:
-        """What the sensor reads.
+        """The reading of the sensor.
 
         Args:
             pose: x, y (m) and heading (rad) of the robot.
@@ -192,7 +193,7 @@ class LightCell:
 
 
 def standard_cells() -> tuple[LightCell, ...]:
-    """The sensors ls0 to ls7, which look where ps0 to ps7 look, without elevation."""
+    """The sensors ls0 to ls7: directions of ps0 to ps7, but horizontal."""
     table = np.array(_TABLE).reshape(-1, 3)
     return tuple(
         LightCell(

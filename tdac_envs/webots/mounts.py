@@ -1,4 +1,4 @@
-"""The nodes that are mounted on a robot, and their places relative to it."""
+"""The nodes that are mounted on a robot, and their frames relative to it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Mount(NamedTuple):
 
     Attributes:
         node: The node.
-        frame: Its frame relative to the robot, whose axes are forward, left and up and
-            whose origin is on the ground, between the wheels.
+        frame: Its frame relative to the robot. The robot's axes are forward, left and
+            up; its origin is on the ground between the wheels.
     """
 
     node: Node
@@ -33,7 +33,7 @@ class Mount(NamedTuple):
 
 
 def mounts(robot: Node, own: Frame, epuck: EPuck) -> Iterator[Mount]:
-    """All nodes in the slots of an e-puck, or in a Robot node.
+    """All nodes in the slots of an e-puck or in a Robot node.
 
     Args:
         robot: Node of the e-puck: the PROTO or a plain Robot.
@@ -65,7 +65,7 @@ def _mounted(node: Node, frame: Frame) -> Iterator[Mount]:
     if node.kind not in _NO_FRAME:
         try:
             frame = placed(node, frame)
-        except WorldError:  # fields of an unknown node may mean something else
+        except WorldError:  # fields of an unknown node may have another meaning
             return
     yield Mount(node, frame)
     yield from _within(node, frame)

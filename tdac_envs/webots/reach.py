@@ -1,4 +1,4 @@
-"""Makes a world file usable where a controller needs no more than to run in it."""
+"""Relaxes the requirements on a world in which a Webots controller runs."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.world import Unmodelled, World
 
 _BEYOND = 0.5
-"""Distance from an arena's wall from which an unmodelled node is out of reach, m."""
+"""Distance from the arena's wall beyond which a node counts as out of reach, m."""
 _OVERLAP = 0.003
-"""Largest overlap of the robot with an obstacle from which it is moved away, m."""
+"""Largest overlap with an obstacle that moving the robot corrects, m."""
 _ROOM, _TURNS = 1e-4, 32
 
 
 def without_far_nodes(world: World) -> tuple[World, tuple[str, ...]]:
-    """Leaves out unmodelled nodes that the robot cannot reach.
+    """Removes unmodelled nodes that the robot cannot reach.
 
     These are the nodes whose origin is well outside the walls of the arena in which
     the robot stands.
 
     Returns:
-        The world without them, and notes that name them.
+        The world without these nodes, and notes that name them.
     """
     far = [n for n in world.unmodelled if n.may_be_solid and _is_far(world, n)]
     if not far:
         return world, ()
     kept = tuple(node for node in world.unmodelled if node not in far)
     names = ", ".join(dict.fromkeys(node.name or node.kind for node in far))
-    note = f"not modelled, but outside of the arena's walls: {names}"
+    note = f"not modelled, but outside the arena's walls: {names}"
     return replace(world, unmodelled=kept), (note,)
 
 
@@ -72,7 +72,7 @@ def beside_obstacles(world: World) -> tuple[World, tuple[str, ...]]:
                 moved = replace(world, robots=(replace(robot, x=x, y=y),))
                 moved = replace(moved, robots=(*moved.robots, *world.robots[1:]))
                 note = (
-                    f"the robot starts {1e3 * away:.1f} mm beside its place in the "
+                    f"the robot starts {1e3 * away:.1f} mm from its place in the "
                     f"file, where it overlaps an obstacle by {1e3 * missing:.1f} mm"
                 )
                 return moved, (note,)
@@ -80,7 +80,7 @@ def beside_obstacles(world: World) -> tuple[World, tuple[str, ...]]:
 
 
 def why_unreachable(world: World) -> str | None:
-    """Why no path leads to the goal, or the robot is there; None if one does."""
+    """Why the goal cannot be used: no path, or the robot is at it; None if it can."""
     assert world.goal is not None
     robot, ground = world.robot, Ground.of(world)
     try:
@@ -90,5 +90,5 @@ def why_unreachable(world: World) -> str | None:
     except TaskError as error:
         return str(error)
     if math.dist((robot.x, robot.y), world.goal) <= TOLERANCE:
-        return "the robot starts there"
+        return "the robot starts at the goal"
     return None

@@ -10,23 +10,24 @@ from numpy.typing import NDArray
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.epuck.prisms import HIGH, LOW, MID_X, MID_Y, ROUND, Array, Index
 
-# Rows of `view`: position of the camera; direction through the middle of the upper left
-# pixel, whose component forwards is 1; steps to the next column and row; forwards.
+# Rows of `view`: position of the camera; direction through the centre of the upper left
+# pixel, scaled so that its forward component is 1; steps to the next column and to the
+# next row; forward direction.
 POSITION, CORNER, RIGHT, DOWN, FORWARD = range(5)
 
-# Columns of `paint`: colour, colour of every second square, a corner of the first
-# square, direction of its sides, their lengths.
+# Columns of `paint`: colour; colour of every second square; a corner of the first
+# square; direction of its first side; lengths of its sides.
 COLOUR, OTHER, CORNER_X, CORNER_Y, COS, SIN, LENGTH, WIDTH, N_PAINT = (
     0, 3, 6, 7, 8, 9, 10, 11, 12
 )  # fmt: skip
 
-# Direction to the light; opposite sides and neighbouring sides differ in brightness.
+# Direction to the light, chosen so that all sides of a box differ in brightness.
 _LIGHT = np.array((0.5, 0.2, 0.84))
 _LIGHT_X, _LIGHT_Y, _LIGHT_Z = (_LIGHT / np.linalg.norm(_LIGHT)).tolist()
 _DARKEST = 0.6
-"""Brightness of a surface that faces away from the light."""
+"""Brightness of a surface that faces directly away from the light."""
 _COPLANAR = 1.0 + 1e-9
-"""Of two surfaces in one plane, the later one is seen."""
+"""Factor on the depth: of two surfaces in one plane, the later one is visible."""
 
 
 def look_through(
@@ -36,7 +37,7 @@ def look_through(
 
     Args:
         place: Position, m, shape (3,).
-        axes: Directions forwards, left and up as columns, shape (3, 3).
+        axes: Forward, left and up directions as columns, shape (3, 3).
         field_of_view: Horizontal field of view, rad.
         width: Width of the image, pixels.
         height: Height of the image, pixels.
@@ -68,11 +69,11 @@ def _entry(
     near: float,
     far: float,
 ) -> tuple[float, float, float]:
-    """The entry of a line into the footprint of a part, as `infrared.crossing`.
+    """Where a line enters the footprint of a part; compare `infrared.crossing`.
 
     Returns:
-        The least t in [near, far] in the footprint, or inf, and the normal there, of
-        any length; it is 0 if the line is inside at `near`.
+        The least t in [near, far] at which the line is in the footprint, or inf; and
+        x and y of the normal there, of any length, 0 if the line is inside at `near`.
     """
     begin, end = first[part], first[part + 1]
     out_x, out_y = 0.0, 0.0
@@ -118,7 +119,7 @@ def _along(view: Array, row: int, x: float, y: float, z: float) -> float:
 def _window(
     points: Array, first: Index, extent: Array, part: int, view: Array, near: float
 ) -> tuple[float, float, float, float]:
-    """Bounds of a part in the image: left, top, right, bottom; all if it is close."""
+    """Left, top, right, bottom of a part in the image; infinite if it is very close."""
     begin, end = first[part], first[part + 1]
     is_disc = end - begin == 1
     corners = 4 if is_disc else end - begin
@@ -160,7 +161,7 @@ def _colour_at(paint: Array, x: float, y: float) -> int:
 
 @subkernel
 def _draw_sky(view: Array, sky: Array, image: NDArray[np.uint8]) -> None:
-    """Fills the image with the sky, which depends on the elevation of the ray."""
+    """Fills the image with the sky, whose colour depends on the ray's elevation."""
     for row in range(image.shape[0]):
         for column in range(image.shape[1]):
             x = view[CORNER, 0] + column * view[RIGHT, 0] + row * view[DOWN, 0]
@@ -198,7 +199,7 @@ def render(
         sky: Shape (3, 3): colours above, at and below the horizon, in [0, 1].
         near: Distance of the near plane, m.
         depth: Shape (height, width), overwritten: distance along the view's forward
-            direction, m; inf where there is sky.
+            direction, m; inf for sky.
         image: Shape (height, width, 4), overwritten: blue, green, red, 255.
     """
     rows, columns = depth.shape

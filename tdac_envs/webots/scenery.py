@@ -1,4 +1,4 @@
-"""What cameras see: the floors and visible parts of a world, with their colours."""
+"""The scenery that cameras see: floors and visible parts, with their colours."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Scenery:
 
     @classmethod
     def of(cls, world: World, sky: Sky) -> Scenery:
-        """The scenery of a world; goal markers are visible."""
+        """The scenery of a world, including goal markers."""
         owned: list[Owned] = []
         paint: list[Array] = []
         for arena in world.arenas:
@@ -88,14 +88,14 @@ def _looks(thing: Obstacle) -> tuple[Look, ...]:
 
 
 def _paint(look: Look, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Array:
-    """A row of `paint`; the squares begin at (x, y), with a side in direction `yaw`."""
+    """A row of `paint`; a square begins at (x, y), with a side in direction `yaw`."""
     other = look.colour if look.other is None else look.other
     sides = (np.cos(yaw), np.sin(yaw), *look.square)
     return np.array((*look.colour, *other, x, y, *sides), np.float64)
 
 
 def _floor_paint(arena: Arena) -> Array:
-    """A row of `paint`: squares begin at a corner of the floor, or at its centre."""
+    """A row of `paint`: a square begins at a corner or at the centre of the floor."""
     shape, look = arena.inside, arena.floor_look
     if isinstance(shape, Rectangle):
         x, y = shape.vertices[0].tolist()

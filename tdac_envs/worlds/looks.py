@@ -14,9 +14,9 @@ class Look:
 
     Attributes:
         colour: Its colour.
-        other: Colour of every second square; None if all of the surface has one colour.
+        other: Colour of every second square; None if the surface has only one colour.
         square: Length and width of a square, m.
-        is_clear: Whether one sees through it.
+        is_clear: Whether the surface is invisible.
     """
 
     colour: Colour
@@ -26,14 +26,14 @@ class Look:
 
 
 WHITE = Look((1.0, 1.0, 1.0))
-"""A Shape without an appearance."""
+"""The look of a Shape without an appearance."""
 GREY = Look((0.72, 0.72, 0.70))
 """A surface of unknown colour."""
 ALUMINIUM = Look((0.80, 0.81, 0.83))
 LIGHT_WOOD: Colour = (0.80, 0.71, 0.57)
 DARK_WOOD: Colour = (0.52, 0.40, 0.28)
 
-# The textures are not available: approximate mean colours.
+# Approximate mean colours, because the textures are not available.
 _KINDS = {
     "CardboardBox": Look((0.72, 0.57, 0.40)),
     "CircleArena": ALUMINIUM,

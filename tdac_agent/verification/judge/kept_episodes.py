@@ -1,4 +1,4 @@
-"""Episodes of an evaluation on disk: a file each, so that none is driven twice."""
+"""Episodes of an evaluation on disk, one file each, so that none runs twice."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class KeptEpisode:
         tier: Sandbox tier; empty if nothing was started.
         late: Whether the policy timed out.
         poses: Shape (T + 1, 3), float32.
-        calls: Call times, s, shape (T,), float32.
+        calls: Durations of the policy's calls, s, shape (T,), float32.
     """
 
     figures: Measured
@@ -48,7 +48,7 @@ class KeptEpisode:
 
 
 def keep_episode(folder: Path, episode: KeptEpisode) -> None:
-    """Writes an episode to a file named after its seed; a killed process leaves none.
+    """Writes an episode to a file named after its seed, atomically.
 
     Raises:
         OSError: The folder cannot be written.
@@ -61,7 +61,7 @@ def keep_episode(folder: Path, episode: KeptEpisode) -> None:
 
 
 def kept_episodes(folder: Path, seeds: Iterable[int]) -> dict[int, KeptEpisode]:
-    """The episodes of these seeds that the folder has; damaged files do not count."""
+    """The episodes with these seeds in the folder; damaged files are ignored."""
     found = {seed: _read(_file(folder, seed)) for seed in seeds}
     return {seed: episode for seed, episode in found.items() if episode is not None}
 

@@ -1,4 +1,4 @@
-"""Cameras, whose images the simulation renders when a controller asks for them."""
+"""Cameras: the simulation renders an image when a controller asks for it."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class Camera(Sensor):
     def getImage(self) -> bytes | None:
         """The last image: blue, green, red and 255 of each pixel, row by row.
 
-        Black before the first sample, as in Webots; None before the first step, and
-        with an error if the camera is disabled.
+        As in Webots, the image is black before the first sample. It is None before the
+        first step, and None with an error if the camera is disabled.
         """
         return self._last("get_image")
 
     def getImageArray(self) -> list[list[list[int]]] | None:
-        """The last image as `array[x][y]`: red, green and blue; None as `getImage`."""
+        """The last image as `array[x][y]`: red, green, blue; None as in `getImage`."""
         image, width = self._last("get_image"), self.width
         if image is None:
             return None
@@ -77,15 +77,15 @@ class Camera(Sensor):
         """Writes the last image to a PNG file; returns 0, or -1 if there is none.
 
         Args:
-            filename: Path; ".jpg" files get the same content, with a message.
-            quality: Without effect, since PNG is lossless.
+            filename: Path; with another suffix than ".png", a message is printed.
+            quality: Has no effect, because PNG is lossless.
         """
         del quality
         image = self._last("save_image")
         if image is None:
             return -1
         if not filename.lower().endswith(".png"):
-            once("tdac: Camera.saveImage() writes PNG, whatever the file is called")
+            once("tdac: Camera.saveImage() writes a PNG file, whatever its name is")
         try:
             with open(filename, "wb") as file:
                 file.write(png(image, self.width, self.height))
@@ -144,7 +144,7 @@ class Camera(Sensor):
         return float(self._facts.get("near", float("nan")))
 
     def _last(self, getter: str) -> bytes | None:
-        """The image of the last sample, asked for once; None if there is none."""
+        """The image of the last sample, requested once; None if there is none."""
         sampled = self._sample(getter, None)
         if sampled is None:
             is_stepped = self._period > 0 and connection.time > self._enabled_at

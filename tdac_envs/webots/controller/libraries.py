@@ -1,4 +1,4 @@
-"""Third-party packages in a process without a screen and without threads."""
+"""Adapts third-party packages to a process without a screen and without threads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WINDOWS = {
 
 
 def prepare() -> None:
-    """Lets plots be drawn without a screen, and windows of OpenCV do nothing."""
+    """Makes matplotlib draw without a screen and OpenCV's windows do nothing."""
     scratch = os.environ.get("TMPDIR", ".")
     os.environ.update(
         MPLBACKEND="Agg", MPLCONFIGDIR=scratch, OPENCV_FOR_THREADS_NUM="1"
@@ -32,7 +32,7 @@ def prepare() -> None:
 
 
 def _tolerate_timers() -> None:
-    """Lets a timer that cannot start be ignored: matplotlib only warns with it."""
+    """Ignores a timer that cannot start: matplotlib uses one only for a warning."""
     original: Callable[[Any], None] = threading.Timer.start
 
     def start_if_possible(timer: threading.Thread) -> None:
@@ -50,7 +50,7 @@ def _without_windows(cv2: ModuleType) -> None:
 
 
 def _without_screen(matplotlib: ModuleType) -> None:
-    """Keeps the backend that needs no screen, whatever a program asks for."""
+    """Keeps the backend that needs no screen, whatever backend a program selects."""
     matplotlib.use = lambda *_, **__: None  # type: ignore[attr-defined]
 
 
@@ -67,7 +67,7 @@ _PATCHES: dict[str, Callable[[ModuleType], None]] = {
 
 
 class _Patching:
-    """Finder that changes a module of `_PATCHES` after its first import."""
+    """Finder that patches a module in `_PATCHES` after its first import."""
 
     def __init__(self) -> None:
         self._begun: set[str] = set()
@@ -75,7 +75,7 @@ class _Patching:
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """The spec of a module, with a loader that changes it; None for others."""
+        """The spec of a module of `_PATCHES`, which is then patched; else None."""
         del path, target
         if name not in _PATCHES or name in self._begun:
             return None

@@ -1,4 +1,4 @@
-"""PNG files (ISO/IEC 15948), since the package uses only the standard library."""
+"""Writes PNG files (ISO/IEC 15948) with the standard library alone."""
 
 from __future__ import annotations
 

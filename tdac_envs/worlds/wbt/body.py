@@ -14,9 +14,9 @@ class Body:
 
     Attributes:
         frame: Frame of the PROTO.
-        solid: Parts that can be hit.
+        solid: Parts for collisions.
         visible: Parts that sensors see.
-        mass: Mass, kg; None if it is fixed.
+        mass: Mass, kg; None if the body is fixed.
         reflectance: Reflectance of all parts.
     """
 

@@ -1,7 +1,7 @@
 """Reads the colours of surfaces and of the sky.
 
-Colours decide nothing but camera images, so an invalid one is no error: the default
-replaces it. Textures in other files are not read; they count as grey.
+Colours affect only camera images. An invalid colour is therefore not an error: the
+default replaces it. Textures in other files are not read; they count as grey.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ BLACK_SKY: Sky = ((0.0, 0.0, 0.0),) * 3
 _OUTDOORS: Sky = ((0.36, 0.57, 0.86), (0.80, 0.87, 0.94), (0.45, 0.47, 0.43))
 
 _CLEAR = 0.9
-"""Transparency above which a surface is invisible; below, it is opaque."""
+"""Transparency above which a surface is invisible; otherwise it is opaque."""
 _TEXTURED = 0.65
-"""Mean brightness of a texture that is not available."""
+"""Assumed mean brightness of a texture that is not available."""
 
 # Approximate mean colours of Webots' appearance PROTOs.
 _SURFACES: dict[str, Colour] = {
@@ -78,7 +78,7 @@ def look(node: Node, field: str = "appearance") -> Look:
 
 
 def proto_look(node: Node) -> Look:
-    """The look of a PROTO: its `appearance` or `color`, else that of its type."""
+    """The look of a PROTO from its `appearance` or `color`, or the look of its type."""
     if "appearance" in node.fields:
         return look(node)
     usual = look_of_kind(node.kind)
@@ -116,7 +116,7 @@ def wall_look(node: Node) -> Look:
 
 
 def sky_of(nodes: Iterable[Node]) -> Sky:
-    """The sky of a file; black without a background, as in Webots.
+    """The sky of a file; without a background it is black, as in Webots.
 
     Args:
         nodes: Top-level nodes.

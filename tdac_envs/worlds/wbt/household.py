@@ -1,8 +1,8 @@
 """Converts common small PROTOs of Webots to prisms: balls, drinks, jars, animals.
 
-Their shapes are those of the PROTOs' boundingObjects, of the animals only the parts
-that matter to a robot on the floor. Where a file gives no mass, those of bottles and
-jars are estimates. A ball slides and does not roll.
+Their shapes are those of the PROTOs' boundingObjects; of an animal, only the parts that
+a robot on the floor can touch. If a file gives no mass, the masses of bottles and jars
+are estimates. A ball slides; it does not roll.
 """
 
 from __future__ import annotations
@@ -142,4 +142,4 @@ HOUSEHOLD: dict[str, Reader] = {
     "WaterBottle": _columns((0.044, 0.002, 0.242), (0.012, 0.242, 0.3055), mass=0.6),
     "YoubotFlag": _flag,
 }
-"""The reader of each type."""
+"""The reader of each PROTO."""

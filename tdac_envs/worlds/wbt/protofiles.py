@@ -1,8 +1,8 @@
-"""PROTO files of a project: replaces their nodes by the nodes that they consist of.
+"""Expands the PROTOs of a project: replaces each by the nodes of which it consists.
 
 A PROTO is read if its file is in the folder of the world, in `protos` there, or in the
-project's `protos`; nothing is fetched. PROTOs with template statements are left as
-they are, and so are those that the reader models itself.
+project's `protos`; nothing is downloaded. PROTOs with template statements, and those
+that the reader models itself, are not expanded.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tdac_envs.worlds.wbt.tree import Document, Field, Item, Node, parse
 LARGEST_PROTO = 2_000_000
 """Maximum size of a PROTO file, bytes."""
 DEEPEST = 8
-"""Maximum number of PROTOs inside one another."""
+"""Maximum depth of nested PROTOs."""
 
 _HEAD = re.compile(r"^\s*PROTO\s+(\S+)\s*\[", re.MULTILINE)
 _COMMENT = re.compile(r'("(?:[^"\\\n]|\\.)*")|#[^\n]*')
@@ -41,7 +41,7 @@ class Proto:
 
     Attributes:
         defaults: Default values of its fields.
-        body: The node that it consists of, with marks where it uses a field.
+        body: The node of which it consists, with marks where it uses a field.
     """
 
     defaults: dict[str, Field]
@@ -62,7 +62,7 @@ class ProtoFolder:
     _known: dict[str, Proto | None] = field(default_factory=dict)
 
     def expanded(self, document: Document) -> Document:
-        """The document with the nodes of its PROTOs instead of the PROTOs."""
+        """The document, in which nodes replace the PROTOs that consist of them."""
         nodes = tuple(self._expand(node, 0) for node in document.nodes)
         return replace(document, nodes=nodes)
 
@@ -110,7 +110,7 @@ class ProtoFolder:
 
 
 def read_proto(text: str, kind: str, version: str) -> Proto | None:
-    """Reads a PROTO; None if it has template statements or another name.
+    """Reads a PROTO; returns None if it has template statements or another name.
 
     Args:
         text: Content of the file.
@@ -137,7 +137,7 @@ def read_proto(text: str, kind: str, version: str) -> Proto | None:
 
 
 def _closing(text: str, start: int) -> int:
-    """Index of the bracket that closes one opened before `start`; -1 if none does."""
+    """Index of the bracket that closes the one before `start`; -1 if there is none."""
     depth = 1
     for match in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[][]', text[start:]):
         depth += {"[": 1, "]": -1}.get(match[0], 0)

@@ -122,7 +122,7 @@ def test_save_image(printed):
         "print(one == two, one[1:4], size)\n"
     )
     assert out[0] == "-1"
-    assert out[1].startswith("tdac: Camera.saveImage() writes PNG")
+    assert out[1].startswith("tdac: Camera.saveImage() writes a PNG file")
     assert out[2].startswith("Error: wb_camera_save_image() failed")
     assert out[3:] == ["0 0 -1", "True b'PNG' [52, 39]"]
 

@@ -267,7 +267,7 @@ class TestCameras:
         eye = 'Camera { name "eye" }'
         robot = f'Robot {{ model "epuck" children [ {eye} ] }}'
         world = f"{HEAD}Transform {{ scale 1e-9 1e-9 1e-9 children [ {robot} ] }}\n"
-        with pytest.raises(WorldError, match="the camera 'eye' is scaled to nothing"):
+        with pytest.raises(WorldError, match="the camera 'eye' has the scale 0"):
             camera(world)
 
     def test_odd_fields(self, camera):

@@ -59,7 +59,7 @@ def test_a_picture_that_is_not_here(stage_of):
     away = PICTURE.replace("textures/halves.png", "https://example.org/a/line.png")
     stage, readings = stage_of(away, f"E-puck {{ {SLOT} }}\n")
     (note,) = stage.notes
-    assert "line.png is not here, and nothing is fetched" in note
+    assert "line.png; tdac downloads nothing" in note
     assert readings.distance("gs0", (0.0, 0.0, 0.0)) == pytest.approx(
         grounded(0.003, 1.0)
     )
@@ -124,6 +124,6 @@ def test_unknown_nodes_behind_the_walls(stage_of):
     """They need no --ignore, but a note; inside the walls they need it."""
     robot = "E-puck { }\n"
     stage, _ = stage_of(ARENA, robot, 'Dragon { translation 3 0 0 name "far" }')
-    assert stage.notes == ("not modelled, but outside of the arena's walls: far",)
+    assert stage.notes == ("not modelled, but outside the arena's walls: far",)
     with pytest.raises(WorldError, match="1 node may be solid but is not modelled"):
         stage_of(ARENA, robot, "Dragon { translation 0.8 0 0 }")
