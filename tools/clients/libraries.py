@@ -75,7 +75,7 @@ LIBRARIES = {
         ("tianshou",),
     ),
     "skrl": Library(
-        "PPO on a batch, found by `wrap_env`",
+        "PPO on a batch, recognised by `wrap_env`",
         _own("train_skrl"),
         ("skrl",),
         ("skrl",),
