@@ -114,8 +114,8 @@ Metres = Annotated[
     bool,
     typer.Option(
         "--metres",
-        help="Places, lengths and headings, in and out, are m and rad in the map's "
-        "frame (map.yaml).",
+        help="Use m and rad in the map's frame (map.yaml) for the input and output of "
+        "places, lengths and headings.",
     ),
 ]
 Polarity = Annotated[

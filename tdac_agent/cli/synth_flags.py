@@ -45,7 +45,7 @@ WITH_RESUME = frozenset(
     "`tdac synth --learner anthropic:claude-sonnet-5-5`; "
     "`tdac synth --resume runs/maze-1`"
 )
-@takes_task(but=())
+@takes_task(without=())
 def synth(
     context: typer.Context,
     named_task: NamedTask,

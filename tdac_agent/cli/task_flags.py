@@ -78,14 +78,14 @@ ONLY_FOR_SYNTH = ("robot_image", "instructions")
 
 
 def takes_task(
-    *, but: Collection[str] = ONLY_FOR_SYNTH
+    *, without: Collection[str] = ONLY_FOR_SYNTH
 ) -> Callable[[Command], Command]:
     """Replaces a command's parameter `named_task` by the flags of `task_flags`.
 
     Args:
-        but: Flags to leave out.
+        without: Names of flags that the command does not have.
     """
-    flags = [flag for flag in _parameters(task_flags) if flag.name not in but]
+    flags = [flag for flag in _parameters(task_flags) if flag.name not in without]
 
     def with_flags(command: Command) -> Command:
         own = _parameters(command)
