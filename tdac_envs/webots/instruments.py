@@ -53,8 +53,8 @@ class Instruments:
             return ()
         names = ", ".join(dict.fromkeys(self.floors.missing))
         return (
-            f"the image of the floor is missing: {names}; tdac downloads nothing: put "
-            "the file beside the world file",
+            f"the image of the floor is missing: {names}; tdac downloads nothing, so "
+            "put the file beside the world file",
         )
 
 
