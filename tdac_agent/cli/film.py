@@ -27,9 +27,10 @@ class Film:
     seconds: float
 
     def __str__(self) -> str:
-        """The speed in words, as in `at real time, 41 s`."""
-        speed = "real time" if self.speed == 1.0 else f"{self.speed:g} times real time"
-        return f"at {speed}, {self.seconds:.0f} s"
+        """The speed in words, as in `in real time, 41 s`."""
+        times = f"at {self.speed:g} times real time"
+        speed = "in real time" if self.speed == 1.0 else times
+        return f"{speed}, {self.seconds:.0f} s"
 
 
 def film_of(steps: int, dt: float, speed: float | None = None) -> Film:

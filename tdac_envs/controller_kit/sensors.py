@@ -238,7 +238,7 @@ def show(
         else:
             real_time = env.metadata["render_fps"] / 2  # every second step is drawn
             write_video(frames, HERE / "controller.mp4", fps=real_time)
-            print("no display: wrote", HERE / "controller.mp4", "(at real time)")
+            print("no display: wrote", HERE / "controller.mp4", "(in real time)")
     except KeyboardInterrupt:
         outcome.append("stopped")
     finally:

@@ -7,6 +7,7 @@ import numpy as np
 from tdac_agent.environments.epuck.surroundings import WorldSurroundings
 from tdac_agent.environments.kernels_used import use_robot
 from tdac_envs.epuck import infrared, kernels
+from tdac_envs.webots.beams import nearest_hit
 from tdac_envs.webots.rendering import look_through
 from tdac_envs.webots.scenery import Scenery
 from tdac_envs.worlds.wbt.colours import BLACK_SKY
@@ -20,6 +21,7 @@ def use_kernels() -> None:
     around.pull(around.path_from(pose))
     points, first, extent = epuck.nominal.ground.solid.arrays()
     infrared.sees(points, first, extent, 0.0, 0.0, 1.0, 1.0)
+    nearest_hit(points, first, extent, 0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 1.0)
     (words,) = epuck.addresses.words
     kernels.turn_wheels(words)
     kernels.finish(words)

@@ -10,14 +10,14 @@ from tdac_agent.cli.film import LONGEST_SECONDS, MOST_FPS, film_of
 @pytest.mark.parametrize(
     ("steps", "dt", "speed", "told"),
     [
-        (800, 0.05, None, "at real time, 40 s"),
-        (1200, 0.05, None, "at real time, 60 s"),
+        (800, 0.05, None, "in real time, 40 s"),
+        (1200, 0.05, None, "in real time, 60 s"),
         (1201, 0.05, None, "at 2 times real time, 30 s"),
         (6000, 0.032, None, "at 4 times real time, 48 s"),
-        (6000, 0.032, 1.0, "at real time, 192 s"),
+        (6000, 0.032, 1.0, "in real time, 192 s"),
         (800, 0.05, 2.0, "at 2 times real time, 20 s"),
         (100, 0.05, 0.5, "at 0.5 times real time, 10 s"),
-        (0, 0.05, None, "at real time, 0 s"),
+        (0, 0.05, None, "in real time, 0 s"),
     ],
 )
 def test_the_speed_is_told(steps, dt, speed, told):

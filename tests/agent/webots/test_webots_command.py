@@ -105,7 +105,7 @@ def test_bundled_world(tdac):
 @pytest.mark.parametrize(
     ("speed", "frames", "told"),
     [
-        ([], 12, "(at real time, 1 s)"),
+        ([], 12, "(in real time, 1 s)"),
         (["--speed", 4], 6, "(at 4 times real time, 0 s)"),
     ],
 )

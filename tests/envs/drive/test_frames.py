@@ -99,12 +99,13 @@ def test_gymnasium_records_a_batch(tmp_path):
     """All robots in one video."""
     pytest.importorskip("moviepy")
     batch = gym.make_vec(IDS[0], 4, horizon=6, **DRAWN)
-    batch = RecordVideo(batch, str(tmp_path), episode_trigger=lambda k: k == 0)
+    folder = str(tmp_path / "films")
+    batch = RecordVideo(batch, folder, episode_trigger=lambda k: k == 0)
     batch.reset(seed=0)
     for _ in range(7):
         batch.step(np.ones((4, 2), np.float32))
     batch.close()
-    (video,) = tmp_path.glob("*.mp4")
+    (video,) = tmp_path.glob("films/*.mp4")
     film = cv2.VideoCapture(str(video))
     assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 7
     assert film.get(cv2.CAP_PROP_FRAME_WIDTH) > 1000

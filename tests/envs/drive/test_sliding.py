@@ -158,7 +158,9 @@ class TestOnMaps:
         assert not info["collision"]
         assert env.pose()[1] < 149.5 - RADIUS - 1
 
-    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize(
+        "seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 8))]
+    )
     def test_it_never_enters_an_obstacle(self, seed):
         """Random commands among boxes, slants and single pixels."""
         cells, random = rough_map(seed), np.random.default_rng(seed)
@@ -188,7 +190,9 @@ class TestOnMaps:
             block.step(action)
             assert stop.pose().tolist() == block.pose().tolist()
 
-    @pytest.mark.parametrize("seed", range(4))
+    @pytest.mark.parametrize(
+        "seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 6))]
+    )
     def test_left_and_right_are_alike(self, seed):
         """On the mirrored map with exchanged wheels it drives the mirrored way."""
         cells, random = rough_map(seed), np.random.default_rng(seed)
