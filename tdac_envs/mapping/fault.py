@@ -81,8 +81,9 @@ def _outside(cells: BoolGrid, ends: dict[str, Point]) -> Fault | None:
     height, width = cells.shape
     none = np.zeros_like(cells)
     for name, (x, y) in ends.items():
-        at = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
-        if math.dist(at, (x, y)) > 0.5:
+        column, row = _pixel((x, y))
+        if not (0 <= column < width and 0 <= row < height):
+            at = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
             label = f"{name} outside the map, in this direction"
             return Fault(label, at, None, none, none)
     return None

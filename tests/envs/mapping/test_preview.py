@@ -174,3 +174,13 @@ def test_unknown_is_apart_from_obstacles(tmp_path):
         )
         assert len({free, solid, unknown}) == 3
         assert {free, solid, unknown} <= legend_colours(shown)
+
+
+@pytest.mark.parametrize("start", [(8, 119.5), (199.5, 8), (-0.6, 8), (1e9, 8)])
+def test_a_start_at_or_beyond_the_border_is_drawn(start, tmp_path):
+    """Pixels reach half a pixel beyond their centres, and the border is outside."""
+    error = refusal(rooms(gap=60), start=start)
+    error.folder = tmp_path
+    (file,) = write_pictures(error)
+    assert cv2.imread(str(file)) is not None
+    assert fault(error).label.startswith("start outside the map")
