@@ -52,8 +52,7 @@ def first_contact(
         In [0, 1), or 2.0 if the step is free. Moving away from or along a wall that the
         disc already touches is no contact.
     """
-    end_x, end_y, _ = move(x, y, heading, forward, turn)
-    return contact_before(clear, x, y, heading, forward, turn, radius, end_x, end_y)
+    return arc_contact(clear, x, y, heading, forward, turn, radius)
 
 
 @subkernel

@@ -199,23 +199,6 @@ def units_of(source: str | Path, *, metres: bool) -> MapUnits:
     return MapUnits.metres(load_image(path))
 
 
-def metres_to_pixels(
-    source: str | Path,
-    start: Point | None,
-    goal: Point | None,
-    robot_radius: float | None,
-) -> tuple[Point | None, Point | None, float | None]:
-    """Converts start, goal and body radius from metres in the map frame to pixels.
-
-    Raises:
-        MapError: The map cannot be read, or has no resolution.
-    """
-    units = units_of(source, metres=True)
-    points = [None if p is None else units.pixels(p) for p in (start, goal)]
-    radius = None if robot_radius is None else units.length_in_pixels(robot_radius)
-    return points[0], points[1], radius
-
-
 def _from_image(image: Path, given: _Given) -> Prepared:
     # Not cached for a ROS map.yaml: the digest does not cover the image that it names.
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tdac_envs.core.errors import MapError, TaskError
-from tdac_envs.map2d.source import metres_to_pixels, prepare
+from tdac_envs.map2d.source import prepare, units_of
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 from tdac_envs.mapping.params import MapParams
 
@@ -158,21 +158,20 @@ class TestMetres:
     def test_of_a_ros_map(self, cells, tmp_path):
         """The corner of the lower-left pixel lies at the origin, (-1, 2) m."""
         source = ros_map(tmp_path, cells)
-        start, goal, radius = metres_to_pixels(source, (-1.0, 2.0), None, 0.3)
-        assert start == pytest.approx((-0.5, 39.5))
-        assert goal is None
-        assert radius == pytest.approx(6.0)
+        units = units_of(source, metres=True)
+        assert units.pixels((-1.0, 2.0)) == pytest.approx((-0.5, 39.5))
+        assert units.length_in_pixels(0.3) == pytest.approx(6.0)
 
     def test_of_a_folder(self, cells, tmp_path):
         prepared = prepare(ros_map(tmp_path, cells), robot_radius=3, **ENDS)
         np.save(tmp_path / "occupancy.npy", cells)
         prepared.params.save(tmp_path / "params.json")
-        _, goal, _ = metres_to_pixels(tmp_path, None, (0.0, 3.0), None)
+        goal = units_of(tmp_path, metres=True).pixels((0.0, 3.0))
         assert goal == pytest.approx((19.5, 19.5))
 
     def test_a_picture_has_no_metres(self, picture):
         with pytest.raises(MapError, match="no resolution"):
-            metres_to_pixels(picture, (1.0, 1.0), None, None)
+            units_of(picture, metres=True)
 
 
 class TestRefused:

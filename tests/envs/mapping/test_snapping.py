@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.mapping.preprocessing import preprocess
@@ -85,6 +86,13 @@ def test_notes_are_in_the_units_of_the_user():
     units = MapUnits.metres(OccupancyGrid(rooms(), 0.05, (-10.0, -5.0, 0.0)))
     moved = snap(rooms(), (186, 100), GOAL, 20.0, units)
     assert moved.notes == ("start moved from (-0.675, 4.975) to (-1.275, 4.975)",)
+
+
+@pytest.mark.parametrize("snapping", [False, True])
+def test_a_radius_beyond_every_map_is_refused(snapping):
+    """Also if its square is no longer a finite number."""
+    with pytest.raises(TaskError, match="robot_radius"):
+        preprocess(rooms(), (80, 84), GOAL, 1e300, snap=snapping)
 
 
 @pytest.mark.parametrize("snapping", [False, True])
