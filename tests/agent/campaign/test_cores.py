@@ -74,6 +74,7 @@ def test_a_campaign_without_a_place_says_so_at_once(temporary, small):
     assert "died" not in complained
 
 
+@pytest.mark.slow
 def test_a_death_carries_its_reason(temporary, small):
     """A worker that meets a link for a lock makes no file through it, and tells why."""
     core_locks()

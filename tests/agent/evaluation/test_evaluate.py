@@ -484,6 +484,7 @@ evaluate(["go-to-goal"], [sys.argv[1]], 6, out=Path(sys.argv[2]), watch=watch)
 """
 
 
+@pytest.mark.slow
 def test_a_killed_evaluation_goes_on(tdac, tmp_path):
     """The same command uses what a process left that was killed with -9."""
     folder, out = write_small_task(tmp_path / "task"), tmp_path / "out"

@@ -183,6 +183,7 @@ def outcome(model, request=QUESTION):
     return told, repr(reply.text)
 
 
+@pytest.mark.slow
 def test_each_fault_is_what_it_is(server, canary):
     """Transient, rate limit, permanent, truncated, refused or an answer: one try each.
 

@@ -196,6 +196,7 @@ def test_a_run_is_replayed(policy_task, recorded, tmp_path, warm):
         assert old.read_bytes() == new.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_replay_has_the_seed_on_record(recorded, tmp_path, good, tdac):
     """Of a run that was begun here; the author of another may have aimed at it."""
     words = ["--task", good, "--seed", 5, "-K", 1, "-J", 0]
