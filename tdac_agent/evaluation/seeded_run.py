@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from tdac_agent.errors import Fault
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.verification.diagnosis.measures import Measured
+from tdac_agent.verification.judge.jobs import write_job
 from tdac_agent.verification.judge.seeded import (
     ENDING_FILE,
     EPISODES_FILE,
@@ -49,7 +50,7 @@ def run_seeds(
     """
     job.out.mkdir()
     request = job.out.parent / f"{job.out.name}.json"
-    request.write_text(job.model_dump_json(), encoding="utf-8")
+    write_job(job, request)
     longest = SLOWEST * nominal.horizon * nominal.dt
     tail = _Tail(kind, job.out / EPISODES_FILE, watch)
     with contextlib.ExitStack() as stack:

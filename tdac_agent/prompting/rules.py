@@ -139,7 +139,9 @@ class RuleBook(_Record):
     def change(self, name: str, **fields: object) -> RuleBook:
         """Returns a copy in which fields of one rule are changed."""
         rules = (
-            rule.model_copy(update=fields) if rule.id == name else rule
+            RepairRule.model_validate({**dict(rule), **fields})
+            if rule.id == name
+            else rule
             for rule in self.rules
         )
         return self.model_copy(update={"rules": tuple(rules)})

@@ -19,7 +19,7 @@ from tdac_agent.tasks.task import Task, called, lay_out
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.report import OWN, SHIPPED, Provenance, Report
-from tdac_agent.verification.judge.jobs import Findings, Job
+from tdac_agent.verification.judge.jobs import Findings, Job, write_job
 from tdac_agent.verification.judge.report_log import (
     read_findings,
     read_outcomes,
@@ -216,7 +216,7 @@ def _run_judge(
     job: Job, folder: Path, judge: WarmJudge, meanwhile: Callable[[], None] | None
 ) -> str:
     request = folder / "job.json"
-    request.write_text(job.model_dump_json(), encoding="utf-8")
+    write_job(job, request)
     judge.run(request, DEADLINE_SECONDS, meanwhile)
     output = (folder / "output.txt").read_bytes().decode("utf-8", "replace")
     return output.replace(f"{folder}/", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Final, Literal
 
@@ -32,6 +33,11 @@ class Job(BaseModel):
     limits: Limits
     out: Path
     trajectories: Path | None = Field(description="Folder; None to discard them.")
+
+
+def write_job(job: BaseModel, path: Path) -> None:
+    """Writes a job as JSON; paths may contain bytes that are not UTF-8."""
+    path.write_text(json.dumps(job.model_dump(mode="json")), encoding="utf-8")
 
 
 class Findings(PrintableRecord):

@@ -236,15 +236,15 @@ def do_job(
     later: contextlib.ExitStack,
 ) -> None:
     """Runs a job of either kind in its folder; the caller closes `later` after it."""
-    text = request.read_text(encoding="utf-8")
+    job = json.loads(request.read_text(encoding="utf-8"))
     os.chdir(request.parent)
-    if json.loads(text)["kind"] == SUITE:
-        judge_suite(Job.model_validate_json(text), child_pool, worker_pool, later)
+    if job["kind"] == SUITE:
+        judge_suite(Job.model_validate(job), child_pool, worker_pool, later)
     else:
         # Imported late, since it loads policies of all kinds.
         from tdac_agent.verification.judge.seeded import SeededJob, judge_seeds
 
-        judge_seeds(SeededJob.model_validate_json(text), child_pool)
+        judge_seeds(SeededJob.model_validate(job), child_pool)
 
 
 if __name__ == "__main__":

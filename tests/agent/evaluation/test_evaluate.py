@@ -439,6 +439,14 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
     assert json.loads(again)["rows"][0]["interval"]["method"] == "Clopper-Pearson"
 
 
+def test_a_folder_whose_name_is_not_utf_8(tdac, tmp_path):
+    folder, out = write_small_task(tmp_path / "task"), tmp_path / "\udcff"
+    words = ["evaluate", "go-to-goal", "--task", folder, "--episodes", 1]
+    code, _, errors = tdac(*words, "--out", out)
+    assert code == 0, errors
+    assert (out / "evaluation.json").is_file()
+
+
 def kept_in(out):
     """Contents of the files of finished episodes, by path."""
     return {file: file.read_bytes() for file in (out / FOLDER).glob("*/*.npz")}

@@ -200,6 +200,13 @@ def test_what_was_dropped_does_not_come_back():
     assert (gone.status, gone.ended, gone.reason) == ("dropped", 2, "too slow")
 
 
+def test_a_changed_rule_is_as_it_is_read_again():
+    """Control characters of an answer do not stay in its text or reason."""
+    book, _ = after([add("1")], [edit("R1", "2 \x1b")], [drop("R1", "3 \x1b")])
+    assert "\x1b" not in repr(book)
+    assert RuleBook.model_validate_json(book.model_dump_json()) == book
+
+
 def test_a_rule_remembers_its_life():
     """Birth, evidence and earlier texts stay with it; ids are never used twice."""
     book, _ = after([add("one")], [drop("R1")], [add("two")], [edit("R2", "three")])
