@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import check_finite, check_radius
+from tdac_agent.cli.flags import check_finite, check_heading, check_radius
 from tdac_envs.core.errors import PicturedError, TaskError
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.map2d.source import units_of
@@ -50,8 +50,8 @@ class MapTask:
         """
         if (self.start is None) != (self.goal is None):
             raise TaskError("give both --start X Y and --goal X Y, or neither")
-        heading = None if self.heading is None else (self.heading,)
-        check_finite(start=self.start, goal=self.goal, heading=heading)
+        check_finite(start=self.start, goal=self.goal)
+        check_heading(self.heading)
         check_radius(self.robot_radius)
 
     def in_pixels(self, units: MapUnits) -> MapTask:

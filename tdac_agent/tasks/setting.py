@@ -145,6 +145,17 @@ class Setting(Protocol):
     def units(self) -> Units:
         """Units of places and lengths."""
 
+    @property
+    def shown(self) -> Units:
+        """The same, but printed in the units that the user has chosen."""
+
+    def in_metres(self) -> Setting:
+        """Returns the same task, shown in metres of the map's frame.
+
+        Raises:
+            TaskError: It has no other units than its own.
+        """
+
     def told(self, length: float) -> str:
         """Formats a length in the units that the user has chosen: `12 px`, `0.6 m`."""
 

@@ -43,6 +43,11 @@ class WorldSurroundings:
         """Metres, printed in mm."""
         return METRES
 
+    def shown_in(self, units: Units) -> WorldSurroundings:
+        """Returns itself: a world has no other units."""
+        assert units == METRES
+        return self
+
     @property
     def radius(self) -> float:
         """Radius of the body, mm."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -63,11 +63,25 @@ class Map2DSetting:
         """Pixels."""
         return PIXELS
 
+    @property
+    def shown(self) -> Units:
+        """Pixels, printed as in `shown_in`."""
+        if self.shown_in == MAP_PIXELS:
+            return PIXELS
+        return PIXELS.in_metres(self.shown_in)
+
+    def in_metres(self) -> Map2DSetting:
+        """See `Setting`."""
+        if self.params.resolution is None:
+            raise TaskError(
+                f"--metres needs a map with a resolution, as in map.yaml; "
+                f"{self.params.source} has none"
+            )
+        return replace(self, shown_in=MapUnits.metres(self.params))
+
     def told(self, length: float) -> str:
         """Formats a length in `shown_in`."""
-        if self.shown_in == MAP_PIXELS:
-            return self.units.figure(length)
-        return self.shown_in.length(length)
+        return self.shown.figure(length)
 
     @property
     def left_out(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,14 +24,19 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapSurroundings:
-    """The map of a task; see `Surroundings`."""
+    """The map of a task; see `Surroundings`.
+
+    Attributes:
+        task: The task.
+        units: Pixels; texts may be in metres.
+    """
 
     task: Map2DTask
+    units: Units = PIXELS
 
-    @property
-    def units(self) -> Units:
-        """Pixels."""
-        return PIXELS
+    def shown_in(self, units: Units) -> MapSurroundings:
+        """Returns the same with texts in other units."""
+        return replace(self, units=units)
 
     @property
     def radius(self) -> float:
@@ -60,8 +65,8 @@ class MapSurroundings:
         earlier = min(trajectory.steps, 10)
         shortest = float(trajectory.ranges[trajectory.steps - earlier].min())
         return (
-            f"{earlier} steps earlier the shortest ray read {shortest:.1f} px (from "
-            "the centre of the body)."
+            f"{earlier} steps earlier the shortest ray read "
+            f"{self.units.far(shortest)} (from the centre of the body)."
         )
 
     def path_from(self, pose: Pose) -> Path:
