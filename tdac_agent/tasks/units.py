@@ -75,7 +75,8 @@ class Units:
             decimals: Decimals of a length in px or mm; in metres, as precise.
         """
         if self.shown is not None:
-            return self.shown.number(length, decimals)
+            length *= self.shown.per_pixel
+            decimals = max(self._decimals - max(1 - decimals, 0), 0)
         return f"{length:.{decimals}f}"
 
     def far(self, length: float, decimals: int = 1) -> str:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tdac_agent.environments.map2d.reference import pull
 from tdac_agent.environments.map2d.touch import nearest_touch
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.units import PIXELS, Points, Units
@@ -70,12 +69,12 @@ class MapSurroundings:
         )
 
     def path_from(self, pose: Pose) -> Path:
-        """Returns the shortest path to the goal."""
+        """Returns the shortest grid path to the goal."""
         return self.task.path_from(pose)
 
     def pull(self, path: Path) -> list[Point]:
         """Returns the corners of a path after all shortcuts."""
-        return pull(self.task, path)
+        return self.task.pulled(path)
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
         """Yields the path's first point `far` away from each place, or its end."""

@@ -114,7 +114,10 @@ def event_of(
     way = path_ahead(around, shown, trajectory.steps)
     return Event(
         title=title,
-        facts=(*facts, f"path left: {units.amount(d_min, 0)} of {units.far(d0, 0)}"),
+        facts=(
+            *facts,
+            f"grid path left: {units.amount(d_min, 0)} of {units.far(d0, 0)}",
+        ),
         where=where,
         contact=contact_of(task, trajectory, episode.outcome),
         way=None if way is None else np.array([units.place_of(x, y) for x, y in way]),

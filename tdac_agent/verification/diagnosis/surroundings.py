@@ -42,7 +42,7 @@ class Surroundings(Protocol):
         """What the distance sensors saw of what was touched, as text."""
 
     def path_from(self, pose: Pose) -> Path:
-        """Shortest path to the goal, shape (n, 2); empty where there is none."""
+        """Shortest grid path to the goal, shape (n, 2); empty where there is none."""
 
     def pull(self, path: Path) -> list[Point]:
         """Corners of a path after every shortcut that the body can take."""

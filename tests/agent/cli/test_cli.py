@@ -149,7 +149,7 @@ def test_the_help_is_quick():
         ("map x.png --start 1 2 0.5 4", "unexpected extra argument(s) (4)"),
         ("map x.png --goal 1,2 4", "unexpected extra argument(s) (4)"),
         ("map x.png --heading 0.5", "--heading needs --start X Y"),
-        ("synth --start 330 --goal 99 100", "Invalid value for '--start'"),
+        ("synth --start 330 --goal 99 100", "--start 330: expected two numbers X Y"),
         ("syth", "No such command 'syth'"),
         ("verify", "Missing argument 'CONTROLLER'; see tdac verify --help"),
     ],
