@@ -156,7 +156,7 @@ def _print_drive(
     """Prints the shortest path and, in metres, the robot."""
     if shortest is not None:
         length = units.length(path_length(shortest), 0)
-        console.print(f"shortest path {length}: the straightest for this body")
+        console.print(f"shortest path {length}: with every shortcut for this body")
     if units != PIXELS:
         console.print(escape(robot_text(params.robot, units)), soft_wrap=True)
         print_sentences(

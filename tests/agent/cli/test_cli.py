@@ -222,7 +222,7 @@ PLACES = {
     "not a number": (["--start", "nan", 30, "--goal", 130, 30], "start"),
     "infinite": (["--start", 30, 30, "--goal", "inf", 30], "goal"),
     "metres": (["--metres", *ENDS], "resolution"),
-    "word for a number": (["--start", "a", 30], "valid (number|float)"),
+    "word for a number": (["--start", "a", 30], "--start a 30: expected two num"),
     "huge body": (
         ["--start", 30, 30, "--goal", 130, 30, "--robot-radius", 60],
         "60 px",

@@ -212,7 +212,6 @@ def test_a_place_in_one_word():
     "words",
     [
         ["--snap"],
-        ["--metres"],
         ["--polarity", "dark"],
         ["--threshold", "3"],
         ["--robot-radius", "3"],
@@ -229,7 +228,7 @@ def test_flags_beside_a_task_are_refused(tdac, words):
     assert err == f"error: --task already defines the task: leave out {words[0]}\n"
 
 
-@pytest.mark.parametrize("words", [["--snap"], ["--metres"], ["--polarity", "dark"]])
+@pytest.mark.parametrize("words", [["--snap"], ["--polarity", "dark"]])
 def test_flags_beside_a_run_folder_are_refused(tdac, tmp_path, words):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "controller.py").write_text("x = 1\n")

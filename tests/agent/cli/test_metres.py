@@ -40,7 +40,7 @@ def folder(plan, tmp_path):
     )
     lay_out(load_task(file), tmp_path / "run")
     (tmp_path / "run" / "controller.py").write_text(FORWARD)
-    assert "metres" not in (tmp_path / "run" / "task.yaml").read_text()
+    assert "metres:" not in (tmp_path / "run" / "task.yaml").read_text()
     return tmp_path / "run"
 
 
