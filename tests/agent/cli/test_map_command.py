@@ -177,11 +177,10 @@ def test_places_that_are_none(typed, message):
         with_places(typed.split())
 
 
-@pytest.mark.parametrize("words", [("--heading", "90"), ("--goal", "30", "30")])
-def test_a_heading_in_degrees(tdac, ros, words):
+@pytest.mark.parametrize("start", ["30 30 --heading 90", "30 30 90", "30,30,90"])
+def test_a_heading_in_degrees(tdac, ros, start):
     """More than a full turn is refused with the radians that may be meant."""
-    start = ("--start", "30", "30", *(() if "--heading" in words else ("90",)))
-    ends = (*start, "--goal", "130", "30", *words)
+    ends = ("--start", *start.split(), "--goal", "130", "30")
     code, _, err = tdac("map", ros.parent / "plan.png", *ends)
     assert (code, err.count("\n")) == (2, 1)
     assert "90 is more than a full turn: did you mean 1.571 (90 degrees)?" in err
