@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.errors import TdacError
 from tdac_envs.grid.grid import BoolGrid, OccupancyGrid, body_free, clearance
 from tdac_envs.mapping.image import ColourImage, load_image, luminance
-from tdac_envs.mapping.map_folder import shortest_path
+from tdac_envs.mapping.map_folder import planned_path
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.preprocessing import preprocess
 from tdac_envs.mapping.score import connected
@@ -394,7 +394,7 @@ def outcome(photo: Photo, with_task: bool = True) -> tuple[str, str]:
 
 def crosses(grid: OccupancyGrid, params: MapParams, truth: BoolGrid) -> bool:
     """Whether the shortest path on the grid meets a true wall."""
-    columns, rows = shortest_path(grid, params).astype(np.intp).T
+    columns, rows = planned_path(grid, params).astype(np.intp).T
     return bool(truth[rows, columns].any())
 
 

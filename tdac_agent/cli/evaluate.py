@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.evaluate_view import show_evaluation
-from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.flags import TaskFlags, check_tier
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.evaluation.entrants import entrants_of
@@ -21,6 +22,7 @@ from tdac_agent.evaluation.evaluate import evaluate, load_tasks
 from tdac_agent.evaluation.evaluation_report import Evaluation
 from tdac_agent.evaluation.unfinished import count_kept
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError
@@ -31,6 +33,7 @@ NO_WRAPPERS = "none"
 def run(
     policies: list[str],
     tasks: list[str],
+    flags: TaskFlags,
     episodes: int,
     seed: int,
     variation: Literal["nominal", "jitter", "mixed", "random"],
@@ -62,12 +65,16 @@ def run(
     )
     row = bar.add_task("", total=episodes, successes=0, doing="preparing")
 
+    is_driven = False
+
     def watch(task: str, policy: str, count: int, successes: int) -> None:
+        nonlocal is_driven
+        is_driven = True
         doing = escape(f"{task}: {policy}")
         bar.update(row, completed=count, successes=successes, doing=doing, refresh=True)
 
     with ChildPool() as child_pool, _keeping(console, out):
-        loaded = load_tasks(tasks)
+        loaded = load_tasks(_tasks(tasks, flags))
         with WarmJudge(child_pool) as judge, bar:
             found = evaluate(
                 policies,
@@ -86,8 +93,12 @@ def run(
     if as_json:
         sys.stdout.write(found.model_dump_json(indent=2) + "\n")
     else:
-        show_evaluation(found, console)
-        if out is not None:
+        units = {task.name: task.setting.shown for task in loaded}
+        show_evaluation(found, console, units)
+        if out is not None and not is_driven:
+            done = f"{out} already has this evaluation; nothing was driven"
+            print_sentences(console, done)
+        elif out is not None:
             pictures = ", ".join(f"{task.name}.png" for task in found.tasks)
             files = f"evaluation.json, episodes.csv, timing.csv, {pictures}"
             console.print(escape(f"wrote {files} to {out}"), soft_wrap=True)
@@ -95,6 +106,22 @@ def run(
         console.print("[red]every policy crashed in every episode[/]")
         return 1
     return 0
+
+
+def _tasks(names: list[str], flags: TaskFlags) -> list[Task]:
+    """The tasks that `--task` names, then that of `--map` or `--world`, if any.
+
+    Raises:
+        TaskError: Flags contradict each other, or a task cannot be used.
+    """
+    shown = TaskFlags(metres=flags.metres)
+    if flags.map_image or flags.world:
+        named = [replace(shown, task=name) for name in names]
+        return [each.load() for each in (*named, flags)]
+    others = replace(flags, metres=False).words()
+    if others:
+        raise TaskError(f"{others[0]} needs --map or --world")
+    return [replace(shown, task=name).load() for name in names or ["maze"]]
 
 
 @contextmanager

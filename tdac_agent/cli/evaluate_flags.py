@@ -17,6 +17,7 @@ from tdac_agent.cli.options import (
     file_flag,
     number_flag,
 )
+from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, NamedTask, takes_task
 
 app = typer.Typer()
 
@@ -25,6 +26,7 @@ app = typer.Typer()
     epilog="Examples: `tdac evaluate reference builtin go-to-goal --task maze "
     "--task epuck`; `tdac evaluate runs/maze-1 ppo.zip --task maze --out compared`"
 )
+@takes_task(without=(*ONLY_FOR_SYNTH, "task"))
 def evaluate(
     policies: Annotated[
         list[str],
@@ -40,6 +42,8 @@ def evaluate(
             "--task", metavar="PATH", help=f"{TASK}; repeatable.  [default: maze]"
         ),
     ] = None,
+    *,
+    named_task: NamedTask,
     episodes: Annotated[
         int, number_flag(min=1, help="Episodes per policy and task.")
     ] = 100,
@@ -78,7 +82,8 @@ def evaluate(
     raise typer.Exit(
         command.run(
             policies,
-            tasks or ["maze"],
+            tasks or [],
+            named_task(),
             episodes,
             seed,
             variation,

@@ -17,7 +17,7 @@ from tdac_agent.evaluation.evaluation_report import (
     PolicyRow,
     Timing,
 )
-from tdac_agent.tasks.units import UNITS
+from tdac_agent.tasks.units import Units
 
 NONE = "–"
 # Least width of long policy names, so that a table fits into 80 columns.
@@ -40,12 +40,20 @@ PAIRED = (
 SIGNIFICANT = 0.05
 
 
-def show_evaluation(found: Evaluation, console: Console) -> None:
-    """Prints a table per task with its failure reasons, then the comparisons."""
+def show_evaluation(
+    found: Evaluation, console: Console, units: dict[str, Units]
+) -> None:
+    """Prints a table per task with its failure reasons, then the comparisons.
+
+    Args:
+        found: The evaluation.
+        console: Console to print to.
+        units: Units of each task by its name, as from `Setting.shown`.
+    """
     timings = {(t.task, t.policy): t for t in found.timings}
     for task in found.tasks:
         rows = [row for row in found.rows if row.task == task.name]
-        console.print(_table(found, task, rows, timings))
+        console.print(_table(found, task, rows, timings, units[task.name]))
         console.print()
         for line in _notes(rows):
             print_sentences(console, line, indent=2)
@@ -61,8 +69,8 @@ def _table(
     task: EvaluatedTask,
     rows: Sequence[PolicyRow],
     timings: dict[tuple[str, str], Timing],
+    units: Units,
 ) -> Table:
-    units = UNITS[task.unit]
     places = 0 if task.unit == "m" else 1
     starts = {
         "jitter": "jittered starts",
@@ -93,7 +101,7 @@ def _table(
             _figure(row.time_ratio, 2),
             _figure(row.path_ratio, 2),
             _figure(row.smoothness, 1),
-            f"{gaps[0]:.{places}f}/{gaps[1]:.0f}",
+            f"{units.amount(gaps[0], places)}/{units.amount(gaps[1], 0)}",
             f"{timing.median_ms:.2f}/{timing.p99_ms:.1f}",
         )
     return table

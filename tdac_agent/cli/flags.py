@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,7 +19,7 @@ from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 
 FIXED_BY_TASK = (
     *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
-    *("robot_image", "snap", "metres", "polarity", "threshold", "instructions"),
+    *("robot_image", "snap", "polarity", "threshold", "instructions"),
 )
 ONLY_FOR_MAPS = (
     *("map_image", "robot_radius", "robot_image", "snap", "metres"),
@@ -54,9 +55,9 @@ class TaskFlags:
         """
         if self.task or self.map_image or self.world:
             return self.load()
-        others = tuple(each.name for each in fields(self))
-        self._refuse(f"{folder} brings its own task", others)
-        return load_task(folder)
+        others = {each.name for each in fields(self)} - {"metres"}
+        self._refuse(f"{folder} brings its own task", sorted(others))
+        return self._shown(load_task(folder))
 
     def words(self) -> list[str]:
         """The command line words that repeat these flags."""
@@ -77,12 +78,12 @@ class TaskFlags:
             TaskError: The flags contradict each other, or the task cannot be used.
             MapError: There is no such map.
         """
-        heading = None if self.heading is None else (self.heading,)
-        check_finite(start=self.start, goal=self.goal, heading=heading)
+        check_finite(start=self.start, goal=self.goal)
+        check_heading(self.heading)
         check_radius(self.robot_radius)
         if self.task is not None:
             self._refuse("--task already defines the task", FIXED_BY_TASK)
-            return load_task(self.task)
+            return self._shown(load_task(self.task))
         if self.world is not None:
             self._refuse("--world defines an e-puck task", ONLY_FOR_MAPS)
             return load_task(self._world_spec(self.world), base=Path())
@@ -98,7 +99,13 @@ class TaskFlags:
             )
         return load_task(self._spec(source), base=Path())
 
-    def _refuse(self, why: str, names: tuple[str, ...]) -> None:
+    def _shown(self, task: Task) -> Task:
+        """The task, with `--metres` shown in metres of the map's frame."""
+        if not self.metres:
+            return task
+        return replace(task, setting=task.setting.in_metres())
+
+    def _refuse(self, why: str, names: Sequence[str]) -> None:
         """Refuses flags that would have no effect.
 
         Raises:
@@ -190,6 +197,21 @@ def check_finite(**points: tuple[float, ...] | None) -> None:
         if point is not None and not all(map(math.isfinite, point)):
             given = " ".join(map(str, point))
             raise TaskError(f"--{name} must be finite, got {given}")
+
+
+def check_heading(heading: float | None) -> None:
+    """Refuses degrees: a heading of more than a full turn.
+
+    Raises:
+        TaskError: The heading is not finite, or larger than 2 pi.
+    """
+    check_finite(heading=None if heading is None else (heading,))
+    if heading is not None and abs(heading) > 2.0 * math.pi + 1e-3:
+        turn = math.remainder(math.radians(heading), 2.0 * math.pi)
+        raise TaskError(
+            f"--heading (the YAW of --start) is in radians, and {heading:g} is more "
+            f"than a full turn: did you mean {turn:.4g} ({heading:g} degrees)?"
+        )
 
 
 def check_radius(radius: float | None) -> None:

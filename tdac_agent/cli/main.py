@@ -33,6 +33,7 @@ from tdac_agent.cli import (
     webots_flags,
 )
 from tdac_agent.cli.mistakes import explain, fail
+from tdac_agent.cli.places import with_places
 from tdac_agent.cli.terminal import filter_streams
 
 
@@ -158,60 +159,6 @@ def _names(part: typer.Typer) -> set[str | None]:
         if command.callback is not None
     }
     return commands | {group.name for group in part.registered_groups}
-
-
-PLACES = ("--start", "--goal")
-
-
-def with_places(words: list[str]) -> list[str]:
-    """The words with each place as `--goal X Y` or `--start X Y --heading YAW`.
-
-    Understands `--start X Y YAW`, `--start X,Y`, `--start "X, Y"`, `--start=X,Y` and
-    the like.
-    """
-    done: list[str] = []
-    rest = list(words)
-    while rest:
-        flag, is_joined, value = rest[0].partition("=")
-        del rest[0]
-        done.append(f"{flag}{is_joined}{value}")
-        if flag not in PLACES:
-            continue
-        numbers, used = _numbers([value, *rest] if is_joined else rest)
-        if len(numbers) < 2 or (len(numbers) == 3 and flag == "--goal"):
-            continue
-        yaw = ["--heading", numbers[2]] if len(numbers) == 3 else []
-        done[-1:] = [flag, *numbers[:2], *yaw]
-        del rest[: used - bool(is_joined)]
-    return done
-
-
-def _numbers(words: list[str]) -> tuple[list[str], int]:
-    """The two or three numbers that the words begin with, and how many words they are.
-
-    Numbers in one word are separated by commas or spaces; if the first word has two of
-    them, the place ends with it.
-    """
-    numbers: list[str] = []
-    for used, word in enumerate(words):
-        parts = [part for part in word.replace(",", " ").strip("()[] ").split() if part]
-        is_place = len(parts) > 1
-        if not parts or not all(map(_is_number, parts)) or (numbers and is_place):
-            return numbers, used
-        if len(numbers) + len(parts) > 3:
-            return numbers, used
-        numbers += parts
-        if is_place:
-            return numbers, used + 1
-    return numbers, len(words)
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def main() -> None:

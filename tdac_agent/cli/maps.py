@@ -11,10 +11,17 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import check_finite, check_radius
+from tdac_agent.cli.flags import check_finite, check_heading, check_radius
+from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.environments.map2d.setting import robot_text
 from tdac_envs.core.errors import PicturedError, TaskError
+from tdac_envs.drive.task import Pose
+from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.grid.plan import Path as Path2D
+from tdac_envs.grid.plan import path_length
 from tdac_envs.map2d.source import units_of
+from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import Candidate, Preset
 from tdac_envs.mapping.image import load_image
@@ -26,10 +33,10 @@ SHOWN, EXPLAINED = 8, 2
 Point = tuple[float, float]
 LEGEND = (
     "margin: distance that the planner keeps in addition to the body radius",
-    "clearance: smallest distance between the path and an obstacle",
-    "path: its length",
+    "grid path: length of the path from pixel to pixel that keeps this margin",
+    "clearance: smallest distance between this path and an obstacle",
     "sharpness: changes between free and occupied, per pixel",
-    "score: 2.5 clearance - 0.02 path - 1.2 sharpness, lengths in px; highest is best",
+    "score: 2.5 clearance - 0.02 grid path - 1.2 sharpness, in px; highest is best",
 )
 
 
@@ -50,8 +57,8 @@ class MapTask:
         """
         if (self.start is None) != (self.goal is None):
             raise TaskError("give both --start X Y and --goal X Y, or neither")
-        heading = None if self.heading is None else (self.heading,)
-        check_finite(start=self.start, goal=self.goal, heading=heading)
+        check_finite(start=self.start, goal=self.goal)
+        check_heading(self.heading)
         check_radius(self.robot_radius)
 
     def in_pixels(self, units: MapUnits) -> MapTask:
@@ -90,7 +97,7 @@ def run(
     if image in bundled_maps():
         bundled = bundled_map(image)
         path, typed = bundled.image, typed.or_else(bundled)
-    units = units_of(path, metres=metres)
+    units = units_of(path, metres=metres).with_typed(typed.start, typed.goal)
     task = typed.in_pixels(units)
     if task.start is None and task.heading is not None:
         raise TaskError("--heading needs --start X Y")
@@ -112,7 +119,8 @@ def run(
     except PicturedError as error:
         error.folder = folder
         raise
-    files = write_map(folder, grid, params, source, units)
+    shortest = _shortest_path(grid, params)
+    files = write_map(folder, grid, params, source, units, shortest)
     if as_json:
         rows = [_row(candidate) for candidate in ranked]
         record = {
@@ -126,7 +134,36 @@ def run(
     _print_reading(console, params, ranked[0], units)
     if task.start is not None:  # candidates have figures only if there is a task
         _print_candidates(console, ranked, units)
+        _print_drive(console, params, shortest, units)
     _print_files(console, params, folder, units)
+
+
+def _shortest_path(grid: OccupancyGrid, params: MapParams) -> Path2D | None:
+    """The task's shortest path, px; None without a task or a path."""
+    if params.start is None or params.goal is None:
+        return None
+    terrain, start = Terrain.of(grid), Pose(*params.start, params.heading)
+    try:
+        task = make_task(terrain, start, params.goal, params.robot)
+    except TaskError:  # for example, start and goal are the same
+        return None
+    return task.shortest_path(start)
+
+
+def _print_drive(
+    console: Console, params: MapParams, shortest: Path2D | None, units: MapUnits
+) -> None:
+    """Prints the shortest path and, in metres, the robot."""
+    if shortest is not None:
+        length = units.length(path_length(shortest), 0)
+        console.print(f"shortest path {length}: with every shortcut for this body")
+    if units != PIXELS:
+        console.print(escape(robot_text(params.robot, units)), soft_wrap=True)
+        print_sentences(
+            console,
+            "metres of the map's frame; here, start and goal are the centres of the "
+            f"pixels ({params.resolution:g} m each) that contain them",
+        )
 
 
 def _row(candidate: Candidate) -> dict[str, object]:
@@ -185,7 +222,7 @@ def _print_candidates(
 def _table(candidates: list[Candidate], readings: list[str], units: MapUnits) -> Table:
     """The figures of feasible candidates, with their reading if there are several."""
     table = Table(title="Candidates, the chosen one first", title_justify="left")
-    lengths = [f"{name}, {units.name}" for name in ("margin", "clearance", "path")]
+    lengths = [f"{name}, {units.name}" for name in ("margin", "clearance", "grid path")]
     names = [*lengths, "sharpness", "score"]
     for name in names if len(readings) == 1 else ["reading", *names]:
         table.add_column(name, justify="right", no_wrap=True)

@@ -102,7 +102,8 @@ def _explain_usage(error: Any) -> NoReturn:
     """Prints a usage error and names the command whose help to read."""
     context = getattr(error, "ctx", None)
     option = getattr(error, "option_name", None)
-    reason = error.format_message().rstrip(".").replace("Value error, ", "")
+    message = _typed_value(error) or error.format_message()
+    reason = message.rstrip(".").replace("Value error, ", "")
     # Without arguments, typer has already printed the help.
     if not reason:
         sys.exit(2)
@@ -111,6 +112,25 @@ def _explain_usage(error: Any) -> NoReturn:
         reason = error.message + (f"; did you mean {meant}?" if meant else "")
     command = "tdac" if context is None else context.command_path
     fail(f"error: {reason}; see {command} --help", 2)
+
+
+def _typed_value(error: Any) -> str:
+    """Names the option, and the value that was typed for it; empty if unknown."""
+    details = getattr(error.__cause__, "errors", None)
+    option = getattr(error, "param", None)
+    if not callable(details) or option is None:
+        return ""
+    [problem, *_] = details()
+    kinds = {"float_parsing": "a number", "int_parsing": "a whole number"}
+    value, kind = problem["input"], kinds.get(problem["type"])
+    if kind is None:
+        return "" if str(value) in error.message else f"{_got(error)}, got {value}"
+    name = max(option.opts, key=len)
+    return f"{name} {value}: expected {kind}"
+
+
+def _got(error: Any) -> str:
+    return str(error.format_message()).rstrip(".").replace("Input should", "it must")
 
 
 def _nearest(typed: str, options: list[str]) -> str | None:

@@ -115,7 +115,7 @@ Metres = Annotated[
     typer.Option(
         "--metres",
         help="Use m and rad in the map's frame (map.yaml) for the input and output of "
-        "places, lengths and headings.",
+        "places, lengths and headings; a run folder or task may be in px.",
     ),
 ]
 Polarity = Annotated[

@@ -14,8 +14,9 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.episodes.trajectory import nominal_first
 from tdac_agent.prompting.feedback import group_failures
-from tdac_agent.tasks.units import UNITS
+from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.diagnosis.report import Failure, Report
+from tdac_agent.verification.diagnosis.shown import in_units
 
 MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
@@ -26,6 +27,7 @@ def show_report(
     console: Console,
     out: Path | None = None,
     folder: Path | None = None,
+    units: Units | None = None,
 ) -> None:
     """Prints the verdict, the failures with their diagnosis, and the episodes.
 
@@ -34,7 +36,10 @@ def show_report(
         console: Console to print to.
         out: Folder to which the report and its pictures were written.
         folder: Folder of the task file; None for a bundled task.
+        units: Units of the task, as from `Setting.shown`; None for the report's.
     """
+    units = UNITS[report.provenance.unit] if units is None else units
+    report = in_units(report, units)
     verdict, about = report.verdict, report.provenance
     for warning in about.warnings:
         console.print(f"[yellow]warning: {escape(warning)}[/]")
@@ -50,7 +55,7 @@ def show_report(
     if not_run:
         _show_failed(console, not_run)
         print_sentences(console, not_run[0].message, indent=2)
-    console.print(episode_table(report))
+    console.print(episode_table(report, units))
     if out is not None:
         _show_files(out, console)
     colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
@@ -112,9 +117,8 @@ def _show_files(out: Path, console: Console) -> None:
     console.print(Text(f"report: {out / 'report.json'}"), soft_wrap=True)
 
 
-def episode_table(report: Report) -> Table:
-    """One row per judged episode."""
-    units = UNITS[report.provenance.unit]
+def episode_table(report: Report, units: Units) -> Table:
+    """One row per judged episode; `units` are those of lengths."""
     table = Table(
         title=f"Episodes as the environment recorded them ({units.length})",
         title_justify="left",
@@ -124,7 +128,7 @@ def episode_table(report: Report) -> Table:
     )
     table.add_column("start", no_wrap=True)
     table.add_column("outcome", no_wrap=True)
-    figures = ("steps", "contacts", "path\nleft", "straight\nleft", "ms per\ncall")
+    figures = ("steps", "contacts", "grid path\nleft", "straight\nleft", "ms per\ncall")
     for name in figures:
         table.add_column(name, justify="right", no_wrap=True)
     for episode in (e for e in report.episodes if e.outcome != "not run"):
@@ -134,12 +138,13 @@ def episode_table(report: Report) -> Table:
             f"[{colour}]{escape(episode.outcome)}[/]",
             str(episode.steps),
             str(episode.collisions),
-            _fraction(units.scale, episode.d_min, episode.d0),
-            _fraction(units.scale, episode.d_min_euclidean, episode.d0_euclidean),
+            _fraction(units, episode.d_min, episode.d0),
+            _fraction(units, episode.d_min_euclidean, episode.d0_euclidean),
             f"{episode.call_ms_mean:.2f}" if episode.call_ms_p99 else "–",
         )
     return table
 
 
-def _fraction(scale: float, left: float, whole: float) -> str:
-    return f"{scale * left:.0f} of {scale * whole:.0f}"
+def _fraction(units: Units, left: float, whole: float) -> str:
+    shown = (units.amount(units.scale * length, 0) for length in (left, whole))
+    return " of ".join(shown)

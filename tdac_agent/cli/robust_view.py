@@ -11,20 +11,23 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.evaluation.robust_report import Interval, RobustReport, SequentialResult
-from tdac_agent.tasks.units import UNITS, Units
+from tdac_agent.tasks.units import Units
 from tdac_agent.verification.judge.seeded import SeededEpisode
 
 LEAST, MOST, ERRORS = 5, 10, 3
 REACHED = "reached"
 
 
-def show_robust(report: RobustReport, console: Console, play: list[str]) -> None:
+def show_robust(
+    report: RobustReport, console: Console, play: list[str], units: Units
+) -> None:
     """Prints the worst episodes, the success rate and the sequential test's decision.
 
-    `play` is the command line that plays an episode, without `--seed`.
+    `play` is the command line that plays an episode, without `--seed`; `units` are
+    those of places and lengths, as from `Setting.shown`.
     """
     say = partial(console.print, highlight=False)
-    say(worst_table(report))
+    say(worst_table(report, units))
     for error in _errors(report):
         print_sentences(console, error, indent=2)
     replay = shlex.join([*play, "--seed", str(report.worst[0].seed)])
@@ -56,10 +59,9 @@ def show_robust(report: RobustReport, console: Console, play: list[str]) -> None
         say(_error_rates(result))
 
 
-def worst_table(report: RobustReport) -> Table:
+def worst_table(report: RobustReport, units: Units) -> Table:
     """The worst episodes: up to `MOST` failures, then the slowest successes."""
     first, failures = report.provenance.first_seed, len(report.failed_seeds)
-    units = UNITS[report.provenance.unit]
     seeds = f"the seeds {first} to {first + report.episodes - 1} ({units.length})"
     title = f"Worst of {seeds}" if failures else f"No failure; the slowest of {seeds}"
     if failures > MOST:
@@ -67,7 +69,7 @@ def worst_table(report: RobustReport) -> Table:
     table = Table(title=title, title_justify="left")
     table.add_column("seed", justify="right")
     table.add_column("outcome")
-    for name in ("steps", "path left", *(("from step", "at") if failures else ())):
+    for name in ("steps", "grid path left", *(("from step", "at") if failures else ())):
         table.add_column(name, justify="right")
     for episode in report.worst[: max(LEAST, min(failures, MOST))]:
         table.add_row(*_row(episode, units)[: len(table.columns)])
@@ -81,7 +83,8 @@ def _row(episode: SeededEpisode, units: Units) -> list[str]:
         str(episode.seed),
         f"[{'green' if episode.success else 'red'}]{episode.outcome}{more}[/]",
         str(episode.steps),
-        f"{units.scale * episode.d_min:.0f} of {units.scale * episode.d0:.0f}",
+        f"{units.amount(units.scale * episode.d_min, 0)} of "
+        f"{units.amount(units.scale * episode.d0, 0)}",
         "" if episode.step is None else str(episode.step),
         _place(episode, units),
     ]

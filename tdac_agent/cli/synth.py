@@ -20,6 +20,7 @@ from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import Task, called
 from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
+from tdac_agent.verification.diagnosis.measures import shortest_path_length
 from tdac_agent.verification.verify import read_source
 
 _EXIT = {"verified": 0, "budget": 4}
@@ -144,7 +145,8 @@ def _heading(task: Task, learner: str, optimizer: str | None) -> str:
     if optimizer not in (None, learner):
         model += f", optimizer [bold]{escape(str(optimizer))}[/]"
     return (
-        f"task [bold]{escape(called(task))}[/]: path {setting.told(nominal.shortest)}, "
+        f"task [bold]{escape(called(task))}[/]: shortest path "
+        f"{setting.told(shortest_path_length(nominal))}, "
         f"body radius {setting.told(nominal.body_radius)}, "
         f"at most {nominal.horizon} steps; "
         f"learner [bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))

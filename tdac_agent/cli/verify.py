@@ -17,6 +17,7 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
+from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -68,7 +69,7 @@ def run(
         if junit is not None:
             write_junit(report, junit)
         if not as_json:
-            _show(report, out, task.folder)
+            _show(report, out, task)
         measured = None
         if robust.robust is not None and report.passed:
             from tdac_agent.cli.robust import measure
@@ -79,7 +80,8 @@ def run(
     if as_json:
         sys.stdout.write(_json(report, robust, measured) + "\n")
     elif robust.robust is not None:
-        _show_robust(measured, _replay(controller, flags, robust, tier))
+        replay = _replay(controller, flags, robust, tier)
+        _show_robust(measured, replay, task.setting.shown)
     accepted = measured is None or measured.accepted
     return 0 if report.passed and accepted else 1
 
@@ -94,14 +96,16 @@ def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
         return controller_and_task(controller, flags)
 
 
-def _show(report: Report, out: Path | None, folder: Path | None) -> None:
+def _show(report: Report, out: Path | None, task: Task) -> None:
     from tdac_agent.cli.console import Console
     from tdac_agent.cli.report_view import show_report
 
-    show_report(report, Console(), out, folder)
+    show_report(report, Console(), out, task.folder, task.setting.shown)
 
 
-def _show_robust(measured: RobustReport | None, replay: list[str]) -> None:
+def _show_robust(
+    measured: RobustReport | None, replay: list[str], units: Units
+) -> None:
     from tdac_agent.cli.console import Console
     from tdac_agent.cli.robust_view import show_robust
 
@@ -109,7 +113,7 @@ def _show_robust(measured: RobustReport | None, replay: list[str]) -> None:
     if measured is None:
         console.print("robustness not measured: the controller is not verified")
     else:
-        show_robust(measured, console, replay)
+        show_robust(measured, console, replay, units)
 
 
 def _json(report: Report, robust: RobustFlags, measured: RobustReport | None) -> str:

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.film import film_of
-from tdac_agent.cli.flags import check_finite, check_tier
+from tdac_agent.cli.flags import check_finite, check_heading, check_tier
 from tdac_agent.cli.printed import show_printed
 from tdac_agent.webots.report import WebotsReport
 from tdac_agent.webots.run import frames, run_controller
@@ -47,6 +47,7 @@ def run(
     if heading is not None:
         if start is None:
             raise TaskError("--heading needs --start X Y")
+        check_heading(heading)
         start = (*start, heading)
     check_finite(start=start, goal=goal)
     if video is not None and video.suffix.lower() not in SUFFIXES:

@@ -25,7 +25,7 @@ class Trajectory:
     Attributes:
         poses: Shape (T + 1, 3), float64: x, y (px or m), heading (rad), start included.
         actions: Shape (T, 2), float32: left and right wheel, fractions as applied.
-        path_distances: Shape (T + 1,), float64: shortest path to the goal, px or m.
+        path_distances: Shape (T + 1,), float64: grid path to the goal, px or m.
         ranges: Shape (T + 1, n), float32: observed readings of the distance sensors,
             px, or the raw readings of ps0 to ps7.
         collisions: Number of steps with a contact.
@@ -169,7 +169,7 @@ class Rollout:
         """Returns the distance to the goal before each step and at the end, px or m.
 
         Args:
-            kind: `geodesic` (shortest free path) or `euclidean`.
+            kind: `geodesic` (grid path) or `euclidean`.
         """
         if kind == "geodesic":
             return self.trajectory.path_distances

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,12 @@ from tdac_agent.evaluation.evaluation_report import (
     comparisons_of,
     row_of,
     timing_of,
+)
+from tdac_agent.evaluation.finished import (
+    EPISODE_TABLE,
+    RESULTS,
+    TIMING,
+    finished_evaluation,
 )
 from tdac_agent.evaluation.overlay import Overlay, draw_overlay
 from tdac_agent.evaluation.seeded_run import run_seeds
@@ -81,7 +88,8 @@ def evaluate(
         limits: Limits of a controller's process in each episode.
         out: Folder for `evaluation.json`, `episodes.csv`, `timing.csv`, and a picture
             of each task; by default nothing is written. Until then it keeps each
-            finished episode: after an interruption, the same call continues.
+            finished episode: after an interruption, the same call continues. If it
+            has this evaluation already, that one is returned and nothing is driven.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with task, policy, episodes and successes so far.
 
@@ -92,7 +100,7 @@ def evaluate(
         TaskError: A task or a number is invalid, or a run folder is for another
             environment than a task.
         ControllerFileError: A policy's file cannot be read, or is no policy.
-        RunError: Another evaluation writes to `out`.
+        RunError: Another evaluation is in `out`, or writes to it.
         Fault: The sandbox is broken.
     """
     whole_number("episodes", episodes, 1, MOST_EPISODES)
@@ -106,6 +114,16 @@ def evaluate(
                 f"{entrant.name} was written for {entrant.env}; the task "
                 f"{task.name!r} is of {task.spec.env}"
             )
+    about: dict[str, Any] = {
+        "variation": variation,
+        "seed": seed,
+        "episodes": episodes,
+        "tasks": tuple(map(_about_task, loaded)),
+        "policies": tuple(map(_about_policy, entrants)),
+        "versions": versions(),
+    }
+    if out is not None and (done := finished_evaluation(out, about)) is not None:
+        return done
     seeds = episode_seeds(seed, episodes)
     results: list[Result] = []
     timings: list[Timing] = []
@@ -140,14 +158,9 @@ def evaluate(
             if out is not None:
                 draw_overlay(task, overlays, out / f"{task.name}.png")
         found = Evaluation(
-            variation=variation,
-            seed=seed,
-            episodes=episodes,
-            tasks=tuple(map(_about_task, loaded)),
-            policies=tuple(map(_about_policy, entrants)),
+            **about,
             rows=tuple(map(row_of, results)),
             comparisons=comparisons_of(results),
-            versions=versions(),
             results=tuple(results),
             timings=tuple(timings),
         )
@@ -163,9 +176,9 @@ def episode_seeds(seed: int, episodes: int) -> tuple[int, ...]:
 
 def write_evaluation(found: Evaluation, out: Path) -> None:
     """Writes the results to a folder; wall times go to a separate file."""
-    write_atomic(out / "evaluation.json", found.model_dump_json(indent=2) + "\n")
-    write_atomic(out / "episodes.csv", found.to_frame().to_csv(index=False))
-    write_atomic(out / "timing.csv", found.timing_frame().to_csv(index=False))
+    write_atomic(out / RESULTS, found.model_dump_json(indent=2) + "\n")
+    write_atomic(out / EPISODE_TABLE, found.to_frame().to_csv(index=False))
+    write_atomic(out / TIMING, found.timing_frame().to_csv(index=False))
 
 
 def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, apply_style, new_plot
 from tdac_envs.grid.grid import BoolGrid, OccupancyGrid, body_free, clearance
 from tdac_envs.mapping.image import luminance
-from tdac_envs.mapping.map_folder import shortest_path
+from tdac_envs.mapping.map_folder import planned_path
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.preprocessing import Source, as_image
 
@@ -77,7 +77,7 @@ def _plot_grid(
 
 
 def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
-    """Draws where the body's centre may be, its clearance, and the shortest path."""
+    """Draws where the body's centre may be, its clearance, and the grid path."""
     clear = clearance(grid.cells)
     room = body_free(clear, params.robot.radius + params.inflation)
     axes.imshow(grid.cells, cmap=ListedColormap([FREE, WALL]), interpolation="nearest")
@@ -87,7 +87,7 @@ def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
         vmin=-0.3 * float(clear.max()),  # stands out from the pale background
         interpolation="nearest",
     )
-    path = shortest_path(grid, params)
+    path = planned_path(grid, params)
     axes.plot(path[:, 0], path[:, 1], color=COLOURS[1], linewidth=1.8)
     for place, mark in ((params.start, "o"), (params.goal, "*")):
         if place is not None:
@@ -95,7 +95,7 @@ def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
     margin = f" + {params.inflation:g} px" if params.inflation else ""
     about = f"for a disc of {params.robot.radius:g} px{margin}"
     if params.score_terms is not None:
-        about += f"; path {params.score_terms.path_length:.0f} px"
+        about += f"; grid path {params.score_terms.path_length:.0f} px"
     _title(axes, "4  space for the robot", about)
 
 

@@ -45,7 +45,7 @@ class Nominal(Protocol):
 
     @property
     def shortest(self) -> float:
-        """d0, length of the shortest path from the nominal start."""
+        """d0, length of the shortest grid path from the nominal start."""
 
     @property
     def body_radius(self) -> float:
@@ -60,7 +60,14 @@ class Nominal(Protocol):
         """Distance driven in one step at full speed."""
 
     def path_from(self, start: Pose) -> Way:
-        """Returns the body's shortest path to the goal, shape (n, 2); may be empty."""
+        """Returns the shortest grid path to the goal, shape (n, 2); may be empty."""
+
+    def shortest_path(self, start: Pose) -> Way:
+        """Returns the corners of the body's shortest path to the goal, shape (n, 2).
+
+        It is the grid path after every shortcut that the body can take; the only one
+        that is called shortest path, printed and drawn. May be empty.
+        """
 
     def jittered(self, random: np.random.Generator) -> Pose:
         """Returns a random feasible start of the jitter variation."""
@@ -144,6 +151,17 @@ class Setting(Protocol):
     @property
     def units(self) -> Units:
         """Units of places and lengths."""
+
+    @property
+    def shown(self) -> Units:
+        """The same, but printed in the units that the user has chosen."""
+
+    def in_metres(self) -> Setting:
+        """Returns the same task, shown in metres of the map's frame.
+
+        Raises:
+            TaskError: It has no other units than its own.
+        """
 
     def told(self, length: float) -> str:
         """Formats a length in the units that the user has chosen: `12 px`, `0.6 m`."""

@@ -16,6 +16,11 @@ from tdac_envs.mapping.params import MOST_RAYS, Length, Place
 TASK_FILE = "task.yaml"
 """File name in the folder of a task or a run."""
 
+_MAP_FILES = (
+    *(".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".gif", ".tif", ".tiff", ".webp"),
+    *(".map", ".npy"),
+)
+
 Profile = Literal["policy", "paper"]
 Steps = Annotated[int, Field(gt=0, le=MOST_STEPS)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -105,6 +110,10 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
     Raises:
         TaskError: The file cannot be read, or has an invalid or unknown key.
     """
+    if path.suffix.lower() in _MAP_FILES and path.is_file():
+        raise TaskError(_is_map(asked, "map"))
+    if path.suffix.lower() == ".wbt" and path.is_file():
+        raise TaskError(_is_map(asked, "world"))
     try:
         data = parse_yaml(read_file(path, TEXT_BYTES))
     except OSError as error:
@@ -117,7 +126,18 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
         raise TaskError(f"{path} is not a task file: {error}") from error
     if not isinstance(data, dict):
         raise TaskError(f"{path} is not a task file: expected `key: value` lines")
+    if {"image", "resolution"} <= data.keys():
+        raise TaskError(_is_map(asked, "map"))
     return checked(data, str(path))
+
+
+def _is_map(asked: object, key: str) -> str:
+    """What to do with a map or world that was given as a task file."""
+    ends = "--start X Y --goal X Y" if key == "map" else "--goal X Y"
+    return (
+        f"{asked} is a {key}, not a task: give --{key} {asked} {ends}, or a task.yaml "
+        f"with the line `{key}: {asked}`"
+    )
 
 
 def checked(data: dict[str, Any], source: str) -> TaskFile:

@@ -6,11 +6,14 @@ Diagnoses use screen coordinates: x points right, y points down, headings are cl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from tdac_envs.grid.map_units import MapUnits
 
 Points = NDArray[np.float64]
 Place = Literal["px", "m"]
@@ -27,6 +30,8 @@ class Units:
         up: Whether the environment's y points up, with counter-clockwise headings.
         decimals: Decimals of printed coordinates.
         digits: Decimals of stored values.
+        shown: Units of printed places and lengths on a map, where coordinates and the
+            screen are in pixels; None for the units above.
     """
 
     place: Place
@@ -35,6 +40,11 @@ class Units:
     up: bool
     decimals: int
     digits: int
+    shown: MapUnits | None = None
+
+    def in_metres(self, shown: MapUnits) -> Units:
+        """These units, but printed in metres of a map's frame."""
+        return replace(self, length=shown.name, shown=shown)
 
     def on_screen(self, points: ArrayLike) -> Points:
         """Converts places, shape (n, 2), or poses, shape (n, 3), to the screen."""
@@ -57,34 +67,54 @@ class Units:
         x, y = self.place_of(x, y)
         return round(x, self.digits), round(y, self.digits)
 
+    def amount(self, length: float, decimals: int = 1) -> str:
+        """Formats a screen length without its unit: `12.3`, `0.615`.
+
+        Args:
+            length: The length.
+            decimals: Decimals of a length in px or mm; in metres, as precise.
+        """
+        if self.shown is not None:
+            length *= self.shown.per_pixel
+            decimals = max(self._decimals - max(1 - decimals, 0), 0)
+        return f"{length:.{decimals}f}"
+
+    def far(self, length: float, decimals: int = 1) -> str:
+        """Formats a screen length as `amount` does, with its unit: `12.3 px`."""
+        return f"{self.amount(length, decimals)} {self.length}"
+
     def told(self, length: float) -> str:
-        """Formats a length of the environment: `12 px`, `250 mm`."""
-        return f"{length * self.scale:.0f} {self.length}"
+        """Formats a length of the environment: `12 px`, `250 mm`, `0.61 m`."""
+        return self.far(length * self.scale, 0)
 
     def figure(self, length: float) -> str:
         """Formats a length of the environment with at least three digits: `12.5 px`."""
+        if self.shown is not None:
+            return self.shown.length(length)
         shown = length * self.scale
         return f"{shown:.3g} {self.length}" if shown < 100 else self.told(length)
 
     def told_place(self, x: float, y: float) -> str:
         """Formats a place of the environment: `(12, 34)`, `(0.12, -0.34)`."""
+        if self.shown is not None:
+            return self.shown.point(x, y)
         d = self.decimals - 1
         return f"({x:z.{d}f}, {y:z.{d}f})"
 
     def heading_of(self, heading: float) -> float:
-        """Converts a heading on the screen to the environment."""
+        """Converts a heading on the screen to that of the printed frame."""
+        if self.shown is not None:
+            # The conversion from the frame to the picture is its own inverse.
+            return math.remainder(self.shown.heading_in_pixels(heading), math.tau)
         return -heading if self.up else heading
 
     def point(self, x: float, y: float) -> str:
-        """Formats a place on the screen in the environment's coordinates."""
-        x, y = self.place_of(x, y)
-        return f"({x:z.{self.decimals}f}, {y:z.{self.decimals}f})"
+        """Formats a place on the screen in the coordinates of the printed frame."""
+        return f"({self._coordinates(x, y, ', ')})"
 
     def pose(self, x: float, y: float, heading: float) -> str:
-        """Formats a pose on the screen in the environment's coordinates."""
-        x, y = self.place_of(x, y)
-        place = f"{x:z.{self.decimals}f} {y:z.{self.decimals}f}"
-        return f"{place} {self.heading_of(heading):z.2f}"
+        """Formats a pose on the screen in the coordinates of the printed frame."""
+        return f"{self._coordinates(x, y, ' ')} {self.heading_of(heading):z.2f}"
 
     def box(self, low: Points, high: Points, less: int = 0) -> str:
         """Formats a box on the screen: `x 3.0 to 4.5, y 0.2 to 1.0`.
@@ -94,10 +124,25 @@ class Units:
             high: Largest x and y.
             less: Number of decimals to omit.
         """
-        corners = [self.place_of(*low), self.place_of(*high)]
-        (x0, x1), (y0, y1) = (sorted(values) for values in zip(*corners, strict=True))
-        d = self.decimals - less
-        return f"x {x0:.{d}f} to {x1:.{d}f}, y {y0:.{d}f} to {y1:.{d}f}"
+        (left, top), (right, bottom) = low.tolist(), high.tolist()
+        corners = [(left, top), (right, top), (left, bottom), (right, bottom)]
+        xs, ys = zip(*(self._place(*corner) for corner in corners), strict=True)
+        d = self._decimals - less
+        x, y = (f"{min(v):.{d}f} to {max(v):.{d}f}" for v in (xs, ys))
+        return f"x {x}, y {y}"
+
+    @property
+    def _decimals(self) -> int:
+        return self.decimals if self.shown is None else self.shown.decimals
+
+    def _place(self, x: float, y: float) -> tuple[float, float]:
+        """A place on the screen in the coordinates of the printed frame."""
+        if self.shown is not None:
+            return self.shown.coordinates(x, y)
+        return self.place_of(x, y)
+
+    def _coordinates(self, x: float, y: float, joint: str) -> str:
+        return joint.join(f"{value:z.{self._decimals}f}" for value in self._place(x, y))
 
 
 PIXELS = Units("px", "px", 1.0, up=False, decimals=1, digits=2)

@@ -19,6 +19,7 @@ from tdac_agent.tasks.task import Task, called, lay_out
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.report import OWN, SHIPPED, Provenance, Report
+from tdac_agent.verification.diagnosis.shown import in_units
 from tdac_agent.verification.judge.jobs import Findings, Job, write_job
 from tdac_agent.verification.judge.report_log import (
     read_findings,
@@ -90,6 +91,7 @@ def verify(
             limits=limits or Limits(),
             out=folder / "results",
             trajectories=None if out is None else folder / "trajectories",
+            metres=task.setting.shown != task.setting.units,
         )
         _prepare(job, task, source, suites)
         with contextlib.ExitStack() as stack:
@@ -274,7 +276,8 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
             draw_failures,  # slow to import
         )
 
-        draw_failures(task, report, load_trajectories(folder), folder)
+        shown = in_units(report, task.setting.shown)
+        draw_failures(task, shown, load_trajectories(folder), folder)
     # A robust report in this folder belongs to the controller verified earlier.
     (out / "robust.json").unlink(missing_ok=True)
     write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")

@@ -150,7 +150,7 @@ def _column(event: Event, close: Image | None) -> Image:
     """Caption, close-up and legend, one below the other."""
     lines = [line for fact in event.facts for line in textwrap.wrap(fact, _CHARACTERS)]
     legend = [
-        (GREY, True, "shortest path on the grid"),
+        (GREY, True, "shortest path"),
         (TRAIL, False, "driven, light to dark"),
     ]
     if event.way is not None:

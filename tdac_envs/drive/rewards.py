@@ -13,7 +13,7 @@ class RewardWeights(NamedTuple):
     """Weights of the four reward terms.
 
     Attributes:
-        progress: Reward per full-speed step of progress along the shortest path.
+        progress: Reward per full-speed step of progress along the grid path.
         goal: Reward for reaching the goal.
         collision: Penalty for a step with a contact.
         time: Penalty for each step.

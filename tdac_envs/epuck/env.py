@@ -76,7 +76,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
-    - `progress`: +0.1 times the decrease of the shortest path length to the goal,
+    - `progress`: +0.1 times the decrease of the grid path length to the goal,
       divided by the distance of one step at full speed,
     - `goal`: +10 if the goal is reached,
     - `collision`: -10 if the body touches an obstacle,
@@ -113,7 +113,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         goal_tolerance: Distance at which the goal is reached, m.
         dt: Duration of a step, s. Default: the file's `basicTimeStep`.
         horizon: Steps before truncation. Default: max(2500, 6 * d0 / (v * dt)), where
-            d0 is the length of the shortest path, m, and v the full speed, m/s.
+            d0 is the length of the shortest grid path, m, and v the full
+            speed, m/s.
         max_wheel_speed: Wheel speed at action 1, rad/s. Default: 6.28, or 7.536 for an
             e-puck of version 2.
         on_collision: `"terminate"` or `"block"`; see Episode End.

@@ -123,7 +123,7 @@ class EPuckScene:
 
 def draw_task(view: View, task: EPuckTask) -> None:
     """Draws the shortest path, the start and the goal."""
-    view.canvas.line(view.at(task.path_from(task.start)), GREY, 2, 0.75, dash=7)
+    view.canvas.line(view.at(task.shortest_path(task.start)), GREY, 2, 0.75, dash=7)
     start = view.at(task.start[:2])
     view.canvas.disc(start, 5, FREE)
     view.canvas.disc(start, 5, GREY, width=2)

@@ -25,6 +25,7 @@ from tdac_envs.drive.task import (
     jittered_pose,
     wrap_heading,
 )
+from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.paths import (
@@ -36,6 +37,7 @@ from tdac_envs.epuck.paths import (
     route,
 )
 from tdac_envs.grid.plan import Path
+from tdac_envs.grid.shortcuts import taut
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 TOLERANCE = 0.02
@@ -54,9 +56,10 @@ class EPuckTask:
         goal_tolerance: Distance at which the goal is reached, m.
         dt: Duration of a step, s.
         horizon: Number of steps before truncation.
-        field: Length of the shortest path for the body from each grid point to the
-            goal, m; see `paths.route`.
-        shortest: d0, the length of the shortest path from the nominal start, m.
+        field: Length of the shortest grid path for the body from each grid point to
+            the goal, m; see `paths.route`.
+        shortest: d0, the length of the shortest grid path from the nominal start, m;
+            see `path_from`.
     """
 
     env_id: ClassVar = "TDAC-EPuck-v0"
@@ -95,9 +98,35 @@ class EPuckTask:
         return jittered_start(self, random)
 
     def path_from(self, start: Pose) -> Path:
-        """Shortest path from `start` to the goal, shape (n, 2), m; empty if none."""
+        """Shortest grid path from `start` to the goal, shape (n, 2), m; may be empty.
+
+        It steps from grid point to grid point, so it is up to 8 % longer than
+        `shortest_path`.
+        """
         path = path_down(self.ground, self.field, start[:2])
         return np.vstack([path, self.goal]) if len(path) else path
+
+    def shortest_path(self, start: Pose) -> Path:
+        """The shortest path from `start` to the goal that is printed and drawn.
+
+        It is the grid path after every shortcut that the body can take.
+
+        Returns:
+            Its corners, shape (n, 2), m; empty if there is no path.
+        """
+        return np.array(self.pulled(self.path_from(start))).reshape(-1, 2)
+
+    def pulled(self, path: Path) -> list[Point]:
+        """The corners of a path, in m, after every shortcut that the body can take."""
+        return taut(path, self._is_line_free)
+
+    def _is_line_free(self, begin: Point, end: Point) -> bool:
+        """Whether the body can drive straight between two points."""
+        (x, y), (to_x, to_y) = begin, end
+        solid, heading = self.ground.solid, math.atan2(to_y - y, to_x - x)
+        length = math.hypot(to_x - x, to_y - y)
+        touch = first_touch(*solid.arrays(), x, y, heading, length, 0.0, BODY_RADIUS)
+        return bool(touch > 1.0)
 
     def moved(self, start: Pose, goal: Point | None = None) -> EPuckTask:
         """This task with another start (and goal), but the same horizon and tolerance.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tdac_envs.grid.metric import Framed, Point, resolution_of, to_metres, to_pixels
 
@@ -31,9 +31,11 @@ class MapUnits:
 
     Attributes:
         frame: Frame of the map, for metres; None for pixels.
+        typed: Places that the user typed in metres: each in px, and as typed.
     """
 
     frame: MapFrame | None = None
+    typed: tuple[tuple[Point, Point], ...] = ()
 
     @classmethod
     def metres(cls, framed: Framed) -> MapUnits:
@@ -44,6 +46,16 @@ class MapUnits:
         """
         resolution = resolution_of(framed)
         return cls(MapFrame(framed.height, resolution, framed.origin))
+
+    def with_typed(self, *places: Point | None) -> MapUnits:
+        """The same units, which quote these places as the user typed them.
+
+        A place is otherwise quoted at the centre of the pixel that contains it.
+        """
+        if self.frame is None:
+            return self
+        known = [place for place in places if place is not None]
+        return replace(self, typed=tuple((self.pixels(p), p) for p in known))
 
     @property
     def name(self) -> str:
@@ -86,6 +98,9 @@ class MapUnits:
         """Formats a place in px: `(12, 40)`, `(1.225, -3.05)`."""
         if self.frame is None:
             return f"({x:g}, {y:g})"
+        for place, typed in self.typed:
+            if (x, y) in (place, _pixel(place)):
+                return f"({typed[0]:.10g}, {typed[1]:.10g})"
         first, second = (self.rounded(value) for value in self.coordinates(x, y))
         return f"({first}, {second})"
 
@@ -118,6 +133,11 @@ class MapUnits:
         places = self.decimals if decimals is None else max(decimals, 0)
         text = f"{value:z.{places}f}"
         return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def _pixel(place: Point) -> Point:
+    """The centre of the pixel that contains a place."""
+    return math.floor(place[0] + 0.5), math.floor(place[1] + 0.5)
 
 
 PIXELS = MapUnits()

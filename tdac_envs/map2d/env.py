@@ -60,7 +60,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
-    - `progress`: +0.1 times the decrease of the shortest path length to the goal,
+    - `progress`: +0.1 times the decrease of the grid path length to the goal,
       divided by the distance of one step at full speed,
     - `goal`: +10 if the goal is reached,
     - `collision`: -10 if the body touches an obstacle,
@@ -102,7 +102,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         range_max: Largest range, px; observed if a ray hits nothing.
         dt: Duration of a step, s.
         horizon: Steps before truncation. Default: max(2500, 6 * d0 / (max_wheel_speed *
-            dt)), where d0 is the length of the shortest path, px.
+            dt)), where d0 is the length of the shortest grid path, px.
         goal_tolerance: Distance at which the goal is reached, px. Default:
             min(20, d0 / 4).
         on_collision: `"terminate"` or `"block"`; see Episode End.
@@ -280,7 +280,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 task.goal,
                 goal_tolerance=task.goal_tolerance,
                 robot=task.robot,
-                path=task.path_from(task.start),
+                path=task.shortest_path(task.start),
             )
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)

@@ -22,6 +22,7 @@ from tdac_envs.drawing.marks import (
 )
 from tdac_envs.drawing.runs import SMALLEST_BODY, Status
 from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.mapping.params import RobotParams
 
 ROBOT_IMAGE = Path(__file__).parents[1] / "mapping" / "maps" / "robot.png"
@@ -40,6 +41,7 @@ class MapScene:
         path: Reference path, shape (n, 2), px.
         robot_image: Picture of the robot facing right. A disc with a nose is drawn if
             the file is missing or the robot is too small for it.
+        units: Units of the status strip.
     """
 
     def __init__(
@@ -52,7 +54,9 @@ class MapScene:
         robot: RobotParams,
         path: ArrayLike = (),
         robot_image: Path = ROBOT_IMAGE,
+        units: MapUnits = PIXELS,
     ) -> None:
+        self._units = units
         self._canvas = Canvas(cells)
         self._robot = robot
         self._radius = max(robot.radius * self._canvas.scale, SMALLEST_BODY)
@@ -87,14 +91,16 @@ class MapScene:
             canvas.paste((x, y), heading, self._sprite)
         if status is not None:
             draw_outcome(canvas, (x, y), self._radius, status.outcome)
-            _write_status(canvas, status)
+            _write_status(canvas, status, self._units)
         return canvas.image
 
 
-def _write_status(canvas: Canvas, status: Status) -> None:
+def _write_status(canvas: Canvas, status: Status, units: MapUnits) -> None:
     width, baseline = canvas.image.shape[1], canvas.strip_top + 20
     x = canvas.text(10, baseline, f"step {status.step} / {status.horizon}", INK)
-    x = canvas.text(x + 14, baseline, f"goal {status.distance:.0f} px away", INK)
+    x = canvas.text(
+        x + 14, baseline, f"goal {units.length(status.distance, 0)} away", INK
+    )
     if status.outcome:
         colour = OUTCOMES.get(status.outcome, INK)
         x = canvas.text(x + 14, baseline, status.outcome, colour)

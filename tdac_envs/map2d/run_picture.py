@@ -51,7 +51,7 @@ class Background:
         background = cls(
             task,
             Canvas(task.terrain.grid.cells, strip=0),
-            task.path_from(task.start),
+            task.shortest_path(task.start),
         )
         background.draw_task(background.canvas, background.path)
         return background
@@ -82,15 +82,8 @@ class Background:
         cells = _part(self.task.terrain.grid.cells, x, y, side)
         scale = CLOSE_UP / side
         canvas = Canvas(cells, 0, scale=scale, origin=(x, y), narrowest=CLOSE_UP)
-        self.draw_task(canvas, _inside(self.path, x, y, side))
+        self.draw_task(canvas, self.path)
         return MapChart(canvas)
-
-
-def _inside(path: Points, x: int, y: int, side: int) -> Points:
-    """The part of a path from its first to its last point in a window."""
-    inside = ((path >= (x, y)) & (path < (x + side, y + side))).all(axis=1)
-    found = np.flatnonzero(inside)
-    return path[max(found[0] - 1, 0) : found[-1] + 2] if found.size else path[:0]
 
 
 def _part(cells: BoolGrid, x: int, y: int, side: int) -> BoolGrid:

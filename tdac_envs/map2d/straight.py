@@ -4,13 +4,28 @@ from __future__ import annotations
 
 import math
 
-from tdac_envs.core.compiled import kernel
+from tdac_envs.core.compiled import kernel, read_only
 from tdac_envs.grid.grid import FloatGrid
 from tdac_envs.map2d.contact import first_contact
 
 # Lower bound of the length of a piece, px. Pieces are short because the contact test
 # checks all squares in the bounding box of a piece.
 _SHORTEST_PIECE = 4.0
+
+Point = tuple[float, float]
+
+
+def is_line_free(clear: FloatGrid, begin: Point, end: Point, radius: float) -> bool:
+    """Whether a disc touches nothing between two points; see `is_straight_path_free`.
+
+    Args:
+        clear: `Terrain.padded_clear`, px.
+        begin: Point (x, y), px.
+        end: Point (x, y), px.
+        radius: Radius of the disc, px.
+    """
+    numbers = map(float, (*begin, *end, radius))
+    return bool(is_straight_path_free(read_only(clear), *numbers))
 
 
 @kernel

@@ -28,6 +28,8 @@ from tdac_envs.drive.task import (
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import Path, descend
+from tdac_envs.grid.shortcuts import taut
+from tdac_envs.map2d.straight import is_line_free
 from tdac_envs.map2d.terrain import (
     Terrain,
     at_goal,
@@ -53,6 +55,8 @@ __all__ = [
 ]
 
 MAX_TOLERANCE = 20.0
+SAFE = 1e-3
+"""Clearance of a shortcut beyond the body, px."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,9 +71,10 @@ class Map2DTask:
         goal_tolerance: Distance at which the goal is reached, px.
         dt: Duration of a step, s.
         horizon: Number of steps before truncation.
-        field: Shape (height, width), float32: length of the shortest path for the
-            body from each pixel to the goal, px; inf if there is none.
-        shortest: d0, the length of the shortest path from the nominal start, px.
+        field: Shape (height, width), float32: length of the shortest grid path for
+            the body from each pixel to the goal, px; inf if there is none.
+        shortest: d0, the length of the shortest grid path from the nominal start, px;
+            see `path_from`.
     """
 
     env_id: ClassVar = "TDAC-Map2D-v0"
@@ -108,7 +113,10 @@ class Map2DTask:
         return jittered_start(self, random)
 
     def path_from(self, start: Pose) -> Path:
-        """Shortest path from `start` to the goal, shape (n, 2), px; empty if none."""
+        """Shortest grid path from `start` to the goal, shape (n, 2), px; may be empty.
+
+        It steps from pixel to pixel, so it is up to 8 % longer than `shortest_path`.
+        """
         radius = self.robot.radius
         first = path_entry(self.terrain, self.field, start.x, start.y, radius)
         if first is None:
@@ -116,6 +124,26 @@ class Map2DTask:
         free = body_free(self.terrain.clear, radius)
         path = descend(free, np.asarray(self.field, np.float64), first)
         return np.vstack([[start.x, start.y], path, self.goal])
+
+    def shortest_path(self, start: Pose) -> Path:
+        """The shortest path from `start` to the goal that is printed and drawn.
+
+        It is the grid path after every shortcut that the body can take.
+
+        Returns:
+            Its corners, shape (n, 2), px; empty if there is no path.
+        """
+        return np.array(self.pulled(self.path_from(start))).reshape(-1, 2)
+
+    def pulled(self, path: Path, safe: float = SAFE) -> list[tuple[float, float]]:
+        """The corners of a path after every shortcut that the body can take.
+
+        Args:
+            path: Shape (n, 2), px.
+            safe: Clearance of a shortcut beyond the body, px.
+        """
+        clear, radius = self.terrain.padded_clear, self.robot.radius + safe
+        return taut(path, lambda begin, end: is_line_free(clear, begin, end, radius))
 
     def moved(self, start: Pose, goal: tuple[float, float] | None = None) -> Map2DTask:
         """This task with another start (and goal), but the same horizon and tolerance.

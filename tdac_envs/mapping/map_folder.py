@@ -31,6 +31,7 @@ def write_map(
     params: MapParams,
     image: Source,
     units: MapUnits = PIXELS,
+    path: NDArray[np.float64] | None = None,
 ) -> list[Path]:
     """Writes the four files of a preprocessed map; all of them or none.
 
@@ -44,6 +45,7 @@ def write_map(
         params: From `preprocess`.
         image: The source that was given to `preprocess`.
         units: Units of the preview's rulers and legend.
+        path: Path to draw, from `Map2DTask.shortest_path`; None for the planned one.
 
     Returns:
         The files, in the order above.
@@ -55,7 +57,7 @@ def write_map(
     from tdac_envs.mapping.preprocessing import as_image
 
     folder = Path(folder)
-    preview = preview_of(as_image(image), grid, params, units)
+    preview = preview_of(as_image(image), grid, params, units, path=path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".map-", dir=folder) as work:
@@ -106,8 +108,9 @@ def preview_of(
     params: MapParams,
     units: MapUnits = PIXELS,
     reason: str = "",
+    path: NDArray[np.float64] | None = None,
 ) -> Image:
-    """A picture of a map with its obstacles, task and shortest path, uint8 RGB.
+    """A picture of a map with its obstacles, task and path, uint8 RGB.
 
     Args:
         image: The map as read.
@@ -115,14 +118,20 @@ def preview_of(
         params: From `preprocess`.
         units: Units of rulers and legend.
         reason: Why the task is refused; the picture then shows where it fails.
+        path: The shortest path, from `Map2DTask.shortest_path`, shape (n, 2), px; None
+            for the grid path with the planner's margin.
     """
     from tdac_envs.mapping.fault import fault_of
     from tdac_envs.mapping.preview import draw_preview
 
     cells = grid.cells
     fault = fault_of(cells, params, units) if reason else None
-    path = np.empty((0, 2)) if reason else shortest_path(grid, params)
-    return draw_preview(image, cells, params, path, units, fault, reason)
+    name = "grid path" if path is None else "shortest path"
+    if reason:
+        path = np.empty((0, 2))
+    elif path is None:
+        path = planned_path(grid, params)
+    return draw_preview(image, cells, params, (name, path), units, fault, reason)
 
 
 def png(picture: Image) -> bytes:
@@ -142,8 +151,8 @@ def _save_png(path: Path, picture: NDArray[Any]) -> None:
     path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
 
-def shortest_path(grid: OccupancyGrid, params: MapParams) -> NDArray[np.float64]:
-    """The path from start to goal that keeps the planner's margin, px.
+def planned_path(grid: OccupancyGrid, params: MapParams) -> NDArray[np.float64]:
+    """The grid path from start to goal that keeps the planner's margin, px.
 
     Returns:
         Shape (n, 2), columns x and y; empty without a start and a goal.

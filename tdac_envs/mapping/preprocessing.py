@@ -198,7 +198,7 @@ def _close_call(
 def _path(best: Candidate, units: MapUnits) -> str:
     """A remark on the length of the path."""
     if best.terms is not None:
-        return f" and a path of {units.length(best.terms.path_length, 0)}"
+        return f" and a grid path of {units.length(best.terms.path_length, 0)}"
     return "" if best.reason is None else " and no path"
 
 

@@ -21,6 +21,7 @@ from tdac_envs.drawing.canvas import (
 )
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.grid.plan import path_length
 from tdac_envs.mapping.fault import Fault
 from tdac_envs.mapping.image import ColourImage, MapImage, luminance
 from tdac_envs.mapping.params import MapParams
@@ -48,7 +49,7 @@ def draw_preview(
     image: MapImage,
     cells: BoolGrid,
     params: MapParams,
-    path: Path,
+    path: tuple[str, Path],
     units: MapUnits = PIXELS,
     fault: Fault | None = None,
     reason: str = "",
@@ -59,7 +60,7 @@ def draw_preview(
         image: The map as read.
         cells: Shape (height, width), bool, True = occupied.
         params: The parameters that preprocessing chose.
-        path: Shape (n, 2), the shortest path for the body; may be empty.
+        path: Name of the path for the body, and its points, shape (n, 2), px.
         units: Units of rulers and legend.
         fault: Where the task fails, if it does.
         reason: Why it fails.
@@ -72,13 +73,13 @@ def draw_preview(
         for kind in range(len(_NAMES))
         if kind in (_OPEN, _SOLID) or (classes == kind).any()
     ]
-    legend = _in_rows(kinds, room) + _in_rows(_places(params, units, fault), room)
+    legend = _in_rows(kinds, room) + _in_rows(_places(params, path, units, fault), room)
     lines = [
         row for text in _texts(params, units, reason) for row in _folded(text, room)
     ]
     canvas = Canvas(cells, strip=12 + _ROW * (len(legend) + len(lines)))
     _lay_source(canvas, image.colour, classes)
-    _draw_task(canvas, params, path)
+    _draw_task(canvas, params, path[1])
     if fault is not None:
         _draw_fault(canvas, fault)
     framed = _framed(canvas.image, rulers.left)
@@ -171,16 +172,19 @@ def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
     return red, green, blue
 
 
-def _places(params: MapParams, units: MapUnits, fault: Fault | None) -> list[Entry]:
+def _places(
+    params: MapParams, path: tuple[str, Path], units: MapUnits, fault: Fault | None
+) -> list[Entry]:
     """Legend entries of start, goal, path and fault, each if there is one."""
     entries: list[Entry] = []
     if params.start is not None:
         entries.append((TRAIL, f"start {units.point(*params.start)}"))
     if params.goal is not None:
         entries.append((GREEN, f"goal {units.point(*params.goal)}"))
-    if params.score_terms is not None and params.score_terms.path_length:
-        length = units.length(params.score_terms.path_length, 0)
-        entries.append((TRAIL, f"path {length}"))
+    name, points = path
+    if len(points) > 1:
+        length = units.length(path_length(points), 0)
+        entries.append((TRAIL, f"{name} {length}"))
     if fault is not None:
         entries.append((RED, fault.label))
     if fault is not None and fault.better is not None:
@@ -219,7 +223,7 @@ def _draw_entries(
 ) -> None:
     x = left
     for colour, label in entries:
-        top = 6 if label.startswith("path") else 10
+        top = 6 if " path " in label else 10
         canvas.image[baseline - top : baseline + 1 - (10 - top), x : x + 14] = colour
         x = canvas.text(x + 20, baseline, label, INK) + 14
 

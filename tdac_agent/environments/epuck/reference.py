@@ -9,12 +9,13 @@ import math
 
 import numpy as np
 
-from tdac_agent.verification.suite.reference import Point, taut, without_flat_points
+from tdac_agent.verification.suite.reference import Point, without_flat_points
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.paths import open_field, path_entry
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.plan import Path, descend, distance_field
+from tdac_envs.grid.shortcuts import taut
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 # Clearances beyond the body that are tried for the path, m, widest first.

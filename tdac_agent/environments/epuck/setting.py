@@ -58,6 +58,15 @@ class EPuckSetting:
         """Metres."""
         return METRES
 
+    @property
+    def shown(self) -> Units:
+        """Metres."""
+        return METRES
+
+    def in_metres(self) -> Setting:
+        """Raises an error: worlds are always in metres."""
+        raise TaskError("--metres is for maps; a world is in metres anyway")
+
     def told(self, length: float) -> str:
         """Formats a length in mm."""
         return METRES.figure(length)

@@ -12,9 +12,7 @@ import numpy as np
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.units import METRES, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
-from tdac_agent.verification.suite.reference import taut
 from tdac_envs.drive.task import Pose
-from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.gaps import part_gap
 from tdac_envs.epuck.infrared import PLACES
 from tdac_envs.epuck.prisms import Owned, Prisms
@@ -42,6 +40,11 @@ class WorldSurroundings:
     def units(self) -> Units:
         """Metres, printed in mm."""
         return METRES
+
+    def shown_in(self, units: Units) -> WorldSurroundings:
+        """Returns itself: a world has no other units."""
+        assert units == METRES
+        return self
 
     @property
     def radius(self) -> float:
@@ -88,21 +91,15 @@ class WorldSurroundings:
         )
 
     def path_from(self, pose: Pose) -> Path:
-        """Returns the shortest path to the goal."""
+        """Returns the shortest grid path to the goal."""
         start = Pose(*METRES.place_of(pose.x, pose.y), 0.0)
         return METRES.on_screen(self.task.path_from(start))
 
     def pull(self, path: Path) -> list[Point]:
         """Returns the corners of a path after all shortcuts."""
-        return taut(path, self._free)
-
-    def _free(self, begin: Point, end: Point) -> bool:
-        """Whether the body can drive straight between two places."""
-        (x, y), (to_x, to_y) = METRES.place_of(*begin), METRES.place_of(*end)
-        solid, heading = self.task.ground.solid, math.atan2(to_y - y, to_x - x)
-        length = math.hypot(to_x - x, to_y - y)
-        touch = first_touch(*solid.arrays(), x, y, heading, length, 0.0, BODY_RADIUS)
-        return touch > 1.0
+        places = [METRES.place_of(x, y) for x, y in path.tolist()]
+        corners = self.task.pulled(np.array(places).reshape(-1, 2))
+        return [_on_screen(corner) for corner in corners]
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
         """Yields the path's first point `far` away from each place, or its end."""

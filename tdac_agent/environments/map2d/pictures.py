@@ -36,7 +36,7 @@ class MapPictures:
             nominal.goal,
             goal_tolerance=nominal.goal_tolerance,
             radius=nominal.robot.radius,
-            path=nominal.path_from(nominal.start),
+            path=nominal.shortest_path(nominal.start),
             outcomes=outcomes,
             labels=labels,
         )
@@ -50,8 +50,9 @@ class MapPictures:
             nominal.goal,
             goal_tolerance=nominal.goal_tolerance,
             robot=nominal.robot,
-            path=nominal.path_from(nominal.start),
+            path=nominal.shortest_path(nominal.start),
             robot_image=self.setting.robot_image,
+            units=self.setting.shown_in,
         )
         gaps, last = rollout.distances("euclidean"), trajectory.steps
         for step in rollout.trajectory.every(stride):

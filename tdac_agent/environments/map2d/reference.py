@@ -16,21 +16,19 @@ from numpy.typing import NDArray
 from tdac_agent.verification.suite.reference import (
     Point,
     steer,
-    taut,
     without_flat_points,
 )
-from tdac_envs.core.compiled import read_only
 from tdac_envs.grid.grid import BoolGrid, body_free
 from tdac_envs.grid.plan import Path, descend, distance_field
-from tdac_envs.map2d.straight import is_straight_path_free
+from tdac_envs.map2d.straight import is_line_free
 from tdac_envs.map2d.task import Map2DTask
 
 # Clearances beyond the body that are tried for the path, px, widest first. With the
 # last but one, float32 actions cannot touch a corner that a path with 0 would graze.
 MARGINS = (4.0, 2.0, 1.0, 0.5, 0.05, 0.0)
 _ARRIVED = 1e-4  # px
-_SAFE = 1e-3  # px kept beyond the body on a shortcut
-# The same in privileged controllers: much larger than the rounding errors of float32.
+# Clearance of a shortcut beyond the body in privileged controllers, px: much larger
+# than the rounding errors of float32.
 _SAFE_IN_FLOAT32 = 0.02
 
 
@@ -48,7 +46,7 @@ class Reference:
     def reset(self, pose: Sequence[float]) -> None:
         """Plans from a pose (x, y, heading), px and rad."""
         path = oracle_path(self.task, float(pose[0]), float(pose[1]))
-        self._waypoints = pull(self.task, path)[1:]
+        self._waypoints = self.task.pulled(path)[1:]
 
     def act(self, pose: Sequence[float]) -> tuple[float, float]:
         """Returns wheel fractions (left, right) for the next step at the true pose."""
@@ -82,25 +80,12 @@ def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
 
 def reference_path(task: Map2DTask, x: float, y: float) -> list[Point]:
     """Returns the oracle's path to the goal after shortcuts; both ends included."""
-    return without_flat_points(pull(task, oracle_path(task, x, y), _SAFE_IN_FLOAT32))
+    return without_flat_points(task.pulled(oracle_path(task, x, y), _SAFE_IN_FLOAT32))
 
 
-def pull(task: Map2DTask, path: Path, safe: float = _SAFE) -> list[Point]:
-    """Returns the corners of the path after all shortcuts without contact.
-
-    Args:
-        task: The task, for its map and body.
-        path: Shape (n, 2), px.
-        safe: Clearance of a shortcut beyond the body, px.
-    """
-    return taut(path, lambda begin, end: _free(task, begin, end, safe))
-
-
-def _free(task: Map2DTask, begin: Point, end: Point, safe: float) -> bool:
-    """Whether the body, grown by `safe` px, can drive straight between two points."""
-    clear = task.terrain.padded_clear
-    numbers = (*begin, *end, task.robot.radius + safe)
-    return is_straight_path_free(read_only(clear), *map(float, numbers))
+def _free(task: Map2DTask, begin: Point, end: Point) -> bool:
+    """Whether the body can drive straight between two points."""
+    return is_line_free(task.terrain.padded_clear, begin, end, task.robot.radius)
 
 
 def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:
@@ -144,6 +129,6 @@ def _entry(
 ) -> tuple[int, int] | None:
     """Returns the nearest pixel on a path to the goal that the body can drive to."""
     for i, j in _near(x, y, field.shape):
-        if np.isfinite(field[j, i]) and _free(task, (x, y), (i, j), 0.0):
+        if np.isfinite(field[j, i]) and _free(task, (x, y), (i, j)):
             return int(i), int(j)
     return None

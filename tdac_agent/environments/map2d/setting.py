@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -63,11 +63,25 @@ class Map2DSetting:
         """Pixels."""
         return PIXELS
 
+    @property
+    def shown(self) -> Units:
+        """Pixels, printed as in `shown_in`."""
+        if self.shown_in == MAP_PIXELS:
+            return PIXELS
+        return PIXELS.in_metres(self.shown_in)
+
+    def in_metres(self) -> Map2DSetting:
+        """See `Setting`."""
+        if self.params.resolution is None:
+            raise TaskError(
+                f"--metres needs a map with a resolution, as in map.yaml; "
+                f"{self.params.source} has none"
+            )
+        return replace(self, shown_in=MapUnits.metres(self.params))
+
     def told(self, length: float) -> str:
         """Formats a length in `shown_in`."""
-        if self.shown_in == MAP_PIXELS:
-            return self.units.figure(length)
-        return self.shown_in.length(length)
+        return self.shown.figure(length)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -85,6 +99,7 @@ class Map2DSetting:
                 "metres of the map's frame; the controller and its tests use px "
                 f"({params.resolution:g} m each)"
             )
+            lines.append(robot_text(params.robot, self.shown_in))
         return lines
 
     def env_kwargs(self) -> dict[str, Any]:
@@ -130,7 +145,9 @@ class Map2DSetting:
         """Draws the map image with free space, start, goal and path."""
         grid = self.nominal.terrain.grid
         shown = grid.cells if self.image is None else self.image
-        return preview_of(as_image(shown), grid, self.params, self.shown_in)
+        path = self.nominal.shortest_path(self.nominal.start)
+        image = as_image(shown)
+        return preview_of(image, grid, self.params, self.shown_in, path=path)
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
@@ -171,7 +188,8 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     source = spec.map if bundled else str(base / spec.map)
     if bundled and spec.metres:
         raise TaskError(f"metres: the bundled map {spec.map} has no scale; give pixels")
-    units = units_of(source, metres=spec.metres)
+    typed = None if spec.start is None else (spec.start[0], spec.start[1])
+    units = units_of(source, metres=spec.metres).with_typed(typed, spec.goal)
     spec = _in_pixels(spec, units)
     prepared = prepare(
         source,
@@ -200,6 +218,15 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         _check_robot_image(robot_image)
     name = spec.map if bundled else Path(spec.map).stem
     return name, Map2DSetting(params, nominal, prepared.image, robot_image, units)
+
+
+def robot_text(robot: RobotParams, units: MapUnits) -> str:
+    """The robot's size and speed on a map, and how to change them."""
+    return (
+        f"robot: radius {units.length(robot.radius)}, full speed "
+        f"{units.length(robot.max_wheel_speed, 0)}/s (to change them: --robot-radius, "
+        "and robot: {max_wheel_speed: …} in a task.yaml)"
+    )
 
 
 def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tdac_agent.environments.map2d.reference import pull
 from tdac_agent.environments.map2d.touch import nearest_touch
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.units import PIXELS, Points, Units
@@ -24,14 +23,19 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapSurroundings:
-    """The map of a task; see `Surroundings`."""
+    """The map of a task; see `Surroundings`.
+
+    Attributes:
+        task: The task.
+        units: Pixels; texts may be in metres.
+    """
 
     task: Map2DTask
+    units: Units = PIXELS
 
-    @property
-    def units(self) -> Units:
-        """Pixels."""
-        return PIXELS
+    def shown_in(self, units: Units) -> MapSurroundings:
+        """Returns the same with texts in other units."""
+        return replace(self, units=units)
 
     @property
     def radius(self) -> float:
@@ -60,17 +64,17 @@ class MapSurroundings:
         earlier = min(trajectory.steps, 10)
         shortest = float(trajectory.ranges[trajectory.steps - earlier].min())
         return (
-            f"{earlier} steps earlier the shortest ray read {shortest:.1f} px (from "
-            "the centre of the body)."
+            f"{earlier} steps earlier the shortest ray read "
+            f"{self.units.far(shortest)} (from the centre of the body)."
         )
 
     def path_from(self, pose: Pose) -> Path:
-        """Returns the shortest path to the goal."""
+        """Returns the shortest grid path to the goal."""
         return self.task.path_from(pose)
 
     def pull(self, path: Path) -> list[Point]:
         """Returns the corners of a path after all shortcuts."""
-        return pull(self.task, path)
+        return self.task.pulled(path)
 
     def places_ahead(self, places: Points, far: float) -> Iterator[Point | None]:
         """Yields the path's first point `far` away from each place, or its end."""

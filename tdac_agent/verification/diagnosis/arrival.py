@@ -35,7 +35,7 @@ def why_no_arrival(rollout: Rollout, around: Surroundings) -> Finding:
     trajectory, units = rollout.trajectory, around.units
     gone = np.hypot(*(trajectory.poses[:, :2] - trajectory.poses[0, :2]).T).max()
     if gone < PROGRESS and np.abs(turns(trajectory)).sum() < 1.0:
-        text = f"in {trajectory.steps} steps it moved at most {gone:.1f} {units.length}"
+        text = f"in {trajectory.steps} steps it moved at most {units.far(gone)}"
         return Finding("no motion", f"{text} from its start and hardly turned.", 0)
     since = last_progress(rollout)
     if rollout.reached or trajectory.steps - since < _STALLED * trajectory.steps:
@@ -66,15 +66,15 @@ def last_progress(rollout: Rollout) -> int:
 def _unfinished(trajectory: Trajectory, around: Surroundings) -> Finding:
     """The robot was still making progress when its time was over."""
     distances, steps = trajectory.path_distances, trajectory.steps
-    limit, unit = around.full_speed, around.units.length
+    limit, far = around.full_speed, around.units.far
     driven, seconds = float(lengths(trajectory).sum()), steps * trajectory.dt
     speed = float(np.abs(forward(trajectory)).mean())
     facts = (
         f"covered {percent(1 - distances[-1] / max(distances[0], 1e-9))} of the path "
-        f"in {steps} steps, at a mean speed of {limit * speed:.1f} {unit}/s "
+        f"in {steps} steps, at a mean speed of {far(limit * speed)}/s "
         f"({percent(speed)} of the wheel limit); at least "
-        f"{distances[0] / seconds:.1f} {unit}/s was needed; it drove {driven:.0f} "
-        f"{unit} for {distances[0] - distances[-1]:.0f} {unit} of progress; both "
+        f"{far(distances[0] / seconds)}/s was needed; it drove {far(driven, 0)} "
+        f"for {far(distances[0] - distances[-1], 0)} of progress; both "
         f"wheels stood still in {percent(1 - wheels_turn(trajectory).mean())} of the "
         f"steps."
     )
@@ -90,14 +90,14 @@ def _unfinished(trajectory: Trajectory, around: Surroundings) -> Finding:
 def _missed_goal(rollout: Rollout, since: int, units: Units) -> Finding | None:
     """The robot came near its goal but did not reach it."""
     trajectory, straight = rollout.trajectory, rollout.distances("euclidean")
-    distances, unit = trajectory.path_distances, units.length
+    distances = trajectory.path_distances
     within = straight <= rollout.tolerance
     if within.any():
         step = int(np.argmax(within))
         text = (
-            f"in step {step} it was {straight[step]:.1f} {unit} from the goal, within "
-            f"the tolerance of {rollout.tolerance:.1f} {unit}, but a wall is in "
-            f"between: the path to it is {distances[step]:.1f} {unit} long."
+            f"in step {step} it was {units.far(straight[step])} from the goal, within "
+            f"the tolerance of {units.far(rollout.tolerance)}, but a wall is in "
+            f"between: the path to it is {units.far(distances[step])} long."
         )
         return Finding("missed goal", text, step)
     if distances[since] > near_goal(rollout):
@@ -108,8 +108,8 @@ def _missed_goal(rollout: Rollout, since: int, units: Units) -> Finding | None:
         return None
     step, what = after
     text = (
-        f"in step {best} it was {straight[best]:.1f} {unit} from the goal (tolerance "
-        f"{rollout.tolerance:.1f} {unit}); {what}."
+        f"in step {best} it was {units.far(straight[best])} from the goal (tolerance "
+        f"{units.far(rollout.tolerance)}); {what}."
     )
     return Finding("missed goal", text, step)
 
@@ -123,23 +123,24 @@ def _after_the_goal(
         The step to look at, and the text.
     """
     trajectory, straight = rollout.trajectory, rollout.distances("euclidean")[since:]
-    rounds, unit = rounds_about(trajectory, since, rollout.goal), units.length
+    rounds = rounds_about(trajectory, since, rollout.goal)
     away = float(trajectory.path_distances[-1] - trajectory.path_distances[best])
     if abs(rounds) >= 2.0 and straight.max() < 4.0 * near_goal(rollout):
         sense = "clockwise" if rounds > 0 else "counter-clockwise"
         return best, (
             f"after step {since} it circled the goal {abs(rounds):.1f} times, {sense} "
-            f"seen from above, {straight.min():.1f} to {straight.max():.1f} {unit} "
+            f"seen from above, {units.amount(straight.min())} to "
+            f"{units.far(straight.max())} "
             f"from it"
         )
     rest = standing_since(trajectory)
     if straight[-1] <= near_goal(rollout) and rest < trajectory.steps:
         place = units.point(*trajectory.poses[-1, :2])
         text = f"it stood still from step {rest} to the end at {place}, "
-        return rest, f"{text}{straight[-1]:.1f} {unit} from the goal"
+        return rest, f"{text}{units.far(straight[-1])} from the goal"
     if away > 2.0 * rollout.radius:
         text = "it then passed by and moved away: its remaining path grew by"
-        return best, f"{text} {away:.1f} {unit}"
+        return best, f"{text} {units.far(away)}"
     return None
 
 
@@ -153,7 +154,7 @@ def _wrong_goal(rollout: Rollout, around: Surroundings) -> Finding | None:
         apart = min(math.dist(place, rollout.goal), math.dist(place, start))
         if off <= rollout.tolerance + rollout.radius < apart:
             text = (
-                f"it ended within {off:.1f} {units.length} of {units.point(*place)}, "
+                f"it ended within {units.far(off)} of {units.point(*place)}, "
                 f"which is the goal {units.point(*rollout.goal)} with {mistake}."
             )
             return Finding("wrong goal", text, trajectory.steps)

@@ -37,17 +37,23 @@ _CONTRACT = re.compile(
 )
 
 
-def diagnose(rollout: Rollout, task: Nominal) -> Diagnosis:
+def diagnose(rollout: Rollout, task: Nominal, shown: Units | None = None) -> Diagnosis:
     """Finds the cause and circumstances of a failed (or late) episode.
 
     For a held-out episode the cause is `held out`, and there are no figures.
+
+    Args:
+        rollout: The episode.
+        task: Its task.
+        shown: Units of the text, as from `Setting.shown`; by default those of the
+            environment, which controllers and models use. Figures are always in these.
     """
     if rollout.outcome == "not run":
         return Diagnosis(cause="error", text=f"{rollout.name}: {rollout.error}.")
     if rollout.held_out:
         text = "A held-out start failed; its details are not disclosed."
         return Diagnosis(cause="held out", text=text)
-    around = surroundings_of(task)
+    around = surroundings_of(task, shown)
     return _diagnose(rollout_on_screen(rollout, around.units), around)
 
 
@@ -89,7 +95,7 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
         f"collision in step {trajectory.steps} "
         f"({trajectory.steps * trajectory.dt:.1f} s) at {units.point(pose.x, pose.y)}, "
         f"heading {units.heading_of(pose.heading):z.2f} rad, speed "
-        f"{speed * around.full_speed:.0f} {units.length}/s: the {side} of the body "
+        f"{units.far(speed * around.full_speed, 0)}/s: the {side} of the body "
         f"touched the {touch.thing} at "
         f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
         f"{around.seen(touch, trajectory)} {_limits(share)}"
@@ -122,7 +128,7 @@ def _passed_goal(rollout: Rollout, units: Units) -> str:
         return ""
     if distances[-1] - distances[best] < PROGRESS:
         return ""
-    left = f"{distances[best]:.1f} {units.length} of path left"
+    left = f"{units.far(distances[best])} of path left"
     return f"It had passed the goal in step {best} with {left}. "
 
 
@@ -134,7 +140,7 @@ def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
     if touch is not None and cause in ("stuck", "oscillating", "no motion"):
         near = "wall" if touch.border else touch.thing
         text += f" The nearest {near} is "
-        text += f"{touch.gap:.1f} {around.units.length} from the body, at its "
+        text += f"{around.units.far(touch.gap)} from the body, at its "
         text += f"{side_of(touch.bearing)}."
     error, course = _course(rollout, around)
     text = f"{cause}: {text} {course}"
@@ -177,8 +183,10 @@ def _diagnosis(
     d0, d_min = float(distances[0]), float(distances.min())
     x, y = units.kept_place(*trajectory.poses[step, :2].tolist())
     if trajectory.steps:
-        text += f" Path left: {d0:.1f} {units.length} at the start, {d_min:.1f} "
-        text += f"{units.length} at best. {_last_poses(trajectory, units)}"
+        text += (
+            f" Path left: {units.far(d0)} at the start, {units.far(d_min)} at best. "
+        )
+        text += _last_poses(trajectory, units)
     return Diagnosis(
         cause=cause,
         text=text,

@@ -14,6 +14,7 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.course import path_ahead
 from tdac_agent.verification.diagnosis.report import Diagnosis, Episode, Report
 from tdac_agent.verification.diagnosis.surroundings import (
@@ -63,7 +64,9 @@ def draw_failures(
             continue
         background = background or pictures_of(task.setting).backdrop()
         diagnosis = _diagnosis_of(report, episode)
-        event = event_of(task.nominal, trajectory, episode, diagnosis)
+        event = event_of(
+            task.nominal, trajectory, episode, diagnosis, task.setting.shown
+        )
         picture = run_picture(background, trajectory.poses, event)
         files.append(folder / f"{file_stem(episode.name)}.png")
         write_png(picture, files[-1])
@@ -85,9 +88,18 @@ def event_of(
     trajectory: Trajectory,
     episode: Episode,
     diagnosis: Diagnosis | None,
+    units: Units | None = None,
 ) -> Event:
-    """What the picture of a failed episode shows; the outcome if no cause is known."""
-    around = surroundings_of(task)
+    """What the picture of a failed episode shows; the outcome if no cause is known.
+
+    Args:
+        task: Its task.
+        trajectory: Its trajectory.
+        episode: Its figures.
+        diagnosis: Its diagnosis, if there is one.
+        units: Units of the texts, from `Setting.shown`; None for the environment's.
+    """
+    around = surroundings_of(task, units)
     units, shown = around.units, trajectory_on_screen(trajectory, around.units)
     end = Pose(*shown.poses[-1].tolist())
     held_out = " (held out)" if episode.held_out else ""
@@ -102,7 +114,10 @@ def event_of(
     way = path_ahead(around, shown, trajectory.steps)
     return Event(
         title=title,
-        facts=(*facts, f"path left: {d_min:.0f} of {d0:.0f} {units.length}"),
+        facts=(
+            *facts,
+            f"grid path left: {units.amount(d_min, 0)} of {units.far(d0, 0)}",
+        ),
         where=where,
         contact=contact_of(task, trajectory, episode.outcome),
         way=None if way is None else np.array([units.place_of(x, y) for x, y in way]),

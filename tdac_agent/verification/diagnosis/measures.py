@@ -11,8 +11,6 @@ from pydantic import ConfigDict, Field
 from tdac_agent.episodes.trajectory import Outcome, Rollout
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.setting import Nominal
-from tdac_agent.verification.diagnosis.surroundings import surroundings_of
-from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import path_length
 
 # Cut-off frequency (Hz), threshold and zero padding of the spectral arc length.
@@ -98,15 +96,11 @@ def measure(rollout: Rollout, seed: int, task: Nominal) -> Measured:
 def shortest_path_length(task: Nominal) -> float:
     """Length of the shortest path from a task's start to its goal, px or m.
 
-    The shortest 8-connected grid path, after every shortcut that the body can take.
+    The shortest 8-connected grid path, after every shortcut that the body can take; see
+    `Nominal.shortest_path`.
     """
-    around, start = surroundings_of(task), task.start
-    units = around.units
-    x, y = units.on_screen([start[:2]])[0].tolist()
-    path = around.path_from(Pose(x, y, 0.0))
-    if len(path) < 2:
-        return task.shortest
-    return path_length(np.array(around.pull(path))) / units.scale
+    path = task.shortest_path(task.start)
+    return task.shortest if len(path) < 2 else path_length(path)
 
 
 def spectral_arc_length(speeds: NDArray[np.float64], dt: float) -> float:

@@ -44,6 +44,9 @@ class Diagnosis(_Record):
 
     cause: Cause
     text: str = Field(description="One paragraph; deterministic, without file paths.")
+    shown: str | None = Field(
+        None, exclude=True, description="The text in the user's units; not stored."
+    )
     episode: str | None = Field(
         None, description="`nominal`, `jitter 1` … or `run_episode`."
     )

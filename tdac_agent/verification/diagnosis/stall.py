@@ -80,7 +80,7 @@ def _spinning(
         return None
     side = "right" if net > 0 else "left"
     circle = driven / (rounds * math.tau)
-    wide = f"on a circle of radius {circle:.0f} {units.length}"
+    wide = f"on a circle of radius {units.far(circle, 0)}"
     where = wide if circle >= PROGRESS else "in place"
     return "spinning", (
         f"in the last {trajectory.steps - late} steps it made {rounds:.1f} full turns "
@@ -103,7 +103,7 @@ def _jittering(
         f"in the last {trajectory.steps - late} steps it reversed its turning or "
         f"driving direction every {1 / share:.1f} steps, its heading within "
         f"{math.degrees(swing(trajectory, late)):.0f}°, its position within "
-        f"{_extent(trajectory, late):.1f} {units.length}"
+        f"{units.far(_extent(trajectory, late))}"
     )
 
 
@@ -135,8 +135,8 @@ def _wandering(trajectory: Trajectory, late: int, units: Units) -> Behaviour:
     box = units.box(*_box(trajectory, late))
     driven = float(lengths(trajectory)[late:].sum())
     return "stuck", (
-        f"in the last {trajectory.steps - late} steps it drove {driven:.1f} "
-        f"{units.length} within {box}"
+        f"in the last {trajectory.steps - late} steps it drove "
+        f"{units.far(driven)} within {box}"
     )
 
 

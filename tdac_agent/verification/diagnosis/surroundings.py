@@ -32,6 +32,9 @@ class Surroundings(Protocol):
     def full_speed(self) -> float:
         """Full speed of the body, units of length per second."""
 
+    def shown_in(self, units: Units) -> Surroundings:
+        """The same with texts in other units, from `Setting.shown`."""
+
     def touch(self, pose: Pose, reach: float) -> Touch | None:
         """What the body touches, or would touch first, within `reach`."""
 
@@ -39,7 +42,7 @@ class Surroundings(Protocol):
         """What the distance sensors saw of what was touched, as text."""
 
     def path_from(self, pose: Pose) -> Path:
-        """Shortest path to the goal, shape (n, 2); empty where there is none."""
+        """Shortest grid path to the goal, shape (n, 2); empty where there is none."""
 
     def pull(self, path: Path) -> list[Point]:
         """Corners of a path after every shortcut that the body can take."""
@@ -51,9 +54,10 @@ class Surroundings(Protocol):
         """Where the goal would be with mixed-up coordinates, by name of the mistake."""
 
 
-def surroundings_of(task: Nominal) -> Surroundings:
-    """The surroundings of a task."""
-    return environment(task.env_id).surroundings(task)
+def surroundings_of(task: Nominal, shown: Units | None = None) -> Surroundings:
+    """The surroundings of a task; `shown` are the units of texts, if others."""
+    around = environment(task.env_id).surroundings(task)
+    return around if shown is None else around.shown_in(shown)
 
 
 def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:

@@ -68,4 +68,4 @@ def where_on_the_wall(touch: Touch, towards: float, units: Units = PIXELS) -> st
         return f"at {place}"
     word = "past" if along > 0.5 * distance else "before"
     side = word if abs(along) > 0.5 * distance else "beside"
-    return f"{distance:.1f} {units.length} {side} {place}"
+    return f"{units.far(distance)} {side} {place}"

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.report import Episode
 from tdac_agent.verification.judge.jobs import Findings
@@ -22,22 +23,37 @@ def driven(judge: Judge) -> list[Rollout]:
     ]
 
 
-def findings_of(judge: Judge, expected: list[str]) -> Findings:
-    """The findings of a settled judge; `expected` are the tests that had to run."""
+def findings_of(
+    judge: Judge, expected: list[str], shown: Units | None = None
+) -> Findings:
+    """The findings of a settled judge.
+
+    Args:
+        judge: The judge.
+        expected: The tests that had to run.
+        shown: Units that the user reads, if they are not the environment's.
+    """
     task = judge.task
     rollouts = judge.rollouts
-    diagnoses = {
-        rollout_key(*key): diagnose(
-            _named(key, rollouts), task.nominal
-        ).model_dump_json()
+    failed = {
+        rollout_key(*key): _named(key, rollouts)
         for key, rollout in rollouts.items()
         if rollout.outcome != "not run"
         and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))
     }
+    diagnoses = {
+        key: diagnose(rollout, task.nominal).model_dump_json()
+        for key, rollout in failed.items()
+    }
+    texts = {} if shown is None else failed
     return Findings(
         expected=expected,
         episodes=[_episode(rollout, task) for rollout in driven(judge)],
         diagnoses=diagnoses,
+        shown={
+            key: diagnose(rollout, task.nominal, shown).text
+            for key, rollout in texts.items()
+        },
         tier=judge.tier,
         child_cpu_seconds=round(judge.cpu_seconds, 3),
         fault=judge.fault,

@@ -33,6 +33,7 @@ class Job(BaseModel):
     limits: Limits
     out: Path
     trajectories: Path | None = Field(description="Folder; None to discard them.")
+    metres: bool = Field(False, description="Whether the user reads metres of the map.")
 
 
 def write_job(job: BaseModel, path: Path) -> None:
@@ -48,6 +49,9 @@ class Findings(PrintableRecord):
     expected: list[str]
     episodes: list[Episode]
     diagnoses: dict[str, str]
+    shown: dict[str, str] = Field(
+        default_factory=dict, description="Texts of diagnoses in the user's units."
+    )
     tier: str
     child_cpu_seconds: float
     fault: str | None

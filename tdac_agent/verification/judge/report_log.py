@@ -223,6 +223,8 @@ def _failure(name: str, record: _Tested, findings: Findings) -> Failure:
     for key, value in record.user_properties:
         if key == "rollout" and type(value) is str and value in findings.diagnoses:
             diagnosis = Diagnosis.model_validate_json(findings.diagnoses[value])
+            shown = {"shown": findings.shown.get(value)}
+            diagnosis = diagnosis.model_copy(update=shown)
     message = _message(record)
     return Failure(
         test=name, group=group_of(name), message=message, diagnosis=diagnosis

@@ -49,5 +49,6 @@ def judge_suite(
                 if rollout.trajectory.steps:
                     pool.submit(rollout.trajectory.save, job.trajectories / name)
         judge.settle()
-        findings = findings_of(judge, plugin.expected).model_dump_json()
+        shown = task.setting.in_metres().shown if job.metres else None
+        findings = findings_of(judge, plugin.expected, shown).model_dump_json()
     (job.out / "findings.json").write_text(findings, encoding="utf-8")

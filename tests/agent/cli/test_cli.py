@@ -149,7 +149,7 @@ def test_the_help_is_quick():
         ("map x.png --start 1 2 0.5 4", "unexpected extra argument(s) (4)"),
         ("map x.png --goal 1,2 4", "unexpected extra argument(s) (4)"),
         ("map x.png --heading 0.5", "--heading needs --start X Y"),
-        ("synth --start 330 --goal 99 100", "Invalid value for '--start'"),
+        ("synth --start 330 --goal 99 100", "--start 330: expected two numbers X Y"),
         ("syth", "No such command 'syth'"),
         ("verify", "Missing argument 'CONTROLLER'; see tdac verify --help"),
     ],
@@ -222,7 +222,7 @@ PLACES = {
     "not a number": (["--start", "nan", 30, "--goal", 130, 30], "start"),
     "infinite": (["--start", 30, 30, "--goal", "inf", 30], "goal"),
     "metres": (["--metres", *ENDS], "resolution"),
-    "word for a number": (["--start", "a", 30], "valid (number|float)"),
+    "word for a number": (["--start", "a", 30], "--start a 30: expected two num"),
     "huge body": (
         ["--start", 30, 30, "--goal", 130, 30, "--robot-radius", 60],
         "60 px",

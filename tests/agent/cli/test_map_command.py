@@ -11,7 +11,7 @@ import pytest
 from small import small_cells
 
 from tdac_agent.cli.flags import TaskFlags
-from tdac_agent.cli.main import with_places
+from tdac_agent.cli.places import with_places
 from tdac_agent.tasks.task import load_task
 from tdac_envs.core.errors import RefusedError, TaskError
 
@@ -144,14 +144,58 @@ def test_a_numpy_grid(tdac, tmp_path):
         ("--start 90, 302 --goal (178,386)", "--start 90 302 --goal 178 386"),
         ("--start -40,-3,1.5 --snap", "--start -40 -3 --heading 1.5 --snap"),
         ("--start 1 2 .5 --goal 3,4 x", "--start 1 2 --heading .5 --goal 3 4 x"),
-        ("--start 1 --goal 2 3 4", "--start 1 --goal 2 3 4"),
-        ("--goal 1,2,3", "--goal 1,2,3"),
         ("--out a=b --json", "--out a=b --json"),
-        ("--start", "--start"),
     ],
 )
 def test_places_as_people_type_them(typed, understood):
     assert with_places(typed.split()) == understood.split()
+
+
+@pytest.mark.parametrize(
+    ("typed", "message"),
+    [
+        ("--start 1 --goal 2 3", "--start 1: expected two numbers X Y, or three X Y Y"),
+        ("--start -1 abc --goal 2 3", "--start -1 abc: expected two numbers"),
+        ("--start=1, --snap", "--start 1,: expected two numbers"),
+        ("--start 1,2,3,4", "--start 1,2,3,4: expected two numbers"),
+        ("--start", "--start: expected two numbers"),
+        (
+            "--goal 1,2,3",
+            "--goal 1,2,3: expected two numbers X Y, as in --goal 178 386",
+        ),
+        ("--goal 1 2 3", "--goal 1 2 3: expected two numbers X Y"),
+        (
+            "--start 1 2 3 --heading 1",
+            "--start 1 2 3 already has a heading, 3: leave o",
+        ),
+        ("--heading=1 --start 1,2,3", "--start 1 2 3 already has a heading"),
+    ],
+)
+def test_places_that_are_none(typed, message):
+    """Quoted as typed, with what is expected."""
+    with pytest.raises(TaskError, match=f"^{re.escape(message)}"):
+        with_places(typed.split())
+
+
+@pytest.mark.parametrize("start", ["30 30 --heading 90", "30 30 90", "30,30,90"])
+def test_a_heading_in_degrees(tdac, ros, start):
+    """More than a full turn is refused with the radians that may be meant."""
+    ends = ("--start", *start.split(), "--goal", "130", "30")
+    code, _, err = tdac("map", ros.parent / "plan.png", *ends)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "90 is more than a full turn: did you mean 1.571 (90 degrees)?" in err
+
+
+def test_a_number_that_is_none(tdac):
+    """The flag, the word as typed, and what is expected."""
+    for words, message in (
+        ("map x.png --robot-radius abc", "--robot-radius abc: expected a number"),
+        ("evaluate random --episodes 1.5x", "--episodes 1.5x: expected a whole number"),
+        ("evaluate random --episodes 0", "greater than or equal to 1, got 0"),
+    ):
+        code, _, err = tdac(*words.split())
+        assert (code, err.count("\n")) == (2, 1)
+        assert message in err
 
 
 def test_a_place_in_one_word():
@@ -167,7 +211,6 @@ def test_a_place_in_one_word():
     "words",
     [
         ["--snap"],
-        ["--metres"],
         ["--polarity", "dark"],
         ["--threshold", "3"],
         ["--robot-radius", "3"],
@@ -184,7 +227,7 @@ def test_flags_beside_a_task_are_refused(tdac, words):
     assert err == f"error: --task already defines the task: leave out {words[0]}\n"
 
 
-@pytest.mark.parametrize("words", [["--snap"], ["--metres"], ["--polarity", "dark"]])
+@pytest.mark.parametrize("words", [["--snap"], ["--polarity", "dark"]])
 def test_flags_beside_a_run_folder_are_refused(tdac, tmp_path, words):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "controller.py").write_text("x = 1\n")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from driving import drive, random_env
 
-from tdac_agent.environments.map2d.reference import Reference, oracle_path, pull
+from tdac_agent.environments.map2d.reference import Reference, oracle_path
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.task import jittered_start
 from tdac_envs.mapping.bundled import bundled_maps
@@ -79,7 +79,7 @@ def test_path_keeps_a_margin_where_there_is_room():
 def test_open_room_needs_one_segment():
     """Without obstacles the pulled path is a straight line."""
     env = Map2DEnv(np.zeros((90, 150), bool), (20, 20, 0), (130, 71), robot_radius=8)
-    corners = pull(env.nominal, oracle_path(env.nominal, 20, 20))
+    corners = env.nominal.pulled(oracle_path(env.nominal, 20, 20))
     assert corners == [(20.0, 20.0), (130.0, 71.0)]
 
 

@@ -447,6 +447,62 @@ def test_a_folder_whose_name_is_not_utf_8(tdac, tmp_path):
     assert (out / "evaluation.json").is_file()
 
 
+def test_a_finished_evaluation_is_not_driven_again(tdac, tmp_path):
+    """The same command prints it from its folder; a missing picture is drawn anew."""
+    folder, out = write_small_task(tmp_path / "task"), tmp_path / "out"
+    words = ["evaluate", "reference", "random", "--task", folder, "--episodes", 2]
+    _, first, _ = tdac(*words, "--out", out)
+    kept = {file: file.read_bytes() for file in out.iterdir()}
+    code, again, _ = tdac(*words, "--out", out)
+    assert code == 0
+    assert "out already has this evaluation; nothing was driven" in again
+    assert again.partition("knows: ")[0] == first.partition("knows: ")[0]
+    _, text, _ = tdac(*words, "--out", out, "--json", "--csv", tmp_path / "all.csv")
+    assert text == (out / "evaluation.json").read_text()
+    assert (tmp_path / "all.csv").read_bytes() == (out / "episodes.csv").read_bytes()
+    assert {file: file.read_bytes() for file in out.iterdir()} == kept
+    (out / "small.png").unlink()
+    _, text, _ = tdac(*words, "--out", out)
+    assert "nothing was driven" not in text
+    assert (out / "small.png").read_bytes() == kept[out / "small.png"]
+
+
+@pytest.mark.parametrize(
+    ("words", "differs"),
+    [
+        (["random", "--episodes", "2"], "--episodes"),
+        (["random", "--seed", "3"], "--seed"),
+        (["random", "--variation", "nominal"], "--variation"),
+        (["go-to-goal"], "policies"),
+    ],
+)
+def test_another_evaluation_is_not_overwritten(tdac, tmp_path, words, differs):
+    """One line says what is there, what differs, and what to do."""
+    folder, out = write_small_task(tmp_path / "task"), tmp_path / "out"
+    rest = ["--task", folder, "--out", out]
+    tdac("evaluate", "random", "--episodes", 1, *rest)
+    kept = {file: file.read_bytes() for file in out.iterdir()}
+    words = words if "--episodes" in words else [*words, "--episodes", "1"]
+    code, text, errors = tdac("evaluate", *words, *rest)
+    assert (code, text, errors.count("\n")) == (2, "", 1)
+    assert "already has an evaluation, of random on small (1 episode each, " in errors
+    assert f"it differs in {differs}: give another folder with --out" in errors
+    assert {file: file.read_bytes() for file in out.iterdir()} == kept
+
+
+def test_a_changed_task_or_a_foreign_file_in_the_folder(tdac, tmp_path):
+    folder, out = write_small_task(tmp_path / "task"), tmp_path / "out"
+    words = ["evaluate", "random", "--episodes", 1, "--task", folder, "--out", out]
+    tdac(*words)
+    write_small_task(folder, goal=[130, 90])
+    code, _, errors = tdac(*words)
+    assert (code, "it differs in the settings of the tasks" in errors) == (2, True)
+    (out / "evaluation.json").write_text("[1]")
+    code, _, errors = tdac(*words)
+    assert (code, errors.count("\n")) == (2, 1)
+    assert "evaluation.json cannot be read" in errors
+
+
 def kept_in(out):
     """Contents of the files of finished episodes, by path."""
     return {file: file.read_bytes() for file in (out / FOLDER).glob("*/*.npz")}

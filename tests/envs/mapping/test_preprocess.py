@@ -19,7 +19,7 @@ from tdac_envs.core.errors import MapError, TaskError
 from tdac_envs.grid.grid import body_free, clearance
 from tdac_envs.mapping.cleanup import cleanings
 from tdac_envs.mapping.image import load_image, luminance
-from tdac_envs.mapping.map_folder import FILES, shortest_path, write_map
+from tdac_envs.mapping.map_folder import FILES, planned_path, write_map
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.preprocessing import preprocess, rank_candidates
 from tdac_envs.mapping.score import nearest_free, score, widest_radius
@@ -512,7 +512,7 @@ def test_write_map_round_trip(with_task: bool, tmp_path: Path) -> None:
     assert params.source_sha256 == load_image(tmp_path / "map.png").sha256
     preview = cv2.imread(str(files[3]))
     assert preview.shape[0] > 200
-    assert (len(shortest_path(grid, params)) > 0) == with_task
+    assert (len(planned_path(grid, params)) > 0) == with_task
 
 
 def test_unwritable_folder(tmp_path: Path) -> None:

@@ -148,7 +148,7 @@ def test_held_out_caption():
     assert event.title == "jitter 4 (held out): collision"
     assert event.facts == (
         "ended in step 21 at (578.5, 100.0)",
-        "path left: 945 of 945 px",
+        "grid path left: 945 of 945 px",
     )
 
 
