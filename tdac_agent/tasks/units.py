@@ -6,6 +6,7 @@ Diagnoses use screen coordinates: x points right, y points down, headings are cl
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -75,16 +76,20 @@ class Units:
         """Converts a heading on the screen to the environment."""
         return -heading if self.up else heading
 
+    def degrees(self, heading: float) -> str:
+        """Formats a heading on the screen, rad, in degrees of the environment."""
+        return f"{math.degrees(self.heading_of(heading)):z.0f}"
+
     def point(self, x: float, y: float) -> str:
         """Formats a place on the screen in the environment's coordinates."""
         x, y = self.place_of(x, y)
         return f"({x:z.{self.decimals}f}, {y:z.{self.decimals}f})"
 
     def pose(self, x: float, y: float, heading: float) -> str:
-        """Formats a pose on the screen in the environment's coordinates."""
+        """Formats a pose on the screen: `12.0 34.5 -90`, the heading in degrees."""
         x, y = self.place_of(x, y)
         place = f"{x:z.{self.decimals}f} {y:z.{self.decimals}f}"
-        return f"{place} {self.heading_of(heading):z.2f}"
+        return f"{place} {self.degrees(heading)}"
 
     def box(self, low: Points, high: Points, less: int = 0) -> str:
         """Formats a box on the screen: `x 3.0 to 4.5, y 0.2 to 1.0`.

@@ -173,7 +173,7 @@ def test_runs_in_a_table(tdac, monkeypatch, columns):
 
 def test_an_iteration_that_was_cut_off_is_counted(tdac):
     """Its candidate was written but not judged, so that there is no attempt of it."""
-    run = run_with("runs/maze-1", "interrupted", iterations=20)
+    run = run_with("runs/maze-1", "interrupted").model_copy(update={"iterations": 20})
     Path("runs/maze-1/iterations/k03/j0").mkdir(parents=True)
     Path("runs/maze-1/iterations/kept").mkdir()
     Path("runs/maze-1/run.json").write_text(run.model_dump_json())
