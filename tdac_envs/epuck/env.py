@@ -104,7 +104,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `collisions` | number of such steps so far |
     | `clipped` | number of actions out of range so far |
     | `distance_to_goal` | straight distance from the robot's centre to the goal |
-    | `path_distance` | length of the shortest path for the body from there to the goal |
+    | `path_distance` | length of the shortest path of the body to the goal |
     | `clearance` | distance from the robot's centre to the nearest solid object |
 
     The fence counts as an object. `clearance` is negative if the centre is inside of

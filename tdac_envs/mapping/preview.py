@@ -21,7 +21,7 @@ from tdac_envs.drawing.canvas import (
 )
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
-from tdac_envs.mapping.binarize import otsu
+from tdac_envs.mapping.binarize import otsu, saturated
 from tdac_envs.mapping.fault import Fault
 from tdac_envs.mapping.image import ColourImage, MapImage, luminance
 from tdac_envs.mapping.params import MapParams
@@ -116,11 +116,15 @@ def _classes(
 
 
 def _like_floor(image: MapImage, params: MapParams) -> BoolGrid:
-    """The pixels of the side of the threshold that is free within the plan."""
+    """The pixels that are free within the plan: of the lighter side, if walls are dark.
+
+    Walls in a strong light colour are not among them.
+    """
     shade = luminance(image.colour)
     threshold = otsu(shade) if params.threshold is None else params.threshold
     light = shade > threshold
-    return np.asarray(light if params.polarity == "dark" else ~light)
+    floor = light if params.polarity == "dark" else ~light
+    return np.asarray(floor & ~saturated(image.colour))
 
 
 def _lay_source(canvas: Canvas, source: ColourImage, classes: Classes) -> None:
