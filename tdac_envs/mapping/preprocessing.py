@@ -135,9 +135,9 @@ def _scene(
             raise _outside(alone, name, start, goal)
     ends = [None if point is None else _pixel(point) for point in (start, goal)]
     if not snapping:
-        return alone.with_ends(*ends), []
+        return alone.with_ends(ends[0], ends[1]), []
     light_free = source.occupied is None and decide_light_free(alone)
-    return _snapped(alone.with_ends(*ends), light_free)
+    return _snapped(alone.with_ends(ends[0], ends[1]), light_free)
 
 
 def _result(
