@@ -24,9 +24,9 @@ from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, predict_cost
 
 LEGEND = (
-    "K: iterations; J: repairs per iteration; asked: questions of all runs if no "
-    "controller ever passes; USD at most: if each question is asked once; asked 3 "
-    "times: if each question is asked three times"
+    "K: iterations; J: repairs per iteration; questions: of all runs if no controller "
+    "ever passes; USD once, 3 times: cost if each question is asked once, or three "
+    "times because no answer to it can be used before"
 )
 
 
@@ -53,6 +53,28 @@ class PlanRow:
     cost_most: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The limits of all runs together; None if there is none.
+
+    Attributes:
+        cost: USD.
+        tokens: Input plus output.
+    """
+
+    cost: float | None
+    tokens: int | None
+
+    def words(self) -> str:
+        """The limits and how they are set; empty if there are none."""
+        words = []
+        if self.cost is not None:
+            words.append(f"{format_usd(self.cost)} (max_cost in the file, --max-cost)")
+        if self.tokens is not None:
+            words.append(f"{self.tokens} tokens (max_tokens in the file, --max-tokens)")
+        return " and ".join(words)
+
+
 def run(wanted: CampaignCommand, as_json: bool) -> int:
     """Prints the plan and returns 0; asks no model, needs no key, writes nothing."""
     console = make_console(stderr=as_json)
@@ -76,7 +98,8 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
     if progress.before:
         done = f"{progress.before} of {progress.planned} runs in {folder} have already"
         print_sentences(console, f"{done} finished; they are counted above, too")
-    for line in _lines(rows, config.max_cost, config.max_tokens, prices):
+    limits = Limits(config.max_cost, config.max_tokens)
+    for line in _lines(rows, limits, prices):
         print_sentences(console, line)
     for line in model_warnings(models_of(plan.cells)):
         print_sentences(console, f"note: {line}", "yellow")
@@ -110,7 +133,7 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
 
 def _table(cells: list[Cell], rows: list[PlanRow]) -> Table:
     labels = labels_of(cells)
-    figures = ("runs", "K", "J", "asked", "USD at\nmost", "asked 3\ntimes")
+    figures = ("runs", "K", "J", "questions", "USD\nonce", "USD\n3 times")
     table = make_table(labels.names, figures)
     for cell, row in zip(cells, rows, strict=True):
         table.add_row(
@@ -122,27 +145,46 @@ def _table(cells: list[Cell], rows: list[PlanRow]) -> Table:
     return table
 
 
-def _lines(
-    rows: list[PlanRow],
-    max_cost: float | None,
-    max_tokens: int | None,
-    prices: PriceList,
-) -> list[str]:
-    lines = [f"{sum(row.runs for row in rows)} runs; no model was asked"]
-    costs = [row.cost_once for row in rows]
-    unknown = costs.count(None)
-    total = sum(cost for cost in costs if cost is not None)
-    if total or unknown:
-        kinds = f", excluding {unknown} kinds of unknown price" if unknown else ""
-        lines.append(
-            f"if no controller ever passes: at most {format_usd(total)}{kinds}; a run "
-            "that is verified early costs a small part of that"
-        )
-        bounds = [format_usd(max_cost)] if max_cost is not None else []
-        bounds += [f"{max_tokens} tokens"] if max_tokens is not None else []
-        lines.append(f"limit of all runs together: {' and '.join(bounds) or 'none'}")
-        lines.append(f"prices of {prices.dated}: {price_file()}")
+def _lines(rows: list[PlanRow], limits: Limits, prices: PriceList) -> list[str]:
+    """What the runs may do and cost at most."""
+    runs = sum(row.runs for row in rows)
+    tested = sum(row.runs * row.iterations * (1 + row.patience) for row in rows)
+    lines = [f"{runs} runs; no model was asked"]
+    unknown = [row.cost_once for row in rows].count(None)
+    once, most = (
+        sum(cost for cost in costs if cost is not None)
+        for costs in ([r.cost_once for r in rows], [r.cost_most for r in rows])
+    )
+    if not once and not unknown:
+        return [*lines, f"at most {tested} candidates are tested: K x (1 + J) per run"]
+    kinds = f", excluding {unknown} kinds of unknown price" if unknown else ""
+    questions = sum(row.questions for row in rows)
+    lines += [
+        f"if no controller ever passes: {tested} candidates are tested, K x (1 + J) "
+        f"per run, and {questions} questions are asked; without a limit they cost "
+        f"{format_usd(once)} if each is asked once, and at most {format_usd(most)} if "
+        f"each is asked three times{kinds}; a run that is verified early costs a small "
+        "part of that",
+        _stop(limits, most, is_known=not unknown),
+        f"prices of {prices.dated}: {price_file()}",
+    ]
     return lines
+
+
+def _stop(limits: Limits, most: float, *, is_known: bool) -> str:
+    """What is spent at most, given the limits of all runs together."""
+    words = limits.words()
+    if not words:
+        return "no limit for all runs together; set one by --max-cost or --max-tokens"
+    line = f"limit of all runs together: {words}"
+    if limits.cost is None:
+        return f"{line}; the campaign stops before exceeding it"
+    if is_known and limits.cost >= most:
+        return f"{line}; never reached, since all runs cost at most {format_usd(most)}"
+    return (
+        f"{line}; so this campaign costs at most {format_usd(limits.cost)}: it stops "
+        "before exceeding it"
+    )
 
 
 def _usd(cost: float | None) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 LONGEST_SECONDS = 60.0
 """Longest video in real time, s; the video of a longer episode plays faster."""
-MOST_FPS = 25.0
+MOST_FPS, GIF_FPS = 25.0, 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,9 @@ class Film:
         return f"{speed}, {self.seconds:.0f} s"
 
 
-def film_of(steps: int, dt: float, speed: float | None = None) -> Film:
+def film_of(
+    steps: int, dt: float, speed: float | None = None, video: Path | None = None
+) -> Film:
     """Plans a video of an episode.
 
     Args:
@@ -41,9 +44,12 @@ def film_of(steps: int, dt: float, speed: float | None = None) -> Film:
         dt: Time per step, s.
         speed: Simulated time / playing time; by default 1, or the least whole number
             with which the video lasts at most `LONGEST_SECONDS`.
+        video: File of the video; a GIF has fewer frames, so that it stays small.
     """
+    is_gif = video is not None and video.suffix.lower() == ".gif"
+    most = GIF_FPS if is_gif else MOST_FPS
     simulated = steps * dt
     if speed is None:
         speed = float(max(1, math.ceil(round(simulated / LONGEST_SECONDS, 6))))
-    stride = max(1, math.ceil(round(speed / (dt * MOST_FPS), 6)))
+    stride = max(1, math.ceil(round(speed / (dt * most), 6)))
     return Film(speed, stride, speed / (dt * stride), simulated / speed)

@@ -95,7 +95,7 @@ class TaskFlags:
         if own and (self.start is None or self.goal is None):
             raise TaskError(
                 f"the map {source!r} needs --start X Y and --goal X Y "
-                "(read them off the rulers that `tdac map IMAGE` draws)"
+                f"({_rulers(Path(source), self.metres)})"
             )
         return load_task(self._spec(source), base=Path())
 
@@ -153,6 +153,16 @@ class TaskFlags:
             "instructions": _text(self.instructions),
         }
         return _checked(given)
+
+
+def _rulers(map_file: Path, metres: bool) -> str:
+    """Where to read places on a map."""
+    if metres:
+        return "read them off the rulers that `tdac map IMAGE --metres` draws"
+    text = "read them off the rulers that `tdac map IMAGE` draws"
+    if map_file.suffix in (".yaml", ".yml"):
+        text += "; for places in metres, give --metres to both commands"
+    return text
 
 
 def _checked(given: dict[str, Any]) -> TaskFile:

@@ -28,6 +28,7 @@ from tdac_envs.mapping.image import load_image
 from tdac_envs.mapping.map_folder import write_map
 from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
+from tdac_envs.mapping.wording import obstacles_text, scale_text
 
 SHOWN, EXPLAINED = 8, 2
 Point = tuple[float, float]
@@ -187,7 +188,8 @@ def _print_reading(
     size = f"{params.width} x {params.height} px"
     if units != PIXELS:
         size += f" ({units.length(params.width)} x {units.length(params.height)})"
-    console.print(f"{escape(params.source)}, {size}: {escape(_describe(chosen))}")
+    about = f"{_describe(chosen)}; {scale_text(params.resolution)}"
+    print_sentences(console, f"{params.source}, {size}: {about}")
     for note in params.notes:
         console.print(f"[yellow]note:[/] {escape(note)}")
 
@@ -244,11 +246,9 @@ def _table(candidates: list[Candidate], readings: list[str], units: MapUnits) ->
 def _describe(candidate: Candidate) -> str:
     """How a candidate reads the image."""
     reading = candidate.reading
-    if reading.polarity == "given":
-        return f"obstacles as the file says, {reading.method}"
-    text = f"{reading.polarity} obstacles, {reading.method}"
+    text = obstacles_text(reading)
     if reading.cleanup and "specks" not in reading.method:
-        text += f", cleanup {reading.cleanup}"
+        text += f"; cleaned with strength {reading.cleanup}"
     return text
 
 
@@ -264,4 +264,7 @@ def _print_files(
             + metres
         )
     if params.resolution is not None and units == PIXELS:
-        console.print("lengths are in px; --metres uses the map's frame")
+        console.print(
+            "these places and lengths are in px; with --metres, flags, rulers and "
+            "figures are in metres of the map's frame"
+        )

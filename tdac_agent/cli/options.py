@@ -107,7 +107,9 @@ RobotImage = Annotated[
 Snap = Annotated[
     bool,
     typer.Option(
-        "--snap", help="Move start and goal to the nearest free, connected places."
+        "--snap",
+        help="Move a start or goal that is not free to the nearest free place from "
+        "which the other one can be reached.",
     ),
 ]
 Metres = Annotated[

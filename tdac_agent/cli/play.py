@@ -73,7 +73,8 @@ def _show(
     """Writes the episode as a video, or shows it in a window."""
     steps, dt = rollout.trajectory.steps, task.nominal.dt
     # A window can be closed at any time: it shows real time, however long it lasts.
-    film = film_of(steps, dt, 1.0 if video is None and speed is None else speed)
+    speed = 1.0 if video is None and speed is None else speed
+    film = film_of(steps, dt, speed, video)
     frames = pictures_of(task.setting).frames(rollout, film.stride)
     if video is not None:
         write_video(frames, video, film.fps)

@@ -11,15 +11,21 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.run_view import list_tests
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.episodes.trajectory import nominal_first
-from tdac_agent.prompting.feedback import group_failures
+from tdac_agent.prompting.feedback import Group, cut, group_failures
 from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.diagnosis.report import Failure, Report
 from tdac_agent.verification.diagnosis.shown import in_units
 
 MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
+LEGEND = (
+    "path left, straight left: distance to the goal along the shortest path, and in a "
+    "straight line: the smallest in the episode, of that at the start; ms per call: "
+    "mean time of policy(obs)"
+)
 
 
 def show_report(
@@ -48,7 +54,7 @@ def show_report(
     groups, not_run = group_failures(report)
     for group in groups:
         _show_failed(console, group.members)
-        for message in group.messages:
+        for message in _messages(group):
             print_sentences(console, message, indent=2)
         for text in _held_out(report) if group.held_out else group.happened:
             print_sentences(console, f"what happened: {text}", indent=2)
@@ -56,6 +62,8 @@ def show_report(
         _show_failed(console, not_run)
         print_sentences(console, not_run[0].message, indent=2)
     console.print(episode_table(report, units))
+    if report.episodes:
+        print_sentences(console, LEGEND, "dim")
     if out is not None:
         _show_files(out, console)
     colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
@@ -75,6 +83,19 @@ def show_report(
             "the profile paper needs all these functions and constants; "
             "--profile policy needs only policy(obs)"
         )
+
+
+def _messages(group: Group) -> list[str]:
+    """Messages of a group, each after the names of its tests if there are several."""
+    names: dict[str, list[str]] = {}
+    for failure in group.members:
+        names.setdefault(cut(failure.message), []).append(failure.test)
+    if len(group.members) == 1:
+        return group.messages
+    return [
+        f"{list_tests(names[text], SOME_NAMES)}: {text}" if text in names else text
+        for text in group.messages
+    ]
 
 
 def _held_out(report: Report) -> list[str]:

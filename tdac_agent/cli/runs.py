@@ -19,7 +19,14 @@ from tdac_agent.cli.run_view import resume_command
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import RunError
 from tdac_agent.models.budget import format_usd
-from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, at_work, load_run, status_now
+from tdac_agent.runs.run_record import (
+    JOURNAL,
+    RUN_FILE,
+    Run,
+    at_work,
+    load_run,
+    status_now,
+)
 from tdac_agent.training.curve import PLAN_FILE, read_curve
 
 USUAL = Path("runs")
@@ -147,7 +154,7 @@ def _row(folder: Path) -> dict[str, Any]:
         "learner": run.learner,
         "optimizer": run.optimizer,
         "status": status,
-        "k": max((attempt.k for attempt in run.attempts), default=0),
+        "k": _begun(run),
         "iterations": run.iterations,
         "tau": run.tau,
         "tokens_in": run.tokens_in,
@@ -160,6 +167,14 @@ def _row(folder: Path) -> dict[str, Any]:
         "reason": run.reason,
         "go_on": "" if status == "running" else resume_command(run),
     }
+
+
+def _begun(run: Run) -> int:
+    """The iteration that was begun last, though its candidate may not be judged yet."""
+    folders = (run.folder / "iterations").glob("k*/")
+    names = [folder.name[1:] for folder in folders]
+    begun = [int(name) for name in names if name.isascii() and name.isdecimal()]
+    return max([*begun, *(attempt.k for attempt in run.attempts)], default=0)
 
 
 def _age(row: dict[str, Any]) -> tuple[str, str]:

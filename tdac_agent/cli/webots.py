@@ -71,7 +71,7 @@ def run(
     if video is not None:
         with console.status(f"drawing {escape(video.name)} …"):
             env = stage.make_env(**options, render_mode="rgb_array")
-            film = film_of(done.log.steps, env.nominal.dt, speed)
+            film = film_of(done.log.steps, env.nominal.dt, speed, video)
             write_video(frames(env, done.log, film.stride), video, film.fps)
         if not as_json:
             print(f"wrote {video} ({film})")

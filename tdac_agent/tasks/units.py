@@ -108,13 +108,17 @@ class Units:
             return math.remainder(self.shown.heading_in_pixels(heading), math.tau)
         return -heading if self.up else heading
 
+    def degrees(self, heading: float) -> str:
+        """Formats a heading on the screen, rad, in degrees of the environment."""
+        return f"{math.degrees(self.heading_of(heading)):z.0f}"
+
     def point(self, x: float, y: float) -> str:
         """Formats a place on the screen in the coordinates of the printed frame."""
         return f"({self._coordinates(x, y, ', ')})"
 
     def pose(self, x: float, y: float, heading: float) -> str:
-        """Formats a pose on the screen in the coordinates of the printed frame."""
-        return f"{self._coordinates(x, y, ' ')} {self.heading_of(heading):z.2f}"
+        """Formats a pose on the screen: `12.0 34.5 -90`, the heading in degrees."""
+        return f"{self._coordinates(x, y, ' ')} {self.degrees(heading)}"
 
     def box(self, low: Points, high: Points, less: int = 0) -> str:
         """Formats a box on the screen: `x 3.0 to 4.5, y 0.2 to 1.0`.

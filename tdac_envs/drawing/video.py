@@ -16,6 +16,7 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.drawing.canvas import Image
 
 SUFFIXES = (".mp4", ".gif")
+GIF_COLOURS = 64
 # Every browser plays H.264 in yuv420p. The colour matrix is tagged, because some
 # players would guess another one.
 _PIXELS = "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"
@@ -35,7 +36,8 @@ def write_video(frames: Iterable[Image], path: str | Path, fps: float) -> None:
         frames: Each of shape (height, width, 3), uint8 RGB, all of one size. An MP4
             with an odd side loses its last row or column.
         path: Ends in `.mp4` or `.gif`.
-        fps: Frames per second; a GIF rounds the time of a frame to 1/100 s.
+        fps: Frames per second; a GIF rounds the time of a frame to 1/100 s. It has at
+            most 64 colours, so that it stays small.
 
     Raises:
         VideoError: The suffix is unknown, there are no frames, they differ in size, or
@@ -112,9 +114,10 @@ def _feed(
 def _palettise(film: Path, target: Path) -> None:
     """Converts a video to a GIF with one palette, so that still areas never flicker."""
     palette = film.with_name("palette.png")
+    make = f"palettegen=reserve_transparent=0:max_colors={GIF_COLOURS}"
     use = "paletteuse=dither=none:diff_mode=rectangle"
     passes = (
-        ["-i", str(film), "-vf", "palettegen=reserve_transparent=0", str(palette)],
+        ["-i", str(film), "-vf", make, str(palette)],
         ["-i", str(film), "-i", str(palette), "-lavfi", use, "-f", "gif", str(target)],
     )
     for options in passes:

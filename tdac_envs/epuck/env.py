@@ -94,6 +94,22 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides `variation`.
 
+    ## Info
+    `reset` and `step` return these entries; distances are in m:
+
+    | key | content |
+    |---|---|
+    | `is_success` | whether the goal is reached |
+    | `collision` | whether the body touched an obstacle in this step |
+    | `collisions` | number of such steps so far |
+    | `clipped` | number of actions out of range so far |
+    | `distance_to_goal` | straight distance from the robot's centre to the goal |
+    | `path_distance` | length of the shortest path of the body to the goal |
+    | `clearance` | distance from the robot's centre to the nearest solid object |
+
+    The fence counts as an object. `clearance` is negative if the centre is inside of
+    an object. The gap between the body and the object is `clearance - 0.037`.
+
     ## Episode End
     The episode ends if one of the following happens:
     1. Termination: the robot's centre is within `goal_tolerance` of the goal, with

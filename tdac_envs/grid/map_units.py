@@ -63,6 +63,11 @@ class MapUnits:
         return "px" if self.frame is None else "m"
 
     @property
+    def place(self) -> str:
+        """The word for a point of the map: `pixel` or `place`."""
+        return "pixel" if self.frame is None else "place"
+
+    @property
     def per_pixel(self) -> float:
         """Size of a pixel in these units."""
         return 1.0 if self.frame is None else self.frame.resolution

@@ -75,6 +75,24 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides `variation`.
 
+    ## Info
+    `reset` and `step` return these entries; distances are in px:
+
+    | key | content |
+    |---|---|
+    | `is_success` | whether the goal is reached |
+    | `collision` | whether the body touched an obstacle in this step |
+    | `collisions` | number of such steps so far |
+    | `clipped` | number of actions out of range so far |
+    | `distance_to_goal` | straight distance from the robot's centre to the goal |
+    | `path_distance` | length of the shortest path of the body to the goal |
+    | `clearance` | distance from the robot's centre to the nearest obstacle |
+
+    The border of the map counts as an obstacle. `clearance` is never negative; it is
+    measured from the centre of the pixel in which the robot's centre lies, so it is
+    exact to 0.71 px. The gap between the body and the obstacle is
+    `clearance - robot_radius`.
+
     ## Episode End
     The episode ends if one of the following happens:
     1. Termination: the robot's centre is within `goal_tolerance` of the goal, with no

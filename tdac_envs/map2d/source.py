@@ -161,9 +161,12 @@ def _with_task(prepared: Prepared, given: _Given) -> Prepared:
     params = prepared.params.model_copy(update=changes)
     missing = [name for name in ("start", "goal") if getattr(params, name) is None]
     if missing:
+        unit, flag = (
+            ("pixels", "") if given.units == PIXELS else ("metres", " --metres")
+        )
         raise TaskError(
             f"no {' and no '.join(missing)} for {params.source}: give start and goal "
-            "in pixels (`tdac map IMAGE` draws rulers for reading them)"
+            f"in {unit} (`tdac map IMAGE{flag}` draws rulers for reading them)"
         )
     if given.snap:
         params = _snapped(prepared.grid, params, given.units)
@@ -208,9 +211,8 @@ def _from_image(image: Path, given: _Given) -> Prepared:
     prepared = read(image, _digest(image), *ends, radius, *how)
     # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
-    return _with_task(
-        prepared, _Given(start, goal, given.heading, radius, False, DEFAULT_OPTIONS)
-    )
+    rest = (given.heading, radius, False, DEFAULT_OPTIONS, given.units)
+    return _with_task(prepared, _Given(start, goal, *rest))
 
 
 # Preprocessing takes most of the time of `gym.make`; a grid takes one byte per pixel.

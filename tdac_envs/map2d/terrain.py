@@ -22,6 +22,7 @@ from tdac_envs.grid.grid import (
     clearance_at,
 )
 from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.grid.pieces import end_outside, nearest_free
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.map2d.contact import first_contact, has_room
 from tdac_envs.map2d.kernels import path_distance
@@ -160,16 +161,13 @@ def check_body_fits(
 def _nearest_place(
     terrain: Terrain, x: float, y: float, radius: float, units: MapUnits
 ) -> str:
-    rows, columns = np.nonzero(body_free(terrain.clear, radius))
-    if rows.size == 0:
+    nearest = nearest_free(body_free(terrain.clear, radius), x, y)
+    if nearest is None:
         return (
             "the body fits nowhere; the largest clearance is "
             f"{units.length(float(terrain.clear.max()), 1)}"
         )
-    nearest = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
-    place = "pixel" if units == PIXELS else "place"
-    point = units.point(int(columns[nearest]), int(rows[nearest]))
-    return f"the nearest free {place} is {point}"
+    return f"the nearest free {units.place} is {units.point(*nearest)}"
 
 
 @kernel
@@ -242,11 +240,21 @@ def route(
     radius_text = units.at_most(widest) if units != PIXELS else f"{widest:.1f} px"
     reason = f"the widest body that gets through has a radius of {radius_text}"
     if widest <= 0.0:
-        reason = "they are in separate rooms"
+        reason = _apart(terrain, start, goal)
     raise TaskError(
         f"no free path for a body of {units.length(radius)} radius from start "
         f"{units.point(*start)} to goal {units.point(*goal)}: {reason}"
     )
+
+
+def _apart(terrain: Terrain, start: Point, goal: Point) -> str:
+    """Why no body at all gets from start to goal."""
+    first, last = ((math.floor(x + 0.5), math.floor(y + 0.5)) for x, y in (start, goal))
+    beyond = end_outside(terrain.grid.cells, first, last)
+    if beyond is None:
+        return "they are in separate rooms"
+    other = "goal" if beyond == "start" else "start"
+    return f"the {beyond} lies outside of the closed wall around the {other}"
 
 
 def field_to(

@@ -10,12 +10,19 @@ import numpy as np
 
 from tdac_envs.grid.grid import BoolGrid, FloatGrid, body_free, clearance
 from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.grid.pieces import (
+    connected_with,
+    end_outside,
+    nearest_free,
+    pieces_of,
+)
 from tdac_envs.grid.plan import plan_path
 from tdac_envs.mapping.params import MapParams
-from tdac_envs.mapping.score import nearest_free, pieces_of, widest_radius
+from tdac_envs.mapping.score import widest_radius
 
 Point = tuple[float, float]
 Pixel = tuple[int, int]
+Sides = tuple[BoolGrid, BoolGrid]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,20 +56,18 @@ def fault_of(cells: BoolGrid, params: MapParams, units: MapUnits) -> Fault | Non
     if params.start is None or params.goal is None:
         return None
     ends = {"start": params.start, "goal": params.goal}
-    outside = _outside(cells, ends)
-    if outside is not None:
-        return outside
+    off = _off_the_map(cells, ends)
+    if off is not None:
+        return off
     clear = clearance(cells)
     free = body_free(clear, params.robot.radius)
     start, goal = _pixel(params.start), _pixel(params.goal)
     labels = pieces_of(free)
     numbers = labels[start[::-1]], labels[goal[::-1]]
-    sides = tuple((labels == number) & free for number in numbers)
-    for name, (x, y), other in (("start", start, sides[1]), ("goal", goal, sides[0])):
-        if not free[y, x]:
-            what = "in an obstacle" if cells[y, x] else "too near to an obstacle"
-            better = nearest_free(other if other.any() else free, x, y)
-            return Fault(f"{name} {what}", (x, y), better, sides[0], sides[1])
+    sides = (labels == numbers[0]) & free, (labels == numbers[1]) & free
+    misplaced = _misplaced(cells, free, (start, goal), sides)
+    if misplaced is not None:
+        return misplaced
     if numbers[0] == numbers[1]:
         return None
     widest = widest_radius(clear, start, goal)
@@ -72,11 +77,34 @@ def fault_of(cells: BoolGrid, params: MapParams, units: MapUnits) -> Fault | Non
     return Fault(label, _gap(clear, widest, start, goal), None, *sides)
 
 
+def _misplaced(
+    cells: BoolGrid, free: BoolGrid, ends: tuple[Pixel, Pixel], sides: Sides
+) -> Fault | None:
+    """The fault of an end that is walled off or where the body does not fit."""
+    beyond = end_outside(cells, *ends)
+    for name, (x, y), there, other in zip(
+        ("start", "goal"), ends, ends[::-1], sides[::-1], strict=True
+    ):
+        if name == beyond:
+            what, places = (
+                "outside of the closed wall",
+                free & connected_with(~cells, there),
+            )
+        elif beyond is None and not free[y, x]:
+            what = "in an obstacle" if cells[y, x] else "too near to an obstacle"
+            places = free
+        else:
+            continue
+        better = nearest_free(other if other.any() else places, x, y)
+        return Fault(f"{name} {what}", (x, y), better, *sides)
+    return None
+
+
 def _pixel(point: Point) -> Pixel:
     return math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)
 
 
-def _outside(cells: BoolGrid, ends: dict[str, Point]) -> Fault | None:
+def _off_the_map(cells: BoolGrid, ends: dict[str, Point]) -> Fault | None:
     """The fault of the first end outside the map, at the nearest border."""
     height, width = cells.shape
     none = np.zeros_like(cells)

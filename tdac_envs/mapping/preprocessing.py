@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.errors import PolarityError, RefusedError, TaskError
-from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
+from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.mapping.candidates import Candidate, Preset, ranked
 from tdac_envs.mapping.image import MapImage, from_array, load_image
@@ -29,7 +29,8 @@ from tdac_envs.mapping.scene import (
     is_polarity_unclear,
 )
 from tdac_envs.mapping.score import Point
-from tdac_envs.mapping.snapping import fits, snap
+from tdac_envs.mapping.snapping import body_fits, snap
+from tdac_envs.mapping.wording import metres_hint
 
 Source = str | Path | NDArray[np.generic] | MapImage
 
@@ -133,10 +134,10 @@ def _scene(
         if point is not None and not _is_inside(source, point):
             raise _outside(alone, name, start, goal)
     ends = [None if point is None else _pixel(point) for point in (start, goal)]
-    scene = replace(alone, start=ends[0], goal=ends[1])
     if not snapping:
-        return scene, []
-    return _snapped(scene, source.occupied is None and decide_light_free(alone))
+        return alone.with_ends(ends[0], ends[1]), []
+    light_free = source.occupied is None and decide_light_free(alone)
+    return _snapped(alone.with_ends(ends[0], ends[1]), light_free)
 
 
 def _result(
@@ -158,7 +159,10 @@ def _refusal(
 ) -> RefusedError:
     """The error with a picture of a reading on which the task is infeasible."""
     name = scene.image.name
-    picture = (scene.image, _grid(scene, reading), params, scene.units)
+    grid = _grid(scene, reading)
+    if scene.units == PIXELS:
+        reason += metres_hint(grid, params.start, params.goal)
+    picture = (scene.image, grid, params, scene.units)
     return RefusedError(f"{name}: {reason}", name, {"refused": picture})
 
 
@@ -284,16 +288,14 @@ def _snapped(scene: MapProblem, light_free: bool) -> tuple[MapProblem, list[str]
     moved = snap(reading.cells, scene.start, scene.goal, scene.radius, scene.units)
     ends = [None if p is None else _pixel(p) for p in (moved.start, moved.goal)]
     pointed = tuple(scene.ends) if reading.words else ()
-    scene = replace(scene, start=ends[0], goal=ends[1], pointed=pointed)
-    return scene, list(moved.notes)
+    return scene.with_ends(ends[0], ends[1], pointed), list(moved.notes)
 
 
 def _clearest(scene: MapProblem, light_free: bool) -> MapReading:
     """The plainest reading on which as few ends as possible need a move."""
     best, most = None, (-1, -1)
     for reading in readings(scene, light_free):
-        free = body_free(clearance(reading.cells), scene.radius)
-        fitting = sum(fits(free, end) for end in scene.ends)
+        fitting = sum(body_fits(reading.cells, p, scene.radius) for p in scene.ends)
         # Thin lines and specks under a start may be obstacles, words are not.
         if best is None or (fitting, reading.words) > most:
             best, most = reading, (fitting, reading.words)

@@ -22,11 +22,13 @@ from tdac_envs.drawing.canvas import (
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import path_length
+from tdac_envs.mapping.binarize import otsu, saturated
 from tdac_envs.mapping.fault import Fault
 from tdac_envs.mapping.image import ColourImage, MapImage, luminance
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.readings import unknown_grey
 from tdac_envs.mapping.rulers import RIGHT, TOP, Rulers
+from tdac_envs.mapping.wording import OUTSIDE_CLOSED, obstacles_text
 
 Picture = NDArray[np.uint8]
 Path = NDArray[np.float64]
@@ -34,12 +36,12 @@ Classes = NDArray[np.uint8]
 Entry = tuple[Colour, str]
 
 _NAMES = (
-    *("free", "obstacle", "unknown, not free"),
+    *("free", "obstacle", "unknown, not free", "outside of the plan, not free"),
     *("reach of the start", "reach of the goal"),
 )
-_OPEN, _SOLID, _UNKNOWN, _START_SIDE, _GOAL_SIDE = range(5)
+_OPEN, _SOLID, _UNKNOWN, _OUTSIDE, _START_SIDE, _GOAL_SIDE = range(6)
 _TINTS: tuple[Colour, ...] = (
-    *((150, 214, 178), (196, 84, 76), (98, 104, 150)),
+    *((150, 214, 178), (196, 84, 76), (98, 104, 150), (196, 84, 76)),
     *((166, 148, 240), (240, 208, 96)),
 )
 _ROW = 22
@@ -106,10 +108,24 @@ def _classes(
         unknown = np.abs(luminance(image.colour).astype(np.int16) - level) <= 3
     if unknown is not None:
         classes[unknown & cells] = _UNKNOWN
+    if OUTSIDE_CLOSED in params.method:
+        classes[_like_floor(image, params) & (classes == _SOLID)] = _OUTSIDE
     if fault is not None:
         classes[fault.goal_side] = _GOAL_SIDE
         classes[fault.start_side] = _START_SIDE
     return classes
+
+
+def _like_floor(image: MapImage, params: MapParams) -> BoolGrid:
+    """The pixels that are free within the plan: of the lighter side, if walls are dark.
+
+    Walls in a strong light colour are not among them.
+    """
+    shade = luminance(image.colour)
+    threshold = otsu(shade) if params.threshold is None else params.threshold
+    light = shade > threshold
+    floor = light if params.polarity == "dark" else ~light
+    return np.asarray(floor & ~saturated(image.colour))
 
 
 def _lay_source(canvas: Canvas, source: ColourImage, classes: Classes) -> None:
@@ -235,6 +251,5 @@ def _texts(params: MapParams, units: MapUnits, reason: str) -> list[str]:
         size += f", {params.resolution:g} m per px"
     if units != PIXELS:
         size += "; rulers: m in the map's frame"
-    shade = "" if params.polarity == "given" else f"{params.polarity} "
-    texts = [size, f"{shade}obstacles: {params.method}"]
+    texts = [size, obstacles_text(params)]
     return [*texts, f"refused: {reason}"] if reason else texts

@@ -28,6 +28,7 @@ from tdac_envs.mapping.image import GreyImage, luminance
 from tdac_envs.mapping.lighting import LEVEL
 from tdac_envs.mapping.params import DEFAULT_OPTIONS
 from tdac_envs.mapping.scene import MapProblem, MapReading, decide_light_free, touches
+from tdac_envs.mapping.wording import OUTSIDE_CLOSED
 from tdac_envs.mapping.words import without_words
 
 SLIVER = 6.0
@@ -117,7 +118,7 @@ def _with_outside_closed(reading: MapReading, beyond: BoolGrid) -> MapReading:
     """
     if reading.polarity == "mixed" or not (beyond & ~reading.cells).any():
         return reading
-    note = f"{reading.method}, outside of the plan closed"
+    note = f"{reading.method}, {OUTSIDE_CLOSED}"
     cells = reading.cells | beyond
     return replace(reading, cells=cells | _slivers(cells, beyond), method=note)
 

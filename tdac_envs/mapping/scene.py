@@ -120,11 +120,25 @@ class MapProblem:
             return self.said.threshold
         return LEVEL if self.photo else otsu(self.luminance)
 
+    def with_ends(
+        self, start: Point | None, goal: Point | None, pointed: tuple[Point, ...] = ()
+    ) -> MapProblem:
+        """This problem with another task; what depends only on the picture is kept."""
+        changed = replace(self, start=start, goal=goal, pointed=pointed)
+        kept = ("threshold", "picture_evidence", "saturated")
+        vars(changed).update({k: v for k, v in vars(self).items() if k in kept})
+        return changed
+
+    @cached_property
+    def picture_evidence(self) -> float:
+        """Log-odds that the light side is free, from the picture alone."""
+        light = self.luminance > self.threshold
+        return light_free_evidence(self.luminance, light, self.photo)
+
     @cached_property
     def evidence(self) -> float:
         """Log-odds that the light side is free, from the picture, start and goal."""
-        light = self.luminance > self.threshold
-        found = light_free_evidence(self.luminance, light, self.photo)
+        light, found = self.luminance > self.threshold, self.picture_evidence
         # Ignores marks on start or goal, unless the whole paper is coloured.
         neutral = ~self.saturated
         neutral = neutral if neutral.mean() > 0.5 else np.ones_like(neutral)

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from tdac_envs.grid.astar import Guide
 from tdac_envs.grid.grid import BoolGrid, FloatGrid, body_free, clearance
 from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.grid.pieces import (
+    REACHABLE,
+    End,
+    connected_with,
+    end_outside,
+    nearest_free,
+    pieces_of,
+)
 from tdac_envs.grid.plan import Path, guide_between, path_length, plan_paths
 from tdac_envs.mapping.params import ScoreTerms
 
@@ -145,10 +151,14 @@ def explain(cells: BoolGrid, trip: NavigationTask, inflation: int = 0) -> str:
         trip: Start, goal and body.
         inflation: Margin that the planner keeps around the body, px.
     """
+    beyond = end_outside(cells, trip.start, trip.goal)
     clear = clearance(cells)
     free = body_free(clear, trip.radius + inflation)
+    if beyond is not None:
+        return _beyond_wall(cells, free, beyond, trip, inflation)
     start, goal, units = trip.start, trip.goal, trip.units
-    for name, (x, y), other in (("start", start, goal), ("goal", goal, start)):
+    names: tuple[End, End] = ("start", "goal")
+    for name, (x, y) in zip(names, (start, goal), strict=True):
         if free[y, x]:
             continue
         what = (
@@ -156,7 +166,7 @@ def explain(cells: BoolGrid, trip: NavigationTask, inflation: int = 0) -> str:
             if cells[y, x]
             else f"is {units.length(clear[y, x], 1)} from an obstacle, too near"
         )
-        near = _nearest_text(_connected_to(free, other), x, y, trip)
+        near = _nearest_text(free, name, trip, inflation)
         return f"{name} {units.point(x, y)} {what}; {near}{_narrower(clear, trip)}"
     widest = widest_radius(clear, start, goal)
     advice = (
@@ -166,16 +176,32 @@ def explain(cells: BoolGrid, trip: NavigationTask, inflation: int = 0) -> str:
     )
     return (
         f"start {units.point(*start)} and goal {units.point(*goal)} are not connected "
-        f"for a robot of {units.length(trip.radius)} radius; {advice}"
+        f"for {_robot(trip, inflation)}; {advice}"
     )
 
 
-def _connected_to(free: BoolGrid, point: Point) -> BoolGrid:
-    """The free pixels connected with a point; all if the point is not free."""
-    labels = pieces_of(free)
-    label = labels[point[::-1]]
-    joined: BoolGrid = labels == label
-    return joined if label else free
+def _beyond_wall(
+    cells: BoolGrid, free: BoolGrid, name: End, trip: NavigationTask, inflation: int
+) -> str:
+    """Why there is no path: a closed wall around the other end."""
+    point, other = trip.units.point, "goal" if name == "start" else "start"
+    at, there = _at_and_there(trip, name)
+    within = free & connected_with(~cells, there)
+    return (
+        f"{name} {point(*at)} lies outside of the closed wall around {other} "
+        f"{point(*there)}; {_nearest_text(within, name, trip, inflation)}"
+    )
+
+
+def _at_and_there(trip: NavigationTask, name: End) -> tuple[Point, Point]:
+    """The pixels of an end and of the other end."""
+    ends = trip.start, trip.goal
+    return ends if name == "start" else ends[::-1]
+
+
+def _robot(trip: NavigationTask, inflation: int) -> str:
+    margin = f" and a margin of {trip.units.length(inflation)}" if inflation else ""
+    return f"a robot of {trip.units.length(trip.radius)} radius{margin}"
 
 
 def _narrower(clear: FloatGrid, trip: NavigationTask) -> str:
@@ -187,40 +213,26 @@ def _narrower(clear: FloatGrid, trip: NavigationTask) -> str:
     return f"; from this start to this goal a radius of {radius} gets through"
 
 
-def _nearest_text(free: BoolGrid, x: int, y: int, trip: NavigationTask) -> str:
-    nearest, radius = nearest_free(free, x, y), trip.units.length(trip.radius)
+def _nearest_text(
+    free: BoolGrid, name: End, trip: NavigationTask, inflation: int
+) -> str:
+    """The free place nearest to an end; if the other end is free, connected with it."""
+    at, there = _at_and_there(trip, name)
+    robot, reach = _robot(trip, inflation), ""
+    if free[there[::-1]]:
+        free, reach = connected_with(free, there), f" {REACHABLE[name]}"
+    nearest = nearest_free(free, *at)
     if nearest is None:
-        return f"a robot of {radius} radius fits nowhere on this map"
-    place = "pixel" if trip.units == PIXELS else "place"
-    return (
-        f"the nearest free {place} for a robot of {radius} radius is "
-        f"{trip.units.point(*nearest)}"
-    )
-
-
-def nearest_free(free: BoolGrid, x: int, y: int) -> Point | None:
-    """The free pixel nearest to (x, y), or None where there is none."""
-    rows, columns = np.nonzero(free)
-    if rows.size == 0:
-        return None
-    best = int(np.argmin((columns - x) ** 2 + (rows - y) ** 2))
-    return int(columns[best]), int(rows[best])
+        return f"{robot} fits nowhere on this map"
+    place = trip.units.point(*nearest)
+    return f"the nearest free {trip.units.place} for {robot}{reach} is {place}"
 
 
 def connected(free: BoolGrid, start: Point, goal: Point) -> bool:
-    """Whether two free pixels are connected without cutting a corner.
-
-    A diagonal step requires both pixels beside it, so 4-connectivity decides.
-    """
+    """Whether two free pixels are connected without cutting a corner."""
     labels = pieces_of(free)
     at_start, at_goal = labels[start[::-1]], labels[goal[::-1]]
     return bool(at_start == at_goal and at_start > 0)
-
-
-def pieces_of(free: BoolGrid) -> NDArray[np.int32]:
-    """Number of the connected piece of each free pixel, from 1; 0 for the others."""
-    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
-    return labels.astype(np.int32, copy=False)
 
 
 def widest_radius(clear: FloatGrid, start: Point, goal: Point) -> float:

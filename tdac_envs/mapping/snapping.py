@@ -5,15 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.grid.grid import BoolGrid, body_free, clearance
+from tdac_envs.grid.grid import BoolGrid, body_free, clearance, clearance_at
 from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.grid.pieces import (
+    REACHABLE,
+    End,
+    Pixel,
+    connected_with,
+    nearest_free,
+    pieces_of,
+)
 
 Point = tuple[float, float]
-Pixel = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,111 +57,129 @@ def snap(
         radius: Body radius, px.
         units: Units of the notes.
     """
-    free = body_free(clearance(cells), radius)
-    given = {"start": start, "goal": goal}
+    given: dict[End, Point | None] = {"start": start, "goal": goal}
     ends = {name: point for name, point in given.items() if point is not None}
-    found = {**given, **_places(free, ends)}
-    moved = [name for name in ends if found[name] != ends[name]]
+    stay = {name: at for name, at in ends.items() if body_fits(cells, at, radius)}
+    if len(stay) == len(ends):
+        return Snapped(start, goal, ())
+    free = body_free(clearance(cells), radius)
+    moved = _places(free, stay, ends)
+    found: dict[End, Point | None] = {**given, **moved}
+    is_joined = len(ends) == 2 and _is_joined(free, found)
     notes = [
-        f"{name} moved from {units.point(*ends[name])} to "
-        f"{units.point(*_given(found[name]))}{_remark(cells, ends[name], found[name])}"
-        for name in moved
+        f"{name} moved from {units.point(*ends[name])} to {units.point(*place)}"
+        + (_reach(name, len(moved), units) if is_joined else "")
+        + _remark(cells, ends[name], place)
+        for name, place in moved.items()
     ]
     return Snapped(found["start"], found["goal"], tuple(notes))
 
 
-def fits(free: BoolGrid, point: Point) -> bool:
-    """Whether a point, px, is on a free pixel of the map."""
-    x, y = math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)
-    height, width = free.shape
-    return 0 <= x < width and 0 <= y < height and bool(free[y, x])
+def _reach(name: End, moved: int, units: MapUnits) -> str:
+    """Describes the new place of an end that is connected with the other end."""
+    # Of two that move, each may have a nearer place, but not both.
+    which = "the nearest" if moved == 1 else "a"
+    return f", {which} free {units.place} {REACHABLE[name]}"
 
 
-def _places(free: BoolGrid, ends: dict[str, Point]) -> dict[str, Point]:
-    """The places of the points, in one connected piece if there is such a piece."""
-    stay = {name: point for name, point in ends.items() if fits(free, point)}
-    rows, columns = np.nonzero(free)
-    if len(stay) == len(ends) or rows.size == 0:
-        return ends
-    found = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
-    labels = np.asarray(found, np.int32)
-    pieces = labels[rows, columns]
-    nearest = {
-        name: _nearest_by_piece(pieces, rows, columns, point)
-        for name, point in ends.items()
-        if name not in stay
-    }
-    homes = {
-        int(labels[math.floor(y + 0.5), math.floor(x + 0.5)]) for x, y in stay.values()
-    }
-    piece = _cheapest(nearest, homes)
-    return {**stay, **{name: _pixel(near, piece) for name, near in nearest.items()}}
+def body_fits(cells: BoolGrid, point: Point, radius: float) -> bool:
+    """Whether the pixel of a point is free for the body, as `body_free` says.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        point: (x, y), px.
+        radius: Body radius, px.
+    """
+    x, y = _pixel_of(point)
+    height, width = cells.shape
+    if not (0 <= x < width and 0 <= y < height):
+        return False
+    room = np.full((1, 1), clearance_at(cells, x, y, radius + 1.0), np.float32)
+    return bool(body_free(room, radius)[0, 0])
+
+
+def _pixel_of(point: Point) -> Pixel:
+    return math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)
+
+
+def _places(
+    free: BoolGrid, stay: dict[End, Point], ends: dict[End, Point]
+) -> dict[End, Pixel]:
+    """New places of the points that move, connected with the others if possible.
+
+    Args:
+        free: Shape (height, width), bool, the pixels where the body fits.
+        stay: The points where it fits, px.
+        ends: All points, px.
+
+    Returns:
+        Pixel (x, y) by name; empty if the body fits nowhere.
+    """
+    moving = {name: point for name, point in ends.items() if name not in stay}
+    for point in stay.values():
+        free = connected_with(free, _pixel_of(point))
+    if len(moving) > 1:
+        both = _nearest_pair(pieces_of(free), moving)
+        if both is not None:
+            return both
+    nearest = {name: nearest_free(free, *point) for name, point in moving.items()}
+    return {name: place for name, place in nearest.items() if place is not None}
+
+
+def _nearest_pair(
+    labels: NDArray[np.int32], ends: dict[End, Point]
+) -> dict[End, Pixel] | None:
+    """Two pixels of one piece with the shortest total move; None if there are none."""
+    first, second = (_nearest_by_piece(labels, point) for point in ends.values())
+    total = first[0] + second[0]
+    total[(first[1] == second[1]).all(axis=1)] = np.inf
+    best = int(np.argmin(total))
+    if not np.isfinite(total[best]):
+        return None
+    pair = [tuple(pixels[best].tolist()) for _, pixels in (first, second)]
+    return dict(zip(ends, pair, strict=True))
 
 
 _Nearest = tuple[NDArray[np.float64], NDArray[np.int64]]
 """By piece: distance of its nearest pixel, px, and that pixel, shape (n, 2)."""
 
 
-def _nearest_by_piece(
-    pieces: NDArray[np.int32],
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    point: Point,
-) -> _Nearest:
-    """The pixel of each connected piece nearest to a point; piece 0 is empty."""
-    away = np.hypot(columns - point[0], rows - point[1])
-    order = np.lexsort((away, pieces))
-    numbers, first = np.unique(pieces[order], return_index=True)
-    gaps = np.full(int(numbers.max()) + 1, np.inf)
-    pixels = np.zeros((gaps.size, 2), np.int64)
-    chosen = order[first]
-    gaps[numbers] = away[chosen]
-    pixels[numbers] = np.column_stack([columns[chosen], rows[chosen]])
-    return gaps, pixels
+def _nearest_by_piece(labels: NDArray[np.int32], point: Point) -> _Nearest:
+    """The pixel of each connected piece nearest to a point; piece 0 has none."""
+    height, width = labels.shape
+    across = (np.arange(width) - point[0]) ** 2
+    squares = (across + ((np.arange(height) - point[1]) ** 2)[:, None]).ravel()
+    pieces = labels.ravel()
+    least = np.full(int(pieces.max()) + 1, np.inf)
+    np.minimum.at(least, pieces, squares)
+    least[0] = np.inf
+    nearest = np.flatnonzero(squares == least[pieces])
+    numbers, first = np.unique(pieces[nearest], return_index=True)
+    pixels = np.zeros((least.size, 2), np.int64)
+    pixels[numbers] = np.column_stack(np.divmod(nearest[first], width))[:, ::-1]
+    return np.sqrt(least), pixels
 
 
-def _cheapest(nearest: dict[str, _Nearest], homes: set[int]) -> int | None:
-    """The piece with the shortest total move of the points; None if there is none."""
-    total = np.sum([gaps for gaps, _ in nearest.values()], axis=0)
-    if len(nearest) > 1:
-        first, second = (pixels for _, pixels in nearest.values())
-        total[(first == second).all(axis=1)] = np.inf
-    if homes:
-        elsewhere = np.ones(total.size, np.bool_)
-        elsewhere[list(homes)] = False
-        total[elsewhere] = np.inf
-    best = int(np.argmin(total))
-    return best if np.isfinite(total[best]) else None
+def _is_joined(free: BoolGrid, found: dict[End, Point | None]) -> bool:
+    """Whether start and goal are on free pixels that are connected."""
+    labels = pieces_of(free)
+    pixels = [_pixel_of(point) for point in found.values() if point is not None]
+    numbers = {int(labels[pixel[::-1]]) for pixel in pixels}
+    return len(numbers) == 1 and 0 not in numbers
 
 
-def _pixel(near: _Nearest, piece: int | None) -> Pixel:
-    gaps, pixels = near
-    x, y = pixels[int(np.argmin(gaps)) if piece is None else piece].tolist()
-    return x, y
-
-
-def _given(point: Point | None) -> Point:
-    assert point is not None
-    return point
-
-
-def _remark(cells: BoolGrid, point: Point, moved: Point | None) -> str:
-    if not _is_across_wall(cells, point, _given(moved)):
-        return ""
-    return ", across a wall: check the preview"
-
-
-def _is_across_wall(cells: BoolGrid, point: Point, moved: Point) -> bool:
-    """Whether an obstacle lies between a point and the place to which it moved.
+def _remark(cells: BoolGrid, point: Point, moved: Pixel) -> str:
+    """A warning if an obstacle lies between a point and the place to which it moved.
 
     For a point in an obstacle, the nearest free pixel takes its place.
     """
-    begin = point
-    if not fits(~cells, point):
-        rows, columns = np.nonzero(~cells)
-        best = int(np.argmin((columns - point[0]) ** 2 + (rows - point[1]) ** 2))
-        begin = float(columns[best]), float(rows[best])
+    begin: Point | None = point
+    x, y = _pixel_of(point)
+    height, width = cells.shape
+    if not (0 <= x < width and 0 <= y < height) or cells[y, x]:
+        begin = nearest_free(~cells, *point)
+    assert begin is not None  # the body fits on `moved`
     count = 2 + int(2 * math.dist(begin, moved))
     xs = np.floor(np.linspace(begin[0], moved[0], count) + 0.5).astype(int)
     ys = np.floor(np.linspace(begin[1], moved[1], count) + 0.5).astype(int)
-    return bool(cells[ys, xs].any())
+    return "; across a wall: check the preview" if cells[ys, xs].any() else ""

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 
 from tdac_envs.grid.grid import body_free, clearance
+from tdac_envs.grid.pieces import nearest_free
 from tdac_envs.grid.plan import descend, distance_field, path_length
 from tdac_envs.mapping.image import from_array, luminance
 from tdac_envs.mapping.params import ScoreTerms
 from tdac_envs.mapping.readings import plain_reading
 from tdac_envs.mapping.scene import MapProblem
-from tdac_envs.mapping.score import nearest_free
 
 SQUARE = np.ones((3, 3), np.uint8)
 
@@ -59,18 +59,41 @@ def widest(clear, start, goal):
     return float(np.floor(low * 10) / 10)
 
 
-def failure(cells, clear, free, start, goal, radius):
+def outside(cells, start, goal):
+    """Which end is on free space that reaches the border, if the other is not."""
+    labels = cv2.connectedComponents((~cells).astype(np.uint8), connectivity=4)[1]
+    rim = np.ones_like(cells)
+    rim[1:-1, 1:-1] = False
+    at = [labels[end[::-1]] for end in (start, goal)]
+    open_ = [label in labels[rim] for label in at]
+    if at[0] == at[1] or not all(at) or open_[0] == open_[1]:
+        return None
+    return "start" if open_[0] else "goal"
+
+
+def failure(cells, clear, free, start, goal, radius, inflation):
     """Which check fails, or None."""
+    robot = f"a robot of {radius:g} px radius"
+    robot += f" and a margin of {inflation} px" if inflation else ""
+    beyond = outside(cells, start, goal)
     for name, (x, y), other in (("start", start, goal), ("goal", goal, start)):
-        if free[y, x]:
+        if free[y, x] if beyond is None else name != beyond:
             continue
         what = f"is {clear[y, x]:.1f} px from an obstacle, too near"
         what = "lies in an obstacle" if cells[y, x] else what
+        able = free
+        if beyond is not None:
+            opposite = "goal" if name == "start" else "start"
+            what = f"lies outside of the closed wall around {opposite} {other}"
+            room = cv2.connectedComponents((~cells).astype(np.uint8), connectivity=4)[1]
+            able = free & (room == room[other[::-1]])
         pieces = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
-        joined = pieces == pieces[other[::-1]] if free[other[::-1]] else free
+        joined = pieces == pieces[other[::-1]] if free[other[::-1]] else able
         near = nearest_free(joined, x, y)
-        robot = f"a robot of {radius:g} px radius"
-        text = f"the nearest free pixel for {robot} is {near}"
+        reach = "from which the goal can be reached "
+        reach = "that can be reached from the start " if name == "goal" else reach
+        reach = reach if free[other[::-1]] else ""
+        text = f"the nearest free pixel for {robot} {reach}is {near}"
         text = f"{robot} fits nowhere on this map" if near is None else text
         room = widest(clear, start, goal)
         way = f"from this start to this goal a radius of {room:.1f} px gets through"
@@ -80,10 +103,7 @@ def failure(cells, clear, free, start, goal, radius):
     room = widest(clear, start, goal)
     advice = f"the largest radius that gets through is {room:.1f} px"
     advice = "no robot gets through: a wall blocks the way" if room < 0.5 else advice
-    return (
-        f"start {start} and goal {goal} are not connected for a robot of "
-        f"{radius:g} px radius; {advice}"
-    )
+    return f"start {start} and goal {goal} are not connected for {robot}; {advice}"
 
 
 def terms(cells, clear, free, start, goal):
@@ -109,7 +129,8 @@ def candidates(picture, start, goal, radius):
                 cells = clean(base.cells, strength)
                 clear = clearance(cells)
                 free = body_free(clear, radius + inflation)
-                why = failure(cells, clear, free, start, goal, radius)
+                task = (start, goal, radius, inflation)
+                why = failure(cells, clear, free, *task)
                 values = None if why else terms(cells, clear, free, start, goal)
                 who = (base.polarity, strength, inflation)
                 found.append((*who, cells, why, values))

@@ -27,6 +27,7 @@ from tdac_envs.mapping.image import picture_size, read_bytes
 from tdac_envs.mapping.map_folder import preview_of, write_grid
 from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import as_image
+from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
 
 DT = 0.05
 ROBOT_IMAGE_BYTES = 16_000_000
@@ -93,11 +94,11 @@ class Map2DSetting:
         params = self.params
         if params.method == "given":
             return []
-        lines = [f"map: {params.polarity} obstacles, {params.method}"]
+        scale = scale_text(params.resolution)
+        lines = [f"map: {obstacles_text(params)}; {scale}"]
         if self.shown_in != MAP_PIXELS:
             lines.append(
-                "metres of the map's frame; the controller and its tests use px "
-                f"({params.resolution:g} m each)"
+                "metres of the map's frame; the controller and its tests use px"
             )
             lines.append(robot_text(params.robot, self.shown_in))
         return lines
@@ -209,6 +210,8 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         image = as_image(prepared.image or prepared.grid.cells)
         picture = (image, prepared.grid, params, units)
         message = f"{params.source}: {error}"
+        if units == MAP_PIXELS:
+            message += metres_hint(prepared.grid, params.start, params.goal)
         pictures = {"refused": picture}
         raise RefusedError(message, params.source, pictures) from error
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image

@@ -94,7 +94,7 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
     text = (
         f"collision in step {trajectory.steps} "
         f"({trajectory.steps * trajectory.dt:.1f} s) at {units.point(pose.x, pose.y)}, "
-        f"heading {units.heading_of(pose.heading):z.2f} rad, speed "
+        f"heading {units.degrees(pose.heading)}°, speed "
         f"{units.far(speed * around.full_speed, 0)}/s: the {side} of the body "
         f"touched the {touch.thing} at "
         f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
@@ -220,7 +220,8 @@ def _last_poses(trajectory: Trajectory, units: Units) -> str:
         f"{first}{f'-{last}' if last > first else ''}: {row}"
         for first, last, row in reversed(groups)
     ]
-    return f"Last poses (step: x y heading [left right]): {'; '.join(rows)}."
+    what = f"x y in {units.place}, heading in ° [left right]"
+    return f"Last poses (step: {what}): {'; '.join(rows)}."
 
 
 def _pose(trajectory: Trajectory, step: int) -> Pose:

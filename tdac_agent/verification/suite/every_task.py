@@ -207,15 +207,20 @@ def test_policy_is_fast_enough(rollout, task):
 
 
 def test_progress(rollout, task):
-    """d_min <= 0.7 d0 within max(400, 0.16 horizon) steps, by default."""
+    """By default, the path left falls to 0.7 of its length at the start in time.
+
+    The time is max(400, 0.16 horizon) steps.
+    """
     episode, spec, units = rollout("nominal"), task.spec.progress, task.setting.units
     assert episode.trajectory.steps > 0, episode.error or "the episode has no steps"
     distances = episode.distances(spec.distance)[: task.progress_steps + 1]
     d0, d_min = (float(d) * units.scale for d in (distances[0], distances.min()))
+    what = "path" if spec.distance == "geodesic" else "straight distance"
     assert d_min <= spec.fraction * d0, (
-        f"d_min {d_min:.1f} {units.length} > {spec.fraction:g} x d0 = "
-        f"{spec.fraction * d0:.1f} {units.length} (smallest {spec.distance} distance "
-        f"to the goal in {task.progress_steps} steps)"
+        f"not enough progress: in the first {task.progress_steps} steps the {what} to "
+        f"the goal must fall from {d0:.1f} {units.length} to "
+        f"{spec.fraction * d0:.1f} {units.length} or less ({spec.fraction:.0%}); its "
+        f"smallest value was {d_min:.1f} {units.length}"
     )
 
 
@@ -224,13 +229,22 @@ def test_no_collisions(rollout):
     episode = rollout("nominal")
     assert episode.error is None, episode.error
     assert episode.trajectory.steps > 0, "the episode has no steps"
-    assert episode.collisions == 0, f"{episode.collisions} collision(s)"
+    number = episode.collisions
+    assert number == 0, (
+        "the body must touch nothing during the whole episode; it had "
+        f"{number} collision{'' if number == 1 else 's'}"
+    )
 
 
-def test_reaches_goal(rollout):
+def test_reaches_goal(rollout, task):
     """The goal is reached within the horizon."""
-    episode = rollout("nominal")
-    assert episode.reached, episode.error or f"the episode ended: {episode.outcome}"
+    episode, nominal, units = rollout("nominal"), task.nominal, task.setting.units
+    near = nominal.goal_tolerance * units.scale
+    assert episode.reached, episode.error or (
+        f"the robot must come within {near:.4g} {units.length} of the goal in at most "
+        f"{nominal.horizon} steps; the episode ended after {episode.trajectory.steps} "
+        f"steps: {episode.outcome}"
+    )
 
 
 @pytest.mark.jitter

@@ -1,6 +1,7 @@
 """A campaign from the command line: it goes on, repeats nothing, and fails alone."""
 
 import json
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -103,7 +104,14 @@ def test_a_dry_run_writes_nothing_and_needs_no_key(tdac, monkeypatch):
     code, said, _ = tdac("campaign", "paper_2d", "--dry-run")
     assert code == 0
     assert "25 runs; no model was asked" in said
-    assert "limit of all runs together: 50.00 USD" in said
+    words = " ".join(said.split())
+    assert "if no controller ever passes: 1000 candidates are tested" in words
+    assert "1500 questions are asked; without a limit they cost 408.56 USD" in words
+    assert "so this campaign costs at most 50.00 USD" in words
+    code, said, _ = tdac("campaign", "paper_2d", "--dry-run", "--max-cost", 1e6)
+    assert "never reached, since all runs cost at most 1776." in " ".join(said.split())
+    code, said, _ = tdac("campaign", "offline", "--dry-run")
+    assert re.search(r"at most \d+ candidates are tested: K x \(1 \+ J\)", said)
     assert not list(Path().iterdir())
 
 

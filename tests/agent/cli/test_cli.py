@@ -554,7 +554,7 @@ def test_map_says_its_reading_once(tdac, image):
     for ends in (ENDS, []):
         code, out, _ = tdac("map", image, *ends)
         assert code == 0
-        assert out.count("dark obstacles") == 1
+        assert out.count("obstacles are dark pixels") == 1
         assert " ".join(out.split()).count("look at plan-map/preview.png") == 1
 
 

@@ -1,5 +1,7 @@
 """The speed of videos: real time where they are short, and whatever is asked for."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -38,3 +40,13 @@ def test_frames_and_rate_agree(steps, dt, speed):
     if speed is None:
         assert film.seconds <= LONGEST_SECONDS * 1.001
         assert film.speed == 1.0 or steps * dt > LONGEST_SECONDS
+
+
+def test_a_gif_has_at_most_ten_frames_per_second():
+    """Its size grows with the frames; its speed is that of an MP4."""
+    for dt, speed in ((0.05, 1.0), (0.016, 1.0), (0.05, 3.0)):
+        film = film_of(400, dt, speed, Path("film.gif"))
+        assert film.fps <= 10.0
+        assert film.speed == speed
+        assert film.fps == pytest.approx(speed / (dt * film.stride))
+        assert film_of(400, dt, speed, Path("film.mp4")).fps > film.fps

@@ -61,7 +61,8 @@ def test_metres_in_and_out(tdac, ros):
         (
             ("5.35", "5.95"),
             r"start \(5.35, 5.95\) lies in an obstacle; the nearest free place for a "
-            r"robot of 0.6 m radius is \(\d+\.\d+, \d+\.\d+\)",
+            r"robot of 0.6 m radius from which the goal can be reached "
+            r"is \(\d+\.\d+, \d+\.\d+\)",
         ),
     ],
 )
@@ -128,7 +129,7 @@ def test_a_numpy_grid(tdac, tmp_path):
     ends = ("--start", "30,30", "--goal=130,30", "--robot-radius", "6")
     code, out, _ = tdac("map", tmp_path / "grid.npy", *ends)
     assert code == 0
-    assert out.startswith("grid.npy, 160 x 120 px: obstacles as the file says")
+    assert out.startswith("grid.npy, 160 x 120 px: obstacles are those of the grid")
     np.testing.assert_array_equal(np.load("grid-map/occupancy.npy"), small_cells())
     np.save(tmp_path / "grey.npy", small_cells().astype(np.uint8))
     code, _, err = tdac("map", tmp_path / "grey.npy", *ends)

@@ -171,6 +171,17 @@ def test_runs_in_a_table(tdac, monkeypatch, columns):
     assert "to continue: tdac synth --resume runs/epuck-clutter-12" in out
 
 
+def test_an_iteration_that_was_cut_off_is_counted(tdac):
+    """Its candidate was written but not judged, so that there is no attempt of it."""
+    run = run_with("runs/maze-1", "interrupted").model_copy(update={"iterations": 20})
+    Path("runs/maze-1/iterations/k03/j0").mkdir(parents=True)
+    Path("runs/maze-1/iterations/kept").mkdir()
+    Path("runs/maze-1/run.json").write_text(run.model_dump_json())
+    (row,) = json.loads(tdac("runs", "--json")[1])
+    assert row["k"] == 3
+    assert "3/20" in tdac("runs")[1]
+
+
 def test_runs_of_a_campaign_are_found(tdac, monkeypatch):
     """Three levels below its folder; not in hidden folders, nor below another run."""
     record = run_with("x", "interrupted").model_dump_json()

@@ -92,7 +92,11 @@ def test_feedback_is_in_millimetres(task, warm):
     """What fails the progress test is told in the units of the prompt."""
     report = verify(NOTHING, task, profile="policy", judge=warm)
     message = next(f.message for f in report.failures if "test_progress" in f.test)
-    assert re.search(r"d_min 127\d\.\d mm > 0\.7 x d0 = 8[89]\d\.\d mm", message)
+    assert re.search(
+        r"the path to the goal must fall from 127\d\.\d mm to 8[89]\d\.\d mm or less "
+        r"\(70%\); its smallest value was 127\d\.\d mm",
+        message,
+    )
 
 
 def test_a_trajectory_picture_has_each_run(task):

@@ -20,6 +20,7 @@ from tdac_agent.cli.report_view import show_report
 from tdac_agent.episodes.episode import as_wheels, wrong_action
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.sandbox import Limits
+from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.verify import load_trajectories, read_source, verify
 
@@ -157,7 +158,7 @@ HOSTILE = {
     "judge's channel": (
         "import os\nfor fd in range(3, 20):\n    try:\n        os.write(fd, b'x')\n"
         "    except OSError:\n        print(fd)\n" + NOTHING,
-        "channel|progress|d_min|did not end within",
+        "channel|progress|did not end within",
     ),
     "recursion": ("def f():\n    f()\n\n\nf()\n", "RecursionError at import"),
     "no policy": ("X = 1\n", "has no attribute 'policy'|no `def policy"),
@@ -428,3 +429,23 @@ def test_the_report_is_json(small_task, warm):
     )
     again = Report.model_validate(json.loads(report.model_dump_json()))
     assert again == report
+
+
+def test_each_message_names_its_test():
+    """Tests that fail for one reason share a heading, so the messages say whose they
+    are; what is required stands in each of them, in units, and angles in degrees."""
+    task = load_task("maze")
+    report = verify(NOTHING, task, profile="policy")
+    console = Console(file=io.StringIO(), width=300, highlight=False)
+    show_report(report, console)
+    shown = console.file.getvalue()
+    for line in (
+        r"test_progress: not enough progress: in the first \d+ steps the path to the "
+        r"goal must fall from \d+\.\d px to \d+\.\d px or less \(70%\); its smallest",
+        r"test_reaches_goal: the robot must come within 20 px of the goal in at most "
+        r"\d+ steps; the episode ended after \d+ steps: out of time",
+        r"heading in ° \[left right\]",
+        r"path left, straight left: distance to the goal along the shortest path",
+    ):
+        assert re.search(line, shown), line
+    assert not re.search(r"\d rad\b|d_min|d0", shown)

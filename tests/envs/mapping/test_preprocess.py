@@ -17,12 +17,13 @@ from hypothesis import strategies as st
 
 from tdac_envs.core.errors import MapError, TaskError
 from tdac_envs.grid.grid import body_free, clearance
+from tdac_envs.grid.pieces import nearest_free
 from tdac_envs.mapping.cleanup import cleanings
 from tdac_envs.mapping.image import load_image, luminance
 from tdac_envs.mapping.map_folder import FILES, planned_path, write_map
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.preprocessing import preprocess, rank_candidates
-from tdac_envs.mapping.score import nearest_free, score, widest_radius
+from tdac_envs.mapping.score import score, widest_radius
 
 START, GOAL = (40, 40), (260, 40)
 REAL_MAPS = Path(__file__).parents[4] / "shared" / "data" / "maps"
@@ -234,14 +235,17 @@ def test_the_advised_pixel_is_joined_with_the_other_end() -> None:
     """A nearer one, from which no way leads there, would be of no use."""
     cells = np.zeros((80, 160), np.bool_)
     cells[:, 30:34] = True
-    with pytest.raises(TaskError, match=r"radius is \(3[6-9], 40\)"):
+    with pytest.raises(TaskError, match=r"can be reached is \(3[6-9], 40\)"):
         preprocess(cells, (30, 40), (140, 40), 3.0)
 
 
 def test_snap_moves_the_ends_and_says_so() -> None:
     grid, params = preprocess(rooms(), (150, 50), GOAL, 12.0, snap=True)
     assert params.start != (150, 50)
-    assert params.notes == (f"start moved from (150, 50) to {_ints(params.start)}",)
+    assert params.notes == (
+        f"start moved from (150, 50) to {_ints(params.start)}, the nearest free pixel "
+        "from which the goal can be reached",
+    )
     x, y = _ints(params.start)
     assert body_free(clearance(grid.cells), 12.0)[y, x]
 

@@ -184,3 +184,76 @@ def test_a_start_at_or_beyond_the_border_is_drawn(start, tmp_path):
     (file,) = write_pictures(error)
     assert cv2.imread(str(file)) is not None
     assert fault(error).label.startswith("start outside the map")
+
+
+def plan():
+    """A closed building with paper around it, as a grey picture; 120 x 200 px."""
+    picture = np.full((120, 200), 255, np.uint8)
+    cv2.rectangle(picture, (30, 20), (170, 100), 0, 5)
+    return picture
+
+
+INSIDE, BEYOND = (60, 60), (10, 10)
+
+
+@pytest.mark.parametrize("coloured", [False, True])
+def test_the_outside_of_a_plan_is_apart_from_its_walls(coloured):
+    """It has a colour of its own, in the preview and in its legend."""
+    picture = np.dstack([plan()] * 3)
+    if coloured:
+        picture[picture[..., 0] == 0] = (230, 30, 30)
+        picture[20:25, 60:140] = (235, 225, 20)
+    source = from_array(picture)
+    grid, params = preprocess(source, INSIDE, (140, 60), 8.0)
+    assert grid.cells[BEYOND[::-1]]
+    shown = preview_of(source, grid, params)
+    free, wall, outside = (
+        tuple(shown[30 + 4 * y, 52 + 4 * x])
+        for x, y in ((100, 80), (100, 20), (101, 6))
+    )
+    assert len({free, wall, outside}) == 3
+    legend = {
+        tuple(colour) for colour in shown[30 + 480 :, 52:].reshape(-1, 3).tolist()
+    }
+    # The swatch of walls in two colours has their mean colour.
+    for colour in (free, outside) if coloured else (free, wall, outside):
+        gaps = [np.abs(np.subtract(colour, other)).max() for other in legend]
+        assert min(gaps) <= 2
+
+
+@pytest.mark.parametrize("name", ["start", "goal"])
+@pytest.mark.parametrize("place", [BEYOND, (10, 3)])
+def test_an_end_outside_of_a_closed_wall_is_named(name, place):
+    """Also if it is too near to the border of the map, which is not the reason."""
+    ends = {"start": INSIDE, "goal": INSIDE, name: place}
+    other = "goal" if name == "start" else "start"
+    error = refusal(plan(), ends["start"], ends["goal"])
+    text = f"{name} {place} lies outside of the closed wall around {other} {INSIDE}; "
+    assert text in str(error)
+    found = fault(error)
+    assert (found.label, found.at) == (f"{name} outside of the closed wall", place)
+    assert found.better is not None
+    assert 30 < found.better[0] < 170
+    assert 20 < found.better[1] < 100
+
+
+def test_two_closed_rooms_are_still_called_closed():
+    """Neither is the outside of the other."""
+    cells = rooms()
+    cells[:2] = cells[-2:] = cells[:, :2] = cells[:, -2:] = True
+    assert "no robot gets through: a wall blocks the way" in str(refusal(cells))
+
+
+@pytest.mark.parametrize(
+    ("start", "asked"), [((-5, 3), True), ((-50, 3), False), ((400, 300), False)]
+)
+def test_metres_typed_as_pixels_are_recognised(tmp_path, start, asked):
+    """Only if both places would be free in metres, and the map has a resolution."""
+    cv2.imwrite(str(tmp_path / "map.png"), np.where(rooms(30), 0, 254).astype(np.uint8))
+    (tmp_path / "map.yaml").write_text(
+        "image: map.png\nresolution: 0.1\norigin: [-10, -6, 0]\n"
+    )
+    hint = "; did you mean --metres? As metres, start and goal are free places"
+    error = refusal(tmp_path / "map.yaml", start=start, goal=(5, -3))
+    assert (hint in str(error)) == asked
+    assert hint not in str(refusal(rooms(30), start=start, goal=(5, -3)))

@@ -1,5 +1,7 @@
 """Start and goal that are moved to free places, and words that cover them."""
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -7,12 +9,14 @@ import pytest
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.grid.pieces import nearest_free
 from tdac_envs.mapping.preprocessing import preprocess
 from tdac_envs.mapping.score import connected
-from tdac_envs.mapping.snapping import snap
+from tdac_envs.mapping.snapping import body_fits, snap
 from tdac_envs.mapping.words import without_words
 
 GOAL, RADIUS = (350, 250), 8.0
+REACH = ", the nearest free pixel from which the goal can be reached"
 
 
 def rooms():
@@ -55,7 +59,7 @@ def test_a_start_in_the_wall_of_a_closet_leaves_it():
     assert moved.goal == GOAL
     free = body_free(clearance(cells), RADIUS)
     assert connected(free, moved.start, GOAL)
-    note = f"start moved from (110, 84) to {moved.start}, across a wall"
+    note = f"start moved from (110, 84) to {moved.start}{REACH}; across a wall"
     assert moved.notes == (f"{note}: check the preview",)
 
 
@@ -70,11 +74,12 @@ def test_both_ends_move_to_one_part_of_the_map():
     assert moved.goal is not None
     assert connected(free, moved.start, moved.goal)
     assert sum("across a wall" in note for note in moved.notes) == 1
+    assert all(", a free pixel " in note for note in moved.notes)
 
 
 def test_a_move_within_a_room_is_not_across_a_wall():
     moved = snap(rooms(), (186, 100), GOAL, 20.0)
-    assert moved.notes == ("start moved from (186, 100) to (174, 100)",)
+    assert moved.notes == (f"start moved from (186, 100) to (174, 100){REACH}",)
 
 
 def test_where_the_body_fits_nowhere_nothing_moves():
@@ -85,7 +90,61 @@ def test_where_the_body_fits_nowhere_nothing_moves():
 def test_notes_are_in_the_units_of_the_user():
     units = MapUnits.metres(OccupancyGrid(rooms(), 0.05, (-10.0, -5.0, 0.0)))
     moved = snap(rooms(), (186, 100), GOAL, 20.0, units)
-    assert moved.notes == ("start moved from (-0.675, 4.975) to (-1.275, 4.975)",)
+    note = "start moved from (-0.675, 4.975) to (-1.275, 4.975)"
+    assert moved.notes == (note + REACH.replace("pixel", "place"),)
+
+
+def plainly(free, ends):
+    """The pair of free pixels of one piece with the shortest total move, by force."""
+    pixels = [(int(x), int(y)) for y, x in np.argwhere(free)]
+    pairs = (
+        (math.dist(a, ends[0]) + math.dist(b, ends[1]))
+        for a in pixels
+        for b in pixels
+        if a != b and connected(free, a, b)
+    )
+    return min(pairs, default=None)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_moves_are_the_shortest_together(seed):
+    """Compared with all pairs of free pixels."""
+    random = np.random.default_rng(seed)
+    cells = random.random((10, 14)) < 0.15
+    cells[3, 2] = cells[6, 11] = True
+    start, goal = (2, 3), (11, 6)
+    free = body_free(clearance(cells), 0.2)
+    moved = snap(cells, start, goal, 0.2)
+    total = math.dist(moved.start, start) + math.dist(moved.goal, goal)
+    least = plainly(free, (start, goal))
+    assert least is not None
+    assert total == pytest.approx(least)
+    assert connected(free, moved.start, moved.goal)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_nearest_free_pixel_is_found_in_a_growing_window(seed):
+    """Compared with all free pixels, for points on and off the map."""
+    random = np.random.default_rng(seed)
+    free = random.random((400, 300)) < random.choice([1e-5, 1e-4, 0.01])
+    x, y = random.uniform(-500, 800, 2)
+    rows, columns = np.nonzero(free)
+    found = nearest_free(free, x, y)
+    if rows.size == 0:
+        assert found is None
+    else:
+        best = np.hypot(columns - x, rows - y).min()
+        assert math.dist(found, (x, y)) == pytest.approx(best)
+        assert free[found[1], found[0]]
+
+
+@pytest.mark.parametrize("radius", [0.3, 2.0, 7.5])
+def test_a_body_fits_where_the_clearance_says_so(radius):
+    """The look at one place agrees with the clearance of the whole map."""
+    cells = np.random.default_rng(3).random((40, 50)) < 0.01
+    free = body_free(clearance(cells), radius)
+    found = [[body_fits(cells, (x, y), radius) for x in range(50)] for y in range(40)]
+    np.testing.assert_array_equal(found, free)
 
 
 @pytest.mark.parametrize("snapping", [False, True])

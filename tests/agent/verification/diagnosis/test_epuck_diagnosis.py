@@ -92,7 +92,7 @@ def test_figures_of_a_collision():
     assert found.d0 == pytest.approx(distances[0], abs=1e-4)
     assert found.d_min == pytest.approx(distances.min(), abs=1e-4)
     assert 0.7 < found.d0 < 0.9
-    assert "at (0.213, 0.000), heading 0.00 rad, speed 126 mm/s" in found.text
+    assert "at (0.213, 0.000), heading 0°, speed 126 mm/s" in found.text
     assert f"Path left: {1e3 * found.d0:.1f} mm at the start" in found.text
     assert re.search(r"ps[07] read \d+, the sensor on that side", found.text)
     assert "A wheel was at its limit in 100 % of the steps" in found.text

@@ -1,7 +1,7 @@
 # idea: catch every error and stand still, as a published controller does
 # profile: policy
 # fails: test_hygiene[swallowed_errors], test_progress, test_reaches_goal
-# error: d_min .* > 0.7 x d0
+# error: not enough progress: in the first \d+ steps the path to the goal must fall
 # why: it must make progress and reach the goal
 def policy(obs):
     try:
