@@ -38,6 +38,8 @@ from tdac_envs.worlds.wbt.reader import load_world
 
 INDEX = Path(__file__).with_suffix(".yaml")
 STEPS = 600
+SECONDS = 300.0
+"""Time that a controller may compute; Webots has no such limit."""
 _UNSUPPORTED = ("tdac: ", 'Device "')
 
 Result = Literal["runs", "ignore", "fails"]
@@ -120,8 +122,9 @@ def measure(entry: Entry, folder: Path, steps: int) -> Row:
 def _run(
     controller: Path, world: Path, ignored: tuple[str, ...], steps: int
 ) -> WebotsRun:
-    stage = open_stage(world, ignore=ignored)
-    return run_controller(controller, stage, stage.make_env(steps=steps))
+    stage = open_stage(world, ignore=ignored, controller=controller.stem)
+    env = stage.make_env(steps=steps)
+    return run_controller(controller, stage, env, seconds=SECONDS)
 
 
 def _unmodelled(world: Path) -> tuple[str, ...]:

@@ -134,14 +134,6 @@ class Display(Unknown):
     """Not modelled."""
 
 
-class Lidar(Unknown):
-    """Not modelled."""
-
-
-class LidarPoint:
-    """Not modelled."""
-
-
 class Pen(Unknown):
     """Not modelled."""
 
@@ -152,15 +144,6 @@ class Radar(Unknown):
 
 class RadarTarget:
     """Not modelled."""
-
-
-class RangeFinder(Unknown):
-    """Not modelled."""
-
-    @staticmethod
-    def rangeImageGetDepth(image: list[float], width: int, x: int, y: int) -> float:
-        """A pixel of a range image."""
-        return image[y * width + x]
 
 
 class Skin(Unknown):

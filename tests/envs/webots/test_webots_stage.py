@@ -71,7 +71,7 @@ def test_odd_worlds(tmp_path):
     assert [(d.name, d.offset) for d in gps] == [
         ("my gps", (pytest.approx(0.0005), 0.0, 0.0486))
     ]
-    assert "scan" in stage.absent
+    assert [scanner.name for scanner in stage.scanners] == ["scan"]
     types = {node.kind: node.base for node in stage.scene.nodes}
     assert types["Rock"] == "Solid"
     assert types["Dragon"] == "Dragon"
