@@ -49,7 +49,8 @@ def run(
         if start is None:
             raise TaskError("--heading needs --start X Y")
         start = (*start, heading)
-    check_finite(start=start, goal=goal)
+    limit = None if seconds is None else (seconds,)
+    check_finite(start=start, goal=goal, seconds=limit)
     if video is not None and video.suffix.lower() not in SUFFIXES:
         raise TaskError(f"--video must end in .mp4 or .gif, got {video.name!r}")
     stage = open_stage(world_file(world), goal, ignore, start, controller.stem)
