@@ -9,8 +9,10 @@ sandbox, in the world file of its own repository, without a goal.
 A controller *runs* if it raises no error and moves nothing as a supervisor, commands
 the wheels, and the robot gets farther than its radius from the start. A world that is
 refused because of unmodelled nodes is tried again with all of them ignored
-(`--ignore`). The shares count the controllers whose `expected` is not `refused`; for a
-refused one, `reason` says why it cannot run, here or in any other simulator.
+(`--ignore`). The shares count the controllers whose `expected` is not `refused`: a
+refused one cannot run in Webots either, is made for another robot, or does not drive.
+One that is expected to fail should run, but needs what is not modelled. For both,
+`reason` says why. `fuzzy-wall` needs the package scikit-fuzzy.
 """
 
 from __future__ import annotations
@@ -56,8 +58,8 @@ class Entry:
         controller: Path of the controller in the repository.
         world: Path of its world in the repository.
         licence: Licence as stated by the repository.
-        expected: `runs`, `ignore` (runs with `--ignore`) or `refused`.
-        reason: Why it is refused; otherwise empty.
+        expected: `runs`, `ignore` (runs with `--ignore`), `fails` or `refused`.
+        reason: Why it fails or is refused; otherwise empty.
     """
 
     name: str

@@ -91,7 +91,7 @@ def report_of(
     # An error after the end of the run does not count.
     error = None if fault is None or log.outcome is not None else fault
     outcome: Outcome = log.outcome or ("controller ended" if error is None else "error")
-    described = None if error is None else _described(error, log, env)
+    described = None if error is None else _described(error, controller, log, env)
     why = _why_not(outcome, log, stage, described)
     goal = stage.world.goal if stage.has_goal else None
     return WebotsReport(
@@ -127,17 +127,25 @@ _INSTALLED_AS = {
 }  # fmt: skip
 
 
-def _described(fault: ControllerFault, log: Log, env: EPuckEnv) -> str:
+def _described(
+    fault: ControllerFault, controller: Path, log: Log, env: EPuckEnv
+) -> str:
     """The fault, and what to do about a time limit or a missing package."""
-    text = str(fault)
     if isinstance(fault, ControllerTimeout):
         return _too_slow(fault.seconds, log.steps, env.nominal.horizon)
+    text = " ".join(str(fault).split())  # the text of an exception may have many lines
     if not isinstance(fault, ControllerError):
         return text
     missing = _MISSING.search(fault.text)
     if fault.type_name != "ModuleNotFoundError" or missing is None:
         return text
     name = missing[1].partition(".")[0]
+    beside = controller.resolve().parent.parent
+    if (beside / name).is_dir() or (beside / f"{name}.py").is_file():
+        return (
+            f"{text}; tdac copies only the controller's own folder: put a copy of "
+            f"{name}, from the folder above, beside the controller"
+        )
     package = _INSTALLED_AS.get(name, name)
     return (
         f"{text}; if it is a package: pip install {package}, in the environment of tdac"
@@ -147,9 +155,9 @@ def _described(fault: ControllerFault, log: Log, env: EPuckEnv) -> str:
 def _too_slow(seconds: float, steps: int, horizon: int) -> str:
     if not steps:
         return (
-            f"it never called robot.step() with a duration, and after {seconds:g} s "
-            "the time limit ended it; call robot.step() in its loop, or set a longer "
-            "limit with --seconds"
+            f"it never called robot.step(), and after {seconds:g} s the time limit "
+            "ended it; call robot.step() in its loop, or set a longer limit with "
+            "--seconds"
         )
     return (
         f"it took {seconds:g} s for its own computation, the time limit, and had done "

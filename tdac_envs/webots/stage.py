@@ -242,9 +242,7 @@ def _driven_by(controller: str, world: World) -> tuple[World, tuple[str, ...]]:
     return replace(world, robots=(own[0], *others)), (note,)
 
 
-def _find_robot(
-    nodes: Iterable[Node], top: Frame, name: str, controller: str
-) -> Found:
+def _find_robot(nodes: Iterable[Node], top: Frame, name: str, controller: str) -> Found:
     """The e-puck of `_driven_by` and its frame, in the order of the reader."""
     found = [pair for pair in walk_frames(nodes, top) if is_epuck(pair[0])]
     own = [pair for pair in found if text(pair[0], "controller") == controller]

@@ -125,8 +125,34 @@ class Camera(ViewingSensor):
     getFocalLength: Any = unsupported("Camera.getFocalLength", 0.0)
     getFocalDistance: Any = unsupported("Camera.getFocalDistance", 0.0)
     setFocalDistance: Any = unsupported("Camera.setFocalDistance")
+    getMinFocalDistance: Any = unsupported("Camera.getMinFocalDistance", 0.0)
+    getMaxFocalDistance: Any = unsupported("Camera.getMaxFocalDistance", 0.0)
     recognitionEnable: Any = unsupported("Camera.recognitionEnable")
     recognitionDisable: Any = unsupported("Camera.recognitionDisable")
+    getRecognitionSamplingPeriod: Any = unsupported(
+        "Camera.getRecognitionSamplingPeriod", 0
+    )
+    hasRecognitionSegmentation: Any = unsupported(
+        "Camera.hasRecognitionSegmentation", False
+    )
+    enableRecognitionSegmentation: Any = unsupported(
+        "Camera.enableRecognitionSegmentation"
+    )
+    disableRecognitionSegmentation: Any = unsupported(
+        "Camera.disableRecognitionSegmentation"
+    )
+    isRecognitionSegmentationEnabled: Any = unsupported(
+        "Camera.isRecognitionSegmentationEnabled", False
+    )
+    getRecognitionSegmentationImage: Any = unsupported(
+        "Camera.getRecognitionSegmentationImage"
+    )
+    getRecognitionSegmentationImageArray: Any = unsupported(
+        "Camera.getRecognitionSegmentationImageArray"
+    )
+    saveRecognitionSegmentationImage: Any = unsupported(
+        "Camera.saveRecognitionSegmentationImage", -1
+    )
     getRecognitionObjects: Any = unsupported("Camera.getRecognitionObjects", ())
     getRecognitionNumberOfObjects: Any = unsupported(
         "Camera.getRecognitionNumberOfObjects", 0

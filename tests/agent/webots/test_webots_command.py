@@ -228,7 +228,7 @@ STARTS = "from controller import Robot\nrobot = Robot()\n"
     [
         (
             "while True:\n    pass\n",
-            "it never called robot.step() with a duration, and after 1.5 s the time "
+            "it never called robot.step(), and after 1.5 s the time "
             "limit ended it; call robot.step() in its loop, or set a longer limit with "
             "--seconds",
         ),
@@ -256,6 +256,31 @@ def test_a_program_that_ends_without_a_step(tdac, there):
     )
     assert (code, run["outcome"]) == (1, "controller ended")
     assert run["why_not"] == "it ended without a call of robot.step()"
+
+
+def test_errors_are_one_line(tdac, there):
+    """Whatever the text of the exception; the text of `sys.exit` is printed."""
+    (there / "many.py").write_text(f"{STARTS}raise ValueError('one\\n  two\\n')\n")
+    (there / "ends.py").write_text(f"{STARTS}import sys; sys.exit('please install')\n")
+    words = [there / "bare.wbt", "--json"]
+    _, run = record(tdac("webots", "run", there / "many.py", *words))
+    assert run["error"] == "ValueError at the run (line 3): one two"
+    _, run = record(tdac("webots", "run", there / "ends.py", *words))
+    assert (run["error"], run["output"]) == (None, "please install\n")
+
+
+def test_a_module_beside_the_folder(tdac, there):
+    """It is not copied; the error says so, and does not advise to install it."""
+    for folder in ("mine", "shared"):
+        (there / folder).mkdir()
+    (there / "mine" / "mine.py").write_text("import shared.things\n")
+    words = [there / "mine" / "mine.py", there / "bare.wbt", "--json"]
+    _, run = record(tdac("webots", "run", *words))
+    assert (
+        "tdac copies only the controller's own folder: put a copy of shared"
+        in (run["error"])
+    )
+    assert "pip" not in run["error"]
 
 
 def test_the_robot_with_the_controller_is_driven(tdac, there):
