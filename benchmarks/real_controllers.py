@@ -60,6 +60,7 @@ class Entry:
         licence: Licence as stated by the repository.
         expected: `runs`, `ignore` (runs with `--ignore`), `fails` or `refused`.
         reason: Why it fails or is refused; otherwise empty.
+        steps: Least number of steps, for a controller that drives very slowly.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Entry:
     licence: str
     expected: str
     reason: str = ""
+    steps: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ def measure(entry: Entry, folder: Path, steps: int) -> Row:
     ignored: tuple[str, ...] = ()
     for result in ("runs", "ignore"):
         try:
-            done = _run(controller, world, ignored, steps)
+            done = _run(controller, world, ignored, max(steps, entry.steps))
         except TdacError as error:
             ignored = ignored or _unmodelled(world)
             if result == "ignore" or not ignored:
