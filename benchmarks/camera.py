@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from benchmarks.timing import in_turn
-from tdac_envs.webots.cameras import Cameras
 from tdac_envs.webots.stage import open_stage
+from tdac_envs.webots.views import Views
 from tdac_envs.worlds.bundled import world_file
 
 WORLDS = ("maze", "arena", "room")
@@ -46,7 +46,7 @@ def one_image(world: str, width: int, height: int) -> Callable[[], object]:
     cameras = tuple(
         replace(camera, width=width, height=height) for camera in stage.cameras
     )
-    taking = Cameras(cameras, stage.world, stage.sky, stage.robot, env)
+    taking = Views(cameras, stage.world, stage.sky, stage.robot, env)
 
     def take() -> object:
         taking.expose("camera")

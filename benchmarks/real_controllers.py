@@ -9,8 +9,10 @@ sandbox, in the world file of its own repository, without a goal.
 A controller *runs* if it raises no error and moves nothing as a supervisor, commands
 the wheels, and the robot gets farther than its radius from the start. A world that is
 refused because of unmodelled nodes is tried again with all of them ignored
-(`--ignore`). The shares count the controllers whose `expected` is not `refused`; for a
-refused one, `reason` says why it cannot run, here or in any other simulator.
+(`--ignore`). The shares count the controllers whose `expected` is not `refused`: a
+refused one cannot run in Webots either, is made for another robot, or does not drive.
+One that is expected to fail should run, but needs what is not modelled. For both,
+`reason` says why. `fuzzy-wall` needs the package scikit-fuzzy.
 """
 
 from __future__ import annotations
@@ -38,6 +40,8 @@ from tdac_envs.worlds.wbt.reader import load_world
 
 INDEX = Path(__file__).with_suffix(".yaml")
 STEPS = 600
+SECONDS = 300.0
+"""Time that a controller may compute; Webots has no such limit."""
 _UNSUPPORTED = ("tdac: ", 'Device "')
 
 Result = Literal["runs", "ignore", "fails"]
@@ -54,8 +58,9 @@ class Entry:
         controller: Path of the controller in the repository.
         world: Path of its world in the repository.
         licence: Licence as stated by the repository.
-        expected: `runs`, `ignore` (runs with `--ignore`) or `refused`.
-        reason: Why it is refused; otherwise empty.
+        expected: `runs`, `ignore` (runs with `--ignore`), `fails` or `refused`.
+        reason: Why it fails or is refused; otherwise empty.
+        steps: Least number of steps, for a controller that drives very slowly.
     """
 
     name: str
@@ -66,6 +71,7 @@ class Entry:
     licence: str
     expected: str
     reason: str = ""
+    steps: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +113,7 @@ def measure(entry: Entry, folder: Path, steps: int) -> Row:
     ignored: tuple[str, ...] = ()
     for result in ("runs", "ignore"):
         try:
-            done = _run(controller, world, ignored, steps)
+            done = _run(controller, world, ignored, max(steps, entry.steps))
         except TdacError as error:
             ignored = ignored or _unmodelled(world)
             if result == "ignore" or not ignored:
@@ -120,8 +126,9 @@ def measure(entry: Entry, folder: Path, steps: int) -> Row:
 def _run(
     controller: Path, world: Path, ignored: tuple[str, ...], steps: int
 ) -> WebotsRun:
-    stage = open_stage(world, ignore=ignored)
-    return run_controller(controller, stage, stage.make_env(steps=steps))
+    stage = open_stage(world, ignore=ignored, controller=controller.stem)
+    env = stage.make_env(steps=steps)
+    return run_controller(controller, stage, env, seconds=SECONDS)
 
 
 def _unmodelled(world: Path) -> tuple[str, ...]:

@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.webots.cameras import CameraFacts, Cameras
+from tdac_envs.webots.cameras import CameraFacts
 from tdac_envs.webots.controller.png import png
 from tdac_envs.webots.stage import open_stage
+from tdac_envs.webots.views import Views
 from tdac_envs.worlds.bundled import world_file
 
 FILE = Path(__file__).parent.parent / "docs" / "camera.png"
@@ -47,7 +48,7 @@ def _image(camera: CameraFacts) -> NDArray[np.uint8]:
     stage = open_stage(world_file(WORLD))
     env = stage.make_env()
     env.reset(seed=0)
-    taking = Cameras((camera,), stage.world, stage.sky, stage.robot, env)
+    taking = Views((camera,), stage.world, stage.sky, stage.robot, env)
     taking.expose(camera.name)
     data = taking.image(camera.name)
     assert data is not None

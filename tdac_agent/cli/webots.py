@@ -31,6 +31,7 @@ def run(
     controller: Path,
     world: str,
     steps: int | None,
+    seconds: float | None,
     start: tuple[float, ...] | None,
     heading: float | None,
     goal: tuple[float, float] | None,
@@ -49,10 +50,11 @@ def run(
             raise TaskError("--heading needs --start X Y")
         check_heading(heading)
         start = (*start, heading)
-    check_finite(start=start, goal=goal)
+    limit = None if seconds is None else (seconds,)
+    check_finite(start=start, goal=goal, seconds=limit)
     if video is not None and video.suffix.lower() not in SUFFIXES:
         raise TaskError(f"--video must end in .mp4 or .gif, got {video.name!r}")
-    stage = open_stage(world_file(world), goal, ignore, start)
+    stage = open_stage(world_file(world), goal, ignore, start, controller.stem)
     options: dict[str, Any] = {
         "steps": steps,
         "goal_tolerance": TOLERANCE if tolerance is None else tolerance,
@@ -62,7 +64,9 @@ def run(
     env = stage.make_env(**options)
     with _bar(console) as bar:
         watch = _watcher(bar, controller.name, env.nominal.horizon)
-        done = run_controller(controller, stage, env, tier=tier, watch=watch)
+        done = run_controller(
+            controller, stage, env, tier=tier, seconds=seconds, watch=watch
+        )
     if as_json:
         record = {"schema_version": 1, **asdict(done.report)}
         sys.stdout.write(json.dumps(record, indent=2) + "\n")

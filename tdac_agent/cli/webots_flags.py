@@ -41,6 +41,14 @@ def webots_run(
             help="Maximum steps of the world.  [default: the environment's horizon]",
         ),
     ] = None,
+    seconds: Annotated[
+        Optional[float],  # noqa: UP045
+        number_flag(
+            min=1,
+            help="Time that the controller may compute, s.  [default: 10 s and the "
+            "simulated time of all steps]",
+        ),
+    ] = None,
     start: Annotated[
         Optional[tuple[float, float]],  # noqa: UP045
         typer.Option(
@@ -91,7 +99,7 @@ def webots_run(
 
     raise typer.Exit(
         webots.run(
-            controller, world, steps, start, heading, goal, tolerance,
+            controller, world, steps, seconds, start, heading, goal, tolerance,
             tuple(ignore or ()), webots_sensors, video, speed, tier, as_json,
         )
     )  # fmt: skip

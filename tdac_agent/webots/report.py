@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from tdac_agent.sandbox import ChildUsage, ControllerError, ControllerFault
+from tdac_agent.sandbox import (
+    ChildUsage,
+    ControllerError,
+    ControllerFault,
+    ControllerTimeout,
+)
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.log import Log, driven_length
 from tdac_envs.webots.stage import ControllerWorld
@@ -86,7 +91,8 @@ def report_of(
     # An error after the end of the run does not count.
     error = None if fault is None or log.outcome is not None else fault
     outcome: Outcome = log.outcome or ("controller ended" if error is None else "error")
-    why = _why_not(outcome, log, stage, error)
+    described = None if error is None else _described(error, controller, log, env)
+    why = _why_not(outcome, log, stage, described)
     goal = stage.world.goal if stage.has_goal else None
     return WebotsReport(
         passed=not why,
@@ -106,7 +112,7 @@ def report_of(
         start=log.poses[0],
         end=log.poses[-1],
         teleport=log.teleport,
-        error=None if error is None else _described(error),
+        error=described,
         traceback=error.traceback if isinstance(error, ControllerError) else "",
         left_out=stage.left_out,
         notes=stage.notes,
@@ -121,29 +127,54 @@ _INSTALLED_AS = {
 }  # fmt: skip
 
 
-def _described(fault: ControllerFault) -> str:
-    """The fault; for a missing package, with the command that installs it."""
-    text = str(fault)
+def _described(
+    fault: ControllerFault, controller: Path, log: Log, env: EPuckEnv
+) -> str:
+    """The fault, and what to do about a time limit or a missing package."""
+    if isinstance(fault, ControllerTimeout):
+        return _too_slow(fault.seconds, log.steps, env.nominal.horizon)
+    text = " ".join(str(fault).split())  # the text of an exception may have many lines
     if not isinstance(fault, ControllerError):
         return text
     missing = _MISSING.search(fault.text)
     if fault.type_name != "ModuleNotFoundError" or missing is None:
         return text
     name = missing[1].partition(".")[0]
+    beside = controller.resolve().parent.parent
+    if (beside / name).is_dir() or (beside / f"{name}.py").is_file():
+        return (
+            f"{text}; tdac copies only the controller's own folder: put a copy of "
+            f"{name}, from the folder above, beside the controller"
+        )
     package = _INSTALLED_AS.get(name, name)
     return (
         f"{text}; if it is a package: pip install {package}, in the environment of tdac"
     )
 
 
+def _too_slow(seconds: float, steps: int, horizon: int) -> str:
+    if not steps:
+        return (
+            f"it never called robot.step(), and after {seconds:g} s the time limit "
+            "ended it; call robot.step() in its loop, or set a longer limit with "
+            "--seconds"
+        )
+    return (
+        f"it took {seconds:g} s for its own computation, the time limit, and had done "
+        f"{steps} of {horizon} steps; set a longer limit with --seconds"
+    )
+
+
 def _why_not(
-    outcome: Outcome, log: Log, stage: ControllerWorld, error: ControllerFault | None
+    outcome: Outcome, log: Log, stage: ControllerWorld, error: str | None
 ) -> str:
     if log.teleport is not None:
         return f"teleport: {log.teleport}"
     if error is not None:
-        return f"the controller failed: {_described(error)}"
+        return f"the controller failed: {error}"
     reasons = []
+    if not log.steps and outcome == "controller ended":
+        reasons.append("it ended without a call of robot.step()")
     if log.first_contact is not None:
         step, x, y = log.first_contact
         count = f"{log.collisions} steps with a contact"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
@@ -81,7 +82,8 @@ def run_controller(
     env: EPuckEnv,
     *,
     tier: str = "auto",
-    limits: Limits = LIMITS,
+    limits: Limits | None = None,
+    seconds: float | None = None,
     watch: Watch | None = None,
 ) -> WebotsRun:
     """Runs a controller with all files of its folder until the run ends.
@@ -91,7 +93,10 @@ def run_controller(
         stage: The world.
         env: Environment of the stage; see `ControllerWorld.make_env`.
         tier: Sandbox tier, or `auto`.
-        limits: Resource limits of the controller.
+        limits: Resource limits of the controller; by default `LIMITS`, with as much
+            CPU time as `seconds` allows.
+        seconds: Time that the controller itself may take; by default `START_SECONDS`
+            and the simulated time of all steps.
         watch: Called with the number of steps so far.
 
     Raises:
@@ -100,7 +105,11 @@ def run_controller(
     """
     source = read_source(controller)
     server = StepServer(env, stage)
-    seconds = START_SECONDS + env.nominal.horizon * env.nominal.dt
+    if seconds is None:
+        seconds = START_SECONDS + env.nominal.horizon * env.nominal.dt
+    if limits is None:
+        most = max(LIMITS.cpu_seconds, math.ceil(seconds + GRACE_SECONDS))
+        limits = replace(LIMITS, cpu_seconds=most)
     fault: ControllerFault | None = None
     left_out: tuple[str, ...] = ()
     with tempfile.TemporaryDirectory(prefix="tdac-webots-") as folder:

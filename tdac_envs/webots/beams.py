@@ -13,20 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tdac_envs.core.compiled import kernel
-from tdac_envs.epuck.infrared import ELEVATION, TABLE, crossing
-from tdac_envs.epuck.prisms import (
-    FACTOR,
-    HIGH,
-    LOW,
-    MID_X,
-    MID_Y,
-    REACH,
-    Array,
-    Index,
-    Prisms,
-)
+from tdac_envs.epuck.infrared import ELEVATION, TABLE
+from tdac_envs.epuck.prisms import FACTOR, Array, Prisms
 from tdac_envs.webots.floors import Floors
+from tdac_envs.webots.rays import nearest_hit
 from tdac_envs.worlds.wbt.fields import number, number_list, text
 from tdac_envs.worlds.wbt.frames import Frame
 from tdac_envs.worlds.wbt.tree import Node
@@ -179,53 +169,3 @@ def reading(
         factor = factor if painted is None else painted
     measured = distance / factor if beam.is_infrared else distance
     return float(np.interp(measured, beam.table[:, 0], beam.table[:, 1]))
-
-
-@kernel
-def nearest_hit(
-    points: Array,
-    first: Index,
-    extent: Array,
-    x: float,
-    y: float,
-    z: float,
-    dir_x: float,
-    dir_y: float,
-    dir_z: float,
-    longest: float,
-) -> tuple[float, int]:
-    """The first part that a ray hits.
-
-    Args:
-        points: Vertices of the parts; see `tdac_envs.epuck.gaps`.
-        first: See `points`.
-        extent: See `points`.
-        x: Origin of the ray, m.
-        y: See `x`.
-        z: See `x`.
-        dir_x: Direction, of length 1.
-        dir_y: See `dir_x`.
-        dir_z: See `dir_x`.
-        longest: Length of the ray, m.
-
-    Returns:
-        Distance, m, and index of the part; `longest` and -1 if there is none.
-    """
-    best, found = longest, -1
-    for k in range(extent.shape[0]):
-        off_x, off_y = extent[k, MID_X] - x, extent[k, MID_Y] - y
-        if math.sqrt(off_x * off_x + off_y * off_y) - extent[k, REACH] > best:
-            continue
-        near, far = 0.0, best
-        if dir_z != 0.0:
-            enter = (extent[k, LOW] - z) / dir_z
-            leave = (extent[k, HIGH] - z) / dir_z
-            near, far = max(near, min(enter, leave)), min(far, max(enter, leave))
-        elif z < extent[k, LOW] or z > extent[k, HIGH]:
-            continue
-        if near > far:
-            continue
-        at = crossing(points, first, extent, k, x, y, dir_x, dir_y, near, far)
-        if at < best:
-            best, found = at, k
-    return best, found

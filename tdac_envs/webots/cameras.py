@@ -9,18 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tdac_envs.core.errors import WorldError
-from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.prisms import Array
 from tdac_envs.webots.rendering import look_through
 from tdac_envs.webots.scenery import Scenery
-from tdac_envs.worlds.bodies import floor_under
-from tdac_envs.worlds.wbt.colours import Sky
 from tdac_envs.worlds.wbt.fields import children, number, numbers, text
 from tdac_envs.worlds.wbt.frames import Frame, axis_angle, own_axes, world_frame
 from tdac_envs.worlds.wbt.placing import placed
 from tdac_envs.worlds.wbt.robots import ROBOTS
 from tdac_envs.worlds.wbt.tree import Node
-from tdac_envs.worlds.world import EPuck, World
+from tdac_envs.worlds.world import EPuck
 
 MOST_PIXELS = 1 << 21
 """Largest image; cameras with more pixels are not modelled."""
@@ -67,6 +64,20 @@ class CameraFacts:
             "near": self.near,
         }
 
+    def view(
+        self,
+        scenery: Scenery,
+        place: Array,
+        axes: Array,
+        things: Array,
+        random: np.random.Generator | None,
+    ) -> bytes:
+        """The image, BGRA; see `views.Viewer`. It has no noise."""
+        del random
+        width, height = self.width, self.height
+        view = look_through(place, axes, self.field_of_view, width, height)
+        return scenery.image(view, self.near, width, height, things).tobytes()
+
 
 def find_cameras(
     robot: Node, own: Frame, epuck: EPuck
@@ -90,67 +101,6 @@ def find_cameras(
         elif camera.name not in [other.name for other in found]:
             found.append(camera)
     return tuple(found), tuple(absent)
-
-
-class Cameras:
-    """Takes images: a sample records the poses, and `image` renders it.
-
-    Args:
-        cameras: The cameras.
-        world: World of the environment.
-        sky: Its sky.
-        robot: Node of the robot.
-        env: The environment.
-    """
-
-    def __init__(
-        self,
-        cameras: tuple[CameraFacts, ...],
-        world: World,
-        sky: Sky,
-        robot: Node,
-        env: EPuckEnv,
-    ) -> None:
-        self._cameras = {camera.name: camera for camera in cameras}
-        self._world, self._sky, self._env = world, sky, env
-        # A Robot node may have its origin above the ground.
-        is_proto = robot.kind not in ROBOTS
-        self._ground = floor_under(world) if is_proto else world.robot.z
-        self._scenery: Scenery | None = None
-        # Poses of the robot and of the movable objects at the last sample.
-        self._seen: dict[str, tuple[Array, Array]] = {}
-        self._images: dict[str, bytes] = {}
-        self._count = 0
-
-    def __contains__(self, name: str) -> bool:
-        return name in self._cameras
-
-    def expose(self, name: str) -> int:
-        """Takes a sample without rendering it; returns its number."""
-        self._seen[name] = self._env.pose(), self._env.things()
-        self._images.pop(name, None)
-        self._count += 1
-        return self._count
-
-    def image(self, name: str) -> bytes | None:
-        """The last image in Webots' format, BGRA; None before the first sample."""
-        if name not in self._seen:
-            return None
-        if name not in self._images:
-            self._images[name] = self._render(self._cameras[name], *self._seen[name])
-        return self._images[name]
-
-    def _render(self, camera: CameraFacts, pose: Array, things: Array) -> bytes:
-        if self._scenery is None:
-            self._scenery = Scenery.of(self._world, self._sky)
-        x, y, heading = pose.tolist()
-        turn = axis_angle(0.0, 0.0, 1.0, heading)
-        place = turn @ camera.place + (x, y, self._ground)
-        width, height = camera.width, camera.height
-        axes = turn @ camera.axes
-        view = look_through(place, axes, camera.field_of_view, width, height)
-        scenery = self._scenery
-        return scenery.image(view, camera.near, width, height, things).tobytes()
 
 
 _Found = tuple[str, Node, str, Frame]

@@ -10,6 +10,7 @@ from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.webots.cameras import CAMERA_TYPE, CameraFacts
 from tdac_envs.webots.instruments import Instruments
 from tdac_envs.webots.mounts import Mount
+from tdac_envs.webots.scanners import LIDAR_TYPE, RANGE_FINDER_TYPE, ScannerFacts
 from tdac_envs.worlds.wbt.fields import number, text
 from tdac_envs.worlds.wbt.tree import Node
 
@@ -71,6 +72,7 @@ def find_devices(
     mounted: tuple[Mount, ...] = (),
     instruments: Instruments | None = None,
     cameras: Iterable[CameraFacts] = (),
+    scanners: Iterable[ScannerFacts] = (),
 ) -> tuple[tuple[DeviceFacts, ...], tuple[str, ...]]:
     """The devices of an e-puck, and the names of those that are not modelled.
 
@@ -79,12 +81,17 @@ def find_devices(
         mounted: Nodes in its slots, or in the Robot node.
         instruments: Its distance and light sensors beside ps0 to ps7.
         cameras: Its cameras.
+        scanners: Its lidars and range finders.
     """
     devices = _standard(max_velocity)
     devices += [
         DeviceFacts(camera.name, "Camera", CAMERA_TYPE, camera.plain())
         for camera in cameras
     ]
+    for scanner in scanners:
+        number_of = LIDAR_TYPE if scanner.is_lidar else RANGE_FINDER_TYPE
+        kind = "Lidar" if scanner.is_lidar else "RangeFinder"
+        devices.append(DeviceFacts(scanner.name, kind, number_of, scanner.plain()))
     if instruments is not None:
         for beam in instruments.beams:
             devices.append(DeviceFacts(beam.name, "DistanceSensor", 42, beam.plain()))
@@ -92,8 +99,11 @@ def find_devices(
             devices.append(DeviceFacts(cell.name, "LightSensor", 49, cell.plain()))
     devices += [
         DeviceFacts(node_name, "PositionSensor", 52, {"motor": WHEELS[wheel][0]})
-        for node_name, wheel in renamed_sensors(mounted)
+        for node_name, wheel in renamed(mounted, "PositionSensor")
     ]
+    for node_name, wheel in renamed(mounted, "RotationalMotor"):
+        more = {"max_velocity": max_velocity, "sensor": WHEELS[wheel][1]}
+        devices.append(DeviceFacts(node_name, "Motor", 57, more))
     known = {device.name for device in devices}
     absent: list[str] = []
     for node, frame in mounted:
@@ -111,10 +121,18 @@ def find_devices(
     return tuple(devices), tuple(absent)
 
 
-def renamed_sensors(mounted: tuple[Mount, ...]) -> list[tuple[str, int]]:
-    """Names of wheel sensors that a Robot node calls otherwise, and their wheels."""
-    usual = {sensor for _, sensor in WHEELS}
-    names = [text(n, "name") for n, _ in mounted if n.kind == "PositionSensor"]
+def renamed(mounted: tuple[Mount, ...], kind: str) -> list[tuple[str, int]]:
+    """Names of wheel motors or sensors that a Robot node calls otherwise.
+
+    Args:
+        mounted: Nodes in the Robot node.
+        kind: `RotationalMotor` or `PositionSensor`.
+
+    Returns:
+        Names, and the index of the wheel in `WHEELS`.
+    """
+    usual = {name for pair in WHEELS for name in pair}
+    names = [text(node, "name") for node, _ in mounted if node.kind == kind]
     return [
         (name, wheel)
         for name in dict.fromkeys(names)

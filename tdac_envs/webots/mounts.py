@@ -16,6 +16,8 @@ from tdac_envs.worlds.world import EPuck
 _TURRET, _UNDER = (-0.0095, 0.0, 0.0486), (0.03, 0.0, 0.0003)
 # Before R2022a, the axes of the slot for ground sensors were turned.
 _UNDER_TURN = (0.0, 0.0, 1.0, -1.57)
+# Translations of PROTOs of Webots' library if the file gives none, m.
+_PLACES = {"RobotisLds01": (0.0, 0.0, 0.02)}
 _NO_FRAME = ("Group", "HingeJoint", "SliderJoint", "Slot")
 
 
@@ -64,7 +66,7 @@ def _within(node: Node, frame: Frame) -> Iterator[Mount]:
 def _mounted(node: Node, frame: Frame) -> Iterator[Mount]:
     if node.kind not in _NO_FRAME:
         try:
-            frame = placed(node, frame)
+            frame = placed(node, frame, _PLACES.get(node.kind, (0.0, 0.0, 0.0)))
         except WorldError:  # fields of an unknown node may have another meaning
             return
     yield Mount(node, frame)

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from tdac_envs.drive.env import Observation
-from tdac_envs.webots.cameras import Cameras
 from tdac_envs.webots.devices import ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
 from tdac_envs.webots.instruments import Readings
 from tdac_envs.webots.log import Pose, turn_rate, velocity
 from tdac_envs.webots.stage import ControllerWorld
+from tdac_envs.webots.views import Views
 
 GRAVITY = 9.81
 Reader = Callable[[], Any]
@@ -26,19 +26,19 @@ class Sampler:
     Args:
         stage: Stage with the world and the robot.
         readings: Readings of its instruments.
-        cameras: Cameras of the robot.
+        views: What its cameras, lidars and range finders see.
     """
 
     def __init__(
-        self, stage: ControllerWorld, readings: Readings, cameras: Cameras
+        self, stage: ControllerWorld, readings: Readings, views: Views
     ) -> None:
         self._frame = stage.frame
         self._observation: Observation = {}
         self._poses: list[Pose] = []
         self._dt = stage.world.time_step / 1e3
         self._readers = self._make_readers(stage, readings)
-        for camera in stage.cameras:
-            self._readers[camera.name] = partial(cameras.expose, camera.name)
+        for viewer in stage.viewers:
+            self._readers[viewer.name] = partial(views.expose, viewer.name)
         # Sampling period and time of the last sample, ms.
         self._sampling: dict[str, tuple[int, float]] = {}
         self._fresh: dict[str, Any] = {}

@@ -58,6 +58,18 @@ class Scenery:
             np.array(sky, np.float64),
         )
 
+    def at(self, things: Array) -> Prisms:
+        """The parts while the objects that can be pushed have the given poses.
+
+        Args:
+            things: Shape (k, 3): x, y (m) and rotation since the start (rad).
+        """
+        if not len(things):
+            return self.prisms
+        prisms = self.prisms.copy()
+        prisms.carry(self.prisms, self.centres, things)
+        return prisms
+
     def image(
         self, view: Array, near: float, width: int, height: int, things: Array
     ) -> NDArray[np.uint8]:
@@ -68,13 +80,9 @@ class Scenery:
             near: Distance of the near plane, m.
             width: Width of the image, pixels.
             height: Height of the image, pixels.
-            things: Shape (k, 3): x, y (m) and rotation since the start (rad) of the
-                objects that can be pushed.
+            things: Poses of the objects that can be pushed; see `at`.
         """
-        prisms = self.prisms
-        if len(things):
-            prisms = prisms.copy()
-            prisms.carry(self.prisms, self.centres, things)
+        prisms = self.at(things)
         depth = np.empty((height, width))
         image = np.empty((height, width, 4), np.uint8)
         fixed = read_only(self.paint), read_only(view), read_only(self.sky)

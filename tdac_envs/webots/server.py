@@ -9,7 +9,6 @@ import numpy as np
 
 from tdac_envs.drive.env import Observation
 from tdac_envs.epuck.env import EPuckEnv
-from tdac_envs.webots.cameras import Cameras
 from tdac_envs.webots.devices import WHEELS
 from tdac_envs.webots.instruments import Readings
 from tdac_envs.webots.log import Log, turn_rate, velocity
@@ -17,6 +16,7 @@ from tdac_envs.webots.motors import MotorState
 from tdac_envs.webots.requests import CHANGES, RequestError, checked, real
 from tdac_envs.webots.sampling import Sampler
 from tdac_envs.webots.stage import ControllerWorld
+from tdac_envs.webots.views import Views
 
 PATIENCE = 3
 """Requests answered after the end; a controller should stop after the first."""
@@ -41,11 +41,17 @@ class StepServer:
         self._basic = stage.world.time_step
         self._observation: Observation = {}
         limit = stage.world.robot.max_wheel_speed
-        self._motors = {name: MotorState(limit) for name, _ in WHEELS}
-        self._cameras = Cameras(stage.cameras, stage.world, stage.sky, stage.robot, env)
+        self._wheels = [MotorState(limit) for _ in WHEELS]
+        sensors = [sensor for _, sensor in WHEELS]
+        self._motors = {
+            device.name: self._wheels[sensors.index(device.more["sensor"])]
+            for device in stage.devices
+            if device.kind == "Motor"
+        }
+        self._views = Views(stage.viewers, stage.world, stage.sky, stage.robot, env)
         self._images: dict[str, bytes] = {}
         readings = Readings(stage.instruments, env)
-        self._sampler = Sampler(stage, readings, self._cameras)
+        self._sampler = Sampler(stage, readings, self._views)
         self._warnings: list[str] = []
         self._warned: set[str] = set()
         self._late_requests = 0
@@ -106,7 +112,7 @@ class StepServer:
         angles = self._observation["wheel_positions"].tolist()
         speeds = [
             motor.next_speed(angle, dt)
-            for motor, angle in zip(self._motors.values(), angles, strict=True)
+            for motor, angle in zip(self._wheels, angles, strict=True)
         ]
         wheels = np.array(speeds, np.float32) / np.float32(limit)
         self._observation, _, _, truncated, info = self._env.step(wheels)
@@ -145,8 +151,8 @@ class StepServer:
         if what == "enable" and device in self._sampler:
             self._enable(device, value)
             return
-        if what == "image" and device in self._cameras:
-            image = self._cameras.image(device)
+        if what == "image" and device in self._views:
+            image = self._views.image(device)
             self._images |= {} if image is None else {device: image}
             return
         if device not in self._motors:

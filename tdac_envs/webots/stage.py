@@ -28,7 +28,9 @@ from tdac_envs.webots.reach import (
     why_unreachable,
     without_far_nodes,
 )
+from tdac_envs.webots.scanners import ScannerFacts, find_scanners
 from tdac_envs.webots.scene import NodeTable
+from tdac_envs.webots.views import Viewer
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.wbt.colours import BLACK_SKY, Sky, sky_of
 from tdac_envs.worlds.wbt.fields import flag, text
@@ -61,6 +63,7 @@ class ControllerWorld:
         absent: Names of the devices that are not modelled.
         instruments: Distance and light sensors beside ps0 to ps7.
         cameras: Cameras of the robot.
+        scanners: Lidars and range finders of the robot.
         sky: What cameras see beyond the world.
     """
 
@@ -79,12 +82,18 @@ class ControllerWorld:
     absent: tuple[str, ...]
     instruments: Instruments
     cameras: tuple[CameraFacts, ...] = ()
+    scanners: tuple[ScannerFacts, ...] = ()
     sky: Sky = BLACK_SKY
 
     @property
     def is_supervisor(self) -> bool:
         """Whether the robot is a supervisor, which may query the world."""
         return flag(self.robot, "supervisor", False)
+
+    @property
+    def viewers(self) -> tuple[Viewer, ...]:
+        """The devices that see the scenery."""
+        return (*self.cameras, *self.scanners)
 
     def facts(self) -> dict[str, Any]:
         """The facts that the `controller` package receives at the start."""
@@ -143,6 +152,7 @@ def open_stage(
     goal: Sequence[float] | None = None,
     ignore: Iterable[str] = (),
     start: Sequence[float] | None = None,
+    controller: str = "",
 ) -> ControllerWorld:
     """Reads a world file for a controller.
 
@@ -151,6 +161,8 @@ def open_stage(
         goal: (x, y), m; by default the file's, if it has one.
         ignore: Names or types of unmodelled nodes to leave out.
         start: (x, y) or (x, y, heading), m and rad; by default the file's.
+        controller: Name of the controller; of several e-pucks, the first one that has
+            this controller in the file is driven, else the first of all.
 
     Raises:
         WorldError: The world cannot be used.
@@ -161,7 +173,9 @@ def open_stage(
     if not world.robots:
         raise WorldError(f"{path.name}: there is no e-puck in it")
     names = tuple(ignore)
+    world, chosen = _driven_by(controller, world)
     world, notes = without_far_nodes(world)
+    notes = (*chosen, *notes)
     check_modelled(world, names)
     if goal is not None:
         world = with_goal(world, finite_point("goal", goal))
@@ -181,7 +195,7 @@ def open_stage(
         world = replace(world, goal=_farthest(world))
     document = parse(content, path.name)
     top = frame_of(document)
-    robot, own = _find_robot(document.nodes, top, path.name)
+    robot, own = _find_robot(document.nodes, top, path.name, controller)
     mounted = tuple(mounts(robot, own, in_file))
     all_nodes = ProtoFolder(path.parent, document.version).expanded(document).nodes
     floors = find_floors(all_nodes, top, path.parent)
@@ -189,8 +203,9 @@ def open_stage(
     instruments = find_instruments(robot, mounted, lights, floors)
     notes += instruments.notes()
     cameras, too_large = find_cameras(robot, own, in_file)
+    scanners = find_scanners(mounted)
     limit = world.robot.max_wheel_speed
-    devices, absent = find_devices(limit, mounted, instruments, cameras)
+    devices, absent = find_devices(limit, mounted, instruments, cameras, scanners)
     frame = FileFrame.of(top, own, in_file.heading)
     scene = NodeTable(document.nodes)
     return ControllerWorld(
@@ -209,15 +224,30 @@ def open_stage(
         absent=tuple(dict.fromkeys((*absent, *too_large))),
         instruments=instruments,
         cameras=cameras,
+        scanners=scanners,
         sky=sky_of(document.nodes),
     )
 
 
-def _find_robot(nodes: Iterable[Node], top: Frame, name: str) -> Found:
-    """The first e-puck and its frame, in the order of the reader."""
-    for node, own in walk_frames(nodes, top):
-        if is_epuck(node):
-            return node, own
+def _driven_by(controller: str, world: World) -> tuple[World, tuple[str, ...]]:
+    """The world with the e-puck first that has a controller, and a note about it."""
+    own = [robot for robot in world.robots if robot.controller == controller]
+    if not own or own[0] is world.robot:
+        return world, ()
+    others = (robot for robot in world.robots if robot is not own[0])
+    note = (
+        f"of {len(world.robots)} e-pucks, {own[0].name!r} is driven: it has the "
+        f"controller {controller!r}"
+    )
+    return replace(world, robots=(own[0], *others)), (note,)
+
+
+def _find_robot(nodes: Iterable[Node], top: Frame, name: str, controller: str) -> Found:
+    """The e-puck of `_driven_by` and its frame, in the order of the reader."""
+    found = [pair for pair in walk_frames(nodes, top) if is_epuck(pair[0])]
+    own = [pair for pair in found if text(pair[0], "controller") == controller]
+    for pair in own or found:
+        return pair
     raise WorldError(
         f"{name}: the e-puck must be at the top level or in a Group, Pose or Solid"
     )

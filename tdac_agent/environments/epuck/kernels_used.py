@@ -6,8 +6,9 @@ import numpy as np
 
 from tdac_agent.environments.epuck.surroundings import WorldSurroundings
 from tdac_agent.environments.kernels_used import use_robot
+from tdac_envs.core.compiled import read_only
 from tdac_envs.epuck import infrared, kernels
-from tdac_envs.webots.beams import nearest_hit
+from tdac_envs.webots.rays import nearest_hit, scan
 from tdac_envs.webots.rendering import look_through
 from tdac_envs.webots.scenery import Scenery
 from tdac_envs.worlds.wbt.colours import BLACK_SKY
@@ -28,3 +29,5 @@ def use_kernels() -> None:
     view = look_through(np.zeros(3), np.eye(3), 1.0, 4, 3)
     scenery = Scenery.of(epuck.nominal.ground.world, BLACK_SKY)
     scenery.image(view, 0.01, 4, 3, epuck.things())
+    place, ahead = read_only(np.zeros(3)), read_only(np.eye(3)[:1])
+    scan(*scenery.prisms.arrays(), place, ahead, 0.01, 1.0, np.empty(1))

@@ -38,6 +38,8 @@ def run_program(source: bytes, arguments: list[str], world: Any) -> int | str | 
         exec(code, main.__dict__)
     except SystemExit as ended:
         status = ended.code
+        if not (status is None or isinstance(status, int)):
+            print(status, file=sys.stderr)  # as Python does
         return status if status is None or type(status) is int else str(status)[:200]
     return None
 

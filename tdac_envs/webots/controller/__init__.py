@@ -15,6 +15,7 @@ from .input import Joystick, Keyboard, Mouse
 from .led import LED
 from .motor import Motor
 from .node import Node
+from .ranges import Lidar, LidarPoint, RangeFinder
 from .robot import Robot
 from .sensors import (
     GPS,
@@ -34,12 +35,9 @@ from .unmodelled import (
     Connector,
     Display,
     Emitter,
-    Lidar,
-    LidarPoint,
     Pen,
     Radar,
     RadarTarget,
-    RangeFinder,
     Receiver,
     Skin,
     Speaker,

@@ -4,31 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from .connection import connection
 from .messages import complain, once, unsupported
 from .png import png
-from .sensors import Sensor
+from .viewing import ViewingSensor
 
 
-class Camera(Sensor):
-    """A colour camera.
-
-    Args:
-        name: Device name in the world.
-        sampling_period: Period, ms; if given, the camera is enabled at once.
-    """
+class Camera(ViewingSensor):
+    """A colour camera."""
 
     _c_name = "camera"
-
-    def __init__(self, name: str, sampling_period: int | None = None) -> None:
-        super().__init__(name, sampling_period)
-        self._sampled: Any = None
-        self._image: bytes | None = None
-
-    def enable(self, p: int) -> None:
-        """Takes an image every `p` ms, first after `p` ms; 0 disables the camera."""
-        self._enabled_at = connection.time
-        super().enable(p)
 
     def getImage(self) -> bytes | None:
         """The last image: blue, green, red and 255 of each pixel, row by row.
@@ -120,16 +104,6 @@ class Camera(Sensor):
         return self._last("get_image")
 
     @property
-    def width(self) -> int:
-        """See `getWidth`."""
-        return int(self._facts.get("width", 0))
-
-    @property
-    def height(self) -> int:
-        """See `getHeight`."""
-        return int(self._facts.get("height", 0))
-
-    @property
     def fov(self) -> float:
         """See `getFov`; setting it has no effect."""
         return float(self._facts.get("fov", float("nan")))
@@ -143,16 +117,6 @@ class Camera(Sensor):
         """See `getNear`."""
         return float(self._facts.get("near", float("nan")))
 
-    def _last(self, getter: str) -> bytes | None:
-        """The image of the last sample, requested once; None if there is none."""
-        sampled = self._sample(getter, None)
-        if sampled is None:
-            is_stepped = self._period > 0 and connection.time > self._enabled_at
-            return bytes(4 * self.width * self.height) if is_stepped else None
-        if sampled != self._sampled:
-            self._sampled, self._image = sampled, connection.image(self.name)
-        return self._image
-
     setFov: Any = unsupported("Camera.setFov")
     getMinFov: Any = unsupported("Camera.getMinFov", float("nan"))
     getMaxFov: Any = unsupported("Camera.getMaxFov", float("nan"))
@@ -161,8 +125,34 @@ class Camera(Sensor):
     getFocalLength: Any = unsupported("Camera.getFocalLength", 0.0)
     getFocalDistance: Any = unsupported("Camera.getFocalDistance", 0.0)
     setFocalDistance: Any = unsupported("Camera.setFocalDistance")
+    getMinFocalDistance: Any = unsupported("Camera.getMinFocalDistance", 0.0)
+    getMaxFocalDistance: Any = unsupported("Camera.getMaxFocalDistance", 0.0)
     recognitionEnable: Any = unsupported("Camera.recognitionEnable")
     recognitionDisable: Any = unsupported("Camera.recognitionDisable")
+    getRecognitionSamplingPeriod: Any = unsupported(
+        "Camera.getRecognitionSamplingPeriod", 0
+    )
+    hasRecognitionSegmentation: Any = unsupported(
+        "Camera.hasRecognitionSegmentation", False
+    )
+    enableRecognitionSegmentation: Any = unsupported(
+        "Camera.enableRecognitionSegmentation"
+    )
+    disableRecognitionSegmentation: Any = unsupported(
+        "Camera.disableRecognitionSegmentation"
+    )
+    isRecognitionSegmentationEnabled: Any = unsupported(
+        "Camera.isRecognitionSegmentationEnabled", False
+    )
+    getRecognitionSegmentationImage: Any = unsupported(
+        "Camera.getRecognitionSegmentationImage"
+    )
+    getRecognitionSegmentationImageArray: Any = unsupported(
+        "Camera.getRecognitionSegmentationImageArray"
+    )
+    saveRecognitionSegmentationImage: Any = unsupported(
+        "Camera.saveRecognitionSegmentationImage", -1
+    )
     getRecognitionObjects: Any = unsupported("Camera.getRecognitionObjects", ())
     getRecognitionNumberOfObjects: Any = unsupported(
         "Camera.getRecognitionNumberOfObjects", 0

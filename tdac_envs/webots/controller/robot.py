@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from . import camera, led, motor, sensors, unmodelled
+from . import camera, led, motor, ranges, sensors, unmodelled
 from .connection import c_int, connection
 from .device import Device
 from .input import Joystick, Keyboard, Mouse
@@ -22,6 +22,8 @@ _KINDS: dict[str, type[Device]] = {
     "Accelerometer": sensors.Accelerometer,
     "Gyro": sensors.Gyro,
     "Camera": camera.Camera,
+    "Lidar": ranges.Lidar,
+    "RangeFinder": ranges.RangeFinder,
     "Emitter": unmodelled.Emitter,
     "Receiver": unmodelled.Receiver,
     "Speaker": unmodelled.Speaker,

@@ -100,7 +100,14 @@ class Receiver(_Mute):
     getString: Any = unsupported("Receiver.getString")
     getBytes: Any = unsupported("Receiver.getBytes")
     getData: Any = unsupported("Receiver.getData")
+    getFloats: Any = unsupported("Receiver.getFloats")
+    getInts: Any = unsupported("Receiver.getInts")
+    getBools: Any = unsupported("Receiver.getBools")
     getDataSize: Any = unsupported("Receiver.getDataSize", -1)
+    getSignalStrength: Any = unsupported("Receiver.getSignalStrength", math.nan)
+    getEmitterDirection: Any = unsupported(
+        "Receiver.getEmitterDirection", (math.nan,) * 3
+    )
 
 
 class Speaker(Device):
@@ -109,6 +116,9 @@ class Speaker(Device):
     playSound: Any = unsupported("Speaker.playSound")
     stop: Any = unsupported("Speaker.stop")
     speak: Any = unsupported("Speaker.speak")
+    getEngine: Any = unsupported("Speaker.getEngine", "")
+    setEngine: Any = unsupported("Speaker.setEngine", False)
+    getLanguage: Any = unsupported("Speaker.getLanguage", "")
     setLanguage: Any = unsupported("Speaker.setLanguage", False)
     isSoundPlaying: Any = unsupported("Speaker.isSoundPlaying", False)
     isSpeaking: Any = unsupported("Speaker.isSpeaking", False)
@@ -134,14 +144,6 @@ class Display(Unknown):
     """Not modelled."""
 
 
-class Lidar(Unknown):
-    """Not modelled."""
-
-
-class LidarPoint:
-    """Not modelled."""
-
-
 class Pen(Unknown):
     """Not modelled."""
 
@@ -152,15 +154,6 @@ class Radar(Unknown):
 
 class RadarTarget:
     """Not modelled."""
-
-
-class RangeFinder(Unknown):
-    """Not modelled."""
-
-    @staticmethod
-    def rangeImageGetDepth(image: list[float], width: int, x: int, y: int) -> float:
-        """A pixel of a range image."""
-        return image[y * width + x]
 
 
 class Skin(Unknown):

@@ -86,6 +86,25 @@ class TestDevices:
             "0 32",
         ]
 
+    def test_calls_without_effect_give_neutral_values(self, printed):
+        """Calls of Webots' API that are not modelled exist, and return nothing."""
+        out = printed(
+            'radio, speaker, camera = map(robot.getDevice, ("receiver", "speaker", '
+            '"camera"))\n'
+            "print(radio.getFloats(), radio.getEmitterDirection(), "
+            'speaker.setEngine("pico"), camera.enableRecognitionSegmentation(),\n'
+            "      camera.getRecognitionSegmentationImage(), "
+            "camera.getRecognitionSamplingPeriod())\n"
+        )
+        calls = (
+            "Receiver.getFloats", "Receiver.getEmitterDirection", "Speaker.setEngine",
+            "Camera.enableRecognitionSegmentation",
+            "Camera.getRecognitionSegmentationImage",
+            "Camera.getRecognitionSamplingPeriod",
+        )  # fmt: skip
+        said = [f"tdac: {call}() is not supported; it has no effect" for call in calls]
+        assert out == [*said, "None (nan, nan, nan) False None None 0"]
+
     def test_all_devices_can_be_counted(self, printed):
         """By index, in one order, with their names and types."""
         out = printed(

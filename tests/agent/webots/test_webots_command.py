@@ -5,7 +5,7 @@ from pathlib import Path
 
 import cv2
 import pytest
-from worlds_for_controllers import BLOCKED, NO_GOAL, OPEN
+from worlds_for_controllers import BLOCKED, NO_GOAL, OPEN, epuck
 
 from tdac_agent.sandbox import TIERS, available_tiers
 
@@ -205,6 +205,8 @@ def test_another_tolerance(tdac, there):
         (["good.py", "open.wbt", "--ignore", "X"], "no node called 'X' to ignore"),
         (["good.py"], "Missing argument"),
         (["good.py", "open.wbt", "--steps", "0"], "--steps"),
+        (["good.py", "open.wbt", "--seconds", "0"], "--seconds"),
+        (["good.py", "open.wbt", "--seconds", "inf"], "--seconds must be finite"),
     ],
 )
 def test_usage(tdac, words, said):
@@ -216,6 +218,82 @@ def test_usage(tdac, words, said):
     assert code == 2, (out, err)
     assert said in err
     assert len(err.strip().splitlines()) == 1
+
+
+STARTS = "from controller import Robot\nrobot = Robot()\n"
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (
+            "while True:\n    pass\n",
+            "it never called robot.step(), and after 1.5 s the time "
+            "limit ended it; call robot.step() in its loop, or set a longer limit with "
+            "--seconds",
+        ),
+        (
+            "robot.step(160)\nwhile True:\n    pass\n",
+            "it took 1.5 s for its own computation, the time limit, and had done 5 of "
+            "50 steps; set a longer limit with --seconds",
+        ),
+    ],
+)
+def test_a_program_that_takes_too_long(tdac, there, lines, said):
+    """The reason says whether it made steps, which limit applies, what to do."""
+    (there / "slow.py").write_text(STARTS + lines)
+    words = [there / "slow.py", there / "bare.wbt", "--steps", 50, "--seconds", 1.5]
+    code, run = record(tdac("webots", "run", *words, "--json"))
+    assert (code, run["outcome"], run["error"]) == (1, "error", said)
+    assert run["why_not"] == f"the controller failed: {said}"
+
+
+def test_a_program_that_ends_without_a_step(tdac, there):
+    """It has not passed, even in a world without a goal."""
+    (there / "short.py").write_text(STARTS)
+    code, run = record(
+        tdac("webots", "run", there / "short.py", there / "bare.wbt", "--json")
+    )
+    assert (code, run["outcome"]) == (1, "controller ended")
+    assert run["why_not"] == "it ended without a call of robot.step()"
+
+
+def test_errors_are_one_line(tdac, there):
+    """Whatever the text of the exception; the text of `sys.exit` is printed."""
+    (there / "many.py").write_text(f"{STARTS}raise ValueError('one\\n  two\\n')\n")
+    (there / "ends.py").write_text(f"{STARTS}import sys; sys.exit('please install')\n")
+    words = [there / "bare.wbt", "--json"]
+    _, run = record(tdac("webots", "run", there / "many.py", *words))
+    assert run["error"] == "ValueError at the run (line 3): one two"
+    _, run = record(tdac("webots", "run", there / "ends.py", *words))
+    assert (run["error"], run["output"]) == (None, "please install\n")
+
+
+def test_a_module_beside_the_folder(tdac, there):
+    """It is not copied; the error says so, and does not advise to install it."""
+    for folder in ("mine", "shared"):
+        (there / folder).mkdir()
+    (there / "mine" / "mine.py").write_text("import shared.things\n")
+    words = [there / "mine" / "mine.py", there / "bare.wbt", "--json"]
+    _, run = record(tdac("webots", "run", *words))
+    assert (
+        "tdac copies only the controller's own folder: put a copy of shared"
+        in (run["error"])
+    )
+    assert "pip" not in run["error"]
+
+
+def test_the_robot_with_the_controller_is_driven(tdac, there):
+    """Of several e-pucks; else the first one."""
+    other = OPEN + epuck("-0.4 0.3 0").replace('"mine"', '"second"')
+    (there / "two.wbt").write_text(other)
+    for name, y in (("second", 0.3), ("mine", 0.0), ("third", 0.0)):
+        (there / f"{name}.py").write_text(f"{STARTS}robot.step(32)\n")
+        words = ["webots", "run", there / f"{name}.py", there / "two.wbt", "--json"]
+        _, run = record(tdac(*words))
+        assert run["start"] == pytest.approx([-0.4, y, 0.0])
+        told = "of 2 e-pucks, 'e-puck' is driven: it has the controller 'second'"
+        assert (told in run["notes"]) == (name == "second")
 
 
 def test_a_line_that_repeats_is_shown_once(tdac, there):

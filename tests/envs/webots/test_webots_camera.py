@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from tdac_envs.core.errors import WorldError
-from tdac_envs.webots.cameras import MOST_PIXELS, Cameras
+from tdac_envs.webots.cameras import MOST_PIXELS
 from tdac_envs.webots.controller.png import png
 from tdac_envs.webots.rendering import brightness, look_through
 from tdac_envs.webots.scenery import Scenery
 from tdac_envs.webots.stage import open_stage
+from tdac_envs.webots.views import Views
 from tdac_envs.worlds.bundled import world_file
 from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle
 from tdac_envs.worlds.looks import Look
@@ -49,7 +50,7 @@ def camera(tmp_path):
         stage = open_stage(file, **options)
         env = stage.make_env()
         env.reset(seed=0)
-        cameras = Cameras(stage.cameras, stage.world, stage.sky, stage.robot, env)
+        cameras = Views(stage.cameras, stage.world, stage.sky, stage.robot, env)
         return stage, env, cameras
 
     return make

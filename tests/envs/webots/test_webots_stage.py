@@ -9,6 +9,7 @@ from tdac_envs import bundled_worlds
 from tdac_envs.core.errors import WorldError
 from tdac_envs.webots.controller import Robot
 from tdac_envs.webots.motors import MotorState
+from tdac_envs.webots.server import StepServer
 from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds.bundled import world_file
 from tdac_envs.worlds.wbt.fields import numbers
@@ -71,7 +72,7 @@ def test_odd_worlds(tmp_path):
     assert [(d.name, d.offset) for d in gps] == [
         ("my gps", (pytest.approx(0.0005), 0.0, 0.0486))
     ]
-    assert "scan" in stage.absent
+    assert [scanner.name for scanner in stage.scanners] == ["scan"]
     types = {node.kind: node.base for node in stage.scene.nodes}
     assert types["Rock"] == "Solid"
     assert types["Dragon"] == "Dragon"
@@ -128,3 +129,25 @@ class TestMotor:
         motor.set_position(5.0)
         assert motor.next_speed(0.0, 0.032) == 2.0
         assert motor.next_speed(9.0, 0.032) == -2.0
+
+
+def test_renamed_motors(tmp_path):
+    """A Robot may call its wheel motors otherwise; each drives its wheel."""
+    joints = " ".join(
+        f'HingeJoint {{ device [ RotationalMotor {{ name "{side}_motor" }} ] }}'
+        for side in ("left", "right")
+    )
+    file = tmp_path / "w.wbt"
+    robot = f'Robot {{ model "e-puck" children [ {joints} ] }}'
+    file.write_text(f"#VRML_SIM R2025a utf8\nFloor {{ }}\n{robot}\n")
+    stage = open_stage(file)
+    server = StepServer(stage.make_env(steps=50), stage)
+    facts = {device["name"]: device for device in server.reset()["devices"]}
+    assert facts["left_motor"]["sensor"] == "left wheel sensor"
+    speeds = ("left_motor", 1.0), ("right_motor", 3.0)
+    commands = [(name, "position", math.inf) for name, _ in speeds]
+    commands += [(name, "velocity", speed) for name, speed in speeds]
+    server.step((320, commands, None))
+    x, _, heading = server.log.poses[-1]
+    assert heading == pytest.approx(2.0 * 0.02 / 0.052 * 0.32, rel=1e-5)
+    assert x > 0.01
