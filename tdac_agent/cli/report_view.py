@@ -22,9 +22,9 @@ from tdac_agent.verification.diagnosis.shown import in_units
 MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
 LEGEND = (
-    "path left, straight left: distance to the goal along the shortest path, and in a "
-    "straight line: the smallest in the episode, of that at the start; ms per call: "
-    "mean time of policy(obs)"
+    "grid path left, straight left: the smallest distance to the goal in the episode, "
+    "of the distance at the start, along the path on the grid and in a straight line; "
+    "ms per call: mean time of policy(obs)"
 )
 
 

@@ -445,7 +445,7 @@ def test_each_message_names_its_test():
         r"test_reaches_goal: the robot must come within 20 px of the goal in at most "
         r"\d+ steps; the episode ended after \d+ steps: out of time",
         r"heading in ° \[left right\]",
-        r"path left, straight left: distance to the goal along the shortest path",
+        r"grid path left, straight left: the smallest distance to the goal",
     ):
         assert re.search(line, shown), line
     assert not re.search(r"\d rad\b|d_min|d0", shown)
