@@ -25,12 +25,13 @@ class Robot(NamedTuple):
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (18,), float64: axle length (px), full wheel speed (px/s), dt
+        constants: Shape (22,), float64: axle length (px), full wheel speed (px/s), dt
             (s), body radius, largest range (px), fraction of a wheel's speed that
             remains after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (px); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (px), horizon (steps);
-            coefficient of friction between body and obstacles.
+            coefficient of friction between body and obstacles; gains of the left and
+            right wheel; scales of the measured distance and turn.
         state: Shape (8,), float64: x, y (px), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
             over ground to wheel speed; steps so far.
@@ -38,11 +39,12 @@ class Robot(NamedTuple):
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
         ranges: Shape (n_rays,), float32, px.
-        outcome: Shape (10,), float64: reward of the last step; whether it terminated
+        outcome: Shape (12,), float64: reward of the last step; whether it terminated
             or truncated the episode, reached the goal, touched an obstacle; number of
             contacts and of clipped actions so far; straight distance to the goal,
             length of the shortest path to it, clearance of the pixel under the robot
-            (px).
+            (px); length (px) and turn (rad) of the last step's arc, as driven by the
+            wheels.
     """
 
     constants: Array
@@ -112,6 +114,7 @@ def constants_of(
             task.goal_tolerance,
             task.horizon,
             FRICTION,
+            *stepping.UNDISTURBED,
         ],
         np.float64,
     )
