@@ -147,10 +147,11 @@ def measured(
     return np.clip(seen, -limits, limits).astype(np.float32)
 
 
-def odometry_space(limits: Array) -> spaces.Box:
-    """The space of the observed odometry with these limits, shape (2,)."""
+def with_odometry(space: spaces.Dict, limits: Array) -> spaces.Dict:
+    """An observation space with the odometry of these limits, shape (2,), added."""
     most = limits.astype(np.float32)
-    return spaces.Box(-most, most)
+    # A new `Dict` sorts its keys, as that of a batch does.
+    return spaces.Dict({**space.spaces, "odometry": spaces.Box(-most, most)})
 
 
 class BatchDisturbances:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Addresses
 from tdac_envs.core.arguments import non_negative, one_of
 from tdac_envs.drawing.runs import Status
-from tdac_envs.drive.disturbances import Disturbances, odometry_space
+from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import VARIATIONS
@@ -227,7 +227,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         more = {"gps": self.gps, "compass": self.compass, "encoders": self.encoders}
         space = observation_space(self.nominal, ground=self.ground_sensors, **more)
         if self.disturbances.odometry:
-            space["odometry"] = odometry_space(self._limits)
+            space = with_odometry(space, self._limits)
         self._has_more = len(space) > len(observation_space(self.nominal))
         self.observation_space = space  # type: ignore[assignment]
         reach = BODY_RADIUS + self.nominal.full_step

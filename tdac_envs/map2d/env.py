@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Addresses
 from tdac_envs.core.arguments import non_negative, number_up_to, one_of
 from tdac_envs.drawing.runs import Status
-from tdac_envs.drive.disturbances import Disturbances, odometry_space
+from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import VARIATIONS, Pose
@@ -241,7 +241,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         space = observation_space(self.nominal)
         self._is_inexact = self.setup.has_inexact_ranges
         if self.disturbances.odometry:
-            space["odometry"] = odometry_space(self._limits)
+            space = with_odometry(space, self._limits)
             self._is_inexact = True
         self.observation_space = space  # type: ignore[assignment]
         self.robot = Robot.blank(robot.n_rays, self.delay)
