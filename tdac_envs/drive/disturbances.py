@@ -133,17 +133,17 @@ class Disturbances:
 
 
 def measured(
-    outcome: Array, constants: Array, noise: Array | float, limits: Array
+    state: Array, constants: Array, noise: Array | float, limits: Array
 ) -> Observed:
     """The odometry of one robot, shape (2,), or of many, shape (n, 2).
 
     Args:
-        outcome: `Robot.outcome`.
+        state: `Robot.state`.
         constants: `Robot.constants`.
         noise: Factors of the noise, shape (2,) or (n, 2), or 1.0.
         limits: Of `odometry_limits`, shape (2,) or (n, 2).
     """
-    seen = outcome[..., _ARC] * constants[..., _SCALES] * noise
+    seen = state[..., _ARC] * constants[..., _SCALES] * noise
     return np.clip(seen, -limits, limits).astype(np.float32)
 
 
@@ -213,6 +213,6 @@ class BatchDisturbances:
         for i, factors in zip(robots, noise, strict=True):
             factors[:] = self._own[i].noise(batch.state[i], random(i))
         self._last[rows] = measured(
-            batch.outcome[rows], batch.constants[rows], noise, self._limits[rows]
+            batch.state[rows], batch.constants[rows], noise, self._limits[rows]
         )
         return self._last.copy()

@@ -139,7 +139,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         """The measured distance and turn of the last step, shape (2,)."""
         robot, own = self.robot, self.disturbances
         noise = own.noise(robot.state, self.np_random)
-        return measured(robot.outcome, robot.constants, noise, self._limits)
+        return measured(robot.state, robot.constants, noise, self._limits)
 
     def _observation(self) -> Observation:
         raise NotImplementedError

@@ -26,12 +26,12 @@ PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 1
 FRICTION, GAIN_LEFT, GAIN_RIGHT, DISTANCE_SCALE, TURN_SCALE = range(17, 22)
 N_CONSTANTS = 22
 # Entries of `state`.
-X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS = range(8)
-N_STATE = 8
+X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS, FORWARD, TURN = range(10)
+N_STATE = 10
 # Entries of `outcome`.
 REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
-GAP, REMAINING, ROOM, FORWARD, TURN = range(7, 12)
-N_OUTCOME = 12
+GAP, REMAINING, ROOM = range(7, 10)
+N_OUTCOME = 10
 UNDISTURBED = 1.0, 1.0, 1.0, 1.0
 """The gains and scales in `constants` of a robot without errors."""
 
@@ -43,11 +43,10 @@ def clear(
     """Resets a robot for a new episode, except for pose and remaining path length."""
     state[LEFT] = state[RIGHT] = 0.0
     state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
-    state[STEPS] = 0.0
+    state[STEPS] = state[FORWARD] = state[TURN] = 0.0
     queue[:] = 0.0
     wheel_speeds[:] = 0.0
     outcome[:REMAINING] = 0.0
-    outcome[FORWARD] = outcome[TURN] = 0.0
 
 
 @subkernel

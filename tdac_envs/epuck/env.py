@@ -70,18 +70,14 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `ground` | (3,) | | readings of gs0 to gs2, with `ground_sensors=True` |
     | `gps` | (3,) | m | x, y, z, with `gps=True` |
     | `compass` | (3,) | | north (+y) in the robot's frame, with `compass=True` |
-    | `encoders` | (2,) | rad | `wheel_positions` in encoder steps, `encoders=True` |
-    | `odometry` | (2,) | m, rad | motion of the last step, with `odometry=True` |
+    | `encoders` | (2,) | rad | angles in steps of 0.00628 rad, with `encoders=True` |
+    | `odometry` | (2,) | m, rad | motion in the last step, with `odometry=True` |
 
     The infra-red sensors `ps` are numbered clockwise from the front: ps0, ps1 and ps2
     point ahead, 46 degrees and 90 degrees to the right, ps3 to the right rear, ps4 to
     the left rear, and ps5, ps6 and ps7 mirror ps2, ps1 and ps0 on the left. Each sensor
     sees along one ray of 70 mm that rises from 33 to 44 mm above the ground, so it does
     not see low objects.
-
-    `wheel_speeds` are commands, before gains and slip. An encoder step is 0.00628 rad.
-    `odometry` is the length (negative backwards) and the turn (positive
-    counter-clockwise) of the last step's arc (`docs/disturbances.md`).
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
@@ -134,9 +130,10 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         goal_visible: Whether the sensors see the file's goal marker.
         wheel_slip: Relative standard deviation of each wheel's speed over ground.
         wheel_gains: Bound b of the wheels' hidden gains, uniform in [1 - b, 1 + b] and
-            drawn at each reset, as are the next error and `odometry_scale`.
-        axle_error: Bound of the hidden relative error of the axle length, uniform.
-        odometry: Whether to observe `odometry`.
+            drawn at each reset. `wheel_speeds` are commands: they do not show gains.
+        axle_error: Bound of the hidden relative error of the axle length, uniform, too.
+        odometry: Whether to observe the distance and turn of each step's arc, (0, 0)
+            after a reset; `docs/disturbances.md` defines them.
         odometry_scale: Standard deviation of the hidden scale errors of `odometry`.
         odometry_noise: Relative standard deviation of each measurement of `odometry`.
         motor_lag: Time constant of the wheel speeds, s.

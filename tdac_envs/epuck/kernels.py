@@ -165,8 +165,8 @@ def _turn_wheels(
     state[RIGHT_TURNED] += swept * right
     left, right = left * state[SLIP_LEFT], right * state[SLIP_RIGHT]
     left, right = swept * clip_unit(left), swept * clip_unit(right)
-    outcome[FORWARD] = 0.5 * (left + right) * WHEEL_RADIUS
-    outcome[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]
+    state[FORWARD] = 0.5 * (left + right) * WHEEL_RADIUS
+    state[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]
 
 
 @subkernel
@@ -234,7 +234,7 @@ def _drive(
     `constants` and, in `state`, the commands and the slip.
     """
     _turn_wheels(constants, state, queue, wheel_speeds, outcome)
-    forward, turn, x, y = outcome[FORWARD], outcome[TURN], state[X], state[Y]
+    forward, turn, x, y = state[FORWARD], state[TURN], state[X], state[Y]
     if outcome[ROOM] - constants[RADIUS] > abs(forward):
         # No contact is possible.
         x, y, heading = move(x, y, state[HEADING], forward, turn)
@@ -247,7 +247,7 @@ def _drive(
             (points, first, extent, listed, begin, end), state, forward, turn, constants
         )
         outcome[TOUCHED] = touched
-        outcome[FORWARD], outcome[TURN] = share * forward, share * turn
+        state[FORWARD], state[TURN] = share * forward, share * turn
     _finish(
         points, first, extent, cells, listed,
         seen_points, seen_first, seen_extent, seen_cells, seen_listed, field,

@@ -64,7 +64,7 @@ class Movables:
             drive()
             return
         kernels.turn_wheels(words)
-        forward, turn = outcome[FORWARD : TURN + 1].tolist()
+        forward, turn = state[FORWARD : TURN + 1].tolist()
         ground = task.ground
         outcome[TOUCHED] = push(
             self.solid, ground.solid, ground.centres, ground.masses,

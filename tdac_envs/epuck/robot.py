@@ -31,21 +31,21 @@ class Robot(NamedTuple):
             right wheel; scales of the measured distance and turn; height of the floor,
             x and y of the lower left corner of the path field and of the cells, spacing
             of the field, width of the cells (m).
-        state: Shape (10,), float64: x, y (m), heading (rad); unclipped commands of the
+        state: Shape (12,), float64: x, y (m), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
-            over ground to wheel speed; steps so far; wheel angles (rad).
+            over ground to wheel speed; steps so far; length (m) and turn (rad) of the
+            last step's arc, as driven by the wheels; wheel angles (rad).
         queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
         turned: Shape (2,), float32: observed wheel angles, rad.
         readings: Shape (8,), float32: readings of ps0 to ps7, without noise.
         hits: Shape (8, 3), float64; see `infrared.sense`.
-        outcome: Shape (12,), float64: reward of the last step; whether it terminated
+        outcome: Shape (10,), float64: reward of the last step; whether it terminated
             or truncated the episode, reached the goal, touched an obstacle; number of
             contacts and of clipped actions so far; straight distance to the goal,
             length of the shortest path to it, distance from the centre to the nearest
-            solid part (m); length (m) and turn (rad) of the last step's arc, as driven
-            by the wheels.
+            solid part (m).
     """
 
     constants: Array

@@ -54,15 +54,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `goal` | (2,) | px | x, y of the goal |
     | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
     | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
-    | `odometry` | (2,) | px, rad | motion of the last step, with `odometry=True` |
+    | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
     Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
     heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
     Rays start at the centre; no hit gives `range_max`.
-
-    `wheel_speeds` are commands, before gains and slip. `odometry` is the length
-    (negative backwards) and the turn (positive clockwise) of the last step's arc
-    (`docs/disturbances.md`).
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
@@ -117,9 +113,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         range_dropout: Probability that a ray reads `range_max` in a step.
         wheel_slip: Relative standard deviation of each wheel's speed.
         wheel_gains: Bound b of the wheels' hidden gains, uniform in [1 - b, 1 + b] and
-            drawn at each reset, as are the next error and `odometry_scale`.
-        axle_error: Bound of the hidden relative error of the axle length, uniform.
-        odometry: Whether to observe `odometry`.
+            drawn at each reset. `wheel_speeds` are commands: they do not show gains.
+        axle_error: Bound of the hidden relative error of the axle length, uniform, too.
+        odometry: Whether to observe the distance and turn of each step's arc, (0, 0)
+            after a reset; `docs/disturbances.md` defines them.
         odometry_scale: Standard deviation of the hidden scale errors of `odometry`.
         odometry_noise: Relative standard deviation of each measurement of `odometry`.
         motor_lag: Time constant of the wheel speeds, s.

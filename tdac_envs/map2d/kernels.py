@@ -239,7 +239,7 @@ def _drive(
             clear, state, forward, turn, radius, constants[FRICTION],
             CONTACT_GAP,
         )  # fmt: skip
-    outcome[FORWARD], outcome[TURN] = forward, turn
+    state[FORWARD], state[TURN] = forward, turn
     _observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip

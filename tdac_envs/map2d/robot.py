@@ -32,19 +32,19 @@ class Robot(NamedTuple):
             goal, collision, time; goal x and y, goal tolerance (px), horizon (steps);
             coefficient of friction between body and obstacles; gains of the left and
             right wheel; scales of the measured distance and turn.
-        state: Shape (8,), float64: x, y (px), heading (rad); unclipped commands of the
+        state: Shape (10,), float64: x, y (px), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
-            over ground to wheel speed; steps so far.
+            over ground to wheel speed; steps so far; length (px) and turn (rad) of the
+            last step's arc, as driven by the wheels.
         queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
         ranges: Shape (n_rays,), float32, px.
-        outcome: Shape (12,), float64: reward of the last step; whether it terminated
+        outcome: Shape (10,), float64: reward of the last step; whether it terminated
             or truncated the episode, reached the goal, touched an obstacle; number of
             contacts and of clipped actions so far; straight distance to the goal,
             length of the shortest path to it, clearance of the pixel under the robot
-            (px); length (px) and turn (rad) of the last step's arc, as driven by the
-            wheels.
+            (px).
     """
 
     constants: Array
