@@ -46,6 +46,9 @@ RANGE_NOISE = "Noise of each range, standard deviation relative to the range."
 WHEEL_SLIP = "Noise of each wheel's speed, standard deviation relative to the speed."
 MOTOR_LAG = "Time constant of the wheel speeds, s."
 DELAY = "Steps by which each action takes effect late."
+WHEEL_GAINS = "Bound of the hidden error of each wheel's speed, constant in an episode."
+AXLE_ERROR = "Bound of the hidden relative error of the axle length, constant, too."
+RANGE_DROPOUT = "Probability that a ray reads the largest range; only on maps."
 Controller = Annotated[
     str,
     typer.Argument(help="Controller file, or run folder, which brings its own task."),
@@ -274,4 +277,16 @@ MotorLag = Annotated[
 Delay = Annotated[
     Optional[int],  # noqa: UP045
     number_flag(help=f"{DELAY}  [default: 1]", rich_help_panel=DISTURBED),
+]
+WheelGains = Annotated[
+    Optional[float],  # noqa: UP045
+    number_flag(help=f"{WHEEL_GAINS}  [default: 0]", rich_help_panel=DISTURBED),
+]
+AxleError = Annotated[
+    Optional[float],  # noqa: UP045
+    number_flag(help=f"{AXLE_ERROR}  [default: 0]", rich_help_panel=DISTURBED),
+]
+RangeDropout = Annotated[
+    Optional[float],  # noqa: UP045
+    number_flag(help=f"{RANGE_DROPOUT}  [default: 0]", rich_help_panel=DISTURBED),
 ]

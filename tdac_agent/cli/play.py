@@ -58,6 +58,7 @@ def run(
     if seed is None:
         rollout = drive(task, read_source(file), name, tier)
     else:
+        task.disturbed_options(disturbance)
         driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
         rollout = driven.rollout
     _show(rollout, task, video, speed)

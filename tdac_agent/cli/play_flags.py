@@ -9,12 +9,15 @@ import typer
 
 from tdac_agent.cli.options import (
     VIDEO,
+    AxleError,
     Controller,
     Delay,
     MotorLag,
+    RangeDropout,
     RangeNoise,
     Speed,
     Tier,
+    WheelGains,
     WheelSlip,
     file_flag,
     number_flag,
@@ -56,6 +59,9 @@ def play(
     wheel_slip: WheelSlip = None,
     motor_lag: MotorLag = None,
     delay: Delay = None,
+    wheel_gains: WheelGains = None,
+    axle_error: AxleError = None,
+    range_dropout: RangeDropout = None,
 ) -> None:
     """Show one episode of a controller, run in the sandbox.
 
@@ -64,7 +70,15 @@ def play(
     from tdac_agent.cli import play as command
     from tdac_agent.cli.robust_flags import DisturbanceFlags
 
-    disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+    disturbed = DisturbanceFlags(
+        range_noise=range_noise,
+        wheel_slip=wheel_slip,
+        motor_lag=motor_lag,
+        delay=delay,
+        wheel_gains=wheel_gains,
+        axle_error=axle_error,
+        range_dropout=range_dropout,
+    )
     raise typer.Exit(
         command.run(
             controller, named_task(), video, speed, episode, seed, disturbed, tier

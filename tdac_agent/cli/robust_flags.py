@@ -18,6 +18,9 @@ class DisturbanceFlags:
     wheel_slip: float | None = None
     motor_lag: float | None = None
     delay: int | None = None
+    wheel_gains: float | None = None
+    axle_error: float | None = None
+    range_dropout: float | None = None
 
     def given(self) -> dict[str, float]:
         """The values of the given flags by field."""

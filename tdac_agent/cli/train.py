@@ -7,7 +7,7 @@ import json
 import math
 import shlex
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from tdac_agent.training.policy_files import POLICY
 from tdac_agent.training.train import check_extra, train
 from tdac_envs.core.errors import TaskError
 
-NOISES = ("range_noise", "wheel_slip", "motor_lag", "delay")
+NOISES = tuple(field.name for field in fields(Disturbance))
 LEARNT_AT = 0.95
 """Success rate from which a policy counts as having learnt its task."""
 

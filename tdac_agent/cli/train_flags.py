@@ -8,11 +8,14 @@ from typing import Annotated, Literal, Optional
 import typer
 
 from tdac_agent.cli.options import (
+    AXLE_ERROR,
     DELAY,
     MOTOR_LAG,
+    RANGE_DROPOUT,
     RANGE_NOISE,
     TASK,
     VARIATION,
+    WHEEL_GAINS,
     WHEEL_SLIP,
     WRAPPER,
     Json,
@@ -123,6 +126,18 @@ def train(
         Optional[int],  # noqa: UP045
         number_flag(help=f"{DELAY}  [default: 0]", rich_help_panel=DISTURBED),
     ] = None,
+    wheel_gains: Annotated[
+        Optional[float],  # noqa: UP045
+        number_flag(help=f"{WHEEL_GAINS}  [default: 0]", rich_help_panel=DISTURBED),
+    ] = None,
+    axle_error: Annotated[
+        Optional[float],  # noqa: UP045
+        number_flag(help=f"{AXLE_ERROR}  [default: 0]", rich_help_panel=DISTURBED),
+    ] = None,
+    range_dropout: Annotated[
+        Optional[float],  # noqa: UP045
+        number_flag(help=f"{RANGE_DROPOUT}  [default: 0]", rich_help_panel=DISTURBED),
+    ] = None,
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
@@ -134,6 +149,9 @@ def train(
         "wheel_slip": wheel_slip,
         "motor_lag": motor_lag,
         "delay": delay,
+        "wheel_gains": wheel_gains,
+        "axle_error": axle_error,
+        "range_dropout": range_dropout,
     }
     given = {
         "task": tasks,

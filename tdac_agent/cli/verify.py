@@ -48,6 +48,8 @@ def run(
         _check_folder(out)
     file, task = _prepared(controller, flags)
     task = allowed(task, suite, trust=trust)
+    if robust.robust is not None:
+        task.disturbed_options(robust.disturbed.disturbance())
     gc.freeze()
     gc.enable()
     with WarmJudge(child_pool) as judge:

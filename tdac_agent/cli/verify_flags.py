@@ -9,16 +9,19 @@ from typing import Annotated, Optional
 import typer
 
 from tdac_agent.cli.options import (
+    AxleError,
     Controller,
     Delay,
     JitterSeed,
     Json,
     MotorLag,
     Profile,
+    RangeDropout,
     RangeNoise,
     Suite,
     Tier,
     Trust,
+    WheelGains,
     WheelSlip,
     dir_flag,
     file_flag,
@@ -96,6 +99,9 @@ def verify(
     wheel_slip: WheelSlip = None,
     motor_lag: MotorLag = None,
     delay: Delay = None,
+    wheel_gains: WheelGains = None,
+    axle_error: AxleError = None,
+    range_dropout: RangeDropout = None,
 ) -> None:
     """Test a controller in the sandbox; exit 0 only if all tests pass."""
     # Imported objects live until exit: collecting them is a waste of time.
@@ -107,7 +113,15 @@ def verify(
         from tdac_agent.cli import verify as command
         from tdac_agent.cli.robust_flags import DisturbanceFlags, RobustFlags
 
-        disturbed = DisturbanceFlags(range_noise, wheel_slip, motor_lag, delay)
+        disturbed = DisturbanceFlags(
+            range_noise=range_noise,
+            wheel_slip=wheel_slip,
+            motor_lag=motor_lag,
+            delay=delay,
+            wheel_gains=wheel_gains,
+            axle_error=axle_error,
+            range_dropout=range_dropout,
+        )
         wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
         code = command.run(
             controller,

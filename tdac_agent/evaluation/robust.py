@@ -72,11 +72,14 @@ def verify_robust(
 
     Raises:
         ControllerFileError: The file cannot be read.
-        TaskError: A number is invalid.
+        TaskError: A number is invalid, or the environment does not have a part of the
+            disturbance.
         Fault: The sandbox is broken; the controller neither passes nor fails.
     """
     began = time.monotonic()
     whole_number("episodes", episodes, 1, MOST_EPISODES)
+    disturbance = disturbance or Disturbance()
+    task.disturbed_options(disturbance)
     if first_seed is not None:
         whole_number("first seed", first_seed, 0)
     test = None if accept_at is None else SequentialTest(accept_at, episodes, margin)
@@ -89,7 +92,7 @@ def verify_robust(
         job = SeededJob(
             task=lay_out(task, folder / "work"),
             policy=PolicySpec("controller", controller_file),
-            disturbance=disturbance or Disturbance(),
+            disturbance=disturbance,
             variation="jitter",
             seeds=tuple(range(first, first + episodes)),
             test=test,

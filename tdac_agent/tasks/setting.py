@@ -182,6 +182,10 @@ class Setting(Protocol):
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the environment's option for relative distance sensor noise."""
 
+    @property
+    def has_dropouts(self) -> bool:
+        """Whether the environment has the option `range_dropout`."""
+
     def facts(self) -> dict[str, Any]:
         """Returns all that determines an episode, the map or world by its hash."""
 

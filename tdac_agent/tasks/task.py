@@ -26,6 +26,7 @@ from tdac_agent.tasks.task_file import (
     bundled_tasks,
     read_task_file,
 )
+from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import printable
 
 SENSORS_FILE = Path(__file__).parents[2] / "tdac_envs" / "controller_kit" / "sensors.py"
@@ -92,9 +93,22 @@ class Task:
         self, disturbance: Disturbance, variation: str = "jitter"
     ) -> JudgedEnv:
         """Constructs this task's environment with a disturbance."""
-        options = {**disturbance.env_options(), "variation": variation}
-        noise = self.setting.noise(options.pop("range_noise"))
-        return self.make_env(**options, **noise)
+        options = self.disturbed_options(disturbance)
+        return self.make_env(**{**options, "variation": variation})
+
+    def disturbed_options(self, disturbance: Disturbance) -> dict[str, Any]:
+        """Returns the arguments of this task's environment for a disturbance.
+
+        Raises:
+            TaskError: The environment does not have one of its parts.
+        """
+        options = disturbance.env_options()
+        if "range_dropout" in options and not self.setting.has_dropouts:
+            raise TaskError(
+                f"the sensors of {self.spec.env} have no dropouts; leave out "
+                "--range-dropout"
+            )
+        return options | self.setting.noise(options.pop("range_noise"))
 
     def sha256(self) -> str:
         """Returns the hash of all that determines an episode and the progress test."""

@@ -100,6 +100,9 @@ def make_plan(
     loaded = [load_task(name) for name in tasks]
     if len({task.spec.env for task in loaded}) != 1:
         raise TaskError("expected tasks of one environment: all maps, or all worlds")
+    disturbance = disturbance or Disturbance(0.0, 0.0, 0.0, 0)
+    for task in loaded:
+        task.disturbed_options(disturbance)
     given = read_hyperparameters(config or config_file(algo), loaded[0].spec.env)
     names = given.wrappers if wrappers is None else wrappers
     check_wrappers(names)
@@ -117,7 +120,7 @@ def make_plan(
         wrappers=names,
         variation=variation or "jitter",
         env_kwargs=_env_kwargs(given, variation, loaded[0]),
-        disturbance=disturbance or Disturbance(0.0, 0.0, 0.0, 0),
+        disturbance=disturbance,
         steps=wanted,
         seed=seed,
         n_envs=max(count, len(tasks)),
@@ -180,9 +183,8 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
     tasks = tasks_of(plan)
     own = plan.env_kwargs if training else {}
     for task in tasks:
-        options = plan.disturbance.env_options()
-        noise = task.setting.noise(options.pop("range_noise"))
-        varied = {**options, **noise, "variation": plan.variation, **own}
+        options = task.disturbed_options(plan.disturbance)
+        varied = {**options, "variation": plan.variation, **own}
         each.append({**task.env_kwargs(), **varied})
     try:
         name = str(gym.spec(tasks[0].spec.env).vector_entry_point)

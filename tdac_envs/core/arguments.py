@@ -88,6 +88,18 @@ def non_negative(name: str, value: float) -> float:
     return number
 
 
+def number_up_to(name: str, value: float, most: float) -> float:
+    """The value as a float.
+
+    Raises:
+        TaskError: It is not a number from 0 to `most`.
+    """
+    number = finite(name, value)
+    if not 0.0 <= number <= most:
+        raise TaskError(f"expected {name} from 0 to {most:g}, got {value!r}")
+    return number
+
+
 def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
     """Checks that the value is one of the allowed values.
 

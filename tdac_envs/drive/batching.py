@@ -114,8 +114,12 @@ def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:
         rays = "n_rays and " if "ranges" in first.observation_space.spaces else ""
         raise TaskError(f"expected the same {rays}delay for all robots of a batch")
     keys = first.observation_space.keys()
-    if any(env.observation_space.keys() != keys for env in envs):
-        raise TaskError("expected the same sensors for all robots of a batch")
+    differ = {key for env in envs for key in keys ^ env.observation_space.keys()}
+    if differ:
+        raise TaskError(
+            "expected the same sensors for all robots of a batch; not all observe "
+            + ", ".join(sorted(differ))
+        )
     bounds: dict[str, gym.Space[Any]] = {}
     for key, box in first.observation_space.items():
         others = [env.observation_space[key] for env in envs]

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import non_negative, one_of, whole_number
 from tdac_envs.drawing.runs import outcome_of
+from tdac_envs.drive.disturbances import Disturbances, measured
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import (
     HEADING,
     LEFT,
     RIGHT,
-    SLIP_LEFT,
-    SLIP_RIGHT,
     info_of,
 )
 
@@ -35,9 +34,9 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     Args:
         on_collision: `"terminate"` or `"block"`.
-        wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
+        disturbances: Slip, hidden errors, odometry.
         reward_weights: Reward weights that differ from the defaults, by name.
         dt: Duration of a step, s.
         render_mode: `"rgb_array"`, `"human"` or None.
@@ -46,11 +45,13 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         title: Title of the window.
         robot: Arrays of the robot; see `tdac_envs.drive.stepping`.
         task: The task of the current episode.
+        nominal: The task without variation, which a subclass sets first.
     """
 
     title: str
     robot: Any
     task: Any
+    nominal: Any
     _scene: Any
     _call_drive: Callable[[], None]
     _steps: int
@@ -61,9 +62,9 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         self,
         *,
         on_collision: str,
-        wheel_slip: float,
         motor_lag: float,
         delay: int,
+        disturbances: Disturbances,
         reward_weights: Mapping[str, float] | None,
         dt: float,
         render_mode: str | None,
@@ -71,7 +72,10 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         one_of("on_collision", on_collision, ("terminate", "block"))
         one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         self.on_collision = on_collision
-        self.wheel_slip = non_negative("wheel_slip", wheel_slip)
+        self.disturbances = disturbances
+        self.wheel_slip = disturbances.wheel_slip
+        robot = self.nominal
+        self._limits = disturbances.odometry_limits(robot.full_step, robot.axle_length)
         self.motor_lag = non_negative("motor_lag", motor_lag)
         self.delay = whole_number("delay", delay, 0)
         self.weights = weights_of(reward_weights)
@@ -91,8 +95,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         state = self.robot.state
         state[LEFT], state[RIGHT] = wheel_speeds(action)
         if self.wheel_slip:
-            slip = self.np_random.normal(1.0, self.wheel_slip, 2)
-            state[SLIP_LEFT : SLIP_RIGHT + 1] = slip
+            self.disturbances.slip(state, self.np_random)
         self._call_drive()
         outcome = self.robot.outcome.tolist()
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
@@ -126,6 +129,17 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         """The true pose, shape (3,): x, y (px or m), heading (rad)."""
         pose: NDArray[np.float64] = self.robot.state[: HEADING + 1].copy()
         return pose
+
+    def _hide(self) -> None:
+        """Draws the hidden errors of an episode, after its task."""
+        axle_length = self.task.axle_length
+        self.disturbances.hide(self.robot.constants, axle_length, self.np_random)
+
+    def _odometry(self) -> NDArray[np.float32]:
+        """The measured distance and turn of the last step, shape (2,)."""
+        robot, own = self.robot, self.disturbances
+        noise = own.noise(robot.state, self.np_random)
+        return measured(robot.state, robot.constants, noise, self._limits)
 
     def _observation(self) -> Observation:
         raise NotImplementedError

@@ -23,15 +23,17 @@ Flags = NDArray[np.bool_]
 # Entries of `constants`.
 AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
 PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 17)
-FRICTION = 17
-N_CONSTANTS = 18
+FRICTION, GAIN_LEFT, GAIN_RIGHT, DISTANCE_SCALE, TURN_SCALE = range(17, 22)
+N_CONSTANTS = 22
 # Entries of `state`.
-X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS = range(8)
-N_STATE = 8
+X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS, FORWARD, TURN = range(10)
+N_STATE = 10
 # Entries of `outcome`.
 REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
 GAP, REMAINING, ROOM = range(7, 10)
 N_OUTCOME = 10
+UNDISTURBED = 1.0, 1.0, 1.0, 1.0
+"""The gains and scales in `constants` of a robot without errors."""
 
 
 @subkernel
@@ -41,7 +43,7 @@ def clear(
     """Resets a robot for a new episode, except for pose and remaining path length."""
     state[LEFT] = state[RIGHT] = 0.0
     state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
-    state[STEPS] = 0.0
+    state[STEPS] = state[FORWARD] = state[TURN] = 0.0
     queue[:] = 0.0
     wheel_speeds[:] = 0.0
     outcome[:REMAINING] = 0.0
@@ -125,6 +127,17 @@ def apply_command(
     lag = constants[LAG]
     wheel_speeds[0] = left + lag * (wheel_speeds[0] - left)
     wheel_speeds[1] = right + lag * (wheel_speeds[1] - right)
+
+
+@subkernel
+def turned_wheels(
+    constants: Array, wheel_speeds: NDArray[np.float32]
+) -> tuple[float, float]:
+    """True speeds of the wheels with their gains, as fractions of the full speed."""
+    return (
+        clip_unit(wheel_speeds[0] * constants[GAIN_LEFT]),
+        clip_unit(wheel_speeds[1] * constants[GAIN_RIGHT]),
+    )
 
 
 @subkernel

@@ -29,6 +29,7 @@ from tdac_envs.drive.batching import (
     seeds_of,
     store_actions,
 )
+from tdac_envs.drive.disturbances import BatchDisturbances
 from tdac_envs.drive.frames import frames_of
 
 Observations = dict[str, NDArray[np.float32]]
@@ -93,7 +94,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         self._slices = Slices(self.threads)
         self._all = np.arange(num_envs)
         self._everyone = np.ones(num_envs, np.bool_)
-        self._slippery = [i for i, s in enumerate(self.setups) if s.wheel_slip]
+        self._disturbances = BatchDisturbances(self.setups)
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
         self._vary = [setup.variation != "nominal" for setup in self.setups]
@@ -159,9 +160,9 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
                 f"call reset(options={{'reset_mask': ...}}) for the robots whose "
                 f"episodes have ended: {ended[:10].tolist()}"
             )
-        if self._slippery:
-            self._slip()
-        if self._tasks_change:
+        if self._disturbances.slippery:
+            self._disturbances.slip(self._over, self.robots.state, self._random)
+        if self._tasks_change or self._disturbances.hidden:
             self._draw(np.flatnonzero(self._over), {})
         observations, outcome = self._results()
         self._act(self._all, observations, outcome)
@@ -276,7 +277,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
 
     def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
         chosen = np.flatnonzero(mask)
-        if options or self._tasks_change:
+        if options or self._tasks_change or self._disturbances.hidden:
             self._draw(chosen, options)
         self._over[chosen] = True
         # The caller reads the robots' own arrays, not these copies.
@@ -286,7 +287,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             self._frames.begin(chosen.tolist(), self.tasks)
 
     def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
-        """Draws the next tasks of some robots."""
+        """Draws the next tasks of some robots, then their hidden errors."""
         drawn = [
             (i, self.setups[i].draw(options, self._random(i)))
             for i in robots.tolist()
@@ -294,6 +295,9 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         ]
         for i, task in drawn:
             self._assign(i, task)
+        if self._disturbances.hidden:
+            constants = self.robots.constants
+            self._disturbances.hide(robots.tolist(), constants, self._random)
 
     def _assign(self, i: int, task: Any) -> None:
         self._tasks_change = True
@@ -310,14 +314,6 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             random, self._seeds[i] = seeding.np_random()
             self._randoms[i] = random
         return random
-
-    def _slip(self) -> None:
-        """Draws the wheel slip of the robots whose episodes go on."""
-        for i in self._slippery:
-            if not self._over[i]:
-                slip = self._random(i).normal(1.0, self.setups[i].wheel_slip, 2)
-                state = self.robots.state[i]
-                state[stepping.SLIP_LEFT : stepping.SLIP_RIGHT + 1] = slip
 
     def _restart(
         self, observations: Observations, infos: dict[str, Any]

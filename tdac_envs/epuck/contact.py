@@ -242,7 +242,7 @@ def advance(
     forward: float,
     turn: float,
     radius: float,
-) -> bool:
+) -> tuple[bool, float]:
     """Moves a disc along an arc, up to a contact.
 
     Args:
@@ -258,8 +258,8 @@ def advance(
         radius: Radius of the disc, m.
 
     Returns:
-        Whether it touched a part. It is then placed `CONTACT_GAP` before the contact,
-        with the heading that it had there.
+        Whether it touched a part, and the fraction of the arc that it moved. It is then
+        placed `CONTACT_GAP` before the contact, with the heading that it had there.
     """
     x, y, heading = state[X], state[Y], state[HEADING]
     touch = touch_of(
@@ -271,7 +271,7 @@ def advance(
         share = max(touch - CONTACT_GAP / abs(forward), 0.0)
     x, y, heading = move(x, y, heading, share * forward, share * turn)
     state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
-    return bool(touch <= 1.0)
+    return bool(touch <= 1.0), share
 
 
 _slide = sliding(arc_touch, near_normals)
@@ -280,7 +280,7 @@ _slide = sliding(arc_touch, near_normals)
 @subkernel
 def move_body(
     near: Near, state: Array, forward: float, turn: float, constants: Array
-) -> bool:
+) -> tuple[bool, float]:
     """Moves the robot along an arc; a contact stops it, or it slides.
 
     Args:
@@ -291,7 +291,8 @@ def move_body(
         constants: See `tdac_envs.epuck.robot.Robot`.
 
     Returns:
-        Whether it touched a part.
+        Whether it touched a part, and the fraction of the arc that its wheels drove: 1
+        if it slides.
     """
     radius = constants[RADIUS]
     if constants[STOPS] == 0.0:
@@ -299,7 +300,7 @@ def move_body(
         touched: bool = _slide(
             near, state, forward, turn, radius, friction, CONTACT_GAP
         )
-        return touched
+        return touched, 1.0
     points, first, extent, listed, begin, end = near
     return advance(
         points, first, extent, listed, begin, end, state, forward, turn, radius

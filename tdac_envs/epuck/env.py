@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Addresses
 from tdac_envs.core.arguments import non_negative, one_of
 from tdac_envs.drawing.runs import Status
+from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
-from tdac_envs.drive.stepping import TOUCHED, info_of
+from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import VARIATIONS
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.ground import Ground
+from tdac_envs.epuck.movables import Movables
 from tdac_envs.epuck.nearby import surroundings
 from tdac_envs.epuck.observed import (
+    encoder_angles,
     ground_readings,
     noisy,
     north,
@@ -67,6 +70,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `ground` | (3,) | | readings of gs0 to gs2, with `ground_sensors=True` |
     | `gps` | (3,) | m | x, y, z, with `gps=True` |
     | `compass` | (3,) | | north (+y) in the robot's frame, with `compass=True` |
+    | `encoders` | (2,) | rad | angles in steps of 0.00628 rad, with `encoders=True` |
+    | `odometry` | (2,) | m, rad | motion in the last step, with `odometry=True` |
 
     The infra-red sensors `ps` are numbered clockwise from the front: ps0, ps1 and ps2
     point ahead, 46 degrees and 90 degrees to the right, ps3 to the right rear, ps4 to
@@ -140,14 +145,21 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             `"webots"`: objects have the reflectance of the file's materials; a
             WoodenBox, for example, is visible only within 15 mm.
         goal_visible: Whether the sensors see the file's goal marker.
-        wheel_slip: Relative standard deviation of each wheel's speed.
+        wheel_slip: Relative standard deviation of each wheel's speed over ground.
+        wheel_gains: Bound b of the wheels' hidden gains, uniform in [1 - b, 1 + b] and
+            drawn at each reset. `wheel_speeds` are commands: they do not show gains.
+        axle_error: Bound of the hidden relative error of the axle length, uniform, too.
+        odometry: Whether to observe the distance and turn of each step's arc, (0, 0)
+            after a reset; `docs/disturbances.md` defines them.
+        odometry_scale: Standard deviation of the hidden scale errors of `odometry`.
+        odometry_noise: Relative standard deviation of each measurement of `odometry`.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
         reward_weights: Reward weights by name, where they differ from the defaults.
             Keep the defaults when comparing rewards.
         ignore: Names or types of unmodelled nodes to leave out. Any other unmodelled
             node that may be solid raises an error.
-        ground_sensors, gps, compass: Whether to observe `ground`, `gps`, `compass`.
+        ground_sensors, gps, compass, encoders: Whether to observe what the table says.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -176,6 +188,11 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         reflectance: str = "ideal",
         goal_visible: bool = False,
         wheel_slip: float = 0.0,
+        wheel_gains: float = 0.0,
+        axle_error: float = 0.0,
+        odometry: bool = False,
+        odometry_scale: float = 0.0,
+        odometry_noise: float = 0.0,
         motor_lag: float = 0.0,
         delay: int = 0,
         reward_weights: Mapping[str, float] | None = None,
@@ -183,6 +200,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         ground_sensors: bool = False,
         gps: bool = False,
         compass: bool = False,
+        encoders: bool = False,
         render_mode: str | None = None,
     ) -> None:
         one_of("variation", variation, VARIATIONS)
@@ -202,9 +220,16 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         )
         super().__init__(
             on_collision=on_collision,
-            wheel_slip=wheel_slip,
             motor_lag=motor_lag,
             delay=delay,
+            disturbances=Disturbances(
+                wheel_slip,
+                wheel_gains,
+                axle_error,
+                odometry,
+                odometry_scale,
+                odometry_noise,
+            ),
             reward_weights=reward_weights,
             dt=self.nominal.dt,
             render_mode=render_mode,
@@ -212,10 +237,12 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self.variation = variation
         self.sensor_noise = non_negative("sensor_noise", sensor_noise)
         self.ground_sensors = bool(ground_sensors)
-        self.gps, self.compass = bool(gps), bool(compass)
-        space = observation_space(
-            self.nominal, ground=self.ground_sensors, gps=self.gps, compass=self.compass
-        )
+        self.gps, self.compass, self.encoders = bool(gps), bool(compass), bool(encoders)
+        more = {"gps": self.gps, "compass": self.compass, "encoders": self.encoders}
+        space = observation_space(self.nominal, ground=self.ground_sensors, **more)
+        if self.disturbances.odometry:
+            space = with_odometry(space, self._limits)
+        self._has_more = len(space) > len(observation_space(self.nominal))
         self.observation_space = space  # type: ignore[assignment]
         reach = BODY_RADIUS + self.nominal.full_step
         self.setup = setup = Setup(
@@ -224,17 +251,12 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             variation,
             horizon is not None,
             on_collision,
-            self.wheel_slip,
             self.motor_lag,
             self.delay,
+            self.disturbances,
             self.weights,
         )
-        self._pushes = setup.pushes
-        # Current positions; `ground.solid` and `visible` keep the initial ones.
-        visible = setup.around.visible
-        self._solid = ground.solid.copy() if self._pushes else ground.solid
-        self._seen = visible.copy() if self._pushes else visible
-        self._things, self._speed = np.zeros((len(ground.masses), 6)), np.zeros(3)
+        self._movables = Movables(setup)
         self.robot = Robot.blank(self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
@@ -254,12 +276,9 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self.task = task = self.setup.draw(options or {}, self.np_random)
         if task.field is not before.field:
             self._bind()
-        if self._pushes:
-            self._speed[:] = 0.0
-            self._things[:] = 0.0
-            self._things[:, :2] = task.ground.centres
-            self._carry()
+        self._movables.reset()
         self.robot.place(task)
+        self._hide()
         self._goal[:] = task.goal
         self._call_begin()
         self._begin_trail()
@@ -270,13 +289,10 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     def things(self) -> NDArray[np.float64]:
         """Centre (m) and rotation since the reset (rad) of movable objects, (k, 3)."""
-        if self._pushes:
-            return self._things[:, :3].copy()
-        centres = self.task.ground.centres
-        return np.column_stack([centres, np.zeros(len(centres))])
+        return self._movables.things[:, :3].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        calls = "addresses", "_call_begin", "_call_drive", "_call_exact"
+        calls = "addresses", "_call_begin", "_call_drive"
         return {**self.__dict__, **dict.fromkeys(calls), "_scene": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -285,44 +301,17 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     def _bind(self) -> None:
         """Binds the kernels to this environment's own arrays."""
-        world = self.setup.world(self.task, self._solid, self._seen)
+        things = self._movables
+        world = self.setup.world(self.task, things.solid, things.seen)
         self.addresses = Addresses([(*world, *self.robot)])
         (words,) = self.addresses.words
         self._call_begin: Callable[[], None] = partial(kernels.begin, words)
         self._call_drive = partial(kernels.drive, words)
-        if self._pushes:
-            self._call_exact, self._call_drive = self._call_drive, self._push
-
-    def _push(self) -> None:
-        """Runs one step, with the physics engine if a movable object is near."""
-        from tdac_envs.epuck.pushing import Drive, is_near, push
-
-        task, robot = self.task, self.robot
-        ground, reach = task.ground, 1.5 * task.full_step
-        if not is_near(self._solid, robot.state, self._things, reach):
-            self._speed[:] = 0.0
-            self._call_exact()
-            return
-        (words,), state, outcome = self.addresses.words, robot.state, robot.outcome
-        kernels.turn_wheels(words)
-        forward, turn = outcome[kernels.FORWARD :].tolist()
-        outcome[TOUCHED] = push(
-            self._solid, ground.solid, ground.centres, ground.masses,
-            state, self._speed, self._things, Drive(forward, turn, task.dt),
-            ground.world.friction,
-        )  # fmt: skip
-        self._carry()
-        kernels.finish(words)
-
-    def _carry(self) -> None:
-        """Moves the solid and visible parts to the current poses of their objects."""
-        ground = self.task.ground
-        self._solid.carry(ground.solid, ground.centres, self._things)
-        visible = self.setup.around.visible
-        self._seen.carry(visible, ground.centres, self._things)
+        if self.setup.pushes:
+            self._call_drive = partial(things.step, words, self.robot, self._call_drive)
 
     def _observation(self) -> Observation:
-        robot, floor = self.robot, self.task.ground.floor
+        robot = self.robot
         observation = {
             "pose": robot.pose.copy(),
             "goal": self._goal.copy(),
@@ -330,14 +319,24 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             "ps": self._noisy(robot.readings.copy(), robot.hits[:, 2]),
             "wheel_positions": robot.turned.copy(),
         }
+        if self._has_more:
+            self._add_more(observation)
+        return observation
+
+    def _add_more(self, observation: Observation) -> None:
+        """Adds what is observed only if an argument asks for it."""
+        robot, floor = self.robot, self.task.ground.floor
         if self.ground_sensors:
-            found = ground_readings(self._seen, floor, robot)
+            found = ground_readings(self._movables.seen, floor, robot)
             observation["ground"] = self._noisy(*found)
         if self.gps:
             observation["gps"] = position(robot, floor)
         if self.compass:
             observation["compass"] = north(robot)
-        return observation
+        if self.encoders:
+            observation["encoders"] = encoder_angles(robot)
+        if self.disturbances.odometry:
+            observation["odometry"] = self._odometry()
 
     def _noisy(
         self, readings: NDArray[np.float32], spreads: NDArray[np.float64]
@@ -352,7 +351,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
         task, robot = self.task, self.robot
         if self._scene is None:
-            self._scene = EPuckScene(task, movable=self._pushes)
+            self._scene = EPuckScene(task, movable=self.setup.pushes)
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)
         return self._scene.frame(
@@ -360,6 +359,6 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             readings=robot.readings,
             reaches=robot.hits[:, 0],
             trail=self._trail,
-            solid=self._solid,
+            solid=self._movables.solid,
             status=status,
         )

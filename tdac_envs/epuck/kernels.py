@@ -17,6 +17,7 @@ from tdac_envs.drive import stepping
 from tdac_envs.drive.stepping import (
     AXLE,
     DT,
+    FORWARD,
     GAP,
     GOAL_X,
     GOAL_Y,
@@ -30,6 +31,7 @@ from tdac_envs.drive.stepping import (
     SLIP_RIGHT,
     TOLERANCE,
     TOUCHED,
+    TURN,
     X,
     Y,
     apply_command,
@@ -40,6 +42,7 @@ from tdac_envs.drive.stepping import (
     finish_step,
     give_command,
     move,
+    turned_wheels,
     wrap_angle,
 )
 from tdac_envs.epuck.contact import move_body
@@ -52,14 +55,11 @@ WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
 MOST_TURNED = 1e4
 """Limit of the observed wheel angles, rad."""
 
-# Entries of `constants`, `state` and `outcome` beyond those of
-# `tdac_envs.drive.stepping`.
+# Entries of `constants` and `state` beyond those of `tdac_envs.drive.stepping`.
 N_CONSTANTS = stepping.N_CONSTANTS + 5
 FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(stepping.N_CONSTANTS, N_CONSTANTS)
 N_STATE = stepping.N_STATE + 2
 LEFT_TURNED, RIGHT_TURNED = range(stepping.N_STATE, N_STATE)
-N_OUTCOME = stepping.N_OUTCOME + 2
-FORWARD, TURN = range(stepping.N_OUTCOME, N_OUTCOME)
 # Indices of some of the arrays of `_arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19
@@ -157,16 +157,16 @@ def _turn_wheels(
     wheel_speeds: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Updates wheel speeds and angles, and the commanded arc, as of `_drive`."""
+    """Updates wheel speeds and angles, and the arc without contact, as of `_drive`."""
     apply_command(constants, state, queue, wheel_speeds, outcome)
     swept = constants[MAX_SPEED] * constants[DT]
-    left, right = float(wheel_speeds[0]), float(wheel_speeds[1])
+    left, right = turned_wheels(constants, wheel_speeds)
     state[LEFT_TURNED] += swept * left
     state[RIGHT_TURNED] += swept * right
     left, right = left * state[SLIP_LEFT], right * state[SLIP_RIGHT]
     left, right = swept * clip_unit(left), swept * clip_unit(right)
-    outcome[FORWARD] = 0.5 * (left + right) * WHEEL_RADIUS
-    outcome[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]
+    state[FORWARD] = 0.5 * (left + right) * WHEEL_RADIUS
+    state[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]
 
 
 @subkernel
@@ -234,7 +234,7 @@ def _drive(
     `constants` and, in `state`, the commands and the slip.
     """
     _turn_wheels(constants, state, queue, wheel_speeds, outcome)
-    forward, turn, x, y = outcome[FORWARD], outcome[TURN], state[X], state[Y]
+    forward, turn, x, y = state[FORWARD], state[TURN], state[X], state[Y]
     if outcome[ROOM] - constants[RADIUS] > abs(forward):
         # No contact is possible.
         x, y, heading = move(x, y, state[HEADING], forward, turn)
@@ -243,9 +243,11 @@ def _drive(
     else:
         left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
         begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
-        outcome[TOUCHED] = move_body(
+        touched, share = move_body(
             (points, first, extent, listed, begin, end), state, forward, turn, constants
         )
+        outcome[TOUCHED] = touched
+        state[FORWARD], state[TURN] = share * forward, share * turn
     _finish(
         points, first, extent, cells, listed,
         seen_points, seen_first, seen_extent, seen_cells, seen_listed, field,

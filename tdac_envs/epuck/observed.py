@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.drive.stepping import HEADING
 from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, sense_ground
-from tdac_envs.epuck.kernels import MOST_TURNED
+from tdac_envs.epuck.kernels import LEFT_TURNED, MOST_TURNED, RIGHT_TURNED
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.task import EPuckTask
@@ -23,9 +23,17 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 Array = NDArray[np.float64]
 Observed = NDArray[np.float32]
 
+ENCODER_STEP = 0.00628
+"""Resolution of the wheel encoders in Webots, rad: 1000 steps per revolution."""
+
 
 def observation_space(
-    task: EPuckTask, *, ground: bool = False, gps: bool = False, compass: bool = False
+    task: EPuckTask,
+    *,
+    ground: bool = False,
+    gps: bool = False,
+    compass: bool = False,
+    encoders: bool = False,
 ) -> spaces.Dict:
     """The observation space of a task; see `EPuckEnv`."""
     # The body is inside the fence, except for small overlaps in the physics engine.
@@ -49,6 +57,8 @@ def observation_space(
         )
     if compass:
         space["compass"] = spaces.Box(-1.0, 1.0, (3,), np.float32)
+    if encoders:
+        space["encoders"] = spaces.Box(-turned, turned, (2,), np.float32)
     return spaces.Dict(space)
 
 
@@ -88,3 +98,14 @@ def north(robot: Robot) -> Observed:
     heading = robot.state[..., HEADING]
     aim = np.stack([np.sin(heading), np.cos(heading), 0.0 * heading], axis=-1)
     return aim.astype(np.float32)
+
+
+def in_encoder_steps(angles: Array) -> Array:
+    """Wheel angles rounded to steps of the encoders, rad."""
+    return ENCODER_STEP * np.round(angles / ENCODER_STEP)
+
+
+def encoder_angles(robot: Robot) -> Observed:
+    """Readings of the wheel encoders since the reset, rad, shape (2,): left, right."""
+    angles = in_encoder_steps(robot.state[..., LEFT_TURNED : RIGHT_TURNED + 1])
+    return np.clip(angles, -MOST_TURNED, MOST_TURNED).astype(np.float32)

@@ -22,28 +22,30 @@ class Robot(NamedTuple):
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (23,), float64: axle length (m), full wheel speed (rad/s), dt
+        constants: Shape (27,), float64: axle length (m), full wheel speed (rad/s), dt
             (s), body radius, sensor range (m), fraction of a wheel's speed that remains
             after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (m); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (m), horizon (steps);
-            coefficient of friction between body and solids; height of the floor, x and
-            y of the lower left corner of the path field and of the cells, spacing of
-            the field, width of the cells (m).
-        state: Shape (10,), float64: x, y (m), heading (rad); unclipped commands of the
+            coefficient of friction between body and solids; gains of the left and
+            right wheel; scales of the measured distance and turn; height of the floor,
+            x and y of the lower left corner of the path field and of the cells, spacing
+            of the field, width of the cells (m).
+        state: Shape (12,), float64: x, y (m), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
-            over ground to wheel speed; steps so far; wheel angles (rad).
+            over ground to wheel speed; steps so far; length (m) and turn (rad) of the
+            last step's arc, as driven by the wheels; wheel angles (rad).
         queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
         turned: Shape (2,), float32: observed wheel angles, rad.
         readings: Shape (8,), float32: readings of ps0 to ps7, without noise.
         hits: Shape (8, 3), float64; see `infrared.sense`.
-        outcome: Shape (12,), float64: reward of the last step; whether it terminated
+        outcome: Shape (10,), float64: reward of the last step; whether it terminated
             or truncated the episode, reached the goal, touched an obstacle; number of
             contacts and of clipped actions so far; straight distance to the goal,
             length of the shortest path to it, distance from the centre to the nearest
-            solid part (m); length (m) and turn (rad) of the commanded arc.
+            solid part (m).
     """
 
     constants: Array
@@ -68,7 +70,7 @@ class Robot(NamedTuple):
             np.zeros((*count, 2), np.float32),
             np.zeros((*count, N_SENSORS), np.float32),
             np.zeros((*count, N_SENSORS, 3)),
-            np.zeros((*count, kernels.N_OUTCOME)),
+            np.zeros((*count, stepping.N_OUTCOME)),
         )
 
     def row(self, index: int) -> Robot:

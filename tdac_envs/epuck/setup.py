@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import check_reset_options, finite_numbers
+from tdac_envs.drive.disturbances import Disturbances
 from tdac_envs.drive.rewards import RewardWeights
+from tdac_envs.drive.stepping import UNDISTURBED
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH
 from tdac_envs.epuck.nearby import NearbyParts
@@ -36,9 +38,9 @@ class Setup:
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
         fixed_horizon: Whether the user set the horizon; else it follows from the task.
         on_collision: `"terminate"` or `"block"`.
-        wheel_slip: Relative standard deviation of each wheel's speed.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
+        disturbances: Slip, hidden errors, odometry.
         weights: Weights of the reward.
     """
 
@@ -47,9 +49,9 @@ class Setup:
     variation: str
     fixed_horizon: bool
     on_collision: str
-    wheel_slip: float
     motor_lag: float
     delay: int
+    disturbances: Disturbances
     weights: RewardWeights
 
     @property
@@ -77,6 +79,7 @@ class Setup:
                 task.goal_tolerance,
                 task.horizon,
                 ground.world.friction,
+                *UNDISTURBED,
                 ground.floor,
                 *ground.bounds[:2],
                 ground.spacing,

@@ -14,7 +14,14 @@ from tdac_envs.drive.batching import make_envs
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import step_rows
-from tdac_envs.epuck.observed import Observed, ground_readings, noisy, north, position
+from tdac_envs.epuck.observed import (
+    Observed,
+    encoder_angles,
+    ground_readings,
+    noisy,
+    north,
+    position,
+)
 
 
 class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
@@ -101,6 +108,11 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             observations["gps"] = position(self.robots, self._floors)
         if one.compass:
             observations["compass"] = north(self.robots)
+        if one.encoders:
+            observations["encoders"] = encoder_angles(self.robots)
+        if self._disturbances.odometry:
+            seen = self._disturbances.measure(robots, self.robots, self._random)
+            observations["odometry"] = seen
 
     def _add_noise(self, robots: Sequence[int]) -> None:
         """Draws new noise for these robots; the others keep their last readings."""

@@ -9,21 +9,22 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Addresses
-from tdac_envs.core.arguments import non_negative, one_of
+from tdac_envs.core.arguments import non_negative, number_up_to, one_of
 from tdac_envs.drawing.runs import Status
+from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import VARIATIONS, Pose
 from tdac_envs.map2d.kernels import begin, drive
+from tdac_envs.map2d.observed import noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
 from tdac_envs.map2d.source import MapSource, prepare
-from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
+from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.params import ReadingOptions, Shade
 
 
@@ -53,6 +54,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `goal` | (2,) | px | x, y of the goal |
     | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
     | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
+    | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
     Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
     heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
@@ -126,7 +128,15 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         on_collision: `"terminate"` or `"block"`; see Episode End.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
         range_noise: Relative standard deviation of each range.
+        range_dropout: Probability that a ray reads `range_max` in a step.
         wheel_slip: Relative standard deviation of each wheel's speed.
+        wheel_gains: Bound b of the wheels' hidden gains, uniform in [1 - b, 1 + b] and
+            drawn at each reset. `wheel_speeds` are commands: they do not show gains.
+        axle_error: Bound of the hidden relative error of the axle length, uniform, too.
+        odometry: Whether to observe the distance and turn of each step's arc, (0, 0)
+            after a reset; `docs/disturbances.md` defines them.
+        odometry_scale: Standard deviation of the hidden scale errors of `odometry`.
+        odometry_noise: Relative standard deviation of each measurement of `odometry`.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
         reward_weights: Reward weights by name, where they differ from the defaults.
@@ -166,7 +176,13 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         on_collision: str = "terminate",
         variation: str = "nominal",
         range_noise: float = 0.0,
+        range_dropout: float = 0.0,
         wheel_slip: float = 0.0,
+        wheel_gains: float = 0.0,
+        axle_error: float = 0.0,
+        odometry: bool = False,
+        odometry_scale: float = 0.0,
+        odometry_noise: float = 0.0,
         motor_lag: float = 0.0,
         delay: int = 0,
         reward_weights: Mapping[str, float] | None = None,
@@ -208,27 +224,40 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self.task = self.nominal
         super().__init__(
             on_collision=on_collision,
-            wheel_slip=wheel_slip,
             motor_lag=motor_lag,
             delay=delay,
+            disturbances=Disturbances(
+                wheel_slip,
+                wheel_gains,
+                axle_error,
+                odometry,
+                odometry_scale,
+                odometry_noise,
+            ),
             reward_weights=reward_weights,
             dt=self.nominal.dt,
             render_mode=render_mode,
         )
         self.variation = variation
         self.range_noise = non_negative("range_noise", range_noise)
+        self.range_dropout = number_up_to("range_dropout", range_dropout, 1.0)
         self.setup = Setup(
             self.nominal,
             variation,
             horizon is not None,
             on_collision,
             self.range_noise,
-            self.wheel_slip,
+            self.range_dropout,
             self.motor_lag,
             self.delay,
+            self.disturbances,
             self.weights,
         )
         space = observation_space(self.nominal)
+        self._is_inexact = self.setup.has_inexact_ranges
+        if self.disturbances.odometry:
+            space = with_odometry(space, self._limits)
+            self._is_inexact = True
         self.observation_space = space  # type: ignore[assignment]
         self.robot = Robot.blank(robot.n_rays, self.delay)
         self.robot.constants[:] = self.setup.constants()
@@ -250,6 +279,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             self._bind()
         task, robot = self.task, self.robot
         robot.place(task)
+        self._hide()
         self._goal[:] = task.goal
         self._call_begin()
         self._begin_trail()
@@ -285,8 +315,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             "wheel_speeds": wheels(),
             "ranges": ranges(),
         }
-        if self.range_noise:
-            seen["ranges"][:] = noisy(seen["ranges"], self.setup, self.np_random)
+        if self._is_inexact:
+            if self.setup.has_inexact_ranges:
+                seen["ranges"][:] = noisy(seen["ranges"], self.setup, self.np_random)
+            if self.disturbances.odometry:
+                seen["odometry"] = self._odometry()
         return seen
 
     def _frame(self) -> NDArray[np.uint8]:
@@ -305,27 +338,3 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         return self._scene.frame(
             robot.state[:3].tolist(), robot.ranges, self._trail, status
         )
-
-
-def noisy(
-    ranges: NDArray[np.float32], setup: Setup, random: np.random.Generator
-) -> NDArray[np.float64]:
-    """The ranges of one robot with relative noise, clipped to [0, range_max]."""
-    noise = random.normal(1.0, setup.range_noise, ranges.size)
-    return np.clip(ranges * noise, 0.0, setup.nominal.robot.range_max, out=noise)
-
-
-def observation_space(task: Map2DTask) -> spaces.Dict:
-    """The observation space of a task; see `Map2DEnv`."""
-    grid, robot = task.terrain.grid, task.robot
-    corner = np.array([grid.width - 0.5, grid.height - 0.5], np.float32)
-    least = np.full(2, -0.5, np.float32)
-    pi = np.float32(math.pi)
-    return spaces.Dict(
-        {
-            "pose": spaces.Box(np.append(least, -pi), np.append(corner, pi)),
-            "goal": spaces.Box(least, corner),
-            "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
-            "ranges": spaces.Box(0.0, robot.range_max, (robot.n_rays,), np.float32),
-        }
-    )

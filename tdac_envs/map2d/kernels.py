@@ -19,6 +19,7 @@ from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
     AXLE,
     DT,
+    FORWARD,
     FRICTION,
     GAP,
     GOAL_X,
@@ -35,6 +36,7 @@ from tdac_envs.drive.stepping import (
     STOPS,
     TOLERANCE,
     TOUCHED,
+    TURN,
     Array,
     X,
     Y,
@@ -45,6 +47,7 @@ from tdac_envs.drive.stepping import (
     finish_step,
     give_command,
     move,
+    turned_wheels,
     wrap_angle,
 )
 from tdac_envs.drive.stepping import clear as clear_state
@@ -70,7 +73,7 @@ def advance(
     axle: float,
     dt: float,
     radius: float,
-) -> bool:
+) -> tuple[bool, float]:
     """Moves the robot for one step at constant wheel speeds, up to a contact.
 
     Args:
@@ -83,8 +86,9 @@ def advance(
         radius: Body radius, px.
 
     Returns:
-        Whether the body touched an obstacle. The robot is then placed `CONTACT_GAP`
-        before the contact, with the heading it had there.
+        Whether the body touched an obstacle, and the fraction of the arc that it drove.
+        After a contact the robot is placed `CONTACT_GAP` before it, with the heading
+        it had there.
     """
     forward, turn = _arc(left, right, axle, dt)
     x, y, heading = state[X], state[Y], state[HEADING]
@@ -92,11 +96,12 @@ def advance(
     touch = contact_before(
         clear, x, y, heading, forward, turn, radius, end_x, end_y
     )  # fmt: skip
+    part = 1.0
     if touch <= 1.0:
         part = max(touch - CONTACT_GAP / abs(forward), 0.0)
         end_x, end_y, end_heading = move(x, y, heading, part * forward, part * turn)
     state[X], state[Y], state[HEADING] = end_x, end_y, wrap_angle(end_heading)
-    return bool(touch <= 1.0)
+    return bool(touch <= 1.0), part
 
 
 @subkernel
@@ -220,17 +225,21 @@ def _drive(
     """
     apply_command(constants, state, queue, wheel_speeds, outcome)
     limit, before = constants[MAX_SPEED], outcome[REMAINING]
-    left = limit * clip_unit(wheel_speeds[0] * state[SLIP_LEFT])
-    right = limit * clip_unit(wheel_speeds[1] * state[SLIP_RIGHT])
+    left, right = turned_wheels(constants, wheel_speeds)
+    left = limit * clip_unit(left * state[SLIP_LEFT])
+    right = limit * clip_unit(right * state[SLIP_RIGHT])
     axle, dt, radius = constants[AXLE], constants[DT], constants[RADIUS]
+    forward, turn = _arc(left, right, axle, dt)
     if constants[STOPS] == 1.0:
-        outcome[TOUCHED] = advance(clear, state, left, right, axle, dt, radius)
+        touched, part = advance(clear, state, left, right, axle, dt, radius)
+        outcome[TOUCHED] = touched
+        forward, turn = part * forward, part * turn
     else:
-        forward, turn = _arc(left, right, axle, dt)
         outcome[TOUCHED] = _slide(
             clear, state, forward, turn, radius, constants[FRICTION],
             CONTACT_GAP,
         )  # fmt: skip
+    state[FORWARD], state[TURN] = forward, turn
     _observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip

@@ -25,15 +25,17 @@ class Robot(NamedTuple):
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (18,), float64: axle length (px), full wheel speed (px/s), dt
+        constants: Shape (22,), float64: axle length (px), full wheel speed (px/s), dt
             (s), body radius, largest range (px), fraction of a wheel's speed that
             remains after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (px); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (px), horizon (steps);
-            coefficient of friction between body and obstacles.
-        state: Shape (8,), float64: x, y (px), heading (rad); unclipped commands of the
+            coefficient of friction between body and obstacles; gains of the left and
+            right wheel; scales of the measured distance and turn.
+        state: Shape (10,), float64: x, y (px), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
-            over ground to wheel speed; steps so far.
+            over ground to wheel speed; steps so far; length (px) and turn (rad) of the
+            last step's arc, as driven by the wheels.
         queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
@@ -112,6 +114,7 @@ def constants_of(
             task.goal_tolerance,
             task.horizon,
             FRICTION,
+            *stepping.UNDISTURBED,
         ],
         np.float64,
     )

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from tdac_envs.core.arguments import check_reset_options, positive, whole_number
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.disturbances import Disturbances
 from tdac_envs.drive.rewards import RewardWeights
 from tdac_envs.map2d.rays import fan
 from tdac_envs.map2d.robot import constants_of
@@ -35,9 +36,10 @@ class Setup:
         fixed_horizon: Whether the user set the horizon; else it follows from the task.
         on_collision: `"terminate"` or `"block"`.
         range_noise: Relative standard deviation of each range.
-        wheel_slip: Relative standard deviation of each wheel's speed.
+        range_dropout: Probability that a ray reads the largest range.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
+        disturbances: Slip, hidden errors, odometry.
         weights: Weights of the reward.
         directions: Directions of the rays, from `rays.fan`.
     """
@@ -47,9 +49,10 @@ class Setup:
     fixed_horizon: bool
     on_collision: str
     range_noise: float
-    wheel_slip: float
+    range_dropout: float
     motor_lag: float
     delay: int
+    disturbances: Disturbances
     weights: RewardWeights
     directions: NDArray[np.float64] = field(init=False)
 
@@ -57,6 +60,11 @@ class Setup:
         robot = self.nominal.robot
         view = np.radians(robot.field_of_view_deg)
         object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
+
+    @property
+    def has_inexact_ranges(self) -> bool:
+        """Whether ranges have noise or dropouts."""
+        return bool(self.range_noise or self.range_dropout)
 
     def constants(self) -> NDArray[np.float64]:
         """`Robot.constants` of the nominal task."""

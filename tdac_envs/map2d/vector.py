@@ -11,8 +11,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.drive.batching import make_envs
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations
-from tdac_envs.map2d.env import Map2DEnv, noisy
+from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.kernels import step_rows
+from tdac_envs.map2d.observed import noisy
 
 
 class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
@@ -30,7 +31,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             number of cores.
         each: Arguments that differ between robots, such as `[{"map": "maze"},
             {"map": "office"}]`; robot i takes entry `i % len(each)`. All robots need
-            the same `n_rays` and `delay`.
+            the same `n_rays`, `delay` and `odometry`.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
         **options: Arguments of `Map2DEnv` for all robots.
     """
@@ -56,8 +57,8 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             threads=threads,
             render_mode=render_mode,
         )
-        noises = [setup.range_noise for setup in self.setups]
-        self._noisy = np.flatnonzero(noises)
+        noisy = [setup.has_inexact_ranges for setup in self.setups]
+        self._noisy = np.flatnonzero(noisy)
         # Last observation: robots that are not reset keep their noise.
         self._ranges = self.robots.ranges.copy()
 
@@ -71,9 +72,11 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         }
 
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
-        if not self._noisy.size:
-            return
-        for i in np.intersect1d(self._noisy, robots).tolist():
-            exact, random = self.robots.ranges[i], self._random(i)
-            self._ranges[i] = noisy(exact, self.setups[i], random)
-        observations["ranges"][self._noisy] = self._ranges[self._noisy]
+        if self._noisy.size:
+            for i in np.intersect1d(self._noisy, robots).tolist():
+                exact, random = self.robots.ranges[i], self._random(i)
+                self._ranges[i] = noisy(exact, self.setups[i], random)
+            observations["ranges"][self._noisy] = self._ranges[self._noisy]
+        if self._disturbances.odometry:
+            seen = self._disturbances.measure(robots, self.robots, self._random)
+            observations["odometry"] = seen

@@ -18,8 +18,6 @@ Offset = tuple[float, ...]
 
 WHEELS = (("left wheel motor", "left wheel sensor"),
           ("right wheel motor", "right wheel sensor"))  # fmt: skip
-ENCODER_STEP = 0.00628
-"""Resolution of the wheel position sensors, rad."""
 _PLACED = {
     "GPS": ("gps", 44),
     "Compass": ("compass", 39),

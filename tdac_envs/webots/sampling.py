@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from tdac_envs.drive.env import Observation
-from tdac_envs.webots.devices import ENCODER_STEP, GYRO_SCALE, WHEELS, Offset
+from tdac_envs.epuck.observed import in_encoder_steps
+from tdac_envs.webots.devices import GYRO_SCALE, WHEELS, Offset
 from tdac_envs.webots.instruments import Readings
 from tdac_envs.webots.log import Pose, turn_rate, velocity
 from tdac_envs.webots.stage import ControllerWorld
@@ -101,8 +102,8 @@ class Sampler:
         return float(self._observation[key][index])
 
     def _encoder(self, wheel: int) -> float:
-        angle = self._observed("wheel_positions", wheel)
-        return ENCODER_STEP * round(angle / ENCODER_STEP)
+        angles = self._observation["wheel_positions"].astype(np.float64)
+        return float(in_encoder_steps(angles)[wheel])
 
     def _here(self, read: Callable[[str, Pose], float], name: str) -> float:
         return read(name, self._poses[-1])

@@ -15,6 +15,16 @@ import tdac_envs  # noqa: F401 - registers the envs
 from tdac_envs.core.extras import install_command
 
 IDS = sorted(name for name in gym.registry if name.startswith("TDAC-"))
+DISTURBED = {
+    "wheel_slip": 0.1,
+    "wheel_gains": 0.1,
+    "axle_error": 0.05,
+    "odometry": True,
+    "odometry_scale": 0.05,
+    "odometry_noise": 0.1,
+    "motor_lag": 0.1,
+    "delay": 2,
+}
 VARIANTS = [
     *((name, {}) for name in IDS),
     (
@@ -24,9 +34,8 @@ VARIANTS = [
             "variation": "random",
             "on_collision": "block",
             "range_noise": 0.1,
-            "wheel_slip": 0.1,
-            "motor_lag": 0.1,
-            "delay": 2,
+            "range_dropout": 0.05,
+            **DISTURBED,
         },
     ),
     (
@@ -37,12 +46,11 @@ VARIANTS = [
             "on_collision": "block",
             "sensor_noise": 1.0,
             "reflectance": "webots",
-            "wheel_slip": 0.1,
-            "motor_lag": 0.1,
-            "delay": 2,
+            **DISTURBED,
             "ground_sensors": True,
             "gps": True,
             "compass": True,
+            "encoders": True,
         },
     ),
     ("TDAC-EPuck-v0", {"world": "maze", "variation": "random"}),

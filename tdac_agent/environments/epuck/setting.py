@@ -100,6 +100,11 @@ class EPuckSetting:
         """Returns the option for the published noise, scaled to this mean."""
         return {"sensor_noise": relative / _MEAN_NOISE}
 
+    @property
+    def has_dropouts(self) -> bool:
+        """False: infra-red sensors have no largest range."""
+        return False
+
     def facts(self) -> dict[str, Any]:
         """Returns the environment's arguments, with the world's hash and `left_out`."""
         own = {"world": self.world_sha256(), "left_out": self.left_out}

@@ -129,6 +129,11 @@ class Map2DSetting:
         """Returns the option for this relative noise of each range."""
         return {"range_noise": relative}
 
+    @property
+    def has_dropouts(self) -> bool:
+        """True: rays may read the largest range."""
+        return True
+
     def facts(self) -> dict[str, Any]:
         """Returns the environment's arguments, with the map's hash."""
         return {**self.env_kwargs(), "map": self.world_sha256()}

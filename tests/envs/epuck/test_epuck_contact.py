@@ -100,13 +100,13 @@ def test_a_disc_that_was_stopped_may_leave_but_not_go_on():
     wall = arrays([Rectangle(0.2, 0.0, 0.0, 0.002, 0.5)])
     prisms = *wall, np.empty(0, np.int64), 0, 1
     state = np.zeros(3)
-    assert advance(*prisms, state, 0.3, 0.0, RADIUS)
+    assert advance(*prisms, state, 0.3, 0.0, RADIUS)[0]
     stopped = state[0]
     assert 0.199 - RADIUS - stopped == pytest.approx(0.0, abs=1e-8)
     for _ in range(100):
-        assert advance(*prisms, state, 0.3, 0.0, RADIUS)
+        assert advance(*prisms, state, 0.3, 0.0, RADIUS)[0]
     assert state[0] == pytest.approx(stopped, abs=1e-6)
-    assert not advance(*prisms, state, -0.1, 0.0, RADIUS)
+    assert not advance(*prisms, state, -0.1, 0.0, RADIUS)[0]
     assert state[0] == pytest.approx(stopped - 0.1, abs=1e-6)
 
 

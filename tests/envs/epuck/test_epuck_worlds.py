@@ -98,7 +98,7 @@ def pushing_env(*nodes, mass=0.05, **options):
 
 
 def box_pose(env):
-    return env._things[0, :3]
+    return env._movables.things[0, :3]
 
 
 class TestPushing:
@@ -128,7 +128,7 @@ class TestPushing:
             observation, *_ = env.step(-FULL)
         np.testing.assert_array_equal(box_pose(env), left)
         assert observation["ps"][0] < 68
-        assert np.abs(env._things[:, 3:]).max() == 0.0
+        assert np.abs(env._movables.things[:, 3:]).max() == 0.0
 
     def test_a_heavy_box_stays(self):
         """More friction than the tyres have grip: it moves by less than 1 mm."""

@@ -187,7 +187,7 @@ class TestMotion:
     )
     def test_straight_and_in_place(self, left, right, expected):
         state = np.array([50.0, 50.0, 0.0])
-        touched = advance(
+        touched, _ = advance(
             padded(open_map(101, 101)), state, left, right, 10.0, 0.1, 5.0
         )
         assert not touched
@@ -344,7 +344,7 @@ class TestFirstContact:
         for heading in (-0.2, 0.0, 0.3):
             state = np.array([200.0, 100.0, heading])
             wheel = 0.5 * turn
-            touched = advance(
+            touched, _ = advance(
                 padded(cells),
                 state,
                 forward + wheel,
@@ -378,7 +378,7 @@ class TestFirstContact:
         contacts = 0
         for _ in range(3000):
             left, right = random.uniform(-1, 1, 2) * 40
-            contacts += advance(world, state, left, right, 8.0, 0.05, 4.0)
+            contacts += advance(world, state, left, right, 8.0, 0.05, 4.0)[0]
             assert brute_force.distance(cells, state[0], state[1]) >= 4.0 - 1e-6
         assert contacts > 100
 

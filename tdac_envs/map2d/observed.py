@@ -1,0 +1,41 @@
+"""Observations of a robot on a map: the space, and disturbed ranges."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from tdac_envs.map2d.setup import Setup
+from tdac_envs.map2d.task import Map2DTask
+
+
+def noisy(
+    ranges: NDArray[np.float32], setup: Setup, random: np.random.Generator
+) -> NDArray[np.float64]:
+    """The ranges of one robot with relative noise and dropouts, in [0, range_max]."""
+    seen, most = ranges.astype(np.float64), setup.nominal.robot.range_max
+    if setup.range_noise:
+        noise = random.normal(1.0, setup.range_noise, ranges.size)
+        np.clip(ranges * noise, 0.0, most, out=seen)
+    if setup.range_dropout:
+        seen[random.random(ranges.size) < setup.range_dropout] = most
+    return seen
+
+
+def observation_space(task: Map2DTask) -> spaces.Dict:
+    """The observation space of a task; see `Map2DEnv`."""
+    grid, robot = task.terrain.grid, task.robot
+    corner = np.array([grid.width - 0.5, grid.height - 0.5], np.float32)
+    least = np.full(2, -0.5, np.float32)
+    pi = np.float32(math.pi)
+    return spaces.Dict(
+        {
+            "pose": spaces.Box(np.append(least, -pi), np.append(corner, pi)),
+            "goal": spaces.Box(least, corner),
+            "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
+            "ranges": spaces.Box(0.0, robot.range_max, (robot.n_rays,), np.float32),
+        }
+    )
