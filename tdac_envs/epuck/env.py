@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -18,18 +19,10 @@ from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import VARIATIONS
-from tdac_envs.epuck import kernels
+from tdac_envs.epuck import kernels, observed
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.movables import Movables
 from tdac_envs.epuck.nearby import surroundings
-from tdac_envs.epuck.observed import (
-    encoder_angles,
-    ground_readings,
-    noisy,
-    north,
-    observation_space,
-    position,
-)
 from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.setup import Setup
 from tdac_envs.epuck.source import WorldSource, open_world
@@ -49,8 +42,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     37 mm radius with two wheels of 20 mm radius, 52 mm apart. It moves along the exact
     arc of its wheel speeds, which are constant during a step. The disc swept along this
     arc is tested exactly against the shapes of all solid objects, so no step can jump
-    through a thin wall. The world is surrounded by a fence,
-    invisible to the sensors (0.5 m from the outermost objects if there are no walls).
+    through a thin wall. The world is surrounded by a fence, invisible to the sensors
+    (0.5 m from the outermost objects if there are no walls).
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
@@ -109,7 +102,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `collisions` | number of such steps so far |
     | `clipped` | number of actions out of range so far |
     | `distance_to_goal` | straight distance from the robot's centre to the goal |
-    | `path_distance` | length of the shortest path of the body to the goal |
+    | `path_distance` | length of the shortest grid path to the goal |
     | `clearance` | distance from the robot's centre to the nearest solid object |
 
     The fence counts as an object. `clearance` is negative if the centre is inside of
@@ -134,8 +127,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         goal_tolerance: Distance at which the goal is reached, m.
         dt: Duration of a step, s. Default: the file's `basicTimeStep`.
         horizon: Steps before truncation. Default: max(2500, 6 * d0 / (v * dt)), where
-            d0 is the length of the shortest grid path, m, and v the full
-            speed, m/s.
+            d0 is the length of the shortest grid path, m, and v the full speed, m/s.
         max_wheel_speed: Wheel speed at action 1, rad/s. Default: 6.28, or 7.536 for an
             e-puck of version 2.
         on_collision: `"terminate"` or `"block"`; see Episode End.
@@ -236,13 +228,12 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         )
         self.variation = variation
         self.sensor_noise = non_negative("sensor_noise", sensor_noise)
-        self.ground_sensors = bool(ground_sensors)
-        self.gps, self.compass, self.encoders = bool(gps), bool(compass), bool(encoders)
-        more = {"gps": self.gps, "compass": self.compass, "encoders": self.encoders}
-        space = observation_space(self.nominal, ground=self.ground_sensors, **more)
+        asked = (ground_sensors, gps, compass, encoders)
+        self.further = tuple(itertools.compress(observed.INSTRUMENTS, asked))
+        space = observed.observation_space(self.nominal, self.further)
         if self.disturbances.odometry:
             space = with_odometry(space, self._limits)
-        self._has_more = len(space) > len(observation_space(self.nominal))
+        self._has_more = bool(self.further or self.disturbances.odometry)
         self.observation_space = space  # type: ignore[assignment]
         reach = BODY_RADIUS + self.nominal.full_step
         self.setup = setup = Setup(
@@ -326,15 +317,10 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     def _add_more(self, observation: Observation) -> None:
         """Adds what is observed only if an argument asks for it."""
         robot, floor = self.robot, self.task.ground.floor
-        if self.ground_sensors:
-            found = ground_readings(self._movables.seen, floor, robot)
+        if "ground" in self.further:
+            found = observed.ground_readings(self._movables.seen, floor, robot)
             observation["ground"] = self._noisy(*found)
-        if self.gps:
-            observation["gps"] = position(robot, floor)
-        if self.compass:
-            observation["compass"] = north(robot)
-        if self.encoders:
-            observation["encoders"] = encoder_angles(robot)
+        observed.add_instruments(observation, self.further, robot, floor)
         if self.disturbances.odometry:
             observation["odometry"] = self._odometry()
 
@@ -344,7 +330,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if not self.sensor_noise:
             return readings
         normal = self.np_random.standard_normal(readings.size)
-        return noisy(readings, self.sensor_noise * spreads, normal)
+        return observed.noisy(readings, self.sensor_noise * spreads, normal)
 
     def _frame(self) -> NDArray[np.uint8]:
         from tdac_envs.epuck.picture import EPuckScene

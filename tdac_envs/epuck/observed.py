@@ -6,6 +6,7 @@ Functions take the arrays of one robot, or of many with an additional first axis
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -23,19 +24,22 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 Array = NDArray[np.float64]
 Observed = NDArray[np.float32]
 
+INSTRUMENTS = ("ground", "gps", "compass", "encoders")
+"""Instruments that are observed only if an argument asks for them."""
 ENCODER_STEP = 0.00628
 """Resolution of the wheel encoders in Webots, rad: 1000 steps per revolution."""
 
 
 def observation_space(
     task: EPuckTask,
-    *,
-    ground: bool = False,
-    gps: bool = False,
-    compass: bool = False,
-    encoders: bool = False,
+    further: Collection[str] = (),
 ) -> spaces.Dict:
-    """The observation space of a task; see `EPuckEnv`."""
+    """The observation space of a task; see `EPuckEnv`.
+
+    Args:
+        task: The task.
+        further: Those of `INSTRUMENTS` that are observed.
+    """
     # The body is inside the fence, except for small overlaps in the physics engine.
     left, low, right, high = task.ground.bounds
     least = np.array([left, low], np.float32) - np.float32(BODY_RADIUS)
@@ -49,15 +53,15 @@ def observation_space(
         "ps": spaces.Box(0.0, LARGEST, (N_SENSORS,), np.float32),
         "wheel_positions": spaces.Box(-turned, turned, (2,), np.float32),
     }
-    if ground:
+    if "ground" in further:
         space["ground"] = spaces.Box(0.0, LARGEST, (3,), np.float32)
-    if gps:
+    if "gps" in further:
         space["gps"] = spaces.Box(
             np.append(least, floor - 1), np.append(most, floor + 1)
         )
-    if compass:
+    if "compass" in further:
         space["compass"] = spaces.Box(-1.0, 1.0, (3,), np.float32)
-    if encoders:
+    if "encoders" in further:
         space["encoders"] = spaces.Box(-turned, turned, (2,), np.float32)
     return spaces.Dict(space)
 
@@ -109,3 +113,25 @@ def encoder_angles(robot: Robot) -> Observed:
     """Readings of the wheel encoders since the reset, rad, shape (2,): left, right."""
     angles = in_encoder_steps(robot.state[..., LEFT_TURNED : RIGHT_TURNED + 1])
     return np.clip(angles, -MOST_TURNED, MOST_TURNED).astype(np.float32)
+
+
+def add_instruments(
+    observation: dict[str, Observed],
+    further: Collection[str],
+    robot: Robot,
+    floor: float | Array,
+) -> None:
+    """Adds the readings of those instruments that have no noise.
+
+    Args:
+        observation: Readings are added to it.
+        further: As for `observation_space`.
+        robot: Arrays of the robot.
+        floor: Height of the ground, m.
+    """
+    if "gps" in further:
+        observation["gps"] = position(robot, floor)
+    if "compass" in further:
+        observation["compass"] = north(robot)
+    if "encoders" in further:
+        observation["encoders"] = encoder_angles(robot)

@@ -16,11 +16,9 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import step_rows
 from tdac_envs.epuck.observed import (
     Observed,
-    encoder_angles,
+    add_instruments,
     ground_readings,
     noisy,
-    north,
-    position,
 )
 
 
@@ -100,16 +98,11 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             observations["ps"][:] = np.where(
                 self._factors[:, None], self._last_ps, observations["ps"]
             )
-        if one.ground_sensors:
+        if "ground" in one.further:
             for i in robots:
                 self._last_ground[i] = self._ground(i)
             observations["ground"] = self._last_ground.copy()
-        if one.gps:
-            observations["gps"] = position(self.robots, self._floors)
-        if one.compass:
-            observations["compass"] = north(self.robots)
-        if one.encoders:
-            observations["encoders"] = encoder_angles(self.robots)
+        add_instruments(observations, one.further, self.robots, self._floors)
         if self._disturbances.odometry:
             seen = self._disturbances.measure(robots, self.robots, self._random)
             observations["odometry"] = seen

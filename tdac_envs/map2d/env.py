@@ -87,7 +87,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `collisions` | number of such steps so far |
     | `clipped` | number of actions out of range so far |
     | `distance_to_goal` | straight distance from the robot's centre to the goal |
-    | `path_distance` | length of the shortest path of the body to the goal |
+    | `path_distance` | length of the shortest grid path to the goal |
     | `clearance` | distance from the robot's centre to the nearest obstacle |
 
     The border of the map counts as an obstacle. `clearance` is never negative; it is

@@ -443,7 +443,7 @@ class TestArguments:
         [
             ({"map": "spirel"}, MapError, "did you mean 'spiral'"),
             ({"start": (-5, 20)}, TaskError, "outside the map"),
-            ({"start": (0, 0)}, TaskError, "from an obstacle, too near"),
+            ({"start": (0, 0)}, TaskError, "outside of the closed wall around goal"),
             ({"start": (math.nan, 3)}, TaskError, "expected start to be 2 finite"),
             ({"on_collision": "stop"}, TaskError, "on_collision to be one of 'termin"),
             ({"variation": "wild"}, TaskError, "variation to be one of 'nominal', 'j"),
