@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from tdac_envs.ladder.words import Words, rounded, world_key
 
+GOLDEN_WORDS = "b836e7e42419968d9a1ddd6e486e2ce19de48f31b065451957778e75beaadf1e"
+GOLDEN_KEY = "ceb7f2773124549d66b61e817c4167932605f830f87dfad4fa26a98ef6565e26"
 KEYS = st.binary(min_size=32, max_size=32)
 
 
@@ -40,9 +42,6 @@ def test_golden_words():
     assert hashlib.sha256(repr(drawn).encode()).hexdigest() == GOLDEN_WORDS
 
 
-GOLDEN_WORDS = "?"
-
-
 def test_golden_key():
     """The key is an HMAC of canonical JSON, as other programs can compute it."""
     key = world_key(b"salt", "ab" * 32, "test", 7, "world")
@@ -55,9 +54,6 @@ def test_golden_key():
         world_key(b"salt", "ab" * 32, "test", 7, "noise"),
     ]
     assert len({key, *others}) == 6
-
-
-GOLDEN_KEY = "?"
 
 
 @given(KEYS, st.integers(-(10**20), 10**20), st.integers(0, 2**64 - 1))
