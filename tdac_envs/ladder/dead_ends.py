@@ -65,25 +65,25 @@ def dead_ends(world: LadderWorld, radius: float, sensor: Sensor) -> DeadEnds:
     heading, driven, depth = world.start.heading, 0.0, 0.0
     path: Path = np.empty((0, 2))
     while here != goal:
-        news = _look(
-            world.terrain.leaps, known, *map(float, (*here, heading)), rays, sensor[2]
-        )
+        x, y = float(here[0]), float(here[1])
+        reach = float(sensor.range_max)
+        news = _look(world.terrain.leaps, known, x, y, float(heading), rays, reach)
         if news or len(path) == 0:
             free = body_free(clearance(known), radius)
             if not _is_free(path, free):
                 path = plan_path(free, here, goal)[1:]
                 heading = _heading(here, path[0])
                 continue
-        x, y = int(path[0, 0]), int(path[0, 1])
-        if not fits[y, x]:
-            _touch(known, world.cells, (x, y), radius)
+        i, j = int(path[0, 0]), int(path[0, 1])
+        if not fits[j, i]:
+            _touch(known, world.cells, (i, j), radius)
             path = path[:0]
             continue
-        driven += math.dist(here, (x, y))
-        here, path = (x, y), path[1:]
+        driven += math.dist(here, (i, j))
+        here, path = (i, j), path[1:]
         heading = _heading(here, path[0]) if len(path) else heading
-        lowest = min(lowest, float(world.field[y, x]))
-        depth = max(depth, float(world.field[y, x]) - lowest)
+        lowest = min(lowest, float(world.field[j, i]))
+        depth = max(depth, float(world.field[j, i]) - lowest)
     # The field is rounded to float32.
     return DeadEnds(depth / shortest, max(driven / shortest - 1.0, 0.0))
 

@@ -92,7 +92,7 @@ def _widest(
             size -= 1
             node = stack[size]
             if node == last:
-                return level
+                return int(level)
             is_corner = node >= centres.size
             place = node - centres.size if is_corner else node
             columns = width + 1 if is_corner else width

@@ -81,7 +81,6 @@ def _without_pockets(cells: BoolGrid) -> BoolGrid:
         return cells
     areas = np.bincount(labels.ravel())
     areas[0] = 0
-    largest = np.flatnonzero(areas == areas.max())
-    if len(largest) > 1:
-        largest = labels.ravel()[np.isin(labels.ravel(), largest)][:1]
-    return np.asarray(labels != largest[0])
+    is_largest = (areas == areas.max())[labels]
+    first = int(np.argmax(is_largest))
+    return np.asarray(labels != labels.ravel()[first])
