@@ -6,6 +6,8 @@ import numpy as np
 
 import tdac_envs
 from tdac_agent.environments.kernels_used import use_robot
+from tdac_envs.ladder.dead_ends import Sensor, dead_ends
+from tdac_envs.ladder.worlds import WorldSpec, make_world
 from tdac_envs.map2d import rays
 
 
@@ -18,3 +20,11 @@ def use_kernels() -> None:
     ends = {"start": start, "goal": goal, "robot_radius": radius}
     disc = use_robot("TDAC-Map2D-v0", map=grid.cells, **ends)
     rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
+    _use_ladder()
+
+
+def _use_ladder() -> None:
+    """Makes a small world."""
+    maze = {"name": "mazes", "width": 60, "height": 60, "loops": 0.0}
+    spec = WorldSpec.model_validate({"generator": maze, "radius": 4, "min_steps": 10})
+    dead_ends(make_world(spec, bytes(32)), spec.radius, Sensor(18, 2.0, 40.0))

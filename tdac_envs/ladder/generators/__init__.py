@@ -1,0 +1,1 @@
+"""Generators of static worlds; `registry.GENERATORS` lists them."""

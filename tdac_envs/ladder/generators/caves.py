@@ -1,0 +1,86 @@
+"""Caves: a cellular automaton that counts neighbours, smoothed to round walls."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy import ndimage
+
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.ladder.generators.draft import (
+    Band,
+    Draft,
+    Parameters,
+    frame,
+    free_places,
+    whole_pixels,
+)
+from tdac_envs.ladder.words import Words
+
+_PLACES = 48
+_ROUNDS = 3
+_MAJORITY = 5
+"""Occupied cells among a cell and its eight neighbours that make it rock."""
+
+
+class Caves(Parameters):
+    """Parameters of caves."""
+
+    name: Literal["caves"] = "caves"
+    grain: Band = Field((0.32, 0.5), description="Side of a cell, body diameters.")
+    rock: float = Field(0.45, ge=0.3, le=0.6, description="Share of rock at first.")
+
+
+def draw(words: Words, params: Caves, body: float) -> Draft:
+    """Draws a cave; pockets without a connection to the largest one are filled.
+
+    Args:
+        words: Random numbers.
+        params: Size and shape.
+        body: Diameter of the body, px.
+    """
+    low, high = (max(whole_pixels(grain, body), 2) for grain in params.grain)
+    side = words.integer(low, high)
+    rows, columns = -(-params.height // side) + 1, -(-params.width // side) + 1
+    rock = words.chances(params.rock, (rows, columns))
+    for _ in range(_ROUNDS):
+        rock = _counts(rock, 1) >= _MAJORITY
+    left, top = words.integer(0, side - 1), words.integer(0, side - 1)
+    cells = rock.repeat(side, axis=0).repeat(side, axis=1)
+    cells = cells[top : top + params.height, left : left + params.width]
+    reach = side // 2 + 2
+    cells = 2 * _counts(cells, reach) > (2 * reach + 1) ** 2
+    frame(cells, 3)
+    cells = _without_pockets(cells)
+    return Draft(cells, free_places(words, cells, _PLACES))
+
+
+def _counts(cells: BoolGrid, reach: int) -> NDArray[np.int32]:
+    """Occupied cells in the square around each cell; there is only rock outside.
+
+    Args:
+        cells: Shape (height, width), bool.
+        reach: The square has a side of 2 * reach + 1.
+    """
+    side = 2 * reach + 1
+    padded = np.pad(cells, reach, constant_values=True)
+    sums = np.zeros((padded.shape[0] + 1, padded.shape[1] + 1), np.int32)
+    np.cumsum(np.cumsum(padded, axis=0, dtype=np.int32), axis=1, out=sums[1:, 1:])
+    after, before = sums[side:], sums[:-side]
+    whole = after - before
+    return np.asarray(whole[:, side:] - whole[:, :-side])
+
+
+def _without_pockets(cells: BoolGrid) -> BoolGrid:
+    """Fills all free regions but the largest; of equal ones the first stays."""
+    labels, count = ndimage.label(~cells)
+    if count < 2:
+        return cells
+    areas = np.bincount(labels.ravel())
+    areas[0] = 0
+    is_largest = (areas == areas.max())[labels]
+    first = int(np.argmax(is_largest))
+    return np.asarray(labels != labels.ravel()[first])

@@ -1,0 +1,108 @@
+"""Clutter of circles: single ones and chains, with room to pass between them."""
+
+from __future__ import annotations
+
+from math import isqrt
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from tdac_envs.ladder.generators.draft import (
+    Band,
+    Draft,
+    Parameters,
+    Share,
+    fill_disc,
+    frame,
+    free_places,
+)
+from tdac_envs.ladder.words import Words
+
+Circle = tuple[int, int, int]
+"""Centre and radius, sixteenths of a px."""
+
+_PLACES = 48
+_FAILURES = 25
+"""The floor is full if so many circles in a row do not fit."""
+_BORDER = 2
+
+
+class Clutter(Parameters):
+    """Parameters of clutter."""
+
+    name: Literal["clutter"] = "clutter"
+    radii: Band = Field((0.3, 0.8), description="Radius of a circle, body diameters.")
+    gaps: Band = Field((1.12, 1.4), description="Least gap to pass, body diameters.")
+    chain: Annotated[int, Field(ge=1, le=100)] = Field(
+        10, description="Largest number of circles that overlap in a row."
+    )
+    density: Share = Field(0.34, description="Share of the floor that is occupied.")
+
+
+def draw(words: Words, params: Clutter, body: float) -> Draft:
+    """Draws circles until the floor is as full as wanted, or hardly any more fit.
+
+    Args:
+        words: Random numbers.
+        params: Size and shape.
+        body: Diameter of the body, px.
+    """
+    cells = np.zeros((params.height, params.width), np.bool_)
+    frame(cells, _BORDER)
+    gap = _sixteenths(words.uniform(*params.gaps) * body)
+    circles: list[Circle] = []
+    wanted = round(words.uniform(0.8 * params.density, params.density) * cells.size)
+    failures = 0
+    while failures < _FAILURES and np.count_nonzero(cells) < wanted:
+        chain = _chain(words, params, body, circles, gap)
+        failures = failures + 1 if not chain else 0
+        for circle in chain:
+            fill_disc(cells, *circle)
+        circles += chain
+    return Draft(cells, free_places(words, cells, _PLACES))
+
+
+def _sixteenths(length: float) -> int:
+    return round(16 * length)
+
+
+def _chain(
+    words: Words, params: Clutter, body: float, circles: list[Circle], gap: int
+) -> list[Circle]:
+    """A row of overlapping circles, up to the first that does not fit."""
+    chain: list[Circle] = []
+    x = words.integer(0, 16 * params.width)
+    y = words.integer(0, 16 * params.height)
+    # Directions without trigonometry: points of a square, scaled to the distance.
+    ahead_x, ahead_y = words.integer(-64, 64), words.integer(-64, 64)
+    for _ in range(words.integer(1, params.chain)):
+        radius = _sixteenths(words.uniform(*params.radii) * body)
+        if chain:
+            ahead_x += words.integer(-48, 48)
+            ahead_y += words.integer(-48, 48)
+            length = max(isqrt(ahead_x * ahead_x + ahead_y * ahead_y), 1)
+            far = 3 * (chain[-1][2] + radius) // 4
+            x, y = x + far * ahead_x // length, y + far * ahead_y // length
+        if not _fits((x, y, radius), circles, gap, params):
+            break
+        chain.append((x, y, radius))
+    return chain
+
+
+def _fits(circle: Circle, circles: list[Circle], gap: int, params: Clutter) -> bool:
+    """Whether the circle leaves the gap to all that it does not touch."""
+    x, y, radius = circle
+    border = 16 * _BORDER
+    for side, extent in ((x, 16 * params.width), (y, 16 * params.height)):
+        if (
+            0 < side - radius - border < gap
+            or 0 < extent - side - radius - border < gap
+        ):
+            return False
+    for i, j, other in circles:
+        touching = radius + other
+        apart = (x - i) ** 2 + (y - j) ** 2
+        if touching * touching < apart < (touching + gap) ** 2:
+            return False
+    return True

@@ -1,0 +1,120 @@
+"""What a generator draws: a floor with its obstacles, and where a task may begin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.ladder.words import FRACTIONS, Words
+
+Places = NDArray[np.int64]
+
+LARGEST_SIDE = 2048
+
+
+def _ordered(band: tuple[float, float]) -> tuple[float, float]:
+    if band[0] > band[1]:
+        raise ValueError(f"expected the smaller number first, got {list(band)}")
+    return band
+
+
+Size = Annotated[float, Field(gt=0, le=100)]
+Band = Annotated[tuple[Size, Size], AfterValidator(_ordered)]
+"""Smallest and largest value of a size, in body diameters."""
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class Parameters(BaseModel):
+    """Parameters that all generators have."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    width: int = Field(220, ge=16, le=LARGEST_SIDE, description="Columns, px.")
+    height: int = Field(220, ge=16, le=LARGEST_SIDE, description="Rows, px.")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """A world that is not yet admitted.
+
+    Attributes:
+        cells: Shape (height, width), bool, True = occupied.
+        places: Shape (n, 2), int64: pixels (x, y) for the start and the goal.
+    """
+
+    cells: BoolGrid
+    places: Places
+
+    def turned(self, quarters: int, mirrored: bool) -> Draft:
+        """This draft mirrored at the vertical axis, then turned by `quarters` * 90°."""
+        cells, places = self.cells, self.places
+        if mirrored:
+            cells = cells[:, ::-1]
+            places = np.column_stack([cells.shape[1] - 1 - places[:, 0], places[:, 1]])
+        for _ in range(quarters % 4):
+            # Turns anticlockwise on the screen, where y points down.
+            places = np.column_stack([places[:, 1], cells.shape[1] - 1 - places[:, 0]])
+            cells = np.rot90(cells)
+        return Draft(np.ascontiguousarray(cells), places)
+
+
+def as_places(points: Sequence[tuple[int, int]]) -> Places:
+    """Points (x, y) as an array of shape (n, 2), also if there are none."""
+    return np.array(points, np.int64).reshape(-1, 2)
+
+
+def free_places(words: Words, cells: BoolGrid, count: int) -> Places:
+    """Random free pixels (x, y); none if there are none.
+
+    Args:
+        words: Random numbers.
+        cells: Shape (height, width), bool, True = occupied.
+        count: Their number.
+    """
+    free = np.flatnonzero(~cells)
+    count = count if len(free) else 0
+    picked = free[
+        np.array([words.integer(0, len(free) - 1) for _ in range(count)], int)
+    ]
+    rows, columns = np.divmod(picked.astype(np.int64), cells.shape[1])
+    return np.column_stack([columns, rows])
+
+
+def pixels(words: Words, band: tuple[float, float], body: float) -> int:
+    """A length drawn from a band of body diameters, px, rounded up.
+
+    Args:
+        words: Random numbers.
+        band: Smallest and largest length, body diameters.
+        body: Diameter of the body, px.
+    """
+    low, high = (whole_pixels(size, body) for size in band)
+    return words.integer(low, high)
+
+
+def whole_pixels(size: float, body: float) -> int:
+    """A length of `size` body diameters in px, rounded up from a multiple of 2**-16."""
+    return -(-round(size * body * FRACTIONS) // FRACTIONS)
+
+
+def fill_disc(cells: BoolGrid, x: int, y: int, radius: int, value: bool = True) -> None:
+    """Sets the pixels whose centre is in a disc; all numbers in sixteenths of a px."""
+    height, width = cells.shape
+    x0, x1 = max((x - radius) >> 4, 0), min(((x + radius) >> 4) + 2, width)
+    y0, y1 = max((y - radius) >> 4, 0), min(((y + radius) >> 4) + 2, height)
+    columns = 16 * np.arange(x0, x1, dtype=np.int64) - x
+    rows = 16 * np.arange(y0, y1, dtype=np.int64) - y
+    inside = columns[None, :] ** 2 + rows[:, None] ** 2 <= radius * radius
+    cells[y0:y1, x0:x1][inside] = value
+
+
+def frame(cells: BoolGrid, thickness: int) -> None:
+    """Draws a wall along the border of the map."""
+    cells[:thickness] = cells[-thickness:] = True
+    cells[:, :thickness] = cells[:, -thickness:] = True

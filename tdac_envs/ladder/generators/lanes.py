@@ -1,0 +1,25 @@
+"""Parallel lanes along one axis of a map, of drawn widths."""
+
+from __future__ import annotations
+
+from tdac_envs.ladder.words import Words
+
+Lane = tuple[int, int]
+"""Begin and end of a lane, px, the end excluded."""
+
+
+def spread(words: Words, widths: list[int], spare: int) -> list[int]:
+    """The widths, some of them wider, so that together they fill `spare` px more."""
+    wider = list(widths)
+    for _ in range(spare if wider else 0):
+        wider[words.integer(0, len(wider) - 1)] += 1
+    return wider
+
+
+def lanes_from(begin: int, widths: list[int], between: int = 0) -> list[Lane]:
+    """Lanes of these widths one after the other, `between` px apart."""
+    lanes = []
+    for width in widths:
+        lanes.append((begin, begin + width))
+        begin += width + between
+    return lanes
