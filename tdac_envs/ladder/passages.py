@@ -61,10 +61,12 @@ def touched_corners(cells: BoolGrid) -> BoolGrid:
     return np.asarray(rows[:, 1:] | rows[:, :-1])
 
 
-@kernel
 def _quarters(distance: float) -> int:
     """A squared distance in quarters of px**2, of which it is a whole number."""
     return math.floor(4.0 * distance * distance + 0.5)
+
+
+_compiled_quarters = subkernel(_quarters)
 
 
 @kernel
@@ -104,9 +106,9 @@ def _widest(
                     continue
                 links[to] = -1
                 if to < centres.size:
-                    room = _quarters(float(centres[to]))
+                    room = _compiled_quarters(centres[to])
                 else:
-                    room = _quarters(float(corners[to - centres.size]))
+                    room = _compiled_quarters(corners[to - centres.size])
                 if room >= level:
                     stack[size] = to
                     size += 1
