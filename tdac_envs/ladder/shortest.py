@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import read_only
 from tdac_envs.grid.grid import BoolGrid, FloatGrid
-from tdac_envs.ladder import tangents
+from tdac_envs.ladder import rolling, tangents
 from tdac_envs.ladder.passages import touched_corners
 
 Point = tuple[float, float]
@@ -72,7 +72,7 @@ def shortest_path(
             heads,
             read_only(ends),
             float(radius),
-            float(bound) + tangents.SLACK,
+            float(bound) + rolling.SLACK,
             values,
             links,
             heap,
@@ -89,7 +89,7 @@ def _corners(
     # Not initialised: memory that is never written costs nothing.
     corners, exposed = np.empty((cells.size, 2)), np.empty((cells.size, 4))
     rows = np.empty(cells.shape[0] + 2, np.int64)
-    count = tangents.exposed_corners(
+    count = rolling.exposed_corners(
         read_only(cells), float(radius), corners, exposed, rows
     )
     return corners[:count], exposed[:count]
