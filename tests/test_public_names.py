@@ -21,6 +21,7 @@ MODULES = {
     "tdac_agent.provider",
     "tdac_envs",
     "tdac_envs.epuck.env",
+    "tdac_envs.ladder",
     "tdac_envs.map2d",
     "tdac_envs.sb3",
     "tdac_envs.wrappers",
