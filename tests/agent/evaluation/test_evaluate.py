@@ -447,6 +447,7 @@ def test_a_folder_whose_name_is_not_utf_8(tdac, tmp_path):
     assert (out / "evaluation.json").is_file()
 
 
+@pytest.mark.slow
 def test_a_finished_evaluation_is_not_driven_again(tdac, tmp_path):
     """The same command prints it from its folder; a missing picture is drawn anew."""
     folder, out = write_small_task(tmp_path / "task"), tmp_path / "out"
