@@ -18,8 +18,8 @@ from maze import STEPS, make_maze, result_line
 
 ARGUMENTS = [
     *("--env-id", "Maze-v0", "--total-timesteps", str(STEPS)),
-    *("--num-envs", "8", "--num-steps", "64", "--num-minibatches", "2"),
-    *("--learning-rate", "2e-3", "--gamma", "0.98"),
+    *("--num-envs", "8", "--num-steps", "128", "--num-minibatches", "4"),
+    *("--learning-rate", "1e-3", "--gamma", "0.98", "--target-kl", "0.03"),
 ]
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tdac_envs import wrap_for_rl
 
-STEPS = 75_000
-"""Steps of 0.2 s: as much driving as 300,000 steps of the default 0.05 s."""
+STEPS = 300_000
+"""Steps of a training, of 0.2 s each."""
 ANYWHERE = STEPS // 2
 """Until then, half of the episodes start anywhere on the map."""
 WINDOW, LEARNT = 100, 0.8

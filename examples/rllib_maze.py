@@ -37,10 +37,10 @@ def main() -> None:
         .environment("maze", normalize_actions=False, clip_actions=True)
         .env_runners(num_env_runners=0, num_envs_per_env_runner=8)
         .training(
-            train_batch_size_per_learner=512,
+            train_batch_size_per_learner=1024,
             minibatch_size=256,
             num_epochs=10,
-            lr=[[0, 2e-3], [given.steps, 0.0]],
+            lr=[[0, 1e-3], [given.steps, 0.0]],
             gamma=GAMMA,
             lambda_=0.95,
             clip_param=0.2,
