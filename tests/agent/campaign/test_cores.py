@@ -64,6 +64,7 @@ def test_nobody_else_may_open_the_folder(temporary):
     assert stat.S_IMODE((temporary / NAME).stat().st_mode) == 0o700
 
 
+@pytest.mark.slow
 def test_a_campaign_without_a_place_says_so_at_once(temporary, small):
     """In one line, instead of a death of each of its processes."""
     (temporary / NAME).symlink_to(temporary)

@@ -79,6 +79,7 @@ def test_a_failed_verification(tdac, plan):
     assert all("shown" not in (f["diagnosis"] or {}) for f in report["failures"])
 
 
+@pytest.mark.slow
 def test_a_run_folder_in_metres(tdac, folder):
     """Its task is in pixels; with `--metres`, only what is printed is converted."""
     code, text, _ = tdac("verify", folder, "--seed", 1)

@@ -298,6 +298,7 @@ def test_a_batch_drives_the_episodes_of_an_evaluation(tmp_path, small_task):
     assert found.mean_length == pytest.approx(lengths, abs=1.0)
 
 
+@pytest.mark.slow
 def test_nothing_of_a_saved_policy_is_run(tmp_path, small_task):
     """Pickled code in it stays what it is: bytes."""
     sb3 = pytest.importorskip("stable_baselines3")

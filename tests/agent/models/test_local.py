@@ -371,6 +371,7 @@ def test_a_key_goes_nowhere_unencrypted(kind, url, safe, options, monkeypatch):
             choose_model(f"{kind}:m", served).complete(QUESTION)
 
 
+@pytest.mark.slow
 def test_the_command_says_that_a_key_would_be_read(tdac, good, monkeypatch):
     """Exit 2, one line, nothing sent; with the flag it goes on."""
     monkeypatch.setenv("OPENAI_API_KEY", "key-12345678")
