@@ -107,9 +107,8 @@ def saturated(colour: ColourImage) -> BoolGrid:
 def disc(shape: tuple[int, ...], x: float, y: float, radius: float) -> BoolGrid:
     """Pixels within `radius` px of (x, y), always including that pixel."""
     rows, columns = np.ogrid[: shape[0], : shape[1]]
-    reach = max(radius, 0.71)
-    # Not `reach**2`, which raises OverflowError for a huge radius.
-    return np.asarray((columns - x) ** 2 + (rows - y) ** 2 <= reach * reach)
+    within = (columns - x) ** 2 + (rows - y) ** 2 <= max(radius, 0.71) ** 2
+    return np.asarray(within)
 
 
 def floor_distance(colour: ColourImage, floor: NDArray[np.float64]) -> GreyImage:

@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 
-from tdac_envs.core.arguments import positive
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.astar import Guide
 from tdac_envs.grid.grid import clearance
@@ -74,16 +73,13 @@ def ranked(scene: MapProblem, preset: Preset) -> list[Candidate]:
     order in which they were tried.
 
     Raises:
-        TaskError: Start equals goal, or the radius is out of range.
+        TaskError: Start equals goal.
     """
     if scene.start is not None and scene.start == scene.goal:
         raise TaskError(
             f"start and goal are the same pixel {scene.units.point(*scene.start)}; "
             "choose two pixels"
         )
-    if not scene.radius > 0:
-        raise TaskError(f"expected a robot radius above 0 px, got {scene.radius:g}")
-    positive("robot_radius", scene.radius)  # checks the upper limit
     search = _paper_grid if preset == "paper" else _staged_search
     tried = list(search(scene))
     # The failure of the plainest reading comes first: later readings only ignore more.

@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from tdac_envs.core.arguments import positive
+from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.mapping.binarize import disc, otsu, saturated, unknown_level
@@ -86,7 +88,14 @@ class MapProblem:
         said: ReadingOptions = DEFAULT_OPTIONS,
         units: MapUnits = PIXELS,
     ) -> MapProblem:
-        """The scene of an image and a task; start and goal may be None."""
+        """The scene of an image and a task; start and goal may be None.
+
+        Raises:
+            TaskError: The radius is out of range.
+        """
+        if not radius > 0:
+            raise TaskError(f"expected a robot radius above 0 px, got {radius:g}")
+        positive("robot_radius", radius)  # checks the upper limit
         grey, task = luminance(image.colour), (start, goal, radius, said)
         automatic = image.occupied is None and said.threshold is None
         even = evened(image.colour, grey) if automatic and photographed(grey) else None

@@ -147,11 +147,12 @@ def test_a_body_fits_where_the_clearance_says_so(radius):
     np.testing.assert_array_equal(found, free)
 
 
+@pytest.mark.parametrize("radius", [1e10, 1e300, np.inf])
 @pytest.mark.parametrize("snapping", [False, True])
-def test_a_radius_beyond_every_map_is_refused(snapping):
-    """Also if its square is no longer a finite number."""
+def test_a_radius_beyond_every_map_is_refused(snapping, radius):
+    """Also if its square or the radius itself is no longer a finite number."""
     with pytest.raises(TaskError, match="robot_radius"):
-        preprocess(rooms(), (80, 84), GOAL, 1e300, snap=snapping)
+        preprocess(rooms(), (80, 84), GOAL, radius, snap=snapping)
 
 
 @pytest.mark.parametrize("snapping", [False, True])
