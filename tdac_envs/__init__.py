@@ -1,6 +1,7 @@
 """Gymnasium environments for map images and Webots worlds.
 
-Create them with `gym.make("TDAC-Map2D-v0")` and `gym.make("TDAC-EPuck-v0")`.
+Create them with `gym.make("TDAC-Map2D-v0")` and `gym.make("TDAC-EPuck-v0")`;
+`gym.make("TDAC-Ladder-v0", level="unknown")` has a new world in each episode.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from tdac_envs.core.errors import MapError, TaskError, TdacError, WorldError
 
 if TYPE_CHECKING:
     from tdac_envs.grid.grid import OccupancyGrid
+    from tdac_envs.ladder.task_sets import load_set
     from tdac_envs.learning.wrapping import wrap_for_rl
     from tdac_envs.mapping.bundled import bundled_map, bundled_maps
     from tdac_envs.mapping.params import MapParams, RobotParams
@@ -35,6 +37,7 @@ __all__ = [
     "bundled_map",
     "bundled_maps",
     "bundled_worlds",
+    "load_set",
     "load_world",
     "preprocess",
     "read_world",
@@ -50,6 +53,7 @@ _MODULE_OF = {
     "bundled_map": "tdac_envs.mapping.bundled",
     "bundled_maps": "tdac_envs.mapping.bundled",
     "bundled_worlds": "tdac_envs.worlds.bundled",
+    "load_set": "tdac_envs.ladder.task_sets",
     "load_world": "tdac_envs.worlds.wbt.reader",
     "preprocess": "tdac_envs.mapping.preprocessing",
     "read_world": "tdac_envs.worlds.wbt.reader",
@@ -82,4 +86,9 @@ gym.register(
     "TDAC-EPuck-v0",
     entry_point="tdac_envs.epuck.env:EPuckEnv",
     vector_entry_point="tdac_envs.epuck.vector:EPuckVectorEnv",
+)
+gym.register(
+    "TDAC-Ladder-v0",
+    entry_point="tdac_envs.ladder.env:LadderEnv",
+    vector_entry_point="tdac_envs.ladder.vector:LadderVectorEnv",
 )

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import non_negative, one_of, whole_number
+from tdac_envs.core.arguments import one_of
 from tdac_envs.drawing.runs import outcome_of
-from tdac_envs.drive.disturbances import Disturbances, measured
-from tdac_envs.drive.rewards import weights_of
+from tdac_envs.drive.disturbances import measured
+from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.stepping import (
     HEADING,
     LEFT,
@@ -33,19 +33,14 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     the observation (`_observation`) and the picture (`_frame`).
 
     Args:
-        on_collision: `"terminate"` or `"block"`.
-        motor_lag: Time constant of the wheel speeds, s.
-        delay: Number of steps until an action takes effect.
-        disturbances: Slip, hidden errors, odometry.
-        reward_weights: Reward weights that differ from the defaults, by name.
-        dt: Duration of a step, s.
+        setup: What does not change between episodes.
         render_mode: `"rgb_array"`, `"human"` or None.
 
     Attributes:
         title: Title of the window.
         robot: Arrays of the robot; see `tdac_envs.drive.stepping`.
         task: The task of the current episode.
-        nominal: The task without variation, which a subclass sets first.
+        nominal: The task without variation.
     """
 
     title: str
@@ -54,33 +49,24 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     nominal: Any
     _scene: Any
     _call_drive: Callable[[], None]
+    _random: np.random.Generator
     _steps: int
     _trail: list[tuple[float, float]]
     _status: str
 
-    def __init__(
-        self,
-        *,
-        on_collision: str,
-        motor_lag: float,
-        delay: int,
-        disturbances: Disturbances,
-        reward_weights: Mapping[str, float] | None,
-        dt: float,
-        render_mode: str | None,
-    ) -> None:
-        one_of("on_collision", on_collision, ("terminate", "block"))
+    def __init__(self, setup: DriveSetup, render_mode: str | None) -> None:
         one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        self.on_collision = on_collision
-        self.disturbances = disturbances
-        self.wheel_slip = disturbances.wheel_slip
-        robot = self.nominal
-        self._limits = disturbances.odometry_limits(robot.full_step, robot.axle_length)
-        self.motor_lag = non_negative("motor_lag", motor_lag)
-        self.delay = whole_number("delay", delay, 0)
-        self.weights = weights_of(reward_weights)
+        self.setup: Any = setup
+        self.nominal = self.task = nominal = setup.nominal
+        self.variation, self.on_collision = setup.variation, setup.on_collision
+        self.motor_lag, self.delay = setup.motor_lag, setup.delay
+        self.weights, self.disturbances = setup.weights, setup.disturbances
+        self.wheel_slip = self.disturbances.wheel_slip
+        sizes = nominal.full_step, nominal.axle_length
+        self._limits = self.disturbances.odometry_limits(*sizes)
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": max(round(1.0 / dt), 1)}
+        rate = max(round(1.0 / nominal.dt), 1)
+        self.metadata = {**self.metadata, "render_fps": rate}
         self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self._window: Window | None = None
 
@@ -95,7 +81,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         state = self.robot.state
         state[LEFT], state[RIGHT] = wheel_speeds(action)
         if self.wheel_slip:
-            self.disturbances.slip(state, self.np_random)
+            self.disturbances.slip(state, self._random)
         self._call_drive()
         outcome = self.robot.outcome.tolist()
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
@@ -130,15 +116,21 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         pose: NDArray[np.float64] = self.robot.state[: HEADING + 1].copy()
         return pose
 
+    def _draw(self, options: dict[str, Any]) -> Any:
+        """Draws the task of an episode, and returns it."""
+        drawn = self.setup.draw(options, self.np_random)
+        self.task, self._random = drawn
+        return self.task
+
     def _hide(self) -> None:
         """Draws the hidden errors of an episode, after its task."""
         axle_length = self.task.axle_length
-        self.disturbances.hide(self.robot.constants, axle_length, self.np_random)
+        self.disturbances.hide(self.robot.constants, axle_length, self._random)
 
     def _odometry(self) -> NDArray[np.float32]:
         """The measured distance and turn of the last step, shape (2,)."""
         robot, own = self.robot, self.disturbances
-        noise = own.noise(robot.state, self.np_random)
+        noise = own.noise(robot.state, self._random)
         return measured(robot.state, robot.constants, noise, self._limits)
 
     def _observation(self) -> Observation:

@@ -74,7 +74,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         self.num_envs = num_envs
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         self.threads = None if threads is None else whole_number("threads", threads, 1)
-        first = envs[0]
+        self._first = first = envs[0]
         self.metadata = {**first.metadata, "render_modes": ["rgb_array"]}
         self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_action_space = first.action_space
@@ -96,8 +96,9 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         self._everyone = np.ones(num_envs, np.bool_)
         self._disturbances = BatchDisturbances(self.setups)
         self._randoms: list[np.random.Generator | None] = [None] * num_envs
+        self._noises: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
-        self._vary = [setup.variation != "nominal" for setup in self.setups]
+        self._vary = [setup.varies for setup in self.setups]
         # Whether a robot's task may change from episode to episode.
         self._tasks_change = any(self._vary)
         self._over = np.zeros(num_envs, np.bool_)
@@ -161,7 +162,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
                 f"episodes have ended: {ended[:10].tolist()}"
             )
         if self._disturbances.slippery:
-            self._disturbances.slip(self._over, self.robots.state, self._random)
+            self._disturbances.slip(self._over, self.robots.state, self._noise)
         if self._tasks_change or self._disturbances.hidden:
             self._draw(np.flatnonzero(self._over), {})
         observations, outcome = self._results()
@@ -178,9 +179,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         return observations, rewards, terminated, truncated, infos
 
     def render(self) -> tuple[Image, ...] | None:
-        """A frame of each robot, uint8 (height, width, 3), all of one size.
-
-        The more robots, the smaller: together they fit on 1280 x 1280 pixels.
+        """A frame of each robot, uint8 (height, width, 3); all fit on 1280 x 1280.
 
         Raises:
             ResetNeeded: Not all robots have been reset yet.
@@ -197,8 +196,9 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
 
         Libraries call `render` in this way, since `SyncVectorEnv` supports it.
         """
-        found = getattr(self, name)
-        values = found(*args, **kwargs) if callable(found) else found
+        values = getattr(self, name)
+        if callable(values):
+            values = values(*args, **kwargs)
         one_each = isinstance(values, tuple | np.ndarray)
         return tuple(values) if one_each else (values,) * self.num_envs
 
@@ -280,7 +280,6 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         if options or self._tasks_change or self._disturbances.hidden:
             self._draw(chosen, options)
         self._over[chosen] = True
-        # The caller reads the robots' own arrays, not these copies.
         self._act(chosen, *self._scratch)
         self._over[chosen] = False
         if self._frames is not None:
@@ -289,15 +288,16 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
     def _draw(self, robots: Rows, options: dict[str, Any]) -> None:
         """Draws the next tasks of some robots, then their hidden errors."""
         drawn = [
-            (i, self.setups[i].draw(options, self._random(i)))
+            (i, *self.setups[i].draw(options, self._random(i)))
             for i in robots.tolist()
             if options or self._vary[i] or self.tasks[i] is not self.setups[i].nominal
         ]
-        for i, task in drawn:
+        for i, task, noise in drawn:
             self._assign(i, task)
+            self._noises[i] = None if noise is self._randoms[i] else noise
         if self._disturbances.hidden:
             constants = self.robots.constants
-            self._disturbances.hide(robots.tolist(), constants, self._random)
+            self._disturbances.hide(robots.tolist(), constants, self._noise)
 
     def _assign(self, i: int, task: Any) -> None:
         self._tasks_change = True
@@ -314,6 +314,10 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             random, self._seeds[i] = seeding.np_random()
             self._randoms[i] = random
         return random
+
+    def _noise(self, i: int) -> np.random.Generator:
+        """Random numbers of the disturbances of robot i."""
+        return self._noises[i] or self._random(i)
 
     def _restart(
         self, observations: Observations, infos: dict[str, Any]

@@ -17,8 +17,8 @@ from tdac_envs.core.arguments import non_negative, one_of
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
+from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import info_of
-from tdac_envs.drive.task import VARIATIONS
 from tdac_envs.epuck import kernels, observed
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.movables import Movables
@@ -195,13 +195,12 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         encoders: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        one_of("variation", variation, VARIATIONS)
         one_of("reflectance", reflectance, ("ideal", "webots"))
         opened = open_world(world, start, goal, ignore)
         assert opened.goal is not None
         robot, ground = opened.robot, Ground.of(opened)
         speed = robot.max_wheel_speed if max_wheel_speed is None else max_wheel_speed
-        self.nominal = self.task = make_task(
+        nominal = make_task(
             ground,
             robot.pose,
             opened.goal,
@@ -210,7 +209,11 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             goal_tolerance=goal_tolerance,
             horizon=horizon,
         )
-        super().__init__(
+        reach = BODY_RADIUS + nominal.full_step
+        setup = Setup(
+            nominal=nominal,
+            variation=variation,
+            fixed_horizon=horizon is not None,
             on_collision=on_collision,
             motor_lag=motor_lag,
             delay=delay,
@@ -222,11 +225,13 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 odometry_scale,
                 odometry_noise,
             ),
-            reward_weights=reward_weights,
-            dt=self.nominal.dt,
-            render_mode=render_mode,
+            weights=weights_of(reward_weights),
+            source=None,
+            around=surroundings(
+                ground, reflectance == "webots", bool(goal_visible), reach
+            ),
         )
-        self.variation = variation
+        super().__init__(setup, render_mode)
         self.sensor_noise = non_negative("sensor_noise", sensor_noise)
         asked = (ground_sensors, gps, compass, encoders)
         self.further = tuple(itertools.compress(observed.INSTRUMENTS, asked))
@@ -235,18 +240,6 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             space = with_odometry(space, self._limits)
         self._has_more = bool(self.further or self.disturbances.odometry)
         self.observation_space = space  # type: ignore[assignment]
-        reach = BODY_RADIUS + self.nominal.full_step
-        self.setup = setup = Setup(
-            self.nominal,
-            surroundings(ground, reflectance == "webots", bool(goal_visible), reach),
-            variation,
-            horizon is not None,
-            on_collision,
-            self.motor_lag,
-            self.delay,
-            self.disturbances,
-            self.weights,
-        )
         self._movables = Movables(setup)
         self.robot = Robot.blank(self.delay)
         self.robot.constants[:] = setup.constants()
@@ -264,7 +257,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         """
         super().reset(seed=seed)
         before = self.task
-        self.task = task = self.setup.draw(options or {}, self.np_random)
+        task = self._draw(options or {})
         if task.field is not before.field:
             self._bind()
         self._movables.reset()
@@ -329,7 +322,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     ) -> NDArray[np.float32]:
         if not self.sensor_noise:
             return readings
-        normal = self.np_random.standard_normal(readings.size)
+        normal = self._random.standard_normal(readings.size)
         return observed.noisy(readings, self.sensor_noise * spreads, normal)
 
     def _frame(self) -> NDArray[np.uint8]:

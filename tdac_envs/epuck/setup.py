@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import check_reset_options, finite_numbers
-from tdac_envs.drive.disturbances import Disturbances
-from tdac_envs.drive.rewards import RewardWeights
+from tdac_envs.core.arguments import finite_numbers
+from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.stepping import UNDISTURBED
+from tdac_envs.drive.task import Pose
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH
 from tdac_envs.epuck.nearby import NearbyParts
@@ -20,7 +20,6 @@ from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.task import (
     EPuckTask,
     default_horizon,
-    jittered_start,
     make_task,
     mixed_start,
     random_task,
@@ -29,30 +28,15 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup:
+class Setup(DriveSetup):
     """The part of an environment that does not change between episodes.
 
     Attributes:
-        nominal: The task without variation.
         around: The parts that the robot may touch and see, depending on its position.
-        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
-        fixed_horizon: Whether the user set the horizon; else it follows from the task.
-        on_collision: `"terminate"` or `"block"`.
-        motor_lag: Time constant of the wheel speeds, s.
-        delay: Number of steps until an action takes effect.
-        disturbances: Slip, hidden errors, odometry.
-        weights: Weights of the reward.
     """
 
     nominal: EPuckTask
     around: NearbyParts
-    variation: str
-    fixed_horizon: bool
-    on_collision: str
-    motor_lag: float
-    delay: int
-    disturbances: Disturbances
-    weights: RewardWeights
 
     @property
     def pushes(self) -> bool:
@@ -110,38 +94,24 @@ class Setup:
             task.field,
         )  # fmt: skip
 
-    def draw(self, options: dict[str, Any], random: np.random.Generator) -> EPuckTask:
-        """The task of an episode.
-
-        Args:
-            options: Options of `reset`: `start` and `goal`, which override the
-                variation.
-            random: Random number generator of the variation.
-
-        Raises:
-            TaskError: An option is unknown, or the start or goal is not feasible.
-        """
-        check_reset_options(options)
+    def _with_ends(self, options: dict[str, Any]) -> EPuckTask:
         task = self.nominal
-        if options:
-            start = tuple(options.get("start", task.start))
-            drawn = make_task(
-                task.ground,
-                finite_numbers("start", (*start, task.start.heading)[:3], 3),
-                options.get("goal", task.goal),
-                max_wheel_speed=task.max_wheel_speed,
-                dt=task.dt,
-                goal_tolerance=task.goal_tolerance,
-                horizon=task.horizon,
-            )
-        elif self.variation == "random":
-            drawn = random_task(task, random)
-        elif self.variation == "mixed":
-            return task.moved(mixed_start(task, random))
-        elif self.variation == "jitter":
-            return task.moved(jittered_start(task, random))
-        else:
-            return task
-        if self.fixed_horizon or drawn.goal == task.goal:
-            return drawn
-        return replace(drawn, horizon=default_horizon(drawn))
+        start = tuple(options.get("start", task.start))
+        return make_task(
+            task.ground,
+            finite_numbers("start", (*start, task.start.heading)[:3], 3),
+            options.get("goal", task.goal),
+            max_wheel_speed=task.max_wheel_speed,
+            dt=task.dt,
+            goal_tolerance=task.goal_tolerance,
+            horizon=task.horizon,
+        )
+
+    def _random_task(self, random: np.random.Generator) -> EPuckTask:
+        return random_task(self.nominal, random)
+
+    def _mixed_start(self, random: np.random.Generator) -> Pose:
+        return mixed_start(self.nominal, random)
+
+    def _default_horizon(self, task: EPuckTask) -> int:
+        return default_horizon(task)

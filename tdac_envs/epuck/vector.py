@@ -104,7 +104,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             observations["ground"] = self._last_ground.copy()
         add_instruments(observations, one.further, self.robots, self._floors)
         if self._disturbances.odometry:
-            seen = self._disturbances.measure(robots, self.robots, self._random)
+            seen = self._disturbances.measure(robots, self.robots, self._noise)
             observations["odometry"] = seen
 
     def _add_noise(self, robots: Sequence[int]) -> None:
@@ -112,7 +112,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         spreads = self.robots.hits[robots, :, 2] * self._factors[robots, None]
         normal = np.empty(spreads.shape)
         for i, row in zip(robots, normal, strict=True):
-            self._random(i).standard_normal(out=row)
+            self._noise(i).standard_normal(out=row)
         readings = self.robots.readings[robots]
         self._last_ps[robots] = noisy(readings, spreads, normal)
 
@@ -123,5 +123,5 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         readings, spreads = ground_readings(seen, floor, self.robots.row(i))
         if i not in self._noisy:
             return readings
-        normal = self._random(i).standard_normal(readings.size)
+        normal = self._noise(i).standard_normal(readings.size)
         return noisy(readings, env.sensor_noise * spreads, normal)

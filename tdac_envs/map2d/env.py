@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Addresses
-from tdac_envs.core.arguments import non_negative, number_up_to, one_of
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
+from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import info_of
-from tdac_envs.drive.task import VARIATIONS, Pose
+from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.kernels import begin, drive
 from tdac_envs.map2d.observed import noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
@@ -190,7 +190,6 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         polarity: Shade | None = None,
         render_mode: str | None = None,
     ) -> None:
-        one_of("variation", variation, VARIATIONS)
         prepared = prepare(
             map,
             start,
@@ -211,7 +210,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         )
         assert params.start is not None
         assert params.goal is not None
-        self.nominal = make_task(
+        nominal = make_task(
             Terrain.of(prepared.grid),
             Pose(*params.start, params.heading),
             params.goal,
@@ -220,9 +219,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             goal_tolerance=goal_tolerance,
             horizon=horizon,
         )
-        self.params = params
-        self.task = self.nominal
-        super().__init__(
+        setup = Setup(
+            nominal=nominal,
+            variation=variation,
+            fixed_horizon=horizon is not None,
             on_collision=on_collision,
             motor_lag=motor_lag,
             delay=delay,
@@ -234,33 +234,32 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 odometry_scale,
                 odometry_noise,
             ),
-            reward_weights=reward_weights,
-            dt=self.nominal.dt,
-            render_mode=render_mode,
+            weights=weights_of(reward_weights),
+            source=None,
+            range_noise=range_noise,
+            range_dropout=range_dropout,
         )
-        self.variation = variation
-        self.range_noise = non_negative("range_noise", range_noise)
-        self.range_dropout = number_up_to("range_dropout", range_dropout, 1.0)
-        self.setup = Setup(
-            self.nominal,
-            variation,
-            horizon is not None,
-            on_collision,
-            self.range_noise,
-            self.range_dropout,
-            self.motor_lag,
-            self.delay,
-            self.disturbances,
-            self.weights,
-        )
-        space = observation_space(self.nominal)
-        self._is_inexact = self.setup.has_inexact_ranges
+        self.params = params
+        self._prepare(setup, render_mode)
+
+    @classmethod
+    def of(cls, setup: Setup, render_mode: str | None = None) -> Map2DEnv:
+        """The environment of a setup; it has no `params`."""
+        env = cls.__new__(cls)
+        env._prepare(setup, render_mode)
+        return env
+
+    def _prepare(self, setup: Setup, render_mode: str | None) -> None:
+        super().__init__(setup, render_mode)
+        self.range_noise, self.range_dropout = setup.range_noise, setup.range_dropout
+        space = observation_space(setup.nominal)
+        self._is_inexact = setup.has_inexact_ranges
         if self.disturbances.odometry:
             space = with_odometry(space, self._limits)
             self._is_inexact = True
         self.observation_space = space  # type: ignore[assignment]
-        self.robot = Robot.blank(robot.n_rays, self.delay)
-        self.robot.constants[:] = self.setup.constants()
+        self.robot = Robot.blank(setup.nominal.robot.n_rays, self.delay)
+        self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self._bind()
         self._scene: MapScene | None = None
@@ -274,7 +273,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             TaskError: An option is unknown, or the start or goal is not feasible.
         """
         super().reset(seed=seed)
-        before, self.task = self.task, self.setup.draw(options or {}, self.np_random)
+        before = self.task
+        self._draw(options or {})
         if self.task.field is not before.field:
             self._bind()
         task, robot = self.task, self.robot
@@ -317,7 +317,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         }
         if self._is_inexact:
             if self.setup.has_inexact_ranges:
-                seen["ranges"][:] = noisy(seen["ranges"], self.setup, self.np_random)
+                seen["ranges"][:] = noisy(seen["ranges"], self.setup, self._random)
             if self.disturbances.odometry:
                 seen["odometry"] = self._odometry()
         return seen

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from tdac_envs.core.arguments import check_reset_options, positive, whole_number
+from tdac_envs.core.arguments import (
+    non_negative,
+    number_up_to,
+    positive,
+    whole_number,
+)
 from tdac_envs.core.errors import TaskError
-from tdac_envs.drive.disturbances import Disturbances
-from tdac_envs.drive.rewards import RewardWeights
+from tdac_envs.drive.setup import DriveSetup
+from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.rays import fan
 from tdac_envs.map2d.robot import constants_of
 from tdac_envs.map2d.task import (
     Map2DTask,
     default_horizon,
-    jittered_start,
     make_task,
     mixed_start,
     random_task,
@@ -27,36 +31,26 @@ from tdac_envs.mapping.params import RobotParams
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup:
+class Setup(DriveSetup):
     """The part of an environment that does not change between episodes.
 
     Attributes:
-        nominal: The task without variation.
-        variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`.
-        fixed_horizon: Whether the user set the horizon; else it follows from the task.
-        on_collision: `"terminate"` or `"block"`.
         range_noise: Relative standard deviation of each range.
         range_dropout: Probability that a ray reads the largest range.
-        motor_lag: Time constant of the wheel speeds, s.
-        delay: Number of steps until an action takes effect.
-        disturbances: Slip, hidden errors, odometry.
-        weights: Weights of the reward.
         directions: Directions of the rays, from `rays.fan`.
     """
 
     nominal: Map2DTask
-    variation: str
-    fixed_horizon: bool
-    on_collision: str
     range_noise: float
     range_dropout: float
-    motor_lag: float
-    delay: int
-    disturbances: Disturbances
-    weights: RewardWeights
     directions: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
+        DriveSetup.__post_init__(self)
+        noise = non_negative("range_noise", self.range_noise)
+        dropout = number_up_to("range_dropout", self.range_dropout, 1.0)
+        object.__setattr__(self, "range_noise", noise)
+        object.__setattr__(self, "range_dropout", dropout)
         robot = self.nominal.robot
         view = np.radians(robot.field_of_view_deg)
         object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
@@ -81,42 +75,26 @@ class Setup:
         terrain = task.terrain
         return terrain.leaps, terrain.padded_clear, task.field, self.directions
 
-    def draw(self, options: dict[str, Any], random: np.random.Generator) -> Map2DTask:
-        """The task of an episode.
-
-        Args:
-            options: Options of `reset`: `start` and `goal`, which override the
-                variation.
-            random: Random number generator of the variation.
-
-        Raises:
-            TaskError: An option is unknown, or the start or goal is not feasible.
-        """
-        check_reset_options(options)
+    def _with_ends(self, options: dict[str, Any]) -> Map2DTask:
         task = self.nominal
-        if options:
-            start = (*options.get("start", task.start), task.start.heading)[:3]
-            drawn = make_task(
-                task.terrain,
-                start,
-                options.get("goal", task.goal),
-                task.robot,
-                dt=task.dt,
-                goal_tolerance=task.goal_tolerance,
-                horizon=task.horizon,
-            )
-        elif self.variation == "random":
-            drawn = random_task(task, random)
-        elif self.variation == "mixed":
-            return task.moved(mixed_start(task, random))
-        elif self.variation == "jitter":
-            return task.moved(jittered_start(task, random))
-        else:
-            return task
-        if self.fixed_horizon or drawn.goal == task.goal:
-            return drawn
-        steps = default_horizon(drawn.shortest, drawn.robot, drawn.dt)
-        return replace(drawn, horizon=steps)
+        return make_task(
+            task.terrain,
+            (*options.get("start", task.start), task.start.heading)[:3],
+            options.get("goal", task.goal),
+            task.robot,
+            dt=task.dt,
+            goal_tolerance=task.goal_tolerance,
+            horizon=task.horizon,
+        )
+
+    def _random_task(self, random: np.random.Generator) -> Map2DTask:
+        return random_task(self.nominal, random)
+
+    def _mixed_start(self, random: np.random.Generator) -> Pose:
+        return mixed_start(self.nominal, random)
+
+    def _default_horizon(self, task: Map2DTask) -> int:
+        return default_horizon(task.shortest, task.robot, task.dt)
 
 
 def override(robot: RobotParams, **given: float | None) -> RobotParams:

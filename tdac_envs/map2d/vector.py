@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         **options: Arguments of `Map2DEnv` for all robots.
     """
 
+    make: Callable[..., Map2DEnv] = Map2DEnv
     step_rows = staticmethod(step_rows)
     copied = ("pose", "wheel_speeds", "ranges")
 
@@ -51,7 +52,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
         super().__init__(
-            make_envs(Map2DEnv, each, options, num_envs),
+            make_envs(self.make, each, options, num_envs),
             num_envs,
             autoreset_mode=autoreset_mode,
             threads=threads,
@@ -74,9 +75,9 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
         if self._noisy.size:
             for i in np.intersect1d(self._noisy, robots).tolist():
-                exact, random = self.robots.ranges[i], self._random(i)
+                exact, random = self.robots.ranges[i], self._noise(i)
                 self._ranges[i] = noisy(exact, self.setups[i], random)
             observations["ranges"][self._noisy] = self._ranges[self._noisy]
         if self._disturbances.odometry:
-            seen = self._disturbances.measure(robots, self.robots, self._random)
+            seen = self._disturbances.measure(robots, self.robots, self._noise)
             observations["odometry"] = seen

@@ -1,0 +1,128 @@
+"""What a robot of a task set observes: keys, frame of reference, infos."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from tdac_envs.ladder.set_file import SetFile
+
+Array = NDArray[np.float64]
+Seen = dict[str, NDArray[np.float32]]
+
+ALWAYS, AT_END = ("collisions", "clipped"), ("is_success", "collision")
+"""Entries of `info`: in every step, and in the last one of an episode."""
+ANCHOR = 7
+"""Numbers of an anchor; see `View.anchor`."""
+
+
+class View:
+    """What is observed in a set, for one robot or for many.
+
+    Args:
+        file: The set.
+        privileged: Whether infos are complete, with the true pose.
+    """
+
+    def __init__(self, file: SetFile, privileged: bool) -> None:
+        self._keys = tuple(sorted(file.observed))
+        self._from_start = file.frame == "start"
+        self._side = file.largest_side
+        self.privileged = privileged
+
+    def space(self, whole: spaces.Dict) -> spaces.Dict:
+        """The observation space: the same for all worlds of the set.
+
+        Args:
+            whole: The space of the environment of one world.
+        """
+        if self._from_start:
+            far = math.hypot(self._side, self._side)
+            low, high = np.full(2, -far, np.float32), np.full(2, far, np.float32)
+        else:
+            low = np.full(2, -0.5, np.float32)
+            high = np.full(2, self._side - 0.5, np.float32)
+        pi = np.float32(math.pi)
+        own = {
+            **whole.spaces,
+            "pose": spaces.Box(np.append(low, -pi), np.append(high, pi)),
+            "goal": spaces.Box(low, high),
+        }
+        return spaces.Dict({key: own[key] for key in self._keys})
+
+    def anchor(self, task: Any) -> Array:
+        """Where an episode's frame of reference is, and its goal, shape (7,).
+
+        They are x, y, heading of the frame, cosine and sine of this heading, and the
+        goal in the frame.
+        """
+        x, y, heading = task.start if self._from_start else (0.0, 0.0, 0.0)
+        # Of `math`, since NumPy's may differ between one number and many.
+        cosine, sine = math.cos(heading), math.sin(heading)
+        anchor = np.array([x, y, heading, cosine, sine, 0.0, 0.0])
+        anchor[5:] = _moved(np.array(task.goal), anchor)
+        return anchor
+
+    def seen(self, whole: Seen, poses: Array, anchors: Array) -> Seen:
+        """The observations of one robot, or of many with an additional first axis.
+
+        Args:
+            whole: What the environment of one world observes.
+            poses: True poses, shape (..., 3).
+            anchors: See `anchor`, shape (..., 7).
+        """
+        own = dict(whole)
+        own["goal"] = anchors[..., 5:].astype(np.float32)
+        if self._from_start and "pose" in self._keys:
+            turned = poses[..., 2] - anchors[..., 2]
+            turned = np.where(turned > math.pi, turned - 2.0 * math.pi, turned)
+            turned = np.where(turned <= -math.pi, turned + 2.0 * math.pi, turned)
+            places = _moved(poses[..., :2], anchors)
+            joined = np.concatenate([places, turned[..., None]], axis=-1)
+            own["pose"] = joined.astype(np.float32)
+        return {key: own[key] for key in self._keys}
+
+    def info(self, whole: dict[str, Any], pose: Array, ended: bool) -> dict[str, Any]:
+        """The info of one robot.
+
+        Args:
+            whole: What the environment of one world tells.
+            pose: True pose, shape (3,).
+            ended: Whether the episode has ended.
+        """
+        if self.privileged:
+            return {**whole, "pose": pose}
+        return {key: whole[key] for key in (*ALWAYS, *(AT_END if ended else ()))}
+
+    def infos(
+        self, whole: dict[str, Any], poses: Array, ended: NDArray[np.bool_]
+    ) -> dict[str, Any]:
+        """The infos of many robots, in Gymnasium's format.
+
+        Args:
+            whole: What the environments of one world tell.
+            poses: True poses, shape (n, 3).
+            ended: Which episodes have ended, shape (n,).
+        """
+        mask = whole[f"_{ALWAYS[0]}"]
+        if self.privileged:
+            shown = np.where(mask[:, None], poses, 0.0)
+            return {**whole, "pose": shown, "_pose": mask.copy()}
+        own: dict[str, Any] = {}
+        for key in ALWAYS:
+            own[key], own[f"_{key}"] = whole[key], mask.copy()
+        if ended.any():
+            for key in AT_END:
+                own[key], own[f"_{key}"] = whole[key] & ended, ended.copy()
+        return own
+
+
+def _moved(points: Array, anchors: Array) -> Array:
+    """Points, shape (..., 2), in the frames of the anchors."""
+    dx, dy = points[..., 0] - anchors[..., 0], points[..., 1] - anchors[..., 1]
+    cosine, sine = anchors[..., 3], anchors[..., 4]
+    return np.stack([cosine * dx + sine * dy, cosine * dy - sine * dx], axis=-1)

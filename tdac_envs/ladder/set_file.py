@@ -1,0 +1,206 @@
+"""Schema of `set.yaml`: worlds, robot, observations and disturbances of a task set."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
+
+from tdac_envs.core.arguments import MOST_STEPS
+from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reason
+from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
+from tdac_envs.drive.disturbances import MOST_HIDDEN
+from tdac_envs.ladder.generators.registry import AnyParameters
+from tdac_envs.ladder.worlds import WorldSpec
+from tdac_envs.mapping.params import Length, RobotParams
+
+Observed = Literal["pose", "goal", "wheel_speeds", "ranges", "odometry"]
+"""Observation keys that a set may have."""
+Split = Literal["train", "dev", "test", "hidden"]
+Share = Annotated[float, Field(ge=0, le=1)]
+SLIP_STEP = 0.1
+"""Duration of the step for which `wheel_slip` of a set is stated, s."""
+
+
+def _distinct(keys: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(keys)) < len(keys):
+        raise ValueError("expected each key once")
+    return keys
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class HorizonSpec(_Strict):
+    """The horizon: `factor` times OT, within `least` and `most` steps."""
+
+    factor: float = Field(16.0, gt=0, le=1000)
+    least: int = Field(400, ge=1, le=MOST_STEPS)
+    most: int = Field(2000, ge=1, le=MOST_STEPS)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.least > self.most:
+            raise ValueError("expected least to be at most most")
+        return self
+
+    def steps(self, least_steps: float) -> int:
+        """The horizon of a world whose OT is `least_steps`."""
+        return min(max(math.ceil(self.factor * least_steps), self.least), self.most)
+
+
+class AdmissionSpec(_Strict):
+    """What every world of the set must fulfil; see `docs/task-sets.md`."""
+
+    gap: float = Field(1.1, ge=1, le=10, description="Least gap.")
+    steps: float = Field(60.0, ge=1, le=MOST_STEPS, description="Least OT, steps.")
+    detour: float | None = Field(
+        None, ge=1, le=100, description="Least detour; by default the generator's."
+    )
+    tries: int = Field(200, ge=1, le=100_000, description="Most drafts of a world.")
+
+
+class DisturbanceSpec(_Strict):
+    """The disturbances of the set; `docs/disturbances.md` defines them."""
+
+    wheel_gains: float = Field(0.0, ge=0, le=MOST_HIDDEN, description="Bound.")
+    wheel_slip: Share = Field(
+        0.0, description="Relative SD for a step of 0.1 s; SD · √(0.1 s / dt) for dt."
+    )
+    axle_error: float = Field(0.0, ge=0, le=MOST_HIDDEN, description="Bound.")
+    range_noise: Share = Field(0.0, description="Relative SD.")
+    range_dropout: Share = Field(0.0, description="Probability of each ray.")
+    odometry_scale: Share = Field(0.0, description="SD of both scale errors.")
+    odometry_noise: Share = Field(0.0, description="Relative SD.")
+    motor_lag: float = Field(0.0, ge=0, le=60, description="Time constant, s.")
+    delay: int = Field(0, ge=0, le=100, description="Steps until an action acts.")
+
+
+class SetFile(_Strict):
+    """Contents of `set.yaml`, schema 1."""
+
+    schema_version: Literal[1] = Field(1, alias="schema")
+    name: str = Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][\w.-]*$")
+    description: str = Field("", max_length=2000)
+    worlds: tuple[AnyParameters, ...] = Field(
+        min_length=1, max_length=16, description="Generators, with equal shares."
+    )
+    robot: RobotParams = RobotParams.disc(8.0)
+    dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
+    goal_tolerance: Length = Field(4.0, le=100, description="px")
+    observed: Annotated[tuple[Observed, ...], AfterValidator(_distinct)] = Field(
+        ("pose", "goal", "wheel_speeds", "ranges"), min_length=1
+    )
+    frame: Literal["map", "start"] = Field(
+        "start", description="Whose origin and heading poses and the goal refer to."
+    )
+    map: bool = Field(False, description="Whether the map is given.")
+    disturbances: DisturbanceSpec = DisturbanceSpec()
+    horizon: HorizonSpec = HorizonSpec()
+    admission: AdmissionSpec = AdmissionSpec()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        own = self.disturbances
+        if "odometry" not in self.observed and (
+            own.odometry_scale or own.odometry_noise
+        ):
+            raise ValueError("errors of the odometry need `odometry` in `observed`")
+        if self.map and self.frame != "map":
+            raise ValueError("a set with `map: true` needs `frame: map`")
+        for number in range(len(self.worlds)):
+            self.spec(number)  # checks the sizes of the robot and of a step
+        return self
+
+    @property
+    def full_step(self) -> float:
+        """Distance of one step at full speed, px."""
+        return self.robot.max_wheel_speed * self.dt
+
+    @property
+    def largest_side(self) -> int:
+        """Largest width or height of a world, px."""
+        return max(max(each.width, each.height) for each in self.worlds)
+
+    @property
+    def slip(self) -> float:
+        """Relative standard deviation of a wheel's slip in a step of `dt`."""
+        return self.disturbances.wheel_slip * math.sqrt(SLIP_STEP / self.dt)
+
+    def spec(self, index: int) -> WorldSpec:
+        """What world `index` is like; generators take turns."""
+        return WorldSpec(
+            generator=self.worlds[index % len(self.worlds)],
+            radius=self.robot.radius,
+            step=self.full_step,
+            tolerance=self.goal_tolerance,
+            min_gap=self.admission.gap,
+            min_steps=self.admission.steps,
+            min_detour=self.admission.detour,
+            tries=self.admission.tries,
+        )
+
+    def sha256(self) -> str:
+        """SHA-256 of the canonical JSON of all values but the description."""
+        values = self.model_dump(mode="json", by_alias=True, exclude={"description"})
+        text = json.dumps(values, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def read_set_file(path: Path) -> SetFile:
+    """Reads a `set.yaml`; without a `name`, the set has that of its file.
+
+    Raises:
+        TaskError: The file cannot be read, or a value is not valid.
+    """
+    try:
+        values: Any = parse_yaml(read_file(path, TEXT_BYTES))
+        if not isinstance(values, dict):
+            raise ValueError("expected keys with values, such as `worlds: [...]`")
+        return SetFile.model_validate({"name": path.stem, **values})
+    except ValidationError as error:
+        known = [field.alias or name for name, field in SetFile.model_fields.items()]
+        raise TaskError(f"{path}: {first_problem(error, known)}") from None
+    except (OSError, ValueError) as error:
+        raise TaskError(f"{path}: {one_line_reason(error)}") from None
+
+
+BUILT_IN = Path(__file__).parent / "sets"
+"""Folder of the sets that come with the package."""
+
+
+def set_names() -> tuple[str, ...]:
+    """Names of the sets that come with the package, the easiest first."""
+    order = {"known": 0, "unknown": 1, "lost": 2}
+    names = [path.stem for path in BUILT_IN.glob("*.yaml")]
+    return tuple(sorted(names, key=lambda name: (order.get(name, len(order)), name)))
+
+
+def find_set_file(name: str | Path) -> SetFile:
+    """The set of a name or of a path of a `set.yaml`.
+
+    Raises:
+        TaskError: There is none, or it is not valid.
+    """
+    if str(name) in set_names():
+        return read_set_file(BUILT_IN / f"{name}.yaml")
+    path = Path(name)
+    if path.suffix in (".yaml", ".yml"):
+        return read_set_file(path)
+    names = set_names()
+    raise TaskError(
+        f"unknown task set {str(name)!r}; expected {', '.join(names)} or the path of "
+        f"a set.yaml{hint(str(name), names)}"
+    )

@@ -1,0 +1,83 @@
+"""Where the tasks of TDAC-Ladder-v0 come from: the worlds of a split, by number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tdac_envs.core.arguments import whole_number
+from tdac_envs.core.errors import TaskError, one_line_reason
+from tdac_envs.core.intake import read_file
+from tdac_envs.ladder.pool import TrainingPool
+from tdac_envs.ladder.task_sets import MOST_SALT, TaskSet
+from tdac_envs.map2d.task import Map2DTask
+
+MOST_WORLDS = 2**31
+"""Numbers of worlds that are drawn at random are below it."""
+
+
+class SetSource:
+    """The tasks of a split: a random world for each episode, or that of `index`.
+
+    The disturbances of a training episode follow from the environment's seed. In the
+    other splits, they follow from the world.
+
+    Args:
+        task_set: The set.
+        split: One of `task_sets.SPLITS`.
+        train_pool: Number of training worlds, which are kept; 0 for a new world in
+            each episode.
+        salt: Salt of the split `hidden`.
+
+    Raises:
+        TaskError: The split is unknown, or its salt is missing or not asked for.
+    """
+
+    def __init__(
+        self, task_set: TaskSet, split: str, train_pool: int, salt: bytes | None
+    ) -> None:
+        task_set.key(split, 0, "world", salt)  # checks the split and its salt
+        self._set, self._split, self._salt = task_set, split, salt
+        size = whole_number("train_pool", train_pool, 0, MOST_WORLDS)
+        kept = split == "train" and size > 0
+        self._pool = TrainingPool(task_set) if kept else None
+        self._count = size if kept else MOST_WORLDS
+
+    def task(self, index: int) -> Map2DTask:
+        """The task of a world.
+
+        Raises:
+            TaskError: There is no feasible world.
+        """
+        if self._pool is not None:
+            return self._pool.task(whole_number("index", index, 0))
+        return self._set.task(self._split, index, self._salt)
+
+    def draw(
+        self, options: dict[str, Any], random: np.random.Generator
+    ) -> tuple[Map2DTask, np.random.Generator]:
+        """As `drive.setup.TaskSource` says; the only option is `index`."""
+        unknown = sorted(map(str, options.keys() - {"index"}))
+        if unknown:
+            raise TaskError(f"unknown reset options {unknown}; expected 'index'")
+        index = options.get("index")
+        if index is None:
+            index = int(random.integers(self._count))
+        task = self.task(index)
+        if self._split == "train":
+            return task, random
+        return task, self._set.noise(self._split, index, self._salt)
+
+
+def read_salt(path: str | Path) -> bytes:
+    """The salt in a file.
+
+    Raises:
+        TaskError: The file cannot be read.
+    """
+    try:
+        return read_file(path, MOST_SALT)
+    except OSError as error:
+        raise TaskError(f"salt file {path}: {one_line_reason(error)}") from None

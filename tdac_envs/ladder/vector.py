@@ -1,0 +1,92 @@
+"""The vector environment of TDAC-Ladder-v0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+
+from tdac_envs.drive.vector import Actions, Observations, Result
+from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.map2d.vector import Map2DVectorEnv
+
+
+class LadderVectorEnv(Map2DVectorEnv, VectorEnv[Observations, Actions, Any]):
+    """A vector of `LadderEnv` that steps in one compiled call on all cores.
+
+    Made by `gym.make_vec("TDAC-Ladder-v0", num_envs=64, level="unknown")`. Robot i
+    behaves bit for bit as a `LadderEnv` does with the same seed and actions. The
+    formats are those of Gymnasium's `SyncVectorEnv`.
+
+    Args:
+        num_envs: Number of robots.
+        autoreset_mode: `"NextStep"`, `"SameStep"`, `"Disabled"`, or a member of
+            `gymnasium.vector.AutoresetMode`.
+        threads: Number of threads, which does not affect the results. Default: the
+            number of cores.
+        render_mode: `"rgb_array"`, for up to 64 robots, or None.
+        **options: Arguments of `LadderEnv`.
+    """
+
+    make = LadderEnv
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(
+            num_envs,
+            each=({},),
+            autoreset_mode=autoreset_mode,
+            threads=threads,
+            render_mode=render_mode,
+            **options,
+        )
+        self.view = view = self._first.view
+        self._anchors = np.array([view.anchor(task) for task in self.tasks])
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts episodes, as `DrivenVectorEnv.reset` does."""
+        whole, infos = super().reset(seed=seed, options=options)
+        poses, none = self.pose(), np.zeros(self.num_envs, np.bool_)
+        seen = self.view.seen(whole, poses, self._anchors)
+        return seen, self.view.infos(infos, poses, none)
+
+    def step(self, actions: Actions) -> Result:
+        """Runs one time step, as `DrivenVectorEnv.step` does."""
+        before = self._anchors.copy()
+        whole, rewards, terminated, truncated, infos = super().step(actions)
+        ended, view, poses = terminated | truncated, self.view, self.pose()
+        seen = view.seen(whole, poses, self._anchors)
+        if "final_obs" not in infos:
+            told = view.infos(infos, poses, ended)
+            return seen, rewards, terminated, truncated, told
+        final = infos.pop("final_obs")
+        for i in np.flatnonzero(ended).tolist():
+            final[i] = view.seen(final[i], self.last_poses[i], before[i])
+        last = view.infos(infos.pop("final_info"), self.last_poses, ended)
+        # The new episodes have not ended.
+        told = view.infos(infos, poses, np.zeros_like(ended))
+        told |= {
+            "final_obs": final,
+            "_final_obs": ended,
+            "final_info": last,
+            "_final_info": ended.copy(),
+        }
+        return seen, rewards, terminated, truncated, told
+
+    def _assign(self, i: int, task: Any) -> None:
+        super()._assign(i, task)
+        self._anchors[i] = self.view.anchor(task)
