@@ -78,8 +78,11 @@ def verify(
     began = time.monotonic()
     source = read_source(controller)
     suites = _suites(task, suite, shipped)
-    with tempfile.TemporaryDirectory(prefix="tdac-verify-") as name:
-        folder = Path(name)
+    with contextlib.ExitStack() as stack:
+        warm = judge or stack.enter_context(WarmJudge())
+        # In the judge's folder, so that no interrupt can leave it behind.
+        made = tempfile.TemporaryDirectory(prefix="tdac-verify-", dir=warm.folder)
+        folder = Path(stack.enter_context(made))
         job = Job(
             task=folder / "work",
             controller=folder / "controller.py",
@@ -94,9 +97,7 @@ def verify(
             metres=task.setting.shown != task.setting.units,
         )
         _prepare(job, task, source, suites)
-        with contextlib.ExitStack() as stack:
-            warm = judge or stack.enter_context(WarmJudge())
-            output = _run_judge(job, folder, warm, meanwhile)
+        output = _run_judge(job, folder, warm, meanwhile)
         findings = read_findings(job.out, output)
         tests, failures = read_outcomes(job.out / "report.jsonl", findings, output)
         report = Report(

@@ -50,6 +50,9 @@ class WarmJudge:
         task: Task of most jobs, which a new interpreter reads in advance.
         turn: File that is locked during a job, so that judges that share it run one job
             at a time.
+
+    Attributes:
+        folder: Its temporary folder, which `close` removes.
     """
 
     def __init__(
@@ -73,12 +76,12 @@ class WarmJudge:
         self._folder = tempfile.TemporaryDirectory(
             prefix="tdac-judge-", ignore_cleanup_errors=True
         )
-        self._path = Path(self._folder.name)
+        self.folder = Path(self._folder.name)
         environment["TMPDIR"] = self._folder.name
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
-        place = environment, self._path, self._log.fileno()
+        place = environment, self.folder, self._log.fileno()
         if child_pool is None:
-            known = [] if task is None else [lay_out(task, self._path / "task")]
+            known = [] if task is None else [lay_out(task, self.folder / "task")]
             self._server = _start_server(known, *place)
         else:
             self._server = _fork_server(child_pool, *place)

@@ -169,6 +169,7 @@ def test_the_line_that_nobody_changed_is_carried_out(name, command, tmp_path):
     assert code == wanted, errors
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("name", READING)
 def test_a_hostile_word_is_taken_or_refused_in_one_line(name, command):
     """Of the commands that judge nothing, 300 lines in all."""

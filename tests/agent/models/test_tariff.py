@@ -115,6 +115,7 @@ def code(source, *counts):
     return Reply(f"```python\n{source}```\n", "end", *counts)
 
 
+@pytest.mark.slow
 def test_an_exhausted_budget_stops_a_run(
     tmp_path, good_source, tdac, monkeypatch, warm
 ):

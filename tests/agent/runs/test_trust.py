@@ -147,6 +147,7 @@ def test_what_was_allowed_stays_somebody_elses(tmp_path, run, secret, warm):
     assert not is_own(load_run(run), run / "suite")
 
 
+@pytest.mark.slow
 def test_byte_code_beside_tests_is_not_used(tmp_path, small_task, good_source):
     """It need not be what the tests were compiled to, and has no part in their hash."""
     suite, canary = tmp_path / "suite", tmp_path / "canary"

@@ -60,7 +60,7 @@ def tdac_without_walls(tmp_path):
     return run
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["verify", "synth"])
 def test_the_judge_refuses_in_one_line(tdac_without_walls, good, tmp_path, command):
     """Exit 3, the reason and what to do; the controller was not started."""

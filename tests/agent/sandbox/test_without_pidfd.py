@@ -46,7 +46,7 @@ SCRIPT = """
 """
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.skipif(
     os.uname().machine not in syscalls.MACHINES, reason="no table of system calls"
 )

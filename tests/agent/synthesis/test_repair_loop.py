@@ -59,6 +59,7 @@ def out(tmp_path):
     return tmp_path / "run"
 
 
+@pytest.mark.slow
 def test_rules_live_on(
     policy_task, good_source, tmp_path, out, tdac, monkeypatch, warm
 ):

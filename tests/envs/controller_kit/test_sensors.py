@@ -344,6 +344,6 @@ def test_show_films_the_episode_and_says_how_it_ended(tmp_path, action, outcome)
     )
     lines = run.stdout.splitlines()
     assert lines[0] == "new", run.stderr
-    assert lines[1] == f"no display: wrote {tmp_path / 'controller.mp4'}"
+    assert lines[1] == f"no display: wrote {tmp_path / 'controller.mp4'} (in real time)"
     assert lines[2].startswith(outcome)
     assert (tmp_path / "controller.mp4").stat().st_size > 1000

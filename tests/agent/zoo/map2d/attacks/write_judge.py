@@ -28,6 +28,6 @@ attempt("new", lambda: open("@TARGET@/new.txt", "w").write("new"))
 attempt("removed", os.remove, "@TARGET@/kept.txt")
 attempt("renamed", os.rename, "@TARGET@", "@TARGET@-gone")
 FOLDER = os.path.dirname(os.path.dirname(os.getcwd()))
-for path in glob.glob(f"{FOLDER}/tdac-verify-*/*"):
+for path in glob.glob(f"{FOLDER}/**/tdac-verify-*/*", recursive=True):
     attempt("results", writable, path)
 GOT[4:] = []
