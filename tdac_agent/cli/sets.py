@@ -1,0 +1,202 @@
+"""`tdac sets` and `tdac sets show`: task sets, their worlds as figures and pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import cv2
+from rich.box import SIMPLE
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import print_sentences
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.ladder.dead_ends import Sensor, dead_ends
+from tdac_envs.ladder.picture import contact_sheet, draw_world
+from tdac_envs.ladder.set_file import DisturbanceSpec, set_names
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.worlds import LadderWorld
+
+ON_A_SHEET = 24
+"""Worlds of a contact sheet."""
+
+
+def list_sets(as_json: bool) -> int:
+    """Prints the task sets that come with the package; returns 0."""
+    sets = [load_set(name) for name in set_names()]
+    if as_json:
+        _print_json([_record(each) for each in sets])
+        return 0
+    console = Console()
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
+    for column in ("set", "observed", "what it asks"):
+        table.add_column(column)
+    for each in sets:
+        seen = ", ".join(each.file.observed) + (", the map" if each.file.map else "")
+        table.add_row(f"[bold]{each.name}[/]", seen, escape(each.file.description))
+    console.print(table)
+    print_sentences(
+        console,
+        'gym.make("TDAC-Ladder-v0", level="unknown") drives on one; '
+        "tdac sets show NAME shows it and its worlds",
+    )
+    return 0
+
+
+def show(
+    name: str,
+    split: str,
+    index: int | None,
+    png: Path | None,
+    sheet: Path | None,
+    as_json: bool,
+) -> int:
+    """Prints a task set and the figures of a world, and draws worlds; returns 0.
+
+    Args:
+        name: Name of the set, or path of its `set.yaml`.
+        split: Split of the worlds.
+        index: Number of a world; None for no figures.
+        png: File for a picture of this world, or of world 0.
+        sheet: File for a picture of `ON_A_SHEET` worlds from this one on.
+        as_json: Whether to print JSON.
+
+    Raises:
+        TaskError: There is no such set or world, or a file does not end in `.png`.
+    """
+    for option, path in (("--png", png), ("--sheet", sheet)):
+        if path is not None and path.suffix.lower() != ".png":
+            raise TaskError(f"{option} must end in .png, got {path}")
+    tasks, first = load_set(name), index or 0
+    wanted = index is not None or png is not None
+    world = tasks.world(split, first) if wanted else None
+    record = _record(tasks)
+    if world is not None:
+        record["world"] = _world_record(tasks, world, split, first)
+    if as_json:
+        _print_json(record)
+    else:
+        _print_set(Console(), tasks, record)
+    sizes = tasks.file.robot.radius, tasks.file.goal_tolerance
+    if png is not None and world is not None:
+        _write(draw_world(world, *sizes), png, as_json)
+    if sheet is not None:
+        worlds = [tasks.world(split, first + k) for k in range(ON_A_SHEET)]
+        captions = [_caption(tasks, each, first + k) for k, each in enumerate(worlds)]
+        _write(contact_sheet(worlds, captions, *sizes), sheet, as_json)
+    return 0
+
+
+def _record(tasks: TaskSet) -> dict[str, Any]:
+    """The set as JSON: all values, with the defaults, and their hash."""
+    values = tasks.file.model_dump(mode="json", by_alias=True)
+    return {**values, "sha256": tasks.sha256}
+
+
+def _world_record(
+    tasks: TaskSet, world: LadderWorld, split: str, index: int
+) -> dict[str, Any]:
+    robot = tasks.file.robot
+    view = math.radians(robot.field_of_view_deg)
+    lost = dead_ends(world, robot.radius, Sensor(robot.n_rays, view, robot.range_max))
+    height, width = world.cells.shape
+    return {
+        "split": split,
+        "index": index,
+        "generator": tasks.file.spec(index).generator.name,
+        "width": width,
+        "height": height,
+        "start": list(world.start),
+        "goal": list(world.goal),
+        "horizon": tasks.file.horizon.steps(world.difficulty.steps),
+        **asdict(world.difficulty),
+        "dead_ends": lost.depth,
+        "excess": lost.excess,
+        "rejected_drafts": len(world.rejected),
+    }
+
+
+def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None:
+    file, robot = tasks.file, tasks.file.robot
+    console.print(f"[bold]{escape(tasks.name)}[/]  {tasks.sha256[:12]}")
+    if file.description:
+        print_sentences(console, file.description)
+    names = ", ".join(each.name for each in file.worlds)
+    drive = (
+        f"radius {robot.radius:g} px, {robot.max_wheel_speed:g} px/s, "
+        f"{robot.n_rays} rays over {robot.field_of_view_deg:g}° up to "
+        f"{robot.range_max:g} px, steps of {file.dt:g} s"
+    )
+    frame = "the map's frame" if file.frame == "map" else "the start's frame"
+    rows = {
+        "worlds": f"{names}, in turn",
+        "robot": drive,
+        "observed": f"{', '.join(file.observed)}, in {frame}"
+        + ("; the map is given" if file.map else ""),
+        "disturbed": _disturbed(file.disturbances) or "nothing",
+        "horizon": f"{file.horizon.factor:g} OT, {file.horizon.least} to "
+        f"{file.horizon.most} steps",
+    }
+    world = record.get("world")
+    if world is not None:
+        rows |= _world_rows(world)
+    table = Table.grid(padding=(0, 2))
+    for label, text in rows.items():
+        table.add_row(label, escape(text))
+    console.print(table)
+
+
+def _disturbed(own: DisturbanceSpec) -> str:
+    given = {name: value for name, value in own.model_dump().items() if value}
+    return ", ".join(f"{name} {value:g}" for name, value in given.items())
+
+
+def _world_rows(world: dict[str, Any]) -> dict[str, str]:
+    """The figures of a world, by label."""
+    x, y, heading = world["start"]
+    goal_x, goal_y = world["goal"]
+    return {
+        f"{world['split']} {world['index']}": f"{world['generator']}, "
+        f"{world['width']} x {world['height']} px, start ({x:g}, {y:g}), heading "
+        f"{heading:.3f} rad, goal ({goal_x:g}, {goal_y:g})",
+        "shortest": f"{world['length']:.1f} px, {world['detour']:.2f} times the "
+        f"straight distance; OT {world['steps']:.1f} steps, horizon "
+        f"{world['horizon']}",
+        "gap": f"{world['gap']:.2f} body diameters at the narrowest place",
+        "dead ends": _dead_ends(world["dead_ends"], world["excess"]),
+        "in sight": f"the goal, from {world['in_sight']:.0%} of the path; "
+        f"{world['density']:.0%} of the map is occupied",
+    }
+
+
+def _dead_ends(depth: float, excess: float) -> str:
+    farther = f"without a map, the way is {1.0 + excess:.2f} times as long"
+    if depth < 0.005:
+        return f"none; {farther}"
+    return f"up to {depth:.2f} of the shortest path deep; {farther}"
+
+
+def _caption(tasks: TaskSet, world: LadderWorld, index: int) -> str:
+    name = tasks.file.spec(index).generator.name
+    hard = world.difficulty
+    return f"{index} {name}  gap {hard.gap:.2f}  OT {hard.steps:.0f}"
+
+
+def _write(image: Image, path: Path, quiet: bool) -> None:
+    _, data = cv2.imencode(".png", image[..., ::-1])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data.tobytes())
+    if not quiet:
+        Console().print(f"drew {escape(str(path))}", soft_wrap=True)
+
+
+def _print_json(value: dict[str, Any] | Sequence[dict[str, Any]]) -> None:
+    sys.stdout.write(json.dumps(value, indent=2) + "\n")
