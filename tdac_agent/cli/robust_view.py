@@ -47,16 +47,16 @@ def show_robust(
             "alone; if this machine was busy, repeat this when it is idle[/]"
         )
     if report.interval is not None and report.rate is not None:
-        say(_rate(report.rate, report.interval))
+        say(rate_text(report.rate, report.interval))
     if report.sequential is not None:
         result = report.sequential
         colour = "green" if report.accepted else "red"
         say(
-            f"[bold {colour}]{_decision(result)}[/] after {report.episodes} of at most "
+            f"[bold {colour}]{decision_text(result)}[/] after {report.episodes} of at most "
             f"{result.test.limit} episodes"
         )
         say(_legend(result))
-        say(_error_rates(result))
+        say(error_rates(result))
 
 
 def worst_table(report: RobustReport, units: Units) -> Table:
@@ -105,7 +105,8 @@ def _errors(report: RobustReport) -> list[str]:
     return [f"seed {seed}: {error}" for error, seed in first.items()][:ERRORS]
 
 
-def _rate(rate: float, interval: Interval) -> str:
+def rate_text(rate: float, interval: Interval) -> str:
+    """A success rate with its interval."""
     return (
         f"[bold]success rate {_percent(rate)}[/], "
         f"{100 * interval.confidence:.0f} % interval {_percent(interval.low)} to "
@@ -113,7 +114,8 @@ def _rate(rate: float, interval: Interval) -> str:
     )
 
 
-def _decision(result: SequentialResult) -> str:
+def decision_text(result: SequentialResult) -> str:
+    """What a sequential test decided."""
     if result.decision == "accepted":
         return f"accepted at {_percent(result.test.accept_at)}"
     if result.decision == "rejected":
@@ -130,7 +132,8 @@ def _legend(result: SequentialResult) -> str:
     )
 
 
-def _error_rates(result: SequentialResult) -> str:
+def error_rates(result: SequentialResult) -> str:
+    """How often a sequential test errs."""
     low, high = result.at_refused_rate, result.at_accepted_rate
     return (
         f"  a true rate of {_percent(low.rate)} is accepted with probability "

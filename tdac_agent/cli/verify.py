@@ -45,7 +45,7 @@ def run(
     check_tier(tier)
     robust.check()
     if out is not None:
-        _check_folder(out)
+        check_folder(out)
     file, task = _prepared(controller, flags)
     task = allowed(task, suite, trust=trust)
     if robust.robust is not None:
@@ -135,7 +135,7 @@ def _replay(
     return words if tier == "auto" else [*words, "--tier", tier]
 
 
-def _check_folder(out: Path) -> None:
+def check_folder(out: Path) -> None:
     """Checks before the work begins that the folder can be written to."""
     folder = out / "trajectories"
     missing = [each for each in (folder, out) if not each.exists()]
@@ -149,19 +149,27 @@ def _check_folder(out: Path) -> None:
 
 def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
     """The controller file and its task; a run folder brings its own task."""
+    path, file = Path(controller), controller_file(controller)
+    if path.is_dir():
+        return file, flags.load_beside(path)
+    if (path.parent / TASK_FILE).is_file():
+        return path, flags.load_beside(path.parent)
+    return path, flags.load()
+
+
+def controller_file(controller: str) -> Path:
+    """The controller file of a path, which may be that of a run folder."""
     path = Path(controller)
     if path.is_dir():
         file = path / "controller.py"
         if not file.is_file():
             raise ControllerFileError(_without_controller(path))
-        return file, flags.load_beside(path)
+        return file
     if not path.is_file():
         raise ControllerFileError(f"no controller {controller!r}: no such file")
     if path.suffix != ".py":
         raise ControllerFileError(f"{controller!r} is not a controller: expected a .py")
-    if (path.parent / TASK_FILE).is_file():
-        return path, flags.load_beside(path.parent)
-    return path, flags.load()
+    return path
 
 
 def _without_controller(folder: Path) -> str:

@@ -102,6 +102,42 @@ def verify(
     wheel_gains: WheelGains = None,
     axle_error: AxleError = None,
     range_dropout: RangeDropout = None,
+    set_name: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--set",
+            metavar="NAME",
+            help="Task set (`tdac sets`) or set.yaml: drive on worlds that the "
+            "controller has never seen; exit 0 only if a sequential test accepts it.",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
+    split: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            metavar="NAME",
+            help="dev, test or hidden.  [default: test]",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
+    worlds: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            "-n",
+            "--worlds",
+            min=1,
+            help="Drive on N worlds and print the scores, without a verdict.",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
+    salt_file: Annotated[
+        Optional[Path],  # noqa: UP045
+        file_flag(
+            "--salt-file",
+            help="File with the salt of the hidden split, 16 bytes or more.",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
 ) -> None:
     """Test a controller in the sandbox; exit 0 only if all tests pass."""
     # Imported objects live until exit: collecting them is a waste of time.
@@ -112,6 +148,7 @@ def verify(
     with ChildPool() as child_pool:
         from tdac_agent.cli import verify as command
         from tdac_agent.cli.robust_flags import DisturbanceFlags, RobustFlags
+        from tdac_agent.cli.set_flags import SetFlags
 
         disturbed = DisturbanceFlags(
             range_noise=range_noise,
@@ -123,6 +160,25 @@ def verify(
             range_dropout=range_dropout,
         )
         wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
+        on_set = SetFlags(set_name, split, worlds, salt_file)
+        if on_set != SetFlags():
+            from tdac_agent.cli import verify_set
+
+            on_set.check(
+                named_task(),
+                wanted,
+                {
+                    "--profile": profile,
+                    "--paper": paper,
+                    "--suite": suite,
+                    "--trust": trust,
+                    "--seed": seed,
+                    "--junit": junit,
+                },
+            )
+            raise typer.Exit(
+                verify_set.run(controller, on_set, tier, out, as_json, child_pool)
+            )
         code = command.run(
             controller,
             named_task(),

@@ -55,6 +55,7 @@ class Record:
             controller must stop after `max_steps` itself.
         collisions_before: Initial value of the collision counter.
         seed: Seed of the environment.
+        options: Options of the environment's `reset`, instead of a start.
     """
 
     env: JudgedEnv
@@ -63,6 +64,7 @@ class Record:
     truncates: bool = False
     collisions_before: int = 0
     seed: int | None = None
+    options: dict[str, Any] | None = None
     outcome: Outcome | None = None
     _poses: list[NDArray[np.float64]] = field(default_factory=list)
     _actions: list[NDArray[np.float32]] = field(default_factory=list)
@@ -79,7 +81,9 @@ class Record:
         """
         if self._poses:
             raise EnvRefusalError("reset() is allowed once, at the beginning")
-        options = None if self.start is None else {"start": self.start}
+        options = self.options
+        if self.start is not None:
+            options = {"start": self.start}
         observation, info = self.env.reset(seed=self.seed, options=options)
         return observation, self._note(observation, info)
 
@@ -284,7 +288,7 @@ def _rollout(
     returned: Any = None,
 ) -> Rollout:
     times = 1000 * np.array(calls) if calls else np.zeros(1)
-    task = record.env.nominal
+    task = record.env.task
     slow = mean_call > task.dt
     return Rollout(
         name=name,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from tdac_agent.errors import Fault
 from tdac_agent.tasks.setting import Nominal
@@ -21,10 +21,11 @@ from tdac_agent.verification.judge.seeded import (
     SeededEpisode,
     SeededJob,
 )
+from tdac_agent.verification.judge.set_job import WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import DEADLINE_SECONDS
 
-E = TypeVar("E", SeededEpisode, Measured)
+E = TypeVar("E", SeededEpisode, Measured, WorldEpisode)
 # Wall time / simulated time: a policy is stopped at 2, a time-out is repeated once.
 SLOWEST = 4.0
 
@@ -48,16 +49,40 @@ def run_seeds(
     Raises:
         Fault: The judge or the sandbox is broken.
     """
-    job.out.mkdir()
-    request = job.out.parent / f"{job.out.name}.json"
+    seconds = nominal.horizon * nominal.dt * len(job.seeds)
+    return run_job(job, job.out, seconds, kind, judge, watch)
+
+
+def run_job(
+    job: BaseModel,
+    out: Path,
+    simulated: float,
+    kind: type[E],
+    judge: WarmJudge | None = None,
+    watch: Callable[[int, int], None] | None = None,
+) -> tuple[list[E], JobEnding]:
+    """Runs a job of many episodes; returns them and its ending.
+
+    Args:
+        job: The job.
+        out: Its result folder, which is made.
+        simulated: Longest simulated time of all episodes together, s.
+        kind: Type of the episodes.
+        judge: A warm judge; None starts one for this call.
+        watch: Called repeatedly with the numbers of episodes and successes so far.
+
+    Raises:
+        Fault: The judge or the sandbox is broken.
+    """
+    out.mkdir()
+    request = out.parent / f"{out.name}.json"
     write_job(job, request)
-    longest = SLOWEST * nominal.horizon * nominal.dt
-    tail = _Tail(kind, job.out / EPISODES_FILE, watch)
+    tail = _Tail(kind, out / EPISODES_FILE, watch)
     with contextlib.ExitStack() as stack:
         warm = judge or stack.enter_context(WarmJudge())
-        warm.run(request, longest * len(job.seeds) + DEADLINE_SECONDS, tail.read)
+        warm.run(request, SLOWEST * simulated + DEADLINE_SECONDS, tail.read)
     tail.read()
-    return tail.episodes, _ending(job.out / ENDING_FILE, request.parent / "output.txt")
+    return tail.episodes, _ending(out / ENDING_FILE, request.parent / "output.txt")
 
 
 def _ending(path: Path, output: Path) -> JobEnding:

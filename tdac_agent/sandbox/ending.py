@@ -66,7 +66,7 @@ class ProcessEnd:
 def _end(forked: Forked) -> ChildUsage:
     channel = forked.channel
     try:
-        cpu, rss = _usage_of_tree(forked.pid)
+        cpu, rss = usage_of_tree(forked.pid)
         # The leader is not reaped yet, so no other process can have its ID.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(forked.pid, signal.SIGKILL)
@@ -98,7 +98,7 @@ def has_ended(lifeline: int, seconds: float) -> bool:
     return bool(poll.poll(seconds * 1000))
 
 
-def _usage_of_tree(pid: int) -> tuple[float, int]:
+def usage_of_tree(pid: int) -> tuple[float, int]:
     """Return CPU seconds and peak resident bytes of a process and its descendants."""
     cpu, rss = 0.0, 0
     pids = [pid]

@@ -78,6 +78,23 @@ class ControllerTimeout(ControllerFault):
         self.is_retryable = not busy
 
 
+class ControllerOverdrawn(ControllerTimeout):
+    """The controller used more CPU time than its budget.
+
+    Args:
+        phase: What the controller was doing.
+        used: CPU time that it used, s.
+        allowed: CPU time that it was allowed, s.
+        what: What the time was for.
+    """
+
+    def __init__(self, phase: str, used: float, allowed: float, what: str) -> None:
+        text = f"used {used:.2f} s of CPU time for {what}; {allowed:.2f} s are allowed"
+        ControllerFault.__init__(self, text, phase)
+        self.seconds = allowed
+        self.is_retryable = used <= 2.0 * allowed
+
+
 class ControllerDied(ControllerFault):
     """The controller's process ended.
 

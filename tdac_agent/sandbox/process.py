@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Protocol
 
 from tdac_agent.sandbox.conversation import Conversation
-from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd
+from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd, usage_of_tree
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
 from tdac_agent.sandbox.inner.wire import Handle, Kind, is_name
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
@@ -97,6 +97,10 @@ class Child:
     def waited(self) -> float:
         """Return its run-queue wait time, s; 0 if it is not known."""
         return self._line.waited()
+
+    def cpu_seconds(self) -> float:
+        """Return its user and system time so far, s; in steps of 10 ms."""
+        return usage_of_tree(self.pid)[0]
 
     def close(self) -> ChildUsage:
         """Kill the child with all its processes; return its resource usage."""

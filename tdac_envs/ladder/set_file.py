@@ -88,6 +88,18 @@ class DisturbanceSpec(_Strict):
     delay: int = Field(0, ge=0, le=100, description="Steps until an action acts.")
 
 
+class CpuSpec(_Strict):
+    """CPU time (user and system) that a controller may use in an episode, s."""
+
+    start: float = Field(2.0, gt=0, le=600, description="Import and reset.")
+    step: float = Field(0.02, gt=0, le=10, description="Mean of a step.")
+    bank: float = Field(2.0, ge=0, le=600, description="What it may be ahead.")
+
+    def of_steps(self, steps: int) -> float:
+        """What the first `steps` steps may use together, s."""
+        return self.bank + self.step * steps
+
+
 class SetFile(_Strict):
     """Contents of `set.yaml`, schema 1."""
 
@@ -110,6 +122,10 @@ class SetFile(_Strict):
     disturbances: DisturbanceSpec = DisturbanceSpec()
     horizon: HorizonSpec = HorizonSpec()
     admission: AdmissionSpec = AdmissionSpec()
+    cpu: CpuSpec = CpuSpec()
+    bar: float = Field(
+        0.95, gt=0.05, lt=1, description="Success rate of a verified controller."
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:

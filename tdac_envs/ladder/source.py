@@ -12,6 +12,7 @@ from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import read_file
 from tdac_envs.ladder.pool import TrainingPool
 from tdac_envs.ladder.task_sets import MOST_SALT, TaskSet
+from tdac_envs.ladder.worlds import LadderWorld
 from tdac_envs.map2d.task import Map2DTask
 
 MOST_WORLDS = 2**31
@@ -44,6 +45,7 @@ class SetSource:
         kept = split == "train" and size > 0
         self._pool = TrainingPool(task_set) if kept else None
         self._count = size if kept else MOST_WORLDS
+        self._last: tuple[int, LadderWorld, Map2DTask] | None = None
 
     def task(self, index: int) -> Map2DTask:
         """The task of a world.
@@ -51,9 +53,24 @@ class SetSource:
         Raises:
             TaskError: There is no feasible world.
         """
+        index = whole_number("index", index, 0)
         if self._pool is not None:
-            return self._pool.task(whole_number("index", index, 0))
-        return self._set.task(self._split, index, self._salt)
+            return self._pool.task(index)
+        return self._made(index)[2]
+
+    def world(self, index: int) -> LadderWorld:
+        """A world with its figures, made anew unless it was the last one.
+
+        Raises:
+            TaskError: There is no feasible world.
+        """
+        return self._made(whole_number("index", index, 0))[1]
+
+    def _made(self, index: int) -> tuple[int, LadderWorld, Map2DTask]:
+        if self._last is None or self._last[0] != index:
+            world = self._set.world(self._split, index, self._salt)
+            self._last = index, world, self._set.task_of(world)
+        return self._last
 
     def draw(
         self, options: dict[str, Any], random: np.random.Generator

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -32,10 +31,9 @@ from tdac_agent.verification.judge.driving import (
     drive_seed,
     record_of,
 )
+from tdac_agent.verification.judge.in_order import in_order
 from tdac_agent.verification.judge.kept_episodes import KeptEpisode, keep_episode
 from tdac_agent.verification.judge.sequential import SequentialTest
-from tdac_agent.verification.judge.turns import Turns
-from tdac_agent.verification.judge.worker_pool import SIZE, WorkerPool
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
 # In an evaluation, the remaining episodes are skipped after this many time-outs.
@@ -165,21 +163,9 @@ def _lasting(kept: EpisodeSummary, figures: Measured) -> KeptEpisode:
 
 
 def _in_order(setup: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
-    """Yields episodes in order, several running at a time; closing waits for them."""
-    size = min(SIZE, len(job.seeds))
-    turns, late = Turns(size), [0] * job.late
     work = partial(_run_episode, setup, job.keep is not None)
-    with (
-        closing(WorkerPool(work, setup.child_pool.close, size)) as worker_pool,
-        ThreadPoolExecutor(max_workers=size) as pool,
-    ):
-        try:
-            patience = MOST_LATE if job.keep is not None else len(job.seeds)
-            yield from pool.map(
-                partial(_run_with_retry, worker_pool, turns, late, patience), job.seeds
-            )
-        finally:
-            pool.shutdown(cancel_futures=True)
+    patience = None if job.keep is None else MOST_LATE
+    return in_order(work, setup.child_pool.close, job.seeds, job.late, patience)
 
 
 def _run_episode(
@@ -207,28 +193,6 @@ def _skipped(setup: EpisodeSetup, seed: int) -> SeededResult:
     record = record_of(setup, seed)
     rollout = not_driven(record, f"seed {seed}", ControllerFault(reason, "policy"))
     return SeededResult(rollout, 0.0, "", record.env.task)
-
-
-def _run_with_retry(
-    worker_pool: WorkerPool[[int, bool], EpisodeSummary],
-    turns: Turns,
-    late: list[int],
-    patience: int,
-    seed: int,
-) -> EpisodeSummary:
-    """Runs an episode in the worker pool.
-
-    After a time-out that may be due to a busy machine, it is run once more, alone.
-    """
-    skip = len(late) >= patience
-    with turns.beside():
-        kept = worker_pool.do(seed, skip)
-    if kept.late and kept.is_retryable and len(late) < patience:
-        with turns.alone():
-            kept = worker_pool.do(seed, False)
-    if kept.late:
-        late.append(seed)
-    return kept
 
 
 def figures(driven: SeededResult, seed: int, task: Task) -> SeededEpisode:

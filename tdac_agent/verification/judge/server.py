@@ -235,11 +235,15 @@ def do_job(
     worker_pool: SuitePool | None,
     later: contextlib.ExitStack,
 ) -> None:
-    """Runs a job of either kind in its folder; the caller closes `later` after it."""
+    """Runs a job of any kind in its folder; the caller closes `later` after it."""
     job = json.loads(request.read_text(encoding="utf-8"))
     os.chdir(request.parent)
     if job["kind"] == SUITE:
         judge_suite(Job.model_validate(job), child_pool, worker_pool, later)
+    elif job["kind"] == "set":
+        from tdac_agent.verification.judge.set_job import SetJob, judge_set
+
+        judge_set(SetJob.model_validate(job), child_pool)
     else:
         # Imported late, since it loads policies of all kinds.
         from tdac_agent.verification.judge.seeded import SeededJob, judge_seeds

@@ -1,0 +1,46 @@
+"""The flags of `tdac verify --set`, and which others they exclude."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.cli.robust_flags import RobustFlags
+from tdac_envs.core.errors import TaskError
+
+
+@dataclass(frozen=True, slots=True)
+class SetFlags:
+    """The flags that name a task set and its worlds; see `tdac verify --help`."""
+
+    name: str | None = None
+    split: str | None = None
+    worlds: int | None = None
+    salt_file: Path | None = None
+
+    def check(
+        self, task: TaskFlags, robust: RobustFlags, others: Mapping[str, object]
+    ) -> None:
+        """Refuses flags that do not belong together.
+
+        Args:
+            task: The flags of a single task.
+            robust: The flags of a robust verification.
+            others: Values of further flags that only a single task has.
+
+        Raises:
+            TaskError: One does not.
+        """
+        if self.name is None:
+            flag = (
+                "--split" if self.split else "--salt-file" if self.salt_file else "-n"
+            )
+            raise TaskError(f"{flag} needs --set NAME; tdac sets lists the task sets")
+        words = [word for word in task.words() if word.startswith("--")]
+        words += [flag for flag, value in others.items() if value]
+        if robust != RobustFlags():
+            words.append("--robust and its flags")
+        if words:
+            raise TaskError(f"--set brings its own tasks; leave out {words[0]}")

@@ -1,0 +1,126 @@
+"""`tdac verify --set`: drives a controller on worlds that it has never seen."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from functools import partial
+from pathlib import Path
+
+from rich.box import SIMPLE
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import TimeRemainingColumn as TimeLeft
+from rich.table import Table
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.robust_view import decision_text, error_rates, rate_text
+from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.set_flags import SetFlags
+from tdac_agent.cli.verify import check_folder, controller_file
+from tdac_agent.evaluation.set_report import Scores, SetReport
+from tdac_agent.evaluation.set_verify import MOST_WORLDS, verify_on_set
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.ladder.task_sets import load_set
+
+MOST_CAUSES = 6
+
+
+def run(
+    controller: str,
+    flags: SetFlags,
+    tier: str,
+    out: Path | None,
+    as_json: bool,
+    child_pool: ChildPool,
+) -> int:
+    """Drives a controller on a set and prints the report; returns the exit code."""
+    check_tier(tier)
+    if out is not None:
+        check_folder(out)
+    assert flags.name is not None
+    tasks, file = load_set(flags.name), controller_file(controller)
+    gc.freeze()
+    gc.enable()
+    columns = (
+        TextColumn(f"worlds of {escape(tasks.name)}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[successes]} reached"),
+        TimeLeft(),
+    )
+    console = Console(stderr=as_json)
+    bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
+    row = bar.add_task("", total=flags.worlds or MOST_WORLDS, successes=0)
+
+    def watch(episodes: int, successes: int) -> None:
+        bar.update(row, completed=episodes, successes=successes, refresh=True)
+
+    with WarmJudge(child_pool) as judge, bar:
+        report = verify_on_set(
+            file,
+            tasks,
+            flags.split or "test",
+            flags.worlds,
+            salt_file=flags.salt_file,
+            tier=tier,
+            out=out,
+            judge=judge,
+            watch=watch,
+        )
+    if as_json:
+        sys.stdout.write(report.model_dump_json(indent=2) + "\n")
+    else:
+        show(report, Console())
+    return 0 if report.passed else 1
+
+
+def show(report: SetReport, console: Console) -> None:
+    """Prints the scores or the decision, the failures by cause, and diagnoses."""
+    say = partial(console.print, highlight=False)
+    about = report.provenance
+    which = "public worlds" if about.split == "test" else f"{about.split} worlds"
+    say(
+        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}, {report.worlds} {which}: "
+        f"{report.successes} reached, {report.worlds - report.successes} failed; "
+        f"{report.seconds:.0f} s"
+    )
+    if report.scores is not None and report.interval is not None:
+        say(_scores(report, report.scores))
+        say(rate_text(report.scores.success, report.interval))
+    if report.causes:
+        causes = list(report.causes.items())[:MOST_CAUSES]
+        say("failures: " + ", ".join(f"{count} {name}" for name, count in causes))
+    for text in report.told:
+        print_sentences(console, text, indent=2)
+    result = report.sequential
+    if result is not None:
+        colour = "green" if report.passed else "red"
+        verdict = "verified" if report.passed else "not verified"
+        say(
+            f"[bold {colour}]{verdict}[/]: {decision_text(result)} after "
+            f"{report.worlds} of at most {result.test.limit} worlds"
+        )
+        say(error_rates(result))
+
+
+def _scores(report: SetReport, whole: Scores) -> Table:
+    """A row for each generator, and one for all worlds."""
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
+    table.add_column("worlds")
+    for name in ("success", "time score", "path score", "BARN score"):
+        table.add_column(name, justify="right")
+    rows = {**report.by_generator, "[bold]all[/]": whole}
+    for name, scores in rows.items():
+        table.add_row(
+            name,
+            f"{100 * scores.success:.1f} %",
+            f"{scores.time:.3f}",
+            f"{scores.path:.3f}",
+            f"{scores.barn:.3f}",
+        )
+    table.caption = " time: OT / T; path: L / driven; BARN: at most 0.5"
+    table.caption_justify = "left"
+    return table

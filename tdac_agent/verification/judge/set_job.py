@@ -1,0 +1,249 @@
+"""Drives a controller on worlds of a task set in the judge's process."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from tdac_agent.episodes.episode import Record, not_driven, run_policy
+from tdac_agent.episodes.trajectory import Outcome, Rollout
+from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.report import Cause
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.cpu_budget import Budgeted
+from tdac_agent.verification.judge.driving import FOREVER
+from tdac_agent.verification.judge.in_order import in_order
+from tdac_agent.verification.judge.seeded import (
+    ENDING_FILE,
+    EPISODES_FILE,
+    JobEnding,
+)
+from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.ladder.scores import barn_score, path_score, time_score
+from tdac_envs.ladder.set_file import SetFile
+from tdac_envs.map2d.task import Map2DTask
+
+
+class SetJob(BaseModel):
+    """Worlds to drive on; all paths are absolute.
+
+    `test` stops early. `told` is whether episodes may have a diagnosis.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["set"] = "set"
+    set_file: Path
+    split: str
+    salt_file: Path | None
+    worlds: tuple[int, ...]
+    controller: Path
+    test: SequentialTest | None
+    told: bool
+    tier: str
+    limits: Limits
+    out: Path
+    trajectories: Path | None = None
+
+
+class WorldEpisode(PrintableRecord):
+    """Figures of an episode on a world; lengths in px.
+
+    `length`, `gap`, `detour`, `in_sight` and `density` describe the world;
+    `least_steps` is OT. `cause` and `text` are the diagnosis of a failure; the text
+    only if it may be told.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    index: int
+    generator: str
+    outcome: Outcome
+    steps: int
+    horizon: int
+    time_score: float
+    path_score: float
+    barn_score: float
+    d_min: float
+    length: float
+    least_steps: float
+    gap: float
+    detour: float
+    in_sight: float
+    density: float
+    cause: Cause | None = None
+    text: str | None = None
+    error: str | None = None
+    cpu_seconds: float
+
+    @property
+    def success(self) -> bool:
+        """Whether the goal was reached without contact."""
+        return self.outcome == "reached"
+
+
+@dataclass(frozen=True, slots=True)
+class WorldSummary:
+    """What is kept of an episode; see `in_order.Timed`."""
+
+    figures: WorldEpisode
+    tier: str
+    late: bool
+    is_retryable: bool
+
+
+@dataclass(eq=False)
+class SetRun:
+    """Everything that the episodes of a job share.
+
+    Attributes:
+        job: The job.
+        source: Bytes of the controller.
+        child_pool: The child pool.
+    """
+
+    job: SetJob
+    source: bytes
+    child_pool: ChildPool
+
+    @cached_property
+    def env(self) -> LadderEnv:
+        """The environment, with complete infos for the judge."""
+        job = self.job
+        return LadderEnv(job.set_file, job.split, 0, job.salt_file, privileged=True)
+
+    @property
+    def file(self) -> SetFile:
+        """The task set."""
+        return self.env.set.file
+
+
+def judge_set(job: SetJob, child_pool: ChildPool) -> None:
+    """Runs the episodes of a job, and writes a line for each in the order of worlds."""
+    job.out.mkdir(exist_ok=True)
+    run = SetRun(job, read_file(job.controller, RECORD_BYTES), child_pool)
+    counts, tier, fault = [0, 0], job.tier, None
+    with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
+        try:
+            work = partial(drive_world, run)
+            with closing(in_order(work, child_pool.close, job.worlds)) as episodes:
+                for kept in episodes:
+                    tier = kept.tier or tier
+                    file.write(kept.figures.model_dump_json() + "\n")
+                    file.flush()
+                    counts[not kept.figures.success] += 1
+                    if job.test and job.test.decide(*counts) != "undecided":
+                        break
+        except SandboxError as error:
+            fault = f"the sandbox failed: {error}"
+    ending = JobEnding(tier=tier, fault=fault)
+    write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
+
+
+def drive_world(run: SetRun, index: int, skip: bool) -> WorldSummary:  # noqa: ARG001
+    """Drives the episode of a world, in a fresh child that is told nothing of it."""
+    # The judge's own copy of the task, so that the files can be written before.
+    task = run.env.setup.source.task(index)
+    record = Record(run.env, None, FOREVER, options={"index": index})
+    child = run.child_pool.take(run.job.tier, run.job.limits)
+    try:
+        with tempfile.TemporaryDirectory() as name:
+            write_files(Path(name), run.file, task)
+            child.copy_files(Path(name), run.source)
+        driver = Budgeted(child, run.file.cpu)
+        driver.load()
+        rollout = run_policy(
+            driver, record, f"world {index}", held_out=False, deadline=math.inf
+        )
+    except ControllerFault as fault:
+        rollout = not_driven(record, f"world {index}", fault)
+        rollout = replace(rollout, is_retryable=fault.is_retryable)
+    finally:
+        usage = child.close()
+    late = rollout.outcome == "error" and rollout.timed_out
+    figures = _figures(run, index, rollout, usage.cpu_seconds)
+    if run.job.trajectories is not None:
+        run.job.trajectories.mkdir(parents=True, exist_ok=True)
+        rollout.trajectory.save(run.job.trajectories / f"{index}.npz")
+    return WorldSummary(figures, child.tier, late, rollout.is_retryable)
+
+
+def write_files(folder: Path, file: SetFile, task: Map2DTask) -> None:
+    """Writes what a controller may read, equal for all worlds but for the map.
+
+    Args:
+        folder: The folder.
+        file: The task set.
+        task: The task of a world, whose map is given if the set says so.
+    """
+    params = folder / "params.json"
+    params.write_text(json.dumps(level_params(file), indent=2) + "\n")
+    written = [params]
+    if file.map:
+        written.append(folder / "occupancy.npy")
+        np.save(written[-1], task.terrain.grid.cells)
+    for path in written:
+        os.utime(path, (0, 0))
+
+
+def level_params(file: SetFile) -> dict[str, Any]:
+    """What `params.json` tells a controller: the robot and its budget, no world."""
+    return {
+        "schema_version": 1,
+        "robot": file.robot.model_dump(),
+        "dt": file.dt,
+        "goal_tolerance": file.goal_tolerance,
+        "observed": list(file.observed),
+        "frame": file.frame,
+        "map": file.map,
+        "disturbances": file.disturbances.model_dump(),
+        "cpu": file.cpu.model_dump(),
+    }
+
+
+def _figures(
+    run: SetRun, index: int, rollout: Rollout, cpu_seconds: float
+) -> WorldEpisode:
+    hard = run.env.setup.source.world(index).difficulty
+    steps = rollout.trajectory.steps
+    places = rollout.trajectory.poses[:, :2]
+    driven = float(np.hypot(*np.diff(places, axis=0).T).sum())
+    reached, failure = rollout.reached, {}
+    if not reached:
+        found = diagnose(rollout, run.env.task)
+        failure = {"cause": found.cause, "text": found.text if run.job.told else None}
+    return WorldEpisode(
+        index=index,
+        generator=run.file.spec(index).generator.name,
+        outcome=rollout.outcome,
+        steps=steps,
+        horizon=run.env.task.horizon,
+        time_score=time_score(reached, steps, hard.steps),
+        path_score=path_score(reached, driven, hard.length),
+        barn_score=barn_score(reached, steps, hard.length / run.file.full_step),
+        d_min=round(float(rollout.distances().min()), 1),
+        length=hard.length,
+        least_steps=hard.steps,
+        gap=hard.gap,
+        detour=hard.detour,
+        in_sight=hard.in_sight,
+        density=hard.density,
+        error=rollout.error,
+        cpu_seconds=round(cpu_seconds, 3),
+        **failure,
+    )
