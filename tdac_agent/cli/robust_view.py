@@ -52,8 +52,8 @@ def show_robust(
         result = report.sequential
         colour = "green" if report.accepted else "red"
         say(
-            f"[bold {colour}]{decision_text(result)}[/] after {report.episodes} of at most "
-            f"{result.test.limit} episodes"
+            f"[bold {colour}]{decision_text(result)}[/] after {report.episodes} of at "
+            f"most {result.test.limit} episodes"
         )
         say(_legend(result))
         say(error_rates(result))

@@ -1,0 +1,237 @@
+"""The judge on a task set: fresh worlds, nothing told, scores that are right."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import tdac_agent
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.evaluation.set_report import SetReport
+from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.judge.set_job import level_params, write_files
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.set_file import set_names
+
+KNOWN = Path(tdac_agent.__file__).parent / "builtin" / "levels" / "known.py"
+SALT = b"a salt of enough bytes"
+STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+
+
+@pytest.fixture(scope="module")
+def judge():
+    with WarmJudge() as warm:
+        yield warm
+
+
+@pytest.fixture
+def set_yaml(tmp_path):
+    """Writes a set of small worlds with these values, and loads it."""
+
+    def load(**values):
+        aisles = {"name": "aisles", "width": 220, "height": 180}
+        short = {"factor": 1.0, "least": 40, "most": 40}
+        path = tmp_path / "few.yaml"
+        path.write_text(
+            yaml.safe_dump({"worlds": [aisles], "horizon": short, **values})
+        )
+        return load_set(path)
+
+    return load
+
+
+def test_a_good_controller(judge, tmp_path):
+    """Its scores are those of its trajectories."""
+    tasks = load_set("known")
+    report = verify_on_set(KNOWN, tasks, "dev", 5, judge=judge, out=tmp_path)
+    assert (report.worlds, report.successes) == (5, 5)
+    assert report.told == ()
+    assert set(report.by_generator) == {each.name for each in tasks.file.worlds}
+    assert report.scores.success == 1.0
+    assert 0.6 < report.scores.time < 1.0
+    for episode in report.episodes:
+        world = tasks.world("dev", episode.index)
+        run = Trajectory.load(tmp_path / "trajectories" / f"{episode.index}.npz")
+        assert np.allclose(run.poses[0], world.start)
+        gap = np.hypot(*(run.poses[-1][:2] - world.goal))
+        assert gap <= tasks.file.goal_tolerance + 1e-6
+        assert episode.steps == run.steps
+        assert episode.time_score == world.difficulty.steps / run.steps
+        driven = np.hypot(*np.diff(run.poses[:, :2], axis=0).T).sum()
+        assert episode.path_score == pytest.approx(
+            min(world.difficulty.length / driven, 1.0)
+        )
+    kept = SetReport.model_validate_json((tmp_path / "set.json").read_text())
+    assert kept == report
+
+
+def test_the_controller_sees_what_the_level_says(judge, set_yaml):
+    """It fails if there is anything else, in its observations or its folder."""
+    source = """
+import os
+def reset(obs):
+    assert sorted(obs) == ["goal", "odometry", "ranges", "wheel_speeds"], sorted(obs)
+    assert sorted(os.listdir(".")) == ["controller.py", "params.json"], os.listdir(".")
+def policy(obs):
+    assert len(obs) == 4
+    return 0.0, 0.0
+"""
+    tasks = set_yaml(observed=["goal", "odometry", "ranges", "wheel_speeds"])
+    report = verify_on_set(source, tasks, "dev", 2, judge=judge)
+    assert [episode.error for episode in report.episodes] == [None, None]
+    assert report.causes == {"standing still": 2} or sum(report.causes.values()) == 2
+
+
+@pytest.mark.parametrize("name", set_names())
+def test_folders_of_two_worlds_differ_by_the_map_alone(name, tmp_path):
+    tasks, folders = load_set(name), []
+    for number in range(2):
+        folders.append(tmp_path / str(number))
+        folders[-1].mkdir()
+        write_files(folders[-1], tasks.file, tasks.task("dev", number))
+    files = [{path.name: path for path in folder.iterdir()} for folder in folders]
+    expected = {"params.json"} | ({"occupancy.npy"} if tasks.file.map else set())
+    assert files[0].keys() == files[1].keys() == expected
+    for path in (*files[0].values(), *files[1].values()):
+        assert path.stat().st_mtime == 0
+    texts = [each["params.json"].read_bytes() for each in files]
+    assert texts[0] == texts[1]
+    told = json.loads(texts[0])
+    assert told == level_params(tasks.file)
+    assert not {"start", "goal", "source", "name", "split", "index"} & set(told)
+    if tasks.file.map:
+        cells = np.load(files[0]["occupancy.npy"])
+        assert np.array_equal(cells, tasks.task("dev", 0).terrain.grid.cells)
+
+
+def test_failures_are_counted_and_three_are_told(judge, set_yaml):
+    report = verify_on_set(STILL, set_yaml(), "dev", 5, judge=judge)
+    assert (report.successes, len(report.told), len(report.episodes)) == (0, 3, 5)
+    assert sum(report.causes.values()) == 5
+    assert report.told[0].startswith("world 0: ")
+    assert report.scores.model_dump() == {
+        "success": 0.0,
+        "time": 0.0,
+        "path": 0.0,
+        "barn": 0.0,
+    }
+
+
+def test_hidden_worlds_are_told_in_sums_alone(judge, set_yaml, tmp_path):
+    salt = tmp_path / "secret.salt"
+    salt.write_bytes(SALT)
+    tasks = set_yaml()
+    given = {"salt_file": salt, "judge": judge, "out": tmp_path / "out"}
+    report = verify_on_set(STILL, tasks, "hidden", 3, **given)
+    assert (report.worlds, report.successes) == (3, 0)
+    assert report.episodes == ()
+    assert report.told == ()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["set.json"]
+    text = (tmp_path / "out" / "set.json").read_text()
+    assert SALT.decode() not in text
+    assert SALT.hex() not in text
+
+
+def test_too_much_cpu_time_is_a_failure(judge, set_yaml):
+    source = """
+import time
+def policy(obs):
+    end = time.process_time() + 0.05
+    while time.process_time() < end:
+        pass
+    return 0.0, 0.0
+"""
+    tasks = set_yaml(cpu={"start": 5.0, "step": 0.01, "bank": 0.1})
+    report = verify_on_set(source, tasks, "dev", 1, judge=judge)
+    (episode,) = report.episodes
+    assert episode.outcome == "error"
+    assert "s of CPU time for 10 steps; 0.20 s are allowed" in episode.error
+    roomy = set_yaml(cpu={"start": 5.0, "step": 0.2, "bank": 0.1})
+    report = verify_on_set(source, roomy, "dev", 1, judge=judge)
+    assert report.episodes[0].outcome == "out of time"
+
+
+def test_an_import_may_not_take_long(judge, set_yaml):
+    source = "x = sum(i * i for i in range(8_000_000))\n" + STILL
+    tasks = set_yaml(cpu={"start": 0.15, "step": 0.02, "bank": 1.0})
+    (episode,) = verify_on_set(source, tasks, "dev", 1, judge=judge).episodes
+    assert "of CPU time for import and reset; 0.15 s are allowed" in episode.error
+
+
+def test_a_sequential_test_stops_early(judge, set_yaml):
+    report = verify_on_set(STILL, set_yaml(bar=0.9), "test", judge=judge)
+    assert report.sequential.decision == "rejected"
+    assert not report.passed
+    assert report.worlds < 10
+    assert report.scores is None
+    assert report.interval is None
+    assert report.by_generator == {}
+
+
+def test_equal_runs_are_equal(judge, tmp_path):
+    """All but the times; also the noise of each world."""
+    source = "def policy(obs):\n    return 1.0, 0.8 + 0.01 * float(obs['ranges'][0])\n"
+    runs = []
+    for folder in (tmp_path / "a", tmp_path / "b"):
+        tasks = load_set("lost")
+        verify_on_set(source, tasks, "dev", 3, judge=judge, out=folder)
+        files = sorted((folder / "trajectories").iterdir())
+        runs.append([Trajectory.load(path) for path in files])
+    for one, other in zip(*runs, strict=True):
+        assert np.array_equal(one.poses, other.poses)
+        assert np.array_equal(one.ranges, other.ranges)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("train", 3), "split"),
+        (("hidden", 3), "split 'hidden' needs a salt"),
+        (("dev", 0), "worlds"),
+    ],
+)
+def test_arguments_that_are_refused(set_yaml, arguments, message):
+    with pytest.raises(TaskError, match=message):
+        verify_on_set(STILL, set_yaml(), *arguments)
+
+
+def test_the_command(tdac, tmp_path):
+    """Exit 0 with scores or an accepting test, 1 with a rejecting one."""
+    words = ("verify", str(KNOWN), "--set", "known", "--split", "dev", "-n", "2")
+    code, out, err = tdac(*words)
+    assert (code, err) == (0, "")
+    assert "2 dev worlds: 2 reached, 0 failed" in out
+    assert "BARN score" in out
+    code, out, _ = tdac(*words, "--json")
+    assert code == 0
+    assert json.loads(out)["successes"] == 2
+    still = tmp_path / "still.py"
+    still.write_text(STILL)
+    code, out, _ = tdac("verify", str(still), "--set", "unknown")
+    assert code == 1
+    assert "not verified: rejected at 95.0 %" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--split", "dev"), "--split needs --set NAME"),
+        (("-n", "3"), "-n needs --set NAME"),
+        (("--set", "unkown"), r"unknown task set 'unkown'"),
+        (("--set", "known", "--task", "maze"), "leave out --task"),
+        (("--set", "known", "--paper"), "leave out --paper"),
+        (("--set", "known", "--robust", "3"), "leave out --robust"),
+        (("--set", "known", "-n", "0"), "-n"),
+        (("--set", "known", "--split", "hidden"), "needs a salt"),
+        (("--set", "known", "--salt-file", "no"), "split 'test' has a public salt|no"),
+    ],
+)
+def test_mistakes_are_one_line(tdac, words, message):
+    code, out, err = tdac("verify", str(KNOWN), *words)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert any(part in err for part in message.split("|"))
