@@ -34,9 +34,8 @@ class SetFlags:
             TaskError: One does not.
         """
         if self.name is None:
-            flag = (
-                "--split" if self.split else "--salt-file" if self.salt_file else "-n"
-            )
+            flags = {"--split": self.split, "--salt-file": self.salt_file, "-n": True}
+            flag = next(flag for flag, value in flags.items() if value)
             raise TaskError(f"{flag} needs --set NAME; tdac sets lists the task sets")
         words = [word for word in task.words() if word.startswith("--")]
         words += [flag for flag, value in others.items() if value]

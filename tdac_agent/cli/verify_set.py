@@ -52,7 +52,13 @@ def run(
         TimeLeft(),
     )
     console = Console(stderr=as_json)
-    bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
+    bar = Progress(
+        *columns,
+        console=console,
+        transient=True,
+        auto_refresh=False,
+        disable=not console.is_terminal,
+    )
     row = bar.add_task("", total=flags.worlds or MOST_WORLDS, successes=0)
 
     def watch(episodes: int, successes: int) -> None:
@@ -83,9 +89,9 @@ def show(report: SetReport, console: Console) -> None:
     about = report.provenance
     which = "public worlds" if about.split == "test" else f"{about.split} worlds"
     say(
-        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}, {report.worlds} {which}: "
-        f"{report.successes} reached, {report.worlds - report.successes} failed; "
-        f"{report.seconds:.0f} s"
+        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}, {report.worlds} "
+        f"{which}: {report.successes} reached, "
+        f"{report.worlds - report.successes} failed; {report.seconds:.0f} s"
     )
     if report.scores is not None and report.interval is not None:
         say(_scores(report, report.scores))
