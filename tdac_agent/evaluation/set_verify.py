@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tdac_agent.evaluation.seeded_run import run_job
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
-from tdac_agent.sandbox import Limits
+from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.first_run import compile_first
 from tdac_agent.tasks.provenance import sha256_of, versions
@@ -23,6 +23,7 @@ from tdac_agent.verification.judge.set_job import SetJob, WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import one_of, whole_number
+from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
@@ -73,6 +74,11 @@ def verify_on_set(
     salt = None if salt_file is None else read_salt(salt_file)
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source, told = read_source(controller), split != "hidden"
+    if not told and tier not in ("auto", *(each.name for each in CONFINING)):
+        raise TaskError(
+            f"the sandbox tier {tier!r} cannot keep a controller from reading files, "
+            "and so not from hidden worlds; leave out --tier"
+        )
     test = SequentialTest(tasks.file.bar, MOST_WORLDS) if worlds is None else None
     compile_first(environment(Map2DTask.env_id))
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:

@@ -136,6 +136,13 @@ def test_hidden_worlds_are_told_in_sums_alone(judge, set_yaml, tmp_path):
     assert SALT.hex() not in text
 
 
+def test_hidden_worlds_need_walls(set_yaml, tmp_path):
+    salt = tmp_path / "secret.salt"
+    salt.write_bytes(SALT)
+    with pytest.raises(TaskError, match="'rlimits' cannot keep a controller from"):
+        verify_on_set(STILL, set_yaml(), "hidden", 1, salt_file=salt, tier="rlimits")
+
+
 def test_too_much_cpu_time_is_a_failure(judge, set_yaml):
     source = """
 import time
