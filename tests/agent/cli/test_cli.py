@@ -413,6 +413,7 @@ def test_a_broken_suite_is_exit_3(tdac, good, tmp_path):
     assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("command", ["verify", "check-suite"])
 def test_a_misspelt_fixture_is_a_fault_of_the_suite(tdac, good, tmp_path, command):
     """It says nothing about the controller; the line and the nearest name are told."""
@@ -473,6 +474,7 @@ def test_synth_writes_a_run(tdac, good):
     assert Path("a/controller.py").is_file()
 
 
+@pytest.mark.slow
 def test_synth_keeps_the_profile_and_takes_a_tier(tdac, good):
     """The profile is part of the run and of its task; a run asks for no tier."""
     (good / "controller.py").unlink()

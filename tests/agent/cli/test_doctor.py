@@ -50,6 +50,7 @@ def test_all_is_tried():
     assert checks["video (.mp4, .gif)"]["detail"].startswith("ffmpeg ")
 
 
+@pytest.mark.slow
 def test_a_broken_package_is_named(on_path):
     """Exit 3, and the doctor itself survives what ends everything else."""
     on_path("cv2", "raise ImportError('libGL.so.1: cannot open shared object file')")

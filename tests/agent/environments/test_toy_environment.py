@@ -55,6 +55,7 @@ def write_task(folder, env):
     return file
 
 
+@pytest.mark.slow
 def test_controllers_are_verified_in_an_environment_of_others(toy):
     """The entry's own tests and its own robot decide, in the judge's process too."""
     task = load_task(write_task(toy, "Toy-Crossed-v0"))

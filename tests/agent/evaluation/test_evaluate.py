@@ -510,6 +510,7 @@ def kept_in(out):
     return {file: file.read_bytes() for file in (out / FOLDER).glob("*/*.npz")}
 
 
+@pytest.mark.slow
 def test_an_interrupted_evaluation_goes_on(small_task, warm, tmp_path):
     """No finished episode is driven again, and the results are those of one piece."""
     words = (["reference", "go-to-goal"], [small_task], 5)
@@ -568,6 +569,7 @@ def test_a_killed_evaluation_goes_on(tdac, tmp_path):
     assert len(pd.read_csv(out / "episodes.csv")) == 6
 
 
+@pytest.mark.slow
 def test_who_only_crashes_is_exit_1(tdac, controllers, tmp_path):
     """With the reason; beside a policy that drives, it is a row like others."""
     folder = write_small_task(tmp_path / "task")

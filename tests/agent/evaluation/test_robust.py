@@ -96,6 +96,7 @@ def test_an_episode_is_what_the_environment_draws(
     assert np.array_equal(judged.trajectory.poses, np.array(poses))
 
 
+@pytest.mark.slow
 def test_play_replays_what_was_counted(small_task, good_source, moody):
     """Whatever became of a seed, playing it gives the same figures again."""
     source = (good_source + MOODS).encode()

@@ -143,6 +143,7 @@ def test_hidden_worlds_need_walls(set_yaml, tmp_path):
         verify_on_set(STILL, set_yaml(), "hidden", 1, salt_file=salt, tier="rlimits")
 
 
+@pytest.mark.slow
 def test_too_much_cpu_time_is_a_failure(judge, set_yaml):
     source = """
 import time

@@ -147,6 +147,7 @@ def test_the_same_page_again(runs, page):
     assert str(runs.parent) not in page.replace(runs.name, "")
 
 
+@pytest.mark.slow
 def test_size_of_a_long_run(long_run):
     """Twenty iterations at their worst stay below 5 MB, with all of their episodes."""
     html = make_page(long_run).html

@@ -77,6 +77,7 @@ def test_faults_cost_neither_k_nor_j(
     assert "Here:" in (out / "iterations/k01/j1/edit.reply.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_fault_that_stays_ends_the_run(
     server, task_file, good_source, tmp_path, monkeypatch, warm
 ):

@@ -66,6 +66,7 @@ def test_own_folders_need_nothing(tdac, run):
     assert tdac("synth", "--resume", run)[0] == 0
 
 
+@pytest.mark.slow
 def test_a_permission_holds_once(tdac, run):
     """`--suite` or `--trust`, which lists what it allows; nothing of it is kept."""
     test = run / "suite" / "test_own.py"

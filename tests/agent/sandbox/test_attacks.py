@@ -125,6 +125,7 @@ def check_call(launch, tier, name):
         child.policy(OBS, timeout=limit)
 
 
+@pytest.mark.slow_after(1)
 def test_cpu_time_is_limited(launch, tier):
     child = loaded(
         launch,

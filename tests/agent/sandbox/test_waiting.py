@@ -73,6 +73,7 @@ def test_standing_in_line_for_a_cpu_is_not_the_controllers_time(crowded):
     assert child.waited() - before > 0.05
 
 
+@pytest.mark.slow_after(1)
 def test_on_a_busy_machine_too_much_work_is_too_much(crowded):
     """Two seconds of work are more than one, and would be at every other time."""
     with pytest.raises(ControllerTimeout, match="policy") as caught:

@@ -49,6 +49,7 @@ def said(process):
     return out, err
 
 
+@pytest.mark.slow
 def test_a_secret_is_made_once(tmp_path):
     """Several processes that start at once agree; the file is for its owner alone."""
     begun = [python(tmp_path / "state", "-c", KEYED) for _ in range(4)]

@@ -20,6 +20,7 @@ def _doubled(words):
         whole[k] += whole.shape[1] * whole.shape[2]
 
 
+@pytest.mark.slow
 def test_arrays_are_found_with_their_shapes():
     """What compiled code writes is seen in the arrays themselves."""
     arrays = np.arange(3.0), np.ones((2, 2)), np.zeros((2, 3, 4), np.int64)

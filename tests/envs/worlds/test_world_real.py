@@ -20,6 +20,7 @@ def truths(folder):
     return json.loads((folder / "expected.json").read_text())
 
 
+@pytest.mark.slow
 def test_every_world_is_as_an_independent_reader_has_it(folder, truths):
     """Poses, arenas, footprints, markers, and nothing dropped."""
     rows = [measure(folder / name, truth) for name, truth in truths.items()]
