@@ -99,8 +99,8 @@ def test_without_a_map_the_frame_is_at_the_start():
     straight = np.subtract(task.goal, task.start[:2])
     assert np.hypot(*seen["goal"]) == pytest.approx(np.hypot(*straight), rel=1e-6)
     goal = seen["goal"]
-    seen = env.step(np.ones(2, np.float32))[0]
-    assert np.allclose(seen["pose"], [3.0, 0.0, 0.0], atol=1e-6)
+    seen = env.step(np.full(2, 0.01, np.float32))[0]
+    assert np.allclose(seen["pose"], [0.03, 0.0, 0.0], atol=1e-6)
     assert np.array_equal(seen["goal"], goal)
     for _ in range(5):
         ((seen, *_),) = driven(env, 1)
