@@ -243,7 +243,7 @@ def test_an_unprivileged_user_reads_a_warm_package(home, cold_start, copied_pack
         "import os, sys, gymnasium as gym\n"
         "for name in [n for n in sys.modules if n.startswith('tdac_envs')]:\n"
         "    del sys.modules[name]\n"
-        "for name in ('TDAC-Map2D-v0', 'TDAC-EPuck-v0'):\n"
+        "for name in [n for n in gym.registry if n.startswith('TDAC-')]:\n"
         "    del gym.registry[name]\n"
         "os.setgroups([]); os.setgid(12345); os.setuid(12345)\n"
         f"{again}\n"
