@@ -42,9 +42,9 @@ def main() -> int:
             outcomes.append(found)
             print(f"{found.result}: {found.said}", flush=True)
     finally:
+        print(f"\n{table(outcomes)}", flush=True)
         if options.work is None:
             shutil.rmtree(folder, ignore_errors=True)
-        print(f"\n{table(outcomes)}", flush=True)
     return 1 if any(outcome.result == FAILED for outcome in outcomes) else 0
 
 
