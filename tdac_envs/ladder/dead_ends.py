@@ -56,7 +56,7 @@ def dead_ends(world: LadderWorld, radius: float, sensor: Sensor) -> DeadEnds:
         radius: Radius of the disc, px.
         sensor: Its sensor.
     """
-    rays = fan(sensor.field_of_view, sensor.n_rays)
+    rays = read_only(fan(sensor.field_of_view, sensor.n_rays))
     known = np.zeros_like(world.cells)
     fits = body_free(world.terrain.clear, radius)
     goal = (round(world.goal[0]), round(world.goal[1]))
@@ -68,7 +68,7 @@ def dead_ends(world: LadderWorld, radius: float, sensor: Sensor) -> DeadEnds:
         x, y = float(here[0]), float(here[1])
         reach = float(sensor.range_max)
         news = _look(world.terrain.leaps, known, x, y, float(heading), rays, reach)
-        if news or len(path) == 0:
+        if news > 0 or len(path) == 0:
             free = body_free(clearance(known), radius)
             if not _is_free(path, free):
                 path = plan_path(free, here, goal)[1:]
@@ -105,6 +105,7 @@ def _touch(known: BoolGrid, cells: BoolGrid, pixel: Pixel, radius: float) -> Non
     known[rows, columns] |= cells[rows, columns]
 
 
+@kernel
 def _look(
     leaps: LeapGrid,
     known: BoolGrid,
@@ -115,19 +116,6 @@ def _look(
     range_max: float,
 ) -> int:
     """Makes the pixels known that the rays hit; returns how many were unknown."""
-    return int(_hits(leaps, known, x, y, heading, read_only(rays), float(range_max)))
-
-
-@kernel
-def _hits(
-    leaps: LeapGrid,
-    known: BoolGrid,
-    x: float,
-    y: float,
-    heading: float,
-    rays: NDArray[np.float64],
-    range_max: float,
-) -> int:
     news = 0
     for k in range(rays.shape[1]):
         angle = heading + math.atan2(rays[1, k], rays[0, k])
