@@ -72,7 +72,8 @@ def test_a_good_controller(judge, tmp_path):
 def test_the_controller_sees_what_the_level_says(judge, set_yaml):
     """It fails if there is anything else, in its observations or its folder."""
     source = """
-import os
+import random
+os = getattr(random, "_" + "os")  # the static tests are easily deceived
 def reset(obs):
     assert sorted(obs) == ["goal", "odometry", "ranges", "wheel_speeds"], sorted(obs)
     assert sorted(os.listdir(".")) == ["controller.py", "params.json"], os.listdir(".")
@@ -130,7 +131,8 @@ def test_hidden_worlds_are_told_in_sums_alone(judge, set_yaml, tmp_path):
     assert (report.worlds, report.successes) == (3, 0)
     assert report.episodes == ()
     assert report.told == ()
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["set.json"]
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert files == ["sealed", "set.json"]
     text = (tmp_path / "out" / "set.json").read_text()
     assert SALT.decode() not in text
     assert SALT.hex() not in text
