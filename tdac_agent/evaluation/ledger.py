@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -53,7 +53,8 @@ class _Begun(_Line):
 
 class _Ended(_Line):
     event: Literal["ended"] = "ended"
-    report: dict[str, Any] = Field(description="The report, without its count.")
+    worlds: int = Field(description="Episodes; 0 if the tests refused the controller.")
+    report: str = Field(description="The report as JSON; its count is not in it.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,8 @@ class Ledger:
             if line.about == about and end is not None:
                 count = _count(begun, about, end.time)
                 try:
-                    return SetReport.model_validate({**end.report, "hidden": count})
+                    report = SetReport.model_validate_json(end.report)
+                    return report.model_copy(update={"hidden": count})
                 except ValidationError:
                     raise TaskError(
                         f"{self.path}: the report of {end.time} cannot be read by this "
@@ -102,8 +104,8 @@ class Ledger:
         Raises:
             TaskError: The ledger cannot be written.
         """
-        values = report.model_dump(mode="json", exclude={"hidden"})
-        self._append(_Ended(id=number, time=_now(), report=values))
+        text = report.model_dump_json(exclude={"hidden"})
+        self._append(_Ended(id=number, time=_now(), worlds=report.worlds, report=text))
         if report.refused:
             return report
         count = _count(self._lines()[0], about, None)
@@ -120,7 +122,7 @@ class Ledger:
             records = read_records(self.path)
             begun = [_Begun(**each) for each in records if each.get("event") == "begun"]
             ends = [_Ended(**each) for each in records if each.get("event") == "ended"]
-        refused = {end.id for end in ends if not end.report.get("worlds")}
+        refused = {end.id for end in ends if not end.worlds}
         begun = [each for each in begun if each.id not in refused]
         return begun, {end.id: end for end in ends if end.id not in refused}
 

@@ -260,7 +260,8 @@ def test_a_hidden_evaluation_is_driven_once(judge, set_yaml, tmp_path):
     assert driven == []
     assert again.hidden.recorded is not None
     same = {"hidden": first.hidden}
-    assert again.model_copy(update=same) == first
+    same_text = again.model_copy(update=same).model_dump_json()
+    assert same_text == first.model_dump_json()
     more = verify_on_set(source, tasks, "hidden", 3, **given)
     assert (more.hidden.number, more.hidden.count, more.worlds) == (2, 2, 3)
     other = verify_on_set(source + "# other\n", tasks, "hidden", 2, **given)
