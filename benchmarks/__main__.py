@@ -30,7 +30,15 @@ from rich.table import Table
 
 from benchmarks.timing import Bench, Effort, Row, duration, show, whole_from_one
 
-NAMES = ("env_step", "epuck_step", "peers", "preprocessing", "planning", "start_up")
+NAMES = (
+    "env_step",
+    "epuck_step",
+    "peers",
+    "preprocessing",
+    "planning",
+    "start_up",
+    "set_judge",
+)
 PROFILED = 25
 """Number of lines in a profile."""
 

@@ -19,7 +19,7 @@ from tdac_agent.cli.robust_view import decision_text, error_rates, rate_text
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
-from tdac_agent.evaluation.set_report import Scores, SetReport
+from tdac_agent.evaluation.set_report import HiddenCount, Scores, SetReport
 from tdac_agent.evaluation.set_verify import MOST_WORLDS, verify_on_set
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -87,6 +87,9 @@ def show(report: SetReport, console: Console) -> None:
     """Prints the scores or the decision, the failures by cause, and diagnoses."""
     say = partial(console.print, highlight=False)
     about = report.provenance
+    if report.refused:
+        _say_refused(report, console)
+        return
     which = "public worlds" if about.split == "test" else f"{about.split} worlds"
     say(
         f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}, {report.worlds} "
@@ -110,6 +113,31 @@ def show(report: SetReport, console: Console) -> None:
             f"{report.worlds} of at most {result.test.limit} worlds"
         )
         say(error_rates(result))
+    if report.hidden is not None:
+        say(_counted(report.hidden, about.set))
+
+
+def _say_refused(report: SetReport, console: Console) -> None:
+    """Prints the tests that failed; no world was driven."""
+    about, tests = report.provenance, list(report.tests.values())
+    console.print(
+        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}: "
+        f"{tests.count('failed')} of {len(tests)} tests failed, so no world was driven",
+        highlight=False,
+    )
+    for text in report.told:
+        print_sentences(console, text, indent=2)
+    console.print("[bold red]not verified[/]", highlight=False)
+
+
+def _counted(hidden: HiddenCount, name: str) -> str:
+    """Which of the hidden evaluations in the ledger it is."""
+    text = f"hidden evaluation {hidden.number} of this file on {escape(name)}"
+    if hidden.count > 1:
+        text += f", {hidden.count} in all; the first one counts"
+    if hidden.recorded is not None:
+        text += f"; recorded {hidden.recorded}, nothing was driven anew"
+    return text
 
 
 def _scores(report: SetReport, whole: Scores) -> Table:

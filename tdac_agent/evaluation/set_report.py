@@ -16,6 +16,7 @@ from tdac_agent.evaluation.robust_report import (
 )
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_agent.verification.judge.set_checks import Checks
 from tdac_agent.verification.judge.set_job import WorldEpisode
 
 MOST_TOLD = 3
@@ -48,26 +49,53 @@ class Scores(_Record):
     barn: float = Field(description="The metric of BARN, at most 0.5.")
 
 
+class HiddenCount(_Record):
+    """What the ledger says about a hidden evaluation."""
+
+    number: int = Field(description="Its number among those of this controller, set.")
+    count: int = Field(description="How many there are so far.")
+    recorded: str | None = Field(
+        None, description="When it was driven, if it was not driven anew (UTC)."
+    )
+
+
 class SetReport(_Record):
     """Episodes on worlds of a set, from world 0 on."""
 
     schema_version: int = 1
     provenance: SetProvenance
+    tests: dict[str, str] = Field(
+        default_factory=dict,
+        description="Static and contract tests: `passed` or `failed`. If one failed, "
+        "no episode was driven, and `told` has a line for each that failed.",
+    )
     worlds: int = Field(description="Episodes; with a test, up to its decision.")
     successes: int
     interval: Interval | None = Field(description="None with a test: it is biased.")
     scores: Scores | None = Field(description="None with a test, likewise.")
     by_generator: dict[str, Scores] = Field(description="Empty with a test.")
     causes: dict[str, int] = Field(description="Failures by cause.")
-    told: tuple[str, ...] = Field(description="Diagnoses; empty for hidden worlds.")
+    told: tuple[str, ...] = Field(
+        description="Diagnoses, in the frame that the controller observes; none of "
+        "hidden worlds."
+    )
     episodes: tuple[WorldEpisode, ...] = Field(description="Empty for hidden worlds.")
     sequential: SequentialResult | None = None
     child_cpu_seconds: float
     seconds: float
 
+    hidden: HiddenCount | None = Field(None, description="Only of hidden worlds.")
+
+    @property
+    def refused(self) -> bool:
+        """Whether a static or contract test failed, so that nothing was driven."""
+        return "failed" in self.tests.values()
+
     @property
     def passed(self) -> bool:
-        """Whether the sequential test accepts; True if there was none."""
+        """Whether the tests and the sequential test accept; True if there was none."""
+        if self.refused:
+            return False
         return self.sequential is None or self.sequential.decision == "accepted"
 
 
@@ -78,6 +106,7 @@ def summarise(
     seconds: float,
     *,
     told: bool,
+    checks: Checks | None = None,
 ) -> SetReport:
     """Summarises episodes.
 
@@ -87,24 +116,30 @@ def summarise(
         test: The sequential test that may have stopped them.
         seconds: Wall time, s.
         told: Whether single worlds may be reported.
+        checks: The static and contract tests. If one failed, there are no episodes.
     """
+    checks = checks or Checks(results={})
+    if checks.failures:
+        test = None
     failed = [episode for episode in episodes if not episode.success]
     successes = len(episodes) - len(failed)
     groups: dict[str, list[WorldEpisode]] = {}
     for episode in episodes:
         groups.setdefault(episode.generator, []).append(episode)
+    scored = test is None and bool(episodes)
     texts = [each.text or f"world {each.index}: {each.error}" for each in failed]
     return SetReport(
         provenance=provenance,
+        tests=checks.outcomes,
         worlds=len(episodes),
         successes=successes,
-        interval=None if test else success_interval(successes, len(episodes)),
-        scores=None if test else scores_of(episodes),
+        interval=success_interval(successes, len(episodes)) if scored else None,
+        scores=scores_of(episodes) if scored else None,
         by_generator=(
-            {} if test else {name: scores_of(group) for name, group in groups.items()}
+            {name: scores_of(group) for name, group in groups.items()} if scored else {}
         ),
         causes=dict(Counter(str(e.cause or e.outcome) for e in failed).most_common()),
-        told=tuple(texts[:MOST_TOLD]) if told else (),
+        told=checks.failures or (tuple(texts[:MOST_TOLD]) if told else ()),
         episodes=tuple(episodes) if told else (),
         sequential=None if test is None else result_of(test, successes, len(failed)),
         child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),

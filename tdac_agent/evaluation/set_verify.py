@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from tdac_agent.evaluation.kept_sets import (
+    keep_report,
+    keep_sealed,
+    keep_trajectories,
+)
+from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, user_ledger
 from tdac_agent.evaluation.seeded_run import run_job
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
 from tdac_agent.sandbox import CONFINING, Limits
+from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.first_run import compile_first
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.tasks.registry import environment
 from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks
 from tdac_agent.verification.judge.set_job import SetJob, WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import read_source
@@ -46,9 +53,12 @@ def verify_on_set(
     judge: WarmJudge | None = None,
     watch: Callable[[int, int], None] | None = None,
 ) -> SetReport:
-    """Drives a controller on the worlds of a split, from world 0 on.
+    """Tests a controller, and drives it on the worlds of a split, from world 0 on.
 
     Each episode has a fresh sandboxed process, which is told neither split nor number.
+    Without a pass in the static and contract tests, nothing is driven. An evaluation
+    on hidden worlds is recorded in the user's ledger before its worlds are driven; one
+    that is recorded there is answered from it.
 
     Args:
         controller: Path of the file, or its source (text of several lines, or bytes).
@@ -58,61 +68,131 @@ def verify_on_set(
             bar decides when to stop; then there are no scores.
         salt_file: File with the salt of the split `hidden`.
         tier: Sandbox tier; `auto` for the best one on this machine.
-        out: Folder for `set.json` and, unless the split is hidden, `trajectories/`.
+        out: Folder for `set.json` and `trajectories/`; of hidden worlds, for `set.json`
+            and `sealed/`, which only this user can read.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with the numbers of episodes and successes so far.
 
     Raises:
         ControllerFileError: The file cannot be read.
-        TaskError: An argument is not valid.
+        TaskError: An argument is not valid, or the ledger cannot be used.
         Fault: The sandbox is broken; the controller neither passes nor fails.
     """
-    began = time.monotonic()
     one_of("split", split, JUDGED)
     if worlds is not None:
         whole_number("worlds", worlds, 1, MOST_EPISODES)
     salt = None if salt_file is None else read_salt(salt_file)
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
-    source, told = read_source(controller), split != "hidden"
-    if not told and tier not in ("auto", *(each.name for each in CONFINING)):
+    source = read_source(controller)
+    request = _Request(source, tasks, split, worlds, salt_file, tier)
+    if salt is None:
+        return _driven(request, out, judge, watch)
+    _check_hiding(request)
+    about = HiddenEvaluation(
+        entrant=sha256_of(source),
+        set=tasks.name,
+        set_sha256=tasks.sha256,
+        worlds=SEQUENTIAL if worlds is None else worlds,
+        salt_sha256=sha256_of(salt),
+    )
+    ledger = user_ledger()
+    report = ledger.recorded(about)
+    if report is None:
+        number = ledger.begin(about)
+        report = _driven(request, out, judge, watch)
+        report = ledger.end(number, about, report)
+    if out is not None:
+        keep_report(report, out)
+    return report
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    """Checked arguments of `verify_on_set`."""
+
+    source: bytes
+    tasks: TaskSet
+    split: str
+    worlds: int | None
+    salt_file: Path | None
+    tier: str
+
+    @property
+    def told(self) -> bool:
+        """Whether single worlds may be reported."""
+        return self.split != "hidden"
+
+
+def _check_hiding(request: _Request) -> None:
+    """Refuses hidden worlds that a controller could find.
+
+    Raises:
+        TaskError: The sandbox does not hide files, or the salt lies where it shows
+            them.
+    """
+    assert request.salt_file is not None
+    if request.tier not in ("auto", *(each.name for each in CONFINING)):
         raise TaskError(
-            f"the sandbox tier {tier!r} cannot keep a controller from reading files, "
-            "and so not from hidden worlds; leave out --tier"
+            f"the sandbox tier {request.tier!r} cannot keep a controller from reading "
+            "files, and so not from hidden worlds; leave out --tier"
         )
+    seen, path = exposure(), request.salt_file.resolve()
+    if any(path.is_relative_to(folder) for folder in (*seen.system, *seen.packages)):
+        raise TaskError(
+            f"salt file {request.salt_file}: controllers can read this folder, which "
+            "belongs to Python or its packages; move the file"
+        )
+
+
+def _driven(
+    request: _Request,
+    out: Path | None,
+    judge: WarmJudge | None,
+    watch: Callable[[int, int], None] | None,
+) -> SetReport:
+    """Has the judge test and drive the controller, and keeps what it found."""
+    began = time.monotonic()
+    tasks, worlds, told = request.tasks, request.worlds, request.told
     test = SequentialTest(tasks.file.bar, MOST_WORLDS) if worlds is None else None
     compile_first(environment(Map2DTask.env_id))
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         folder = Path(name)
+        salt_file = request.salt_file
         job = SetJob(
             set_file=_written(tasks, folder / "set.yaml"),
-            split=split,
+            split=request.split,
             salt_file=None if salt_file is None else salt_file.resolve(),
             worlds=tuple(range(MOST_WORLDS if worlds is None else worlds)),
             controller=folder / "controller.py",
             test=test,
             told=told,
-            tier=tier,
+            tier=request.tier,
             limits=limits_of(tasks),
             out=folder / "results",
             trajectories=folder / "trajectories" if out is not None and told else None,
         )
-        write_atomic(job.controller, source)
+        write_atomic(job.controller, request.source)
         longest = tasks.file.horizon.most * tasks.file.dt * len(job.worlds)
         ended, ending = run_job(job, job.out, longest, WorldEpisode, judge, watch)
+        checks = Checks.model_validate_json((job.out / CHECKS_FILE).read_bytes())
+        salt = None if salt_file is None else read_salt(salt_file)
         provenance = SetProvenance(
             set=tasks.name,
             set_sha256=tasks.sha256,
-            split=split,
-            salt_sha256=None if salt is None else hashlib.sha256(salt).hexdigest(),
-            controller_sha256=sha256_of(source),
+            split=request.split,
+            salt_sha256=None if salt is None else sha256_of(salt),
+            controller_sha256=sha256_of(request.source),
             sandbox=ending.tier,
             limits=asdict(job.limits),
             versions=dict(versions()),
         )
         seconds = time.monotonic() - began
-        report = summarise(provenance, ended, test, seconds, told=told)
-        if out is not None:
-            _keep(report, job.trajectories, out)
+        report = summarise(provenance, ended, test, seconds, told=told, checks=checks)
+        if out is not None and told:
+            keep_report(report, out)
+            keep_trajectories(job.trajectories, out)
+        elif out is not None:
+            keep_sealed(ended, out)
     return report
 
 
@@ -127,14 +207,3 @@ def _written(tasks: TaskSet, path: Path) -> Path:
     values = tasks.file.model_dump(mode="json", by_alias=True)
     path.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
     return path
-
-
-def _keep(report: SetReport, trajectories: Path | None, out: Path) -> None:
-    out.mkdir(parents=True, exist_ok=True)
-    write_atomic(out / "set.json", report.model_dump_json(indent=2) + "\n")
-    if trajectories is None or not trajectories.is_dir():
-        return
-    kept = out / "trajectories"
-    kept.mkdir(exist_ok=True)
-    for path in sorted(trajectories.iterdir()):
-        write_atomic(kept / path.name, path.read_bytes())

@@ -8,15 +8,41 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_envs.grid.map_units import MapUnits
-
 Points = NDArray[np.float64]
 Place = Literal["px", "m"]
+
+
+class ShownUnits(Protocol):
+    """Units and a frame for printed places on a map; arguments are in pixels."""
+
+    @property
+    def name(self) -> str:
+        """Unit of length."""
+
+    @property
+    def per_pixel(self) -> float:
+        """Size of a pixel in this unit."""
+
+    @property
+    def decimals(self) -> int:
+        """Decimals of printed coordinates."""
+
+    def coordinates(self, x: float, y: float) -> tuple[float, float]:
+        """Coordinates of a place."""
+
+    def heading(self, in_pixels: float) -> float:
+        """A heading in the frame, rad."""
+
+    def point(self, x: float, y: float) -> str:
+        """Formats a place."""
+
+    def length(self, length: float) -> str:
+        """Formats a length with its unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +56,8 @@ class Units:
         up: Whether the environment's y points up, with counter-clockwise headings.
         decimals: Decimals of printed coordinates.
         digits: Decimals of stored values.
-        shown: Units of printed places and lengths on a map, where coordinates and the
-            screen are in pixels; None for the units above.
+        shown: Units or frame of printed places and lengths on a map, where coordinates
+            and the screen are in pixels; None for the units above.
     """
 
     place: Place
@@ -40,11 +66,15 @@ class Units:
     up: bool
     decimals: int
     digits: int
-    shown: MapUnits | None = None
+    shown: ShownUnits | None = None
 
-    def in_metres(self, shown: MapUnits) -> Units:
+    def in_metres(self, shown: ShownUnits) -> Units:
         """These units, but printed in metres of a map's frame."""
         return replace(self, length=shown.name, shown=shown)
+
+    def from_start(self, frame: ShownUnits) -> Units:
+        """These units, but places are printed in the frame of a start pose."""
+        return replace(self, shown=frame)
 
     def on_screen(self, points: ArrayLike) -> Points:
         """Converts places, shape (n, 2), or poses, shape (n, 3), to the screen."""
@@ -104,8 +134,7 @@ class Units:
     def heading_of(self, heading: float) -> float:
         """Converts a heading on the screen to that of the printed frame."""
         if self.shown is not None:
-            # The conversion from the frame to the picture is its own inverse.
-            return math.remainder(self.shown.heading_in_pixels(heading), math.tau)
+            return math.remainder(self.shown.heading(heading), math.tau)
         return -heading if self.up else heading
 
     def degrees(self, heading: float) -> str:

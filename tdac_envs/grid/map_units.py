@@ -95,6 +95,10 @@ class MapUnits:
         """
         return heading if self.frame is None else self.frame.origin[2] - heading
 
+    def heading(self, in_pixels: float) -> float:
+        """Converts a heading of the picture, rad; the inverse of the above."""
+        return self.heading_in_pixels(in_pixels)
+
     def coordinates(self, x: float, y: float) -> Point:
         """The coordinates of a pixel in these units."""
         return (x, y) if self.frame is None else to_metres(self.frame, x, y)

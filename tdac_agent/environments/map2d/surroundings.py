@@ -10,6 +10,7 @@ import numpy as np
 
 from tdac_agent.environments.map2d.touch import nearest_touch
 from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.tasks.start_frame import StartFrame
 from tdac_agent.tasks.units import PIXELS, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
@@ -90,6 +91,13 @@ class MapSurroundings:
 
     def mistaken_goals(self) -> dict[str, Point]:
         """Returns where typical coordinate mistakes put the goal, by description."""
+        frame = self.units.shown
+        if isinstance(frame, StartFrame):
+            x, y = frame.coordinates(*self.task.goal)
+            return {
+                "x and y swapped": frame.pixels((y, x)),
+                "y counted to the left": frame.pixels((x, -y)),
+            }
         grid, (x, y) = self.task.terrain.grid, self.task.goal
         return {
             "x and y swapped": (y, x),

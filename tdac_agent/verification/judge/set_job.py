@@ -6,6 +6,7 @@ import json
 import math
 import os
 import tempfile
+from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -15,11 +16,13 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from tdac_agent.episodes.episode import Record, not_driven, run_policy
+from tdac_agent.episodes.episode import Driver, Record, not_driven, run_policy
 from tdac_agent.episodes.trajectory import Outcome, Rollout
-from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
+from tdac_agent.sandbox import Child, ControllerFault, Limits, SandboxError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.start_frame import StartFrame
+from tdac_agent.tasks.units import PIXELS, Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.report import Cause
 from tdac_agent.verification.judge.child_pool import ChildPool
@@ -32,6 +35,13 @@ from tdac_agent.verification.judge.seeded import (
     JobEnding,
 )
 from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_agent.verification.judge.set_checks import (
+    CHECKED_STEPS,
+    CHECKS_FILE,
+    STABLE,
+    Checks,
+    static_checks,
+)
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.env import LadderEnv
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
@@ -132,55 +142,113 @@ class SetRun:
         """The task set."""
         return self.env.set.file
 
+    def budgeted(self, child: Child) -> Driver:
+        """Imports the controller in a child whose CPU time is limited."""
+        driver = Budgeted(child, self.file.cpu)
+        driver.load()
+        return driver
+
+    @property
+    def shown(self) -> Units:
+        """Units of diagnoses, in the frame that the controller observes."""
+        if self.file.frame == "map":
+            return PIXELS
+        return PIXELS.from_start(StartFrame(self.env.task.start))
+
 
 def judge_set(job: SetJob, child_pool: ChildPool) -> None:
-    """Runs the episodes of a job, and writes a line for each in the order of worlds."""
+    """Runs the tests, and if they pass the episodes, with a line for each in order."""
     job.out.mkdir(exist_ok=True)
     run = SetRun(job, read_file(job.controller, RECORD_BYTES), child_pool)
     counts, tier, fault = [0, 0], job.tier, None
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
-            work = partial(drive_world, run)
-            with closing(in_order(work, child_pool.close, job.worlds)) as episodes:
-                for kept in episodes:
-                    tier = kept.tier or tier
-                    file.write(kept.figures.model_dump_json() + "\n")
-                    file.flush()
-                    counts[not kept.figures.success] += 1
-                    if job.test and job.test.decide(*counts) != "undecided":
-                        break
+            checks, tier = _checked(run)
+            write_atomic(job.out / CHECKS_FILE, checks.model_dump_json())
+            worlds = () if checks.failures else job.worlds
+            for kept in _episodes(run, worlds):
+                tier = kept.tier or tier
+                file.write(kept.figures.model_dump_json() + "\n")
+                file.flush()
+                counts[not kept.figures.success] += 1
+                if job.test and job.test.decide(*counts) != "undecided":
+                    break
         except SandboxError as error:
             fault = f"the sandbox failed: {error}"
     ending = JobEnding(tier=tier, fault=fault)
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 
 
+def _checked(run: SetRun) -> tuple[Checks, str]:
+    """The static tests, and the first steps on a world of `dev`; also the tier."""
+    results, job = static_checks(run.source), run.job
+    if len(results) == 1:  # it does not parse
+        return Checks(results=results), job.tier
+    # A public world, so that a failure tells nothing of hidden ones.
+    public = job.model_copy(update={"split": "dev", "salt_file": None})
+    # Here and not in a worker pool, so that its processes share what this loads.
+    drive = partial(_driven, replace(run, job=public), 0, CHECKED_STEPS, _loaded)
+    rollout, _, tier = drive()
+    if rollout.is_retryable:
+        rollout, _, tier = drive()
+    return Checks(results={**results, STABLE: rollout.error}), tier
+
+
+def _episodes(run: SetRun, worlds: tuple[int, ...]) -> Generator[WorldSummary]:
+    if worlds:
+        work = partial(drive_world, run)
+        with closing(in_order(work, run.child_pool.close, worlds)) as episodes:
+            yield from episodes
+
+
 def drive_world(run: SetRun, index: int, skip: bool) -> WorldSummary:  # noqa: ARG001
     """Drives the episode of a world, in a fresh child that is told nothing of it."""
-    # The judge's own copy of the task, so that the files can be written before.
-    task = run.env.setup.source.task(index)
-    record = Record(run.env, None, FOREVER, options={"index": index})
-    child = run.child_pool.take(run.job.tier, run.job.limits)
-    try:
-        with tempfile.TemporaryDirectory() as name:
-            write_files(Path(name), run.file, task)
-            child.copy_files(Path(name), run.source)
-        driver = Budgeted(child, run.file.cpu)
-        driver.load()
-        rollout = run_policy(
-            driver, record, f"world {index}", held_out=False, deadline=math.inf
-        )
-    except ControllerFault as fault:
-        rollout = not_driven(record, f"world {index}", fault)
-        rollout = replace(rollout, is_retryable=fault.is_retryable)
-    finally:
-        usage = child.close()
+    rollout, cpu_seconds, tier = _driven(run, index, FOREVER, run.budgeted)
     late = rollout.outcome == "error" and rollout.timed_out
-    figures = _figures(run, index, rollout, usage.cpu_seconds)
+    figures = _figures(run, index, rollout, cpu_seconds)
     if run.job.trajectories is not None:
         run.job.trajectories.mkdir(parents=True, exist_ok=True)
         rollout.trajectory.save(run.job.trajectories / f"{index}.npz")
-    return WorldSummary(figures, child.tier, late, rollout.is_retryable)
+    return WorldSummary(figures, tier, late, rollout.is_retryable)
+
+
+def _driven(
+    run: SetRun, index: int, most: int, load: Callable[[Child], Driver]
+) -> tuple[Rollout, float, str]:
+    """Drives at most `most` steps; returns also the CPU time, s, and the tier.
+
+    `load` imports the controller.
+    """
+    # The judge's own copy of the task, so that the files can be written before.
+    task, name = run.env.setup.source.task(index), f"world {index}"
+    record = Record(run.env, None, most, options={"index": index})
+    child = run.child_pool.take(run.job.tier, run.job.limits)
+    try:
+        supply(child, run, task)
+        driver = load(child)
+        rollout = run_policy(driver, record, name, held_out=False, deadline=math.inf)
+    except ControllerFault as fault:
+        rollout = not_driven(record, name, fault)
+        rollout = replace(rollout, is_retryable=fault.is_retryable)
+    finally:
+        usage = child.close()
+    return rollout, usage.cpu_seconds, child.tier
+
+
+def supply(child: Child, run: SetRun, task: Map2DTask) -> None:
+    """Gives a child the files of an episode: all that it is told.
+
+    Raises:
+        ControllerFault: The controller is too large.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        write_files(Path(name), run.file, task)
+        child.copy_files(Path(name), run.source)
+
+
+def _loaded(child: Child) -> Driver:
+    child.load()
+    return child
 
 
 def write_files(folder: Path, file: SetFile, task: Map2DTask) -> None:
@@ -225,7 +293,7 @@ def _figures(
     driven = float(np.hypot(*np.diff(places, axis=0).T).sum())
     reached, failure = rollout.reached, {}
     if not reached:
-        found = diagnose(rollout, run.env.task)
+        found = diagnose(rollout, run.env.task, run.shown)
         failure = {"cause": found.cause, "text": found.text if run.job.told else None}
     return WorldEpisode(
         index=index,

@@ -102,6 +102,23 @@ def _target_names(target: ast.expr) -> list[str]:
     return []
 
 
+def import_error(tree: ast.Module) -> str | None:
+    """Says which imports are not allowed, and what is; None if all of them are."""
+    problems = import_problems(tree)
+    allowed = " ".join(sorted(ALLOWED_IMPORTS - {"__future__"}))
+    return f"{'; '.join(problems)}; allowed modules: {allowed}" if problems else None
+
+
+def policy_error(tree: ast.Module) -> str | None:
+    """Says why `policy` is not a plain function of one observation; None if it is."""
+    function = top_level_names(tree).get("policy")
+    if not isinstance(function, ast.FunctionDef):
+        return "no `def policy(obs)` at the top level"
+    least, most = positional_arity(function)
+    taken = str(least) if least == most else f"{least} to {most}"
+    return None if least <= 1 <= most else f"policy takes {taken} arguments, not 1"
+
+
 def import_problems(tree: ast.Module) -> list[str]:
     """Describes imports that are not allowed or not at the top level."""
     top = set(tree.body)

@@ -184,3 +184,9 @@ HYGIENE: dict[str, Callable[[ast.Module], Iterator[str]]] = {
     "unseeded_randomness": unseeded_randomness,
 }
 """Finders of unstable patterns, by name."""
+
+
+def hygiene_error(tree: ast.Module, pattern: str) -> str | None:
+    """Names the lines with an unstable pattern; None without one."""
+    found = list(HYGIENE[pattern](tree))
+    return f"{pattern.replace('_', ' ')}: {'; '.join(found[:8])}" if found else None

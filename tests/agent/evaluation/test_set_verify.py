@@ -1,6 +1,9 @@
 """The judge on a task set: fresh worlds, nothing told, scores that are right."""
 
+import hashlib
 import json
+import math
+import stat
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +12,14 @@ import yaml
 
 import tdac_agent
 from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.evaluation.ledger import user_ledger
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.verification.judge.set_job import level_params, write_files
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.env import LadderEnv
 from tdac_envs.ladder.set_file import set_names
 
 KNOWN = Path(tdac_agent.__file__).parent / "builtin" / "levels" / "known.py"
@@ -72,7 +77,8 @@ def test_a_good_controller(judge, tmp_path):
 def test_the_controller_sees_what_the_level_says(judge, set_yaml):
     """It fails if there is anything else, in its observations or its folder."""
     source = """
-import os
+import random
+os = getattr(random, "_" + "os")  # the static tests are easily deceived
 def reset(obs):
     assert sorted(obs) == ["goal", "odometry", "ranges", "wheel_speeds"], sorted(obs)
     assert sorted(os.listdir(".")) == ["controller.py", "params.json"], os.listdir(".")
@@ -108,6 +114,87 @@ def test_folders_of_two_worlds_differ_by_the_map_alone(name, tmp_path):
         assert np.array_equal(cells, tasks.task("dev", 0).terrain.grid.cells)
 
 
+@pytest.mark.parametrize(
+    ("source", "lines"),
+    [
+        ("def policy(obs:\n", ["test_source_parses: the source does not parse: "]),
+        ("import os\n" + STILL, ["test_imports: line 1: import of 'os'; allowed"]),
+        (
+            "def reset(obs):\n    pass\n",
+            [
+                "test_policy_is_defined: no `def policy(obs)` at the top level",
+                "test_short_rollout_is_stable[10]: AttributeError at policy",
+            ],
+        ),
+        (
+            "def policy(obs):\n    return 1.0,\n",
+            ["test_short_rollout_is_stable[10]: policy must return two finite"],
+        ),
+        (
+            "def policy(obs):\n    return float('nan'), 0.0\n",
+            ["test_short_rollout_is_stable[10]: policy must return two finite"],
+        ),
+        (
+            "def policy(obs):\n    open('/etc/passwd')\n    return 0.0, 0.0\n",
+            ["test_short_rollout_is_stable[10]: FileNotFoundError at policy (line 2)"],
+        ),
+        ("1 / 0\n" + STILL, ["test_short_rollout_is_stable[10]: ZeroDivisionError"]),
+        (
+            "def policy(obs):\n    return 0.0, eval('0.0')\n",
+            ["test_hygiene[forbidden_calls]: forbidden calls: line 2: "],
+        ),
+    ],
+)
+def test_a_file_that_fails_the_tests_is_not_driven(judge, set_yaml, source, lines):
+    """Each failed test is told once, also for hidden worlds, which it never saw."""
+    report = verify_on_set(source.encode(), set_yaml(), "dev", 3, judge=judge)
+    assert (report.worlds, report.episodes, report.scores) == (0, (), None)
+    assert report.refused
+    assert not report.passed
+    assert len(report.told) == len(lines)
+    for text, line in zip(report.told, lines, strict=True):
+        assert text.startswith(line)
+    failed = [name for name, outcome in report.tests.items() if outcome == "failed"]
+    assert failed == [line.partition(":")[0] for line in lines]
+
+
+def test_a_refused_file_is_no_hidden_evaluation(judge, set_yaml, tmp_path):
+    """It can be judged on the same salt when it is mended; both are in the ledger."""
+    salt = tmp_path / "secret.salt"
+    salt.write_bytes(b"a fifth salt of enough bytes")
+    given = {"salt_file": salt, "judge": judge}
+    tasks = set_yaml()
+    wrong = verify_on_set("import os\n" + STILL, tasks, "hidden", 2, **given)
+    assert (wrong.worlds, wrong.hidden) == (0, None)
+    assert "import of 'os'" in wrong.told[0]
+
+
+def test_diagnoses_are_in_the_frame_of_the_controller(judge, set_yaml, tmp_path):
+    """Without a map, places and headings are from the start, as `pose` is."""
+    source = """
+poses = []
+def policy(obs):
+    poses.append(obs["pose"])
+    return 1.0, 0.9
+"""
+    tasks = set_yaml()
+    report = verify_on_set(source, tasks, "dev", 2, judge=judge, out=tmp_path)
+    for episode in report.episodes:
+        run = Trajectory.load(tmp_path / "trajectories" / f"{episode.index}.npz")
+        env = LadderEnv(tmp_path / "few.yaml", "dev")
+        seen, _ = env.reset(options={"index": episode.index})
+        for action in run.actions:
+            seen = env.step(action)[0]
+        x, y, heading = seen["pose"].tolist()
+        # The last steps of an episode end in its last pose.
+        last = episode.text.rpartition("; ")[2]
+        assert last.partition(": ")[2] == (
+            f"{x:z.1f} {y:z.1f} {math.degrees(heading):z.0f}."
+        )
+        far = np.hypot(x, y)
+        assert far < 40, "the start of a map is further from its corner"
+
+
 def test_failures_are_counted_and_three_are_told(judge, set_yaml):
     report = verify_on_set(STILL, set_yaml(), "dev", 5, judge=judge)
     assert (report.successes, len(report.told), len(report.episodes)) == (0, 3, 5)
@@ -130,10 +217,83 @@ def test_hidden_worlds_are_told_in_sums_alone(judge, set_yaml, tmp_path):
     assert (report.worlds, report.successes) == (3, 0)
     assert report.episodes == ()
     assert report.told == ()
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["set.json"]
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert files == ["sealed", "set.json"]
     text = (tmp_path / "out" / "set.json").read_text()
     assert SALT.decode() not in text
     assert SALT.hex() not in text
+
+
+def test_the_rows_of_hidden_worlds_are_sealed(judge, set_yaml, tmp_path):
+    """Only this user can open them, and they have no text."""
+    salt = tmp_path / "secret.salt"
+    salt.write_bytes(b"another salt of enough bytes")
+    out = tmp_path / "out"
+    verify_on_set(STILL, set_yaml(), "hidden", 2, salt_file=salt, judge=judge, out=out)
+    (rows,) = (out / "sealed").iterdir()
+    assert stat.S_IMODE((out / "sealed").stat().st_mode) == 0o700
+    figures = [json.loads(line) for line in rows.read_text().splitlines()]
+    assert [each["index"] for each in figures] == [0, 1]
+    assert {each["text"] for each in figures} == {None}
+    assert not {"sealed", "trajectories"} & set(
+        json.loads((out / "set.json").read_text())
+    )
+
+
+def test_a_hidden_evaluation_is_driven_once(judge, set_yaml, tmp_path):
+    """The same file, set, salt and number are answered from the ledger."""
+    salt, driven = tmp_path / "secret.salt", []
+    salt.write_bytes(b"a third salt of enough bytes")
+    given = {"salt_file": salt, "judge": judge}
+    tasks = set_yaml()
+
+    def watch(episodes, successes):
+        driven.append(episodes)
+
+    source = STILL + "# driven once\n"
+    first = verify_on_set(source, tasks, "hidden", 2, watch=watch, **given)
+    assert (first.hidden.number, first.hidden.count) == (1, 1)
+    assert first.hidden.recorded is None
+    assert driven[-1] == 2
+    driven.clear()
+    again = verify_on_set(source, tasks, "hidden", 2, watch=watch, **given)
+    assert driven == []
+    assert again.hidden.recorded is not None
+    same = {"hidden": first.hidden}
+    same_text = again.model_copy(update=same).model_dump_json()
+    assert same_text == first.model_dump_json()
+    more = verify_on_set(source, tasks, "hidden", 3, **given)
+    assert (more.hidden.number, more.hidden.count, more.worlds) == (2, 2, 3)
+    other = verify_on_set(source + "# other\n", tasks, "hidden", 2, **given)
+    assert (other.hidden.number, other.hidden.count) == (1, 1)
+
+
+def test_the_ledger_is_written_before_hidden_worlds_are_driven(
+    judge, set_yaml, tmp_path
+):
+    """An interrupt leaves the evaluation in it."""
+    salt = tmp_path / "secret.salt"
+    salt.write_bytes(b"a fourth salt of enough bytes")
+    given = {"salt_file": salt, "judge": judge}
+
+    def interrupt(episodes, successes):
+        raise KeyboardInterrupt
+
+    source = STILL + "# interrupted\n"
+    with pytest.raises(KeyboardInterrupt):
+        verify_on_set(source, set_yaml(), "hidden", 2, watch=interrupt, **given)
+    last = json.loads(user_ledger().path.read_text().splitlines()[-1])
+    assert last["event"] == "begun"
+    assert last["about"]["worlds"] == 2
+    assert last["about"]["salt_sha256"] == hashlib.sha256(salt.read_bytes()).hexdigest()
+    resumed = verify_on_set(source, set_yaml(), "hidden", 2, **given)
+    assert (resumed.worlds, resumed.hidden.count) == (2, 1)
+
+
+def test_a_salt_that_controllers_could_read_is_refused(set_yaml):
+    salt = Path(json.__file__).with_name("scanner.py")
+    with pytest.raises(TaskError, match="controllers can read this folder"):
+        verify_on_set(STILL, set_yaml(), "hidden", 1, salt_file=salt)
 
 
 def test_hidden_worlds_need_walls(set_yaml, tmp_path):
