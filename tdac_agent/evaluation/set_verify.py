@@ -71,6 +71,7 @@ def verify_on_set(
     one_of("split", split, JUDGED)
     if worlds is not None:
         whole_number("worlds", worlds, 1, MOST_EPISODES)
+        tasks.check_count(split, worlds, "worlds")
     salt = None if salt_file is None else read_salt(salt_file)
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source, told = read_source(controller), split != "hidden"
@@ -79,7 +80,8 @@ def verify_on_set(
             f"the sandbox tier {tier!r} cannot keep a controller from reading files, "
             "and so not from hidden worlds; leave out --tier"
         )
-    test = SequentialTest(tasks.file.bar, MOST_WORLDS) if worlds is None else None
+    most = most_worlds(tasks, split)
+    test = SequentialTest(tasks.file.bar, most) if worlds is None else None
     compile_first(environment(Map2DTask.env_id))
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         folder = Path(name)
@@ -87,7 +89,7 @@ def verify_on_set(
             set_file=_written(tasks, folder / "set.yaml"),
             split=split,
             salt_file=None if salt_file is None else salt_file.resolve(),
-            worlds=tuple(range(MOST_WORLDS if worlds is None else worlds)),
+            worlds=tuple(range(most if worlds is None else worlds)),
             controller=folder / "controller.py",
             test=test,
             told=told,
@@ -114,6 +116,12 @@ def verify_on_set(
         if out is not None:
             _keep(report, job.trajectories, out)
     return report
+
+
+def most_worlds(tasks: TaskSet, split: str) -> int:
+    """Number of worlds after which a sequential test on a split is undecided."""
+    count = tasks.count(split)
+    return MOST_WORLDS if count is None else min(MOST_WORLDS, count)
 
 
 def limits_of(tasks: TaskSet) -> Limits:
