@@ -27,6 +27,8 @@ from tdac_envs.ladder.worlds import LadderWorld
 
 ON_A_SHEET = 24
 """Worlds of a contact sheet."""
+LONGEST_CAPTION = 14
+"""Longest name of a world on a contact sheet, letters."""
 
 
 def list_sets(as_json: bool) -> int:
@@ -95,7 +97,7 @@ def show(
         numbers = range(first, max(last, first + 1))
         worlds = [tasks.world(split, index) for index in numbers]
         captions = [
-            _caption(tasks.label(split, index), each, index)
+            _caption(tasks.label(split, index).split()[-1], each, index)
             for index, each in zip(numbers, worlds, strict=True)
         ]
         _write(contact_sheet(worlds, captions, *sizes), sheet, as_json)
@@ -212,6 +214,8 @@ def _dead_ends(depth: float, excess: float) -> str:
 
 def _caption(name: str, world: LadderWorld, index: int) -> str:
     hard = world.difficulty
+    if len(name) > LONGEST_CAPTION:
+        name = f"{name[: LONGEST_CAPTION - 2]}.."
     return f"{index} {name}  gap {hard.gap:.2f}  OT {hard.steps:.0f}"
 
 

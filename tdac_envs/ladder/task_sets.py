@@ -89,10 +89,13 @@ class TaskSet:
             argument: Name of the argument or flag that asks for them.
 
         Raises:
-            TaskError: It has fewer.
+            TaskError: It has fewer, or the set has no such split.
         """
-        count = self.count(split)
-        if count is not None and worlds > count:
+        if self.files is None:
+            return
+        self._check_file_split(split)
+        count = self.files.counts[split]
+        if worlds > count:
             raise TaskError(
                 f"{argument} {worlds}: set {self.name!r} has {count} worlds in its "
                 f"split {split!r}"

@@ -137,7 +137,8 @@ def _cells(folder: Path, entry: MapEntry, radius: float) -> BoolGrid:
         return prepare(path, *task, robot_radius=radius, said=said).grid.cells
     except TdacError as error:
         text = str(error)
-        raise TaskError(text if str(path) in text else f"{path}: {text}") from None
+        named = path.name in text
+        raise TaskError(text if named else f"{entry.file}: {text}") from None
 
 
 def _world(entry: MapEntry, cells: BoolGrid) -> FoundWorld:
