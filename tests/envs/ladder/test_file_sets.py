@@ -174,7 +174,7 @@ def test_tasks_that_are_not_feasible(folder):
     assert tasks.count("test") == 1
     assert [line.split(":")[0] for line in tasks.files.skipped] == ["12.png"]
     with pytest.raises(
-        TaskError, match="has no feasible world; the first of 1: 12.png"
+        TaskError, match=r"has no feasible world; the first of 1: 12.png"
     ):
         load_set(folder([12], worlds={"infeasible": "skip"}))
 
@@ -205,16 +205,16 @@ def test_folders_that_are_refused(folder, tmp_path):
     path = folder([20])
     index = tmp_path / "maps" / "index.json"
     index.write_text("[]")
-    with pytest.raises(TaskError, match="index.json lists no maps"):
+    with pytest.raises(TaskError, match=r"index.json lists no maps"):
         load_set(path)
     index.write_text("[{")
-    with pytest.raises(TaskError, match="index.json: "):
+    with pytest.raises(TaskError, match=r"index.json: "):
         load_set(path)
     index.unlink()
-    with pytest.raises(TaskError, match="has no index.json, which lists maps"):
+    with pytest.raises(TaskError, match=r"has no index.json, which lists maps"):
         load_set(path)
     path = folder([20], worlds={"folder": "mapz"})
-    with pytest.raises(TaskError, match="no folder .*mapz"):
+    with pytest.raises(TaskError, match=r"no folder .*mapz"):
         load_set(path)
 
 
