@@ -27,6 +27,8 @@ from tdac_envs.ladder.worlds import LadderWorld
 
 ON_A_SHEET = 24
 """Worlds of a contact sheet."""
+LONGEST_CAPTION = 14
+"""Longest name of a world on a contact sheet, letters."""
 
 
 def list_sets(as_json: bool) -> int:
@@ -89,8 +91,15 @@ def show(
     if png is not None and world is not None:
         _write(draw_world(world, *sizes), png, as_json)
     if sheet is not None:
-        worlds = [tasks.world(split, first + k) for k in range(ON_A_SHEET)]
-        captions = [_caption(tasks, each, first + k) for k, each in enumerate(worlds)]
+        count = tasks.count(split)
+        last = first + ON_A_SHEET if count is None else min(first + ON_A_SHEET, count)
+        # A number beyond the last world is an error of `world`.
+        numbers = range(first, max(last, first + 1))
+        worlds = [tasks.world(split, index) for index in numbers]
+        captions = [
+            _caption(tasks.label(split, index).split()[-1], each, index)
+            for index, each in zip(numbers, worlds, strict=True)
+        ]
         _write(contact_sheet(worlds, captions, *sizes), sheet, as_json)
     return 0
 
@@ -98,6 +107,11 @@ def show(
 def _record(tasks: TaskSet) -> dict[str, Any]:
     """The set as JSON: all values, with the defaults, and their hash."""
     values = tasks.file.model_dump(mode="json", by_alias=True)
+    if tasks.files is None:
+        del values["files"]
+    else:
+        own = {"counts": tasks.files.counts, "skipped": list(tasks.files.skipped)}
+        values["files"] |= own
     return {**values, "sha256": tasks.sha256}
 
 
@@ -111,7 +125,7 @@ def _world_record(
     return {
         "split": split,
         "index": index,
-        "generator": tasks.file.spec(index).generator.name,
+        "generator": tasks.label(split, index),
         "width": width,
         "height": height,
         "start": list(world.start),
@@ -129,7 +143,6 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
     console.print(f"[bold]{escape(tasks.name)}[/]  {tasks.sha256[:12]}")
     if file.description:
         print_sentences(console, file.description)
-    names = ", ".join(each.name for each in file.worlds)
     drive = (
         f"radius {robot.radius:g} px, {robot.max_wheel_speed:g} px/s, "
         f"{robot.n_rays} rays over {robot.field_of_view_deg:g}° up to "
@@ -137,7 +150,7 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
     )
     frame = "the map's frame" if file.frame == "map" else "the start's frame"
     rows = {
-        "worlds": f"{names}, in turn",
+        "worlds": _worlds(tasks),
         "robot": drive,
         "observed": f"{', '.join(file.observed)}, in {frame}"
         + ("; the map is given" if file.map else ""),
@@ -152,6 +165,21 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
     for label, text in rows.items():
         table.add_row(label, escape(text))
     console.print(table)
+
+
+def _worlds(tasks: TaskSet) -> str:
+    """Which generators make the worlds, or how many each split has of a file."""
+    if tasks.files is None or tasks.file.files is None:
+        names = ", ".join(each.name for each in tasks.file.worlds)
+        return f"{names}, in turn"
+    counts = ", ".join(
+        f"{count} {split}" for split, count in tasks.files.counts.items()
+    )
+    text = f"{counts}; of {tasks.file.files.path}"
+    skipped = tasks.files.skipped
+    if skipped:
+        text += f"; {len(skipped)} left out, such as {skipped[0]}"
+    return text
 
 
 def _disturbed(own: DisturbanceSpec) -> str:
@@ -184,9 +212,10 @@ def _dead_ends(depth: float, excess: float) -> str:
     return f"up to {depth:.2f} of the shortest path deep; {farther}"
 
 
-def _caption(tasks: TaskSet, world: LadderWorld, index: int) -> str:
-    name = tasks.file.spec(index).generator.name
+def _caption(name: str, world: LadderWorld, index: int) -> str:
     hard = world.difficulty
+    if len(name) > LONGEST_CAPTION:
+        name = f"{name[: LONGEST_CAPTION - 2]}.."
     return f"{index} {name}  gap {hard.gap:.2f}  OT {hard.steps:.0f}"
 
 

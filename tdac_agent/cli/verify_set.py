@@ -20,7 +20,7 @@ from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
 from tdac_agent.evaluation.set_report import HiddenCount, Scores, SetReport
-from tdac_agent.evaluation.set_verify import MOST_WORLDS, verify_on_set
+from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set
@@ -42,6 +42,8 @@ def run(
         check_folder(out)
     assert flags.name is not None
     tasks, file = load_set(flags.name), controller_file(controller)
+    if flags.worlds is not None:
+        tasks.check_count(flags.split or "test", flags.worlds, "-n")
     gc.freeze()
     gc.enable()
     columns = (
@@ -59,7 +61,9 @@ def run(
         auto_refresh=False,
         disable=not console.is_terminal,
     )
-    row = bar.add_task("", total=flags.worlds or MOST_WORLDS, successes=0)
+    row = bar.add_task(
+        "", total=flags.worlds or most_worlds(tasks, flags.split or "test"), successes=0
+    )
 
     def watch(episodes: int, successes: int) -> None:
         bar.update(row, completed=episodes, successes=successes, refresh=True)

@@ -81,6 +81,7 @@ def verify_on_set(
     one_of("split", split, JUDGED)
     if worlds is not None:
         whole_number("worlds", worlds, 1, MOST_EPISODES)
+        tasks.check_count(split, worlds, "worlds")
     salt = None if salt_file is None else read_salt(salt_file)
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source = read_source(controller)
@@ -153,7 +154,8 @@ def _driven(
     """Has the judge test and drive the controller, and keeps what it found."""
     began = time.monotonic()
     tasks, worlds, told = request.tasks, request.worlds, request.told
-    test = SequentialTest(tasks.file.bar, MOST_WORLDS) if worlds is None else None
+    most = most_worlds(tasks, request.split)
+    test = SequentialTest(tasks.file.bar, most) if worlds is None else None
     compile_first(environment(Map2DTask.env_id))
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         folder = Path(name)
@@ -162,7 +164,7 @@ def _driven(
             set_file=_written(tasks, folder / "set.yaml"),
             split=request.split,
             salt_file=None if salt_file is None else salt_file.resolve(),
-            worlds=tuple(range(MOST_WORLDS if worlds is None else worlds)),
+            worlds=tuple(range(most if worlds is None else worlds)),
             controller=folder / "controller.py",
             test=test,
             told=told,
@@ -194,6 +196,12 @@ def _driven(
         elif out is not None:
             keep_sealed(ended, out)
     return report
+
+
+def most_worlds(tasks: TaskSet, split: str) -> int:
+    """Number of worlds after which a sequential test on a split is undecided."""
+    count = tasks.count(split)
+    return MOST_WORLDS if count is None else min(MOST_WORLDS, count)
 
 
 def limits_of(tasks: TaskSet) -> Limits:

@@ -134,16 +134,40 @@ def _tested(
     padded = read_only(np.pad(clear, 1))
     if _straight_drive_arrives(padded, start, goal, conditions):
         return Rejection.STRAIGHT
+    found = measured(cells, padded, start, goal, field, gap, conditions)
+    if found.difficulty.steps < conditions.min_steps:
+        return Rejection.SHORT
+    if found.difficulty.detour < conditions.min_detour:
+        return Rejection.DIRECT
+    return found
+
+
+def measured(
+    cells: BoolGrid,
+    padded: FloatGrid,
+    start: Pixel,
+    goal: Pixel,
+    field: NDArray[np.float64],
+    gap: float,
+    conditions: Conditions,
+) -> Admitted:
+    """A feasible task with its figures, whatever they are.
+
+    Args:
+        cells: Shape (height, width), bool, True = occupied.
+        padded: Clearance, px, with a border of zeros.
+        start: Pixel (x, y).
+        goal: Pixel (x, y).
+        field: Length of the path on the grid from each pixel to the goal, px.
+        gap: See `Difficulty`.
+        conditions: Radius, step and tolerance; the rest is not used.
+    """
     bound = float(field[start[1], start[0]])
     path = shortest_path(cells, padded, start, goal, conditions.radius, bound)
     assert path is not None, "a path on the grid is a path of the disc"
     length = math.floor(path.length * FRACTIONS) / FRACTIONS
     steps = rounded((length - conditions.tolerance) / conditions.step)
-    if steps < conditions.min_steps:
-        return Rejection.SHORT
     detour = rounded(length / math.dist(start, goal))
-    if detour < conditions.min_detour:
-        return Rejection.DIRECT
     leaps = leaps_of(cells)
     terrain = Terrain(OccupancyGrid(cells), padded[1:-1, 1:-1], padded, leaps)
     sight = rounded(share_in_sight(leaps, path.points, goal))

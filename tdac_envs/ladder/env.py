@@ -97,7 +97,7 @@ class LadderEnv(Map2DEnv):
         self.set = load_set(level)
         source = SetSource(self.set, split, train_pool, salt)
         self._prepare(_setup(self.set, source, reward_weights), render_mode)
-        self.view = View(self.set.file, bool(privileged))
+        self.view = View(self.set.file, self.set.largest_side, bool(privileged))
         self._anchor = self.view.anchor(self.nominal)
         self.observation_space = self.view.space(self.observation_space)  # type: ignore[assignment, arg-type]
 

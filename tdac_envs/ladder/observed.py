@@ -25,13 +25,14 @@ class View:
 
     Args:
         file: The set.
+        side: Largest width or height of its worlds, px.
         privileged: Whether infos are complete, with the true pose.
     """
 
-    def __init__(self, file: SetFile, privileged: bool) -> None:
+    def __init__(self, file: SetFile, side: int, privileged: bool) -> None:
         self._keys = tuple(sorted(file.observed))
         self._from_start = file.frame == "start"
-        self._side = file.largest_side
+        self._side = side
         self.privileged = privileged
 
     def space(self, whole: spaces.Dict) -> spaces.Dict:

@@ -50,7 +50,7 @@ def contact_sheet(
     radius: float,
     tolerance: float,
 ) -> Image:
-    """Many worlds with a line of text below each, uint8 RGB.
+    """Many worlds, each as large as its tile, with a line of text below; uint8 RGB.
 
     Args:
         worlds: The worlds.
@@ -58,11 +58,13 @@ def contact_sheet(
         radius: Radius of the body, px.
         tolerance: Distance at which the goal is reached, px.
     """
-    longest = max(max(world.cells.shape) for world in worlds)
-    scale = _LARGEST_TILE / longest
-    tiles = [draw_world(world, radius, tolerance, scale) for world in worlds]
+    sides = [max(world.cells.shape) for world in worlds]
+    tiles = [
+        draw_world(world, radius, tolerance, _LARGEST_TILE / side)
+        for world, side in zip(worlds, sides, strict=True)
+    ]
     height = max(tile.shape[0] for tile in tiles) + _LINE + _MARGIN
-    width = max(tile.shape[1] for tile in tiles) + _MARGIN
+    width = _LARGEST_TILE + _MARGIN
     columns = min(COLUMNS, len(tiles))
     rows = math.ceil(len(tiles) / columns)
     sheet = blank(rows * height + _MARGIN, columns * width + _MARGIN, PAPER)

@@ -21,6 +21,7 @@ from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.drive.disturbances import MOST_HIDDEN
+from tdac_envs.ladder.files.spec import FilesSpec
 from tdac_envs.ladder.generators.registry import AnyParameters
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
@@ -107,7 +108,10 @@ class SetFile(_Strict):
     name: str = Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][\w.-]*$")
     description: str = Field("", max_length=2000)
     worlds: tuple[AnyParameters, ...] = Field(
-        min_length=1, max_length=16, description="Generators, with equal shares."
+        max_length=16, description="Generators, with equal shares."
+    )
+    files: FilesSpec | None = Field(
+        None, description="Worlds from files; `worlds: {folder: …}` is short for it."
     )
     robot: RobotParams = RobotParams.disc(8.0)
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
@@ -127,9 +131,21 @@ class SetFile(_Strict):
         0.95, gt=0.05, lt=1, description="Success rate of a verified controller."
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _worlds_or_files(cls, values: Any) -> Any:
+        """Moves `worlds`, if it has the keys of `FilesSpec`, to `files`."""
+        if isinstance(values, dict) and isinstance(values.get("worlds"), dict):
+            return {**values, "worlds": (), "files": values["worlds"]}
+        return values
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         own = self.disturbances
+        if bool(self.worlds) == (self.files is not None):
+            raise ValueError("worlds: expected generators, or a folder of maps")
+        if self.files is not None and self.admission != AdmissionSpec():
+            raise ValueError("`admission` is for generators, not for worlds of files")
         if "odometry" not in self.observed and (
             own.odometry_scale or own.odometry_noise
         ):
@@ -147,7 +163,7 @@ class SetFile(_Strict):
 
     @property
     def largest_side(self) -> int:
-        """Largest width or height of a world, px."""
+        """Largest width or height of a generated world, px."""
         return max(max(each.width, each.height) for each in self.worlds)
 
     @property
@@ -156,7 +172,7 @@ class SetFile(_Strict):
         return self.disturbances.wheel_slip * math.sqrt(SLIP_STEP / self.dt)
 
     def spec(self, index: int) -> WorldSpec:
-        """What world `index` is like; generators take turns."""
+        """What generated world `index` is like; generators take turns."""
         return WorldSpec(
             generator=self.worlds[index % len(self.worlds)],
             radius=self.robot.radius,
@@ -168,9 +184,18 @@ class SetFile(_Strict):
             tries=self.admission.tries,
         )
 
-    def sha256(self) -> str:
-        """SHA-256 of the canonical JSON of all values but the description."""
-        values = self.model_dump(mode="json", by_alias=True, exclude={"description"})
+    def sha256(self, files_sha256: str | None = None) -> str:
+        """SHA-256 of the canonical JSON of all values but the description.
+
+        Args:
+            files_sha256: Hash of the worlds, if they come from files: it stands for
+                the place of the files.
+        """
+        out = {"description", "files"}
+        values = self.model_dump(mode="json", by_alias=True, exclude=out)
+        if self.files is not None:
+            splits = list(self.files.splits)
+            values["files"] = {"sha256": files_sha256, "splits": splits}
         text = json.dumps(values, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode("ascii")).hexdigest()
 
@@ -185,12 +210,30 @@ def read_set_file(path: Path) -> SetFile:
         values: Any = parse_yaml(read_file(path, TEXT_BYTES))
         if not isinstance(values, dict):
             raise ValueError("expected keys with values, such as `worlds: [...]`")
-        return SetFile.model_validate({"name": path.stem, **values})
+        return SetFile.model_validate({"name": path.stem, **_placed(values, path)})
     except ValidationError as error:
         known = [field.alias or name for name, field in SetFile.model_fields.items()]
-        raise TaskError(f"{path}: {first_problem(error, known)}") from None
+        known += [f"files.{name}" for name in FilesSpec.model_fields]
+        problem = first_problem(error, known).replace("files.", "worlds.")
+        raise TaskError(f"{path}: {problem}") from None
     except (OSError, ValueError) as error:
         raise TaskError(f"{path}: {one_line_reason(error)}") from None
+
+
+def _placed(values: dict[Any, Any], path: Path) -> dict[Any, Any]:
+    """The values of a set, with the places of its files relative to its own."""
+    key = "worlds" if isinstance(values.get("worlds"), dict) else "files"
+    files = values.get(key)
+    if not isinstance(files, dict):
+        return values
+    own = path.absolute().parent
+    placed = {
+        name: str(own / value)
+        if name in ("folder", "barn") and isinstance(value, str)
+        else value
+        for name, value in files.items()
+    }
+    return {**values, key: placed}
 
 
 BUILT_IN = Path(__file__).parent / "sets"

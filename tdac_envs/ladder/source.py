@@ -44,7 +44,8 @@ class SetSource:
         size = whole_number("train_pool", train_pool, 0, MOST_WORLDS)
         kept = split == "train" and size > 0
         self._pool = TrainingPool(task_set) if kept else None
-        self._count = size if kept else MOST_WORLDS
+        most, count = size if kept else MOST_WORLDS, task_set.count(split)
+        self._count = most if count is None else min(count, most)
         self._last: tuple[int, LadderWorld, Map2DTask] | None = None
 
     def task(self, index: int) -> Map2DTask:

@@ -11,6 +11,10 @@ import numpy as np
 
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, hint
+from tdac_envs.core.intake import printable
+from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.opened import FileWorlds, opened
+from tdac_envs.ladder.files.placed import placed_world
 from tdac_envs.ladder.set_file import SetFile, Split, find_set_file
 from tdac_envs.ladder.words import world_key
 from tdac_envs.ladder.worlds import LadderWorld, make_world
@@ -30,9 +34,11 @@ class TaskSet:
 
     Attributes:
         file: Contents of its `set.yaml`.
+        files: Its worlds, if they come from files; None if they are generated.
     """
 
     file: SetFile
+    files: FileWorlds | None = None
 
     @property
     def name(self) -> str:
@@ -42,7 +48,58 @@ class TaskSet:
     @cached_property
     def sha256(self) -> str:
         """Hash of everything that defines the set; worlds follow from it."""
-        return self.file.sha256()
+        return self.file.sha256(self.files.sha256 if self.files else None)
+
+    @property
+    def largest_side(self) -> int:
+        """Largest width or height of a world, px."""
+        return (self.files or self.file).largest_side
+
+    def count(self, split: str) -> int | None:
+        """Number of worlds of a split; None if there is no limit."""
+        return None if self.files is None else self.files.counts.get(split, 0)
+
+    def kind(self, split: str, index: int) -> str:
+        """What results of a world are grouped by: its generator, or kind of map.
+
+        Raises:
+            TaskError: There is no such world.
+        """
+        if self.files is None:
+            return self.file.spec(index).generator.name
+        return self._found(split, index).kind
+
+    def label(self, split: str, index: int) -> str:
+        """What a world is called: its generator, or kind and name of its map.
+
+        Raises:
+            TaskError: There is no such world.
+        """
+        if self.files is None:
+            return self.kind(split, index)
+        found = self._found(split, index)
+        return f"{found.kind} {printable(found.name)}"
+
+    def check_count(self, split: str, worlds: int, argument: str) -> None:
+        """Checks that a split has so many worlds.
+
+        Args:
+            split: The split.
+            worlds: How many are asked for.
+            argument: Name of the argument or flag that asks for them.
+
+        Raises:
+            TaskError: It has fewer, or the set has no such split.
+        """
+        if self.files is None:
+            return
+        self._check_file_split(split)
+        count = self.files.counts[split]
+        if worlds > count:
+            raise TaskError(
+                f"{argument} {worlds}: set {self.name!r} has {count} worlds in its "
+                f"split {split!r}"
+            )
 
     def world(self, split: str, index: int, salt: bytes | None = None) -> LadderWorld:
         """World `index` of a split: map, start, goal, difficulty.
@@ -57,6 +114,11 @@ class TaskSet:
                 world.
         """
         index = whole_number("index", index, 0)
+        if self.files is not None:
+            self.key(split, index, "world", salt)  # checks the split
+            file = self.file
+            sizes = file.robot.radius, file.full_step, file.goal_tolerance
+            return placed_world(self._found(split, index), *sizes, file.dt)
         spec = self.file.spec(index)
         try:
             return make_world(spec, self.key(split, index, "world", salt))
@@ -101,6 +163,8 @@ class TaskSet:
                 f"unknown split {split!r}; expected one of {', '.join(SPLITS)}"
                 f"{hint(str(split), SPLITS)}"
             )
+        if self.files is not None:
+            self._check_file_split(split)
         if split != "hidden" and salt is not None:
             raise TaskError(f"split {split!r} has a public salt; leave out the salt")
         if split == "hidden" and salt is None:
@@ -110,6 +174,34 @@ class TaskSet:
                 f"expected a salt of {LEAST_SALT} to {MOST_SALT} bytes, got {len(salt)}"
             )
         return world_key(salt or _PUBLIC_SALT, self.sha256, split, index, purpose)
+
+    def _check_file_split(self, split: str) -> None:
+        assert self.files is not None
+        if split == "hidden":
+            raise TaskError(
+                f"set {self.name!r} has no split 'hidden': its worlds are files, which "
+                "an author of a controller may have seen"
+            )
+        if split not in self.files.splits:
+            own = ", ".join(self.files.splits)
+            raise TaskError(f"set {self.name!r} has the split {own}, not {split!r}")
+
+    def _found(self, split: str, index: int) -> FoundWorld:
+        """World `index` of a split, from its file."""
+        assert self.files is not None
+        self._check_file_split(split)
+        worlds = next(own for name, own in self.files.splits.items() if name == split)
+        if not worlds:
+            raise TaskError(
+                f"set {self.name!r} has no worlds in its split {split!r}: whole groups "
+                "of one origin go to a split, and they went elsewhere"
+            )
+        if not 0 <= index < len(worlds):
+            raise TaskError(
+                f"world {index}: set {self.name!r} has {len(worlds)} worlds in its "
+                f"split {split!r}, numbered from 0"
+            )
+        return worlds[index]
 
     def noise(
         self, split: str, index: int, salt: bytes | None = None
@@ -123,6 +215,13 @@ def load_set(name: str | Path) -> TaskSet:
     """A task set by its name (`tdac sets` lists them), or from a `set.yaml`.
 
     Raises:
-        TaskError: There is none, or it is not valid.
+        TaskError: There is none, or it is not valid, or a file of its worlds is not.
     """
-    return TaskSet(find_set_file(name))
+    file = find_set_file(name)
+    if file.files is None:
+        return TaskSet(file)
+    try:
+        files = opened(file.files, file.robot.radius, file.goal_tolerance)
+    except TaskError as error:
+        raise TaskError(f"set {file.name!r}: {error}") from None
+    return TaskSet(file, files)

@@ -64,6 +64,8 @@ class LadderWorld:
         path: Shape (n, 2): points of the disc's shortest path, px.
         difficulty: How hard it is.
         rejected: Reasons of the drafts that were drawn before it.
+        barn_steps: OT' of the BARN score, where the source of the world states one,
+            steps; else it is L divided by the distance of a step.
     """
 
     terrain: Terrain
@@ -73,6 +75,7 @@ class LadderWorld:
     path: NDArray[np.float64]
     difficulty: Difficulty
     rejected: tuple[Rejection, ...]
+    barn_steps: float | None = None
 
     @property
     def cells(self) -> BoolGrid:

@@ -287,7 +287,9 @@ def level_params(file: SetFile) -> dict[str, Any]:
 def _figures(
     run: SetRun, index: int, rollout: Rollout, cpu_seconds: float
 ) -> WorldEpisode:
-    hard = run.env.setup.source.world(index).difficulty
+    world = run.env.setup.source.world(index)
+    hard = world.difficulty
+    barn_steps = world.barn_steps or hard.length / run.file.full_step
     steps = rollout.trajectory.steps
     places = rollout.trajectory.poses[:, :2]
     driven = float(np.hypot(*np.diff(places, axis=0).T).sum())
@@ -297,13 +299,13 @@ def _figures(
         failure = {"cause": found.cause, "text": found.text if run.job.told else None}
     return WorldEpisode(
         index=index,
-        generator=run.file.spec(index).generator.name,
+        generator=run.env.set.kind(run.job.split, index),
         outcome=rollout.outcome,
         steps=steps,
         horizon=run.env.task.horizon,
         time_score=time_score(reached, steps, hard.steps),
         path_score=path_score(reached, driven, hard.length),
-        barn_score=barn_score(reached, steps, hard.length / run.file.full_step),
+        barn_score=barn_score(reached, steps, barn_steps),
         d_min=round(float(rollout.distances().min()), 1),
         length=hard.length,
         least_steps=hard.steps,

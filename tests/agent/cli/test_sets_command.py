@@ -3,6 +3,7 @@
 import json
 
 import cv2
+import numpy as np
 import pytest
 
 from tdac_envs import load_set
@@ -92,6 +93,66 @@ def test_sets_of_ones_own(tdac, tmp_path):
 )
 def test_mistakes_are_one_line(tdac, words, message):
     code, out, err = tdac("sets", "show", *words)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.startswith("error: ")
+    assert len(err.splitlines()) == 1
+
+
+@pytest.fixture
+def of_maps(tmp_path):
+    """A set of one map; returns the path of its set.yaml."""
+    picture = np.full((80, 120), 255, np.uint8)
+    picture[:3] = picture[-3:] = picture[:, :3] = picture[:, -3:] = 0
+    picture[:60, 58:62] = 0
+    cv2.imwrite(str(tmp_path / "one.png"), picture)
+    task = {"file": "one.png", "start": [20, 20], "goal": [100, 20]}
+    (tmp_path / "index.json").write_text(json.dumps([task]))
+    path = tmp_path / "mine.yaml"
+    path.write_text("worlds: {folder: ., splits: [test]}\n")
+    return path
+
+
+def test_it_shows_maps_of_a_folder(tdac, of_maps, tmp_path):
+    """How many worlds there are, a world with its file, and a sheet of all."""
+    sheet = tmp_path / "sheet.png"
+    words = ("--split", "test", "--index", "0", "--sheet", str(sheet))
+    code, out, err = tdac("sets", "show", str(of_maps), *words)
+    assert (code, err) == (0, "")
+    assert "1 test" in out
+    assert "maps one.png, 120 x 80 px" in out
+    assert cv2.imread(str(sheet)).std() > 10
+    record = json.loads(tdac("sets", "show", str(of_maps), "--json")[1])
+    assert record["files"]["counts"] == {"test": 1}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("sets", "show", "SET", "--index", "0"), "has the split test, not 'dev'"),
+        (("sets", "show", "SET", "--split", "test", "--index", "1"), "has 1 worlds"),
+        (("verify", "c.py", "--set", "SET", "-n", "2"), "-n 2: set 'mine' has 1"),
+        (("verify", "c.py", "--set", "SET", "-n", "0"), "--worlds"),
+        (("verify", "c.py", "--set", "SET", "--split", "hidden", "-n", "1"), "hidden"),
+        (("verify", "c.py", "--set", "SET"), "episodes"),
+        (("verify", "c.py", "--set", "mapz.yaml"), "mapz.yaml: No such file"),
+        (("verify", "c.py", "--set", "lots"), "did you mean 'lost'?"),
+        (
+            ("verify", "c.py", "--set", "lost", "--split", "hidden"),
+            "split 'hidden' needs a salt",
+        ),
+        (
+            ("verify", "c.py", "--set=lost", "--split=hidden", "--salt-file=no.salt"),
+            "salt file no.salt: No such file",
+        ),
+    ],
+)
+def test_mistakes_with_sets_are_one_line(tdac, of_maps, tmp_path, words, message):
+    """Worlds, splits, sets and salts that do not exist."""
+    controller = tmp_path / "c.py"
+    controller.write_text("def policy(obs):\n    return 0.0, 0.0\n")
+    places = {"SET": str(of_maps), "c.py": str(controller)}
+    code, out, err = tdac(*(places.get(word, word) for word in words))
     assert (code, out) == (2, "")
     assert message in err
     assert err.startswith("error: ")

@@ -1,0 +1,1 @@
+"""Worlds from files: folders of maps with tasks, and worlds of the BARN challenge."""

@@ -1,0 +1,53 @@
+"""Shares worlds among splits, so that none has a map or an origin of another."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from itertools import accumulate
+
+from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.spec import FileSplit
+
+SHARES: dict[FileSplit, int] = {"train": 3, "dev": 1, "test": 1}
+"""Expected shares of the splits; of those that a set has."""
+
+
+def shared_out(
+    worlds: Sequence[FoundWorld], splits: Sequence[FileSplit]
+) -> dict[FileSplit, tuple[FoundWorld, ...]]:
+    """The worlds of each split, in an order that follows from their hashes.
+
+    Worlds with the same map or the same origin belong to a group, and so do those that
+    are linked by others. The hash of its name decides where a group goes, so further
+    files do not move it.
+    """
+    shared: dict[FileSplit, list[FoundWorld]] = {split: [] for split in splits}
+    for world, group in zip(worlds, groups(worlds), strict=True):
+        shared[_split_of(group, splits)].append(world)
+    return {
+        split: tuple(sorted(found, key=lambda world: world.sha256))
+        for split, found in shared.items()
+    }
+
+
+def groups(worlds: Sequence[FoundWorld]) -> list[str]:
+    """The name of each world's group: its first origin, or its first map's hash."""
+    links = [
+        {f"map {each.content}", *([f"from {each.origin}"] if each.origin else [])}
+        for each in worlds
+    ]
+    group: dict[str, set[str]] = {}
+    for link in links:
+        joined = set().union(link, *(group.get(name, set()) for name in link))
+        for name in joined:
+            group[name] = joined
+    # "from …" comes before "map …".
+    return [min(group[next(iter(link))]) for link in links]
+
+
+def _split_of(group: str, splits: Sequence[FileSplit]) -> FileSplit:
+    digest = hashlib.sha256(group.encode("utf-8", "surrogatepass")).digest()
+    bounds = list(accumulate(SHARES[split] for split in splits))
+    ticket = int.from_bytes(digest[:8], "big") % bounds[-1]
+    return next(s for s, b in zip(splits, bounds, strict=True) if ticket < b)

@@ -1,0 +1,157 @@
+"""Reads a folder of maps whose tasks `index.json` lists."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
+
+from tdac_envs.core.errors import TaskError, TdacError, first_problem, one_line_reason
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, printable, read_file
+from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.map2d.source import prepare
+from tdac_envs.mapping.image import load_image, luminance
+from tdac_envs.mapping.params import ReadingOptions
+
+INDEX = "index.json"
+MOST_TASKS = 10_000
+_SHADES: dict[str, Literal["dark", "light"]] = {
+    "dark": "dark",
+    "light": "light",
+    "dark_obstacle": "dark",
+    "light_obstacle": "light",
+}
+
+
+class MapEntry(BaseModel):
+    """A task of `index.json`; other keys are not read. Lengths are px, y is down."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+    file: str = Field(min_length=1, description="Map, relative to the folder.")
+    start: tuple[float, float] = Field(description="Rounded to whole px.")
+    goal: tuple[float, float] = Field(description="Rounded to whole px.")
+    heading: float = Field(0.0, ge=-math.pi, le=math.pi, description="rad")
+    name: str = Field("", max_length=200)
+    kind: str = Field("maps", min_length=1, max_length=60)
+    origin: str | None = Field(
+        None, validation_alias=AliasChoices("origin", "repo"), max_length=500
+    )
+    polarity: str | None = Field(None, description="dark or light obstacles")
+    truth: str | None = Field(
+        None, description="Picture of the obstacles in black, instead of the map."
+    )
+
+
+def read_folder(
+    folder: Path, radius: float, skipped: list[str] | None
+) -> list[FoundWorld]:
+    """The worlds of a folder, in the order of its index.
+
+    Args:
+        folder: The folder.
+        radius: Radius of the body, px; it helps to tell walls from floor in a picture.
+        skipped: Takes the reasons why maps cannot be used; None to raise them.
+
+    Raises:
+        TaskError: The index or a map is missing or not valid.
+    """
+    entries = _entries(folder)
+    grids: dict[tuple[object, ...], BoolGrid] = {}
+    found = []
+    for entry in entries:
+        key = (entry.truth or entry, radius)
+        try:
+            if key not in grids:
+                grids[key] = _cells(folder, entry, radius)
+        except TdacError as error:
+            if skipped is None:
+                raise
+            skipped.append(str(error))
+            continue
+        found.append(_world(entry, grids[key]))
+    return found
+
+
+def files_of(folder: Path) -> list[Path]:
+    """The index and the files that it names, without reading them.
+
+    Raises:
+        TaskError: The index is missing or not valid.
+    """
+    named = {folder / each.file for each in _entries(folder)}
+    named |= {folder / each.truth for each in _entries(folder) if each.truth}
+    return [folder / INDEX, *sorted(named)]
+
+
+def _entries(folder: Path) -> list[MapEntry]:
+    if not folder.is_dir():
+        raise TaskError(f"no folder {folder}; expected one with maps and {INDEX}")
+    path = folder / INDEX
+    try:
+        values = parse_json(read_file(path, RECORD_BYTES))
+    except FileNotFoundError:
+        raise TaskError(
+            f"the folder {folder} has no {INDEX}, which lists maps with tasks: "
+            '[{"file": "map.png", "start": [x, y], "goal": [x, y]}, ...]'
+        ) from None
+    except (OSError, ValueError) as error:
+        raise TaskError(f"{path}: {one_line_reason(error)}") from None
+    if not isinstance(values, list) or not values:
+        raise TaskError(f"{path} lists no maps; expected a list of tasks")
+    if len(values) > MOST_TASKS:
+        raise TaskError(f"{path}: {len(values)} tasks; at most {MOST_TASKS} are read")
+    return [_entry(path, number, value) for number, value in enumerate(values)]
+
+
+def _entry(path: Path, number: int, value: Any) -> MapEntry:
+    try:
+        entry = MapEntry.model_validate(value)
+    except ValidationError as error:
+        where = f"{path}, task {number}"
+        raise TaskError(f"{where}: {first_problem(error)}") from None
+    for name in (entry.file, entry.truth or entry.file):
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise TaskError(
+                f"{path}, task {number}: {printable(name)} is not in the folder"
+            )
+    return entry
+
+
+def _cells(folder: Path, entry: MapEntry, radius: float) -> BoolGrid:
+    """The map of a task, from the picture of its obstacles or as `tdac map` reads it.
+
+    Raises:
+        TaskError: It cannot be read.
+    """
+    path = folder / (entry.truth or entry.file)
+    try:
+        if entry.truth is not None:
+            return np.asarray(luminance(load_image(path).colour) < 128)
+        said = ReadingOptions(_SHADES.get(entry.polarity or ""))
+        task = (entry.start, entry.goal)
+        return prepare(path, *task, robot_radius=radius, said=said).grid.cells
+    except TdacError as error:
+        text = str(error)
+        named = path.name in text
+        raise TaskError(text if named else f"{entry.file}: {text}") from None
+
+
+def _world(entry: MapEntry, cells: BoolGrid) -> FoundWorld:
+    height, width = cells.shape
+    (x, y), (goal_x, goal_y) = entry.start, entry.goal
+    return FoundWorld(
+        name=entry.name or entry.file,
+        file=entry.file,
+        kind=entry.kind,
+        origin=entry.origin,
+        shape=(height, width),
+        packed=np.packbits(cells).tobytes(),
+        start=(round(x), round(y)),
+        heading=entry.heading,
+        goal=(round(goal_x), round(goal_y)),
+    )

@@ -1,0 +1,51 @@
+"""The key `worlds` of a `set.yaml` whose worlds come from files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+FileSplit = Literal["train", "dev", "test"]
+"""Splits that worlds from files may have."""
+FILE_SPLITS: tuple[FileSplit, ...] = ("train", "dev", "test")
+
+
+def _each_once(splits: tuple[FileSplit, ...]) -> tuple[FileSplit, ...]:
+    if len(set(splits)) < len(splits):
+        raise ValueError("expected each split once")
+    return tuple(split for split in FILE_SPLITS if split in splits)
+
+
+class FilesSpec(BaseModel):
+    """Where the worlds are: either `folder` or `barn`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    folder: Path | None = Field(
+        None, description="Folder of maps; its index.json lists their tasks."
+    )
+    barn: Path | None = Field(None, description="JSON file with worlds of BARN.")
+    resolution: float = Field(
+        0.025, ge=0.001, le=1, description="Metres per px, for BARN."
+    )
+    splits: Annotated[tuple[FileSplit, ...], AfterValidator(_each_once)] = Field(
+        FILE_SPLITS, min_length=1, description="Splits that share the worlds."
+    )
+    infeasible: Literal["refuse", "skip"] = Field(
+        "refuse", description="What happens if a task is not feasible."
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.folder is None) == (self.barn is None):
+            raise ValueError("expected either `folder` or `barn`")
+        return self
+
+    @property
+    def path(self) -> Path:
+        """The folder, or the file of BARN."""
+        path = self.folder or self.barn
+        assert path is not None
+        return path

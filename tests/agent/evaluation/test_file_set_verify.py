@@ -1,0 +1,48 @@
+"""The judge on worlds from files: their own OT, grouped by their kind."""
+
+import json
+
+import pytest
+
+from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+
+AHEAD = "def policy(obs):\n    return 0.25, 0.25\n"
+
+
+@pytest.fixture
+def barn(tmp_path):
+    """A set of two open fields of 10 m, with given path lengths."""
+    sides = [[x, y / 10] for x in (-4.5, 0.0) for y in range(96)]
+    worlds = {
+        name: {"cylinders": sides, "path_length": length}
+        for name, length in (("short", 10.0), ("long", 16.0))
+    }
+    values = {"start": [-2.25, 3.0, 1.5708], "goal": [-2.25, 13.0]}
+    values |= {"cylinder_radius": 0.075, "worlds": worlds}
+    (tmp_path / "worlds.json").write_text(json.dumps(values))
+    path = tmp_path / "barn.yaml"
+    path.write_text(
+        "worlds: {barn: worlds.json, splits: [test]}\n"
+        "robot: {radius: 8, axle_length: 11, max_wheel_speed: 80}\n"
+        "goal_tolerance: 40\n"
+    )
+    return load_set(path)
+
+
+def test_the_barn_score_takes_the_given_length(barn):
+    """OT' is 5 s and 8 s; at a quarter of the speed, both drives take 18 s."""
+    report = verify_on_set(AHEAD, barn, "test", 2)
+    assert report.successes == 2
+    steps = [episode.steps for episode in report.episodes]
+    assert steps == pytest.approx([180, 180], abs=1)
+    scores = sorted(episode.barn_score for episode in report.episodes)
+    assert scores == pytest.approx([50 / steps[0], 80 / steps[0]])
+    assert set(report.by_generator) == {"barn"}
+
+
+def test_more_worlds_than_there_are(barn):
+    """One line says how many there are."""
+    with pytest.raises(TaskError, match="worlds 3: set 'barn' has 2 worlds in its"):
+        verify_on_set(AHEAD, barn, "test", 3)

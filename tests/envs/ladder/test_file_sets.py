@@ -1,0 +1,331 @@
+"""Sets of real maps: tasks of a folder, worlds of BARN, splits without a common map."""
+
+import json
+import math
+import os
+from pathlib import Path
+
+import cv2
+import gymnasium as gym
+import numpy as np
+import pytest
+import yaml
+from brute_force import distance
+
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+from tdac_envs.map2d.task import make_task
+
+REAL = Path(os.environ.get("TDAC_DATA", Path(__file__).parents[4] / "shared" / "data"))
+"""Folder of public maps and worlds; its tests are skipped where there is none."""
+
+
+def floor(gap):
+    """A walled floor of 120 x 80 px with an opening in the wall across it."""
+    cells = np.zeros((80, 120), bool)
+    cells[:3] = cells[-3:] = cells[:, :3] = cells[:, -3:] = True
+    cells[: 80 - gap, 58:62] = True
+    return cells
+
+
+def entry(file, **more):
+    """A task on a map."""
+    return {"file": file, "start": [20, 20], "goal": [100, 20], **more}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Writes maps, by their gaps, and an index; returns the path of a set.yaml."""
+
+    def write(gaps, entries=None, worlds=None, **values):
+        maps = tmp_path / "maps"
+        maps.mkdir(exist_ok=True)
+        for gap in gaps:
+            picture = np.where(floor(gap), 0, 255).astype(np.uint8)
+            cv2.imwrite(str(maps / f"{gap}.png"), picture)
+        if entries is None:
+            entries = [entry(f"{gap}.png") for gap in gaps]
+        (maps / "index.json").write_text(json.dumps(entries))
+        worlds = {"folder": "maps", "splits": ["test"], **(worlds or {})}
+        path = tmp_path / "mine.yaml"
+        path.write_text(yaml.safe_dump({"worlds": worlds, **values}))
+        return path
+
+    return write
+
+
+def barn_file(path, **changed):
+    """Two worlds of cylinders, one of which has a wall with a gap."""
+    wall = [[x / 10, 6.0] for x in range(-44, 0) if not -14 <= x <= -4]
+    sides = [[x, y / 10] for x in (-4.5, 0.0) for y in range(96)]
+    values = {
+        "cylinder_radius": 0.075,
+        "start": [-2.25, 3.0, 1.5708],
+        "goal": [-2.25, 13.0],
+        "worlds": {
+            "free": {"cylinders": sides, "path_length": 10.5},
+            "wall": {"cylinders": sides + wall, "path_length": 11.5},
+        },
+        **changed,
+    }
+    path.write_text(json.dumps(values))
+    return path
+
+
+def test_the_index_gives_the_tasks(folder):
+    """Map, start, heading and goal are those of the files; Map2D takes the task."""
+    own = [entry("20.png", heading=0.5, name="wide"), entry("30.png")]
+    tasks = load_set(folder([20, 30], own))
+    assert tasks.count("test") == 2
+    labels = {tasks.label("test", index): index for index in range(2)}
+    task = tasks.task("test", labels["maps wide"])
+    assert tuple(task.start) == (20, 20, 0.5)
+    assert task.goal == (100, 20)
+    np.testing.assert_array_equal(task.terrain.grid.cells, floor(20))
+    made = make_task(
+        task.terrain, task.start, task.goal, task.robot, goal_tolerance=4.0
+    )
+    np.testing.assert_array_equal(made.field, task.field)
+
+
+def test_the_figures_of_a_map(folder):
+    """The gap and the shortest path around the end of the wall, as brute force."""
+    world = load_set(folder([20])).world("test", 0)
+    assert world.difficulty.gap == pytest.approx(17 / 16, abs=0.07)
+    assert (distance(world.cells, *world.path[::5].T) >= 8 - 1e-5).all()
+    figures, straight = world.difficulty, 80.0
+    assert figures.detour == pytest.approx(figures.length / straight, abs=1e-4)
+    assert figures.length > 2 * math.hypot(38, 40)
+
+
+def test_truth_is_the_map(folder, tmp_path):
+    """A picture of the obstacles replaces the one of the map."""
+    path = folder([20, 30], [entry("20.png", truth="30.png")])
+    world = load_set(path).world("test", 0)
+    np.testing.assert_array_equal(world.cells, floor(30))
+
+
+def test_the_environment_drives_on_them(folder):
+    """By index or at random; spaces hold every observation; equal seeds are equal."""
+    path = folder([20, 30], worlds={"splits": ["train"]})
+    env = gym.make("TDAC-Ladder-v0", level=str(path), split="train", train_pool=0)
+    seen, _ = env.reset(seed=3, options={"index": 1})
+    again, _ = env.reset(seed=3, options={"index": 1})
+    for key, value in seen.items():
+        np.testing.assert_array_equal(value, again[key])
+    for _ in range(5):
+        assert env.observation_space.contains(env.reset()[0])
+    with pytest.raises(TaskError, match="world 2: set 'mine' has 2 worlds"):
+        env.reset(options={"index": 2})
+
+
+def test_the_hash_follows_the_maps_and_not_their_place(folder, tmp_path):
+    """Another task or pixel is another set; a moved folder is not."""
+    path = folder([20, 30])
+    one = load_set(path).sha256
+    (tmp_path / "maps").rename(tmp_path / "moved")
+    text = path.read_text().replace("maps", "moved")
+    path.write_text(text)
+    assert load_set(path).sha256 == one
+    picture = np.where(floor(20), 0, 255).astype(np.uint8)
+    picture[40, 30] = 0
+    cv2.imwrite(str(tmp_path / "moved" / "20.png"), picture)
+    other = load_set(path).sha256
+    assert other != one
+    index = tmp_path / "moved" / "index.json"
+    index.write_text(json.dumps([entry("20.png"), entry("30.png", heading=1.0)]))
+    assert load_set(path).sha256 not in (one, other)
+
+
+def test_splits_have_no_map_and_no_origin_in_common(folder):
+    """Also if maps are linked by others; all worlds are in one split."""
+    gaps = list(range(20, 44))
+    own = [entry(f"{gap}.png", origin=f"maker {gap // 3}") for gap in gaps]
+    # The same map from two makers links them.
+    own.append(entry("20.png", origin=f"maker {41 // 3}", start=[20, 30]))
+    tasks = load_set(folder(gaps, own, {"splits": ["train", "dev", "test"]}))
+    splits = tasks.files.splits
+    origins = {name: {each.origin for each in splits[name]} for name in splits}
+    maps = {name: {each.content for each in splits[name]} for name in splits}
+    assert sum(tasks.files.counts.values()) == 25
+    assert min(tasks.files.counts.values()) > 0
+    for parts in (origins, maps):
+        assert len(set().union(*parts.values())) == sum(map(len, parts.values()))
+
+
+def test_further_files_move_no_group(folder):
+    """A world stays in its split when others are added."""
+    own = [entry(f"{gap}.png", origin=f"maker {gap}") for gap in range(20, 40)]
+    splits = {"splits": ["train", "dev", "test"]}
+    few = load_set(folder(range(20, 40), own[:10], splits)).files.splits
+    many = load_set(folder(range(20, 40), own, splits)).files.splits
+    for name, worlds in few.items():
+        assert {w.sha256 for w in worlds} <= {w.sha256 for w in many[name]}
+
+
+def test_tasks_that_are_not_feasible(folder):
+    """They are refused by file, or left out and counted."""
+    with pytest.raises(TaskError, match=r"12\.png: .*8 px radius"):
+        load_set(folder([20, 12]))
+    masks = [entry(f"{gap}.png", truth=f"{gap}.png") for gap in (20, 12)]
+    with pytest.raises(
+        TaskError, match=r"12\.png: there is no way .*`infeasible: skip"
+    ):
+        load_set(folder([20, 12], masks))
+    tasks = load_set(folder([20, 12], worlds={"infeasible": "skip"}))
+    assert tasks.count("test") == 1
+    assert [line.split(":")[0] for line in tasks.files.skipped] == ["12.png"]
+    with pytest.raises(
+        TaskError, match=r"has no feasible world; the first of 1: 12.png"
+    ):
+        load_set(folder([12], worlds={"infeasible": "skip"}))
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"start": [1, 1]}, r"20\.png.*start \(1, 1\)"),
+        ({"goal": [500, 20]}, r"20\.png.*goal \(500, 20\) lies outside"),
+        ({"goal": [22, 20]}, r"20\.png.*within the tolerance"),
+        ({"goal": "there"}, "index.json, task 0: goal: "),
+        ({"file": "no.png"}, r"no\.png: "),
+        ({"file": "../mine.yaml"}, "mine.yaml is not in the folder"),
+    ],
+)
+def test_wrong_tasks(folder, changed, message):
+    """One line that names the file."""
+    tasks = [{**entry("20.png", truth="20.png"), **changed}]
+    if "file" in changed:
+        del tasks[0]["truth"]
+    with pytest.raises(TaskError, match=message) as caught:
+        load_set(folder([20], tasks))
+    assert "\n" not in str(caught.value)
+
+
+def test_folders_that_are_refused(folder, tmp_path):
+    """No folder, no index, no maps, not JSON."""
+    path = folder([20])
+    index = tmp_path / "maps" / "index.json"
+    index.write_text("[]")
+    with pytest.raises(TaskError, match=r"index.json lists no maps"):
+        load_set(path)
+    index.write_text("[{")
+    with pytest.raises(TaskError, match=r"index.json: "):
+        load_set(path)
+    index.unlink()
+    with pytest.raises(TaskError, match=r"has no index.json, which lists maps"):
+        load_set(path)
+    path = folder([20], worlds={"folder": "mapz"})
+    with pytest.raises(TaskError, match=r"no folder .*mapz"):
+        load_set(path)
+
+
+@pytest.mark.parametrize(
+    ("worlds", "values", "message"),
+    [
+        ({"barn": "a.json"}, {}, "expected either `folder` or `barn`"),
+        ({"foldr": "a"}, {}, r"worlds\.foldr: .*did you mean"),
+        ({"splits": ["hidden"]}, {}, r"worlds\.splits\.0: "),
+        ({}, {"admission": {"gap": 2}}, "`admission` is for generators"),
+    ],
+)
+def test_set_files_that_are_refused(folder, worlds, values, message):
+    with pytest.raises(TaskError, match=message) as caught:
+        load_set(folder([20], worlds=worlds, **values))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("hidden", 0, bytes(16)), "has no split 'hidden': its worlds are files"),
+        (("train", 0), "set 'mine' has the split test, not 'train'"),
+        (("test", 1), "world 1: set 'mine' has 1 worlds in its split 'test'"),
+        (("tset", 0), "did you mean 'test'"),
+    ],
+)
+def test_worlds_that_do_not_exist(folder, arguments, message):
+    with pytest.raises(TaskError, match=message):
+        load_set(folder([20])).world(*arguments)
+
+
+def test_a_split_without_worlds(folder):
+    """One map cannot be in three splits."""
+    tasks = load_set(folder([20], worlds={"splits": ["train", "dev", "test"]}))
+    empty = [name for name, count in tasks.files.counts.items() if count == 0]
+    assert len(empty) == 2
+    with pytest.raises(TaskError, match="has no worlds in its split"):
+        tasks.world(empty[0], 0)
+
+
+def test_worlds_of_barn(tmp_path):
+    """Cylinders are discs, north is up, and OT is half the given length per m/s."""
+    barn_file(tmp_path / "worlds.json")
+    path = tmp_path / "barn.yaml"
+    worlds = {"barn": "worlds.json", "splits": ["test"], "resolution": 0.025}
+    path.write_text(yaml.safe_dump({"worlds": worlds, "goal_tolerance": 40}))
+    tasks = load_set(path)
+    labels = [tasks.label("test", index) for index in range(2)]
+    assert sorted(labels) == ["barn free", "barn wall"]
+    world = tasks.world("test", labels.index("barn wall"))
+    # 10 m are 400 px, up.
+    assert world.goal[1] == world.start.y - 400
+    assert world.goal[0] == world.start.x
+    assert world.start.heading == pytest.approx(-math.pi / 2, abs=1e-3)
+    assert world.barn_steps == pytest.approx(11.5 / 2 / 0.1)
+    # The wall is 3 m ahead, and occupies what is in a cylinder of 3 px.
+    x, y = round(world.start.x), round(world.start.y) - 120
+    assert world.cells[y - 1 : y + 2, x].all()
+    assert not world.cells[y - 4, :].all()
+    # The opening is on the right-hand side.
+    assert not world.cells[y, x + 54 : x + 60].any()
+    assert world.difficulty.detour > 1.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"worlds": {}}, "worlds.json: worlds: "),
+        ({"cylinder_radius": 0}, "worlds.json: cylinder_radius: "),
+        ({"goal": [1e6, 0]}, "use a coarser `resolution`"),
+    ],
+)
+def test_files_of_barn_that_are_refused(tmp_path, changed, message):
+    barn_file(tmp_path / "worlds.json", **changed)
+    path = tmp_path / "barn.yaml"
+    path.write_text("worlds: {barn: worlds.json}\n")
+    with pytest.raises(TaskError, match=message):
+        load_set(path)
+
+
+def test_a_missing_file_of_barn(tmp_path):
+    path = tmp_path / "barn.yaml"
+    path.write_text("worlds: {barn: worlds.json}\n")
+    with pytest.raises(TaskError, match=r"worlds\.json: No such file"):
+        load_set(path)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (REAL / "maps").is_dir(), reason="no folder of public maps")
+def test_public_maps(tmp_path):
+    """Real maps of many kinds are worlds; those without a way are counted."""
+    worlds = {"folder": str(REAL / "maps"), "infeasible": "skip"}
+    path = tmp_path / "maps.yaml"
+    path.write_text(yaml.safe_dump({"worlds": worlds}))
+    tasks = load_set(path)
+    counts = tasks.files.counts
+    assert sum(counts.values()) + len(tasks.files.skipped) == 68
+    assert min(counts.values()) > 0
+    assert tasks.task("test", 0).shortest > 0
+
+
+@pytest.mark.skipif(not (REAL / "barn").is_dir(), reason="no worlds of BARN")
+def test_public_worlds_of_barn(tmp_path):
+    """All are feasible for a disc as wide as the challenge's robot."""
+    worlds = {"barn": str(REAL / "barn" / "worlds.json"), "splits": ["test"]}
+    values = {"worlds": worlds, "robot": {"radius": 8.6}, "goal_tolerance": 40}
+    path = tmp_path / "barn.yaml"
+    path.write_text(yaml.safe_dump(values))
+    tasks = load_set(path)
+    assert tasks.count("test") == 250
+    assert tasks.world("test", 7).barn_steps > 50
