@@ -49,7 +49,7 @@ class Scores(_Record):
 
 
 class SetReport(_Record):
-    """Episodes on worlds of a set, from world 0 on."""
+    """Episodes on consecutive worlds of a set."""
 
     schema_version: int = 1
     provenance: SetProvenance

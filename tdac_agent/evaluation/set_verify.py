@@ -40,13 +40,14 @@ def verify_on_set(
     split: str = "test",
     worlds: int | None = None,
     *,
+    first: int = 0,
     salt_file: Path | None = None,
     tier: str = "auto",
     out: Path | None = None,
     judge: WarmJudge | None = None,
     watch: Callable[[int, int], None] | None = None,
 ) -> SetReport:
-    """Drives a controller on the worlds of a split, from world 0 on.
+    """Drives a controller on the worlds of a split, from world `first` on.
 
     Each episode has a fresh sandboxed process, which is told neither split nor number.
 
@@ -56,6 +57,7 @@ def verify_on_set(
         split: `dev`, `test` or `hidden`.
         worlds: Number of worlds, for scores. By default a sequential test of the set's
             bar decides when to stop; then there are no scores.
+        first: Number of the first world.
         salt_file: File with the salt of the split `hidden`.
         tier: Sandbox tier; `auto` for the best one on this machine.
         out: Folder for `set.json` and, unless the split is hidden, `trajectories/`.
@@ -71,6 +73,7 @@ def verify_on_set(
     one_of("split", split, JUDGED)
     if worlds is not None:
         whole_number("worlds", worlds, 1, MOST_EPISODES)
+    whole_number("first", first, 0)
     salt = None if salt_file is None else read_salt(salt_file)
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source, told = read_source(controller), split != "hidden"
@@ -80,6 +83,7 @@ def verify_on_set(
             "and so not from hidden worlds; leave out --tier"
         )
     test = SequentialTest(tasks.file.bar, MOST_WORLDS) if worlds is None else None
+    count = MOST_WORLDS if worlds is None else worlds
     compile_first(environment(Map2DTask.env_id))
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         folder = Path(name)
@@ -87,7 +91,7 @@ def verify_on_set(
             set_file=_written(tasks, folder / "set.yaml"),
             split=split,
             salt_file=None if salt_file is None else salt_file.resolve(),
-            worlds=tuple(range(MOST_WORLDS if worlds is None else worlds)),
+            worlds=tuple(range(first, first + count)),
             controller=folder / "controller.py",
             test=test,
             told=told,
