@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tdac_agent.errors import ProviderError
-from tdac_agent.models.provider import Reply, Request
+from tdac_agent.models.provider import PermanentFault, Reply, Request
 from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
@@ -19,8 +18,8 @@ class LevelController:
     Args:
         tasks: The task set.
 
-    Raises:
-        ProviderError: There is no controller for what is observed in the set.
+    Attributes:
+        missing: Why it cannot answer; empty if there is a controller.
     """
 
     name = "builtin"
@@ -28,10 +27,18 @@ class LevelController:
     fixed = True
 
     def __init__(self, tasks: TaskSet) -> None:
-        self._file = controller_for(tasks)
+        level = level_of(tasks)
+        self._file = LEVELS / f"{level}.py"
+        self.missing = () if level is not None else (_none_for(tasks),)
 
     def complete(self, request: Request) -> Reply:
-        """Answers one request; see `Provider`. Adds no rules."""
+        """Answers one request; see `Provider`. Adds no rules.
+
+        Raises:
+            PermanentFault: There is no controller for what is observed in the set.
+        """
+        if self.missing:
+            raise PermanentFault(self.missing[0])
         if request.kind == "summarise":
             return Reply("```json\n[]\n```\n")
         source = self._file.read_text(encoding="utf-8")
@@ -39,20 +46,11 @@ class LevelController:
         return Reply(f"```python\n{source}```\n", notes=(note,))
 
 
-def controller_for(tasks: TaskSet) -> Path:
-    """The built-in controller of a set: that of its name, or of an equal level.
-
-    Raises:
-        ProviderError: There is none.
-    """
-    level = level_of(tasks)
-    if level is not None:
-        return LEVELS / f"{level}.py"
+def _none_for(tasks: TaskSet) -> str:
     known = ", ".join(path.stem for path in sorted(LEVELS.glob("*.py")))
-    raise ProviderError(
-        f"there is no built-in controller for the task set {tasks.name!r} (only for "
-        f"{known}, and for sets with the same observations); name a model with "
-        "--learner, or begin with a controller of yours: --from FILE --learner MODEL"
+    return (
+        f"no built-in controller for the task set {tasks.name} (only for {known}, and "
+        "for sets with the same observations): name a model with --learner"
     )
 
 

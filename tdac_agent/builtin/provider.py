@@ -21,7 +21,7 @@ def make_builtin(words: str, options: Options) -> Builtin[Any] | LevelController
     """Returns the provider for a task or for a task set.
 
     Raises:
-        ProviderError: `words` is not empty, or there is no controller for the set.
+        ProviderError: `words` is not empty.
     """
     if words:
         raise ProviderError(f"'builtin' takes no model name; got 'builtin:{words}'")

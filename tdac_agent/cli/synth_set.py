@@ -24,11 +24,11 @@ from tdac_agent.models.choice import check_name
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.resume import check_own, existing_run
-from tdac_agent.runs.run_record import Run
+from tdac_agent.runs.run_record import SET_FILE, Run
 from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
 from tdac_agent.set_synthesis.resume import resume_set_arguments
 from tdac_agent.set_synthesis.selection import CandidateFigures, Selection
-from tdac_agent.set_synthesis.synthesize import SET_FILE, synthesize_on_set
+from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
@@ -202,8 +202,14 @@ def _show_selected(run: Run, console: Console) -> None:
     content = read_file(run.folder / "report.json", RECORD_BYTES)
     selection = Selection.model_validate_json(content)
     console.print(_candidates(selection))
+    used = selection.feedback_used + selection.validation_used
+    console.print(
+        f"  goals reached, of worlds of dev; {used} of at most {selection.episodes} "
+        "episodes were driven",
+        highlight=False,
+    )
     if selection.stopped:
-        console.print(f"the writing ended early: {escape(selection.stopped)}")
+        console.print(f"  the writing ended: {escape(selection.stopped)}")
     console.print(
         f"[bold]selected[/] k={selection.k} j={selection.j}, {run.seconds:.0f} s: "
         f"{escape(str(run.controller))}",
@@ -236,11 +242,6 @@ def _candidates(selection: Selection) -> Table:
     for each in selection.candidates:
         chosen = (each.k, each.j) == (selection.k, selection.j)
         table.add_row(*_cells(each), style="bold" if chosen else None)
-    table.caption = (
-        f" goals reached, of worlds of dev; {selection.feedback_used} + "
-        f"{selection.validation_used} of at most {selection.episodes} episodes"
-    )
-    table.caption_justify = "left"
     return table
 
 

@@ -47,7 +47,8 @@ def verify_hidden(
             raw,
             tasks,
             "hidden",
-            salt_file=drawn_salt(folder / SEALED),
+            # A salt in a folder from elsewhere may be known.
+            salt_file=drawn_salt(folder / SEALED, reuse=bool(recorder.run.mark)),
             tier=tier,
             judge=judge,
             watch=lambda done, reached: recorder.tell(
@@ -60,15 +61,17 @@ def verify_hidden(
     return report
 
 
-def drawn_salt(folder: Path) -> Path:
-    """The file with the salt of a run; draws it unless an interrupted run did.
+def drawn_salt(folder: Path, *, reuse: bool) -> Path:
+    """The file with the salt of a run, 0600 in a folder 0700.
 
-    Only the user can read the folder (0700) and the file (0600).
+    Args:
+        folder: Its folder, which is made.
+        reuse: Whether a salt that an interrupted process drew is used.
     """
     folder.mkdir(mode=0o700, exist_ok=True)
     folder.chmod(0o700)
     path = folder / SALT_FILE
-    if not path.exists():
+    if not (reuse and path.exists()):
         unfinished = folder / f"{SALT_FILE}.new"
         handle = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
         with os.fdopen(handle, "wb") as file:

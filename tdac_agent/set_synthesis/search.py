@@ -14,7 +14,7 @@ from tdac_agent.synthesis.calls import OutOfBudget
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
 from tdac_agent.synthesis.loop import MOST_SPENT, given_up
 
-NO_EPISODES = "no feedback episodes were left"
+NO_EPISODES = "all feedback episodes were driven"
 
 
 def search(

@@ -17,7 +17,7 @@ from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
-from tdac_agent.runs.run_record import Run
+from tdac_agent.runs.run_record import SET_FILE, Run
 from tdac_agent.set_synthesis.hidden import verify_hidden
 from tdac_agent.set_synthesis.search import search
 from tdac_agent.set_synthesis.selection import (
@@ -41,7 +41,6 @@ from tdac_envs.ladder.task_sets import TaskSet
 EPISODES = 128
 """Default limit of simulated episodes: half for tests, half for the selection."""
 FEEDBACK_EPISODES = 8
-SET_FILE = "set.yaml"
 ABOUT = "this task set"
 
 
