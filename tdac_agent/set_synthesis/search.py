@@ -39,8 +39,8 @@ def search(
         Fault: A model does not answer, or gives no code again and again.
     """
     run = trials.recorder.run
-    loop = _Search(dialogue, trials, candidates)
     first = None if given is None else ModelAnswer(given)
+    loop = _Search(dialogue, trials, candidates, first)
     try:
         for k in range(1, run.iterations + 1):
             ending = loop.iteration(k, (k == 1 and first) or dialogue.generate(k))
@@ -60,14 +60,19 @@ class _Search:
         dialogue: The models.
         trials: Tests candidates.
         candidates: Receives the candidates.
+        given: The initial controller, if there is one.
     """
 
     def __init__(
-        self, dialogue: Dialogue, trials: Trials, candidates: list[Candidate]
+        self,
+        dialogue: Dialogue,
+        trials: Trials,
+        candidates: list[Candidate],
+        given: ModelAnswer | None,
     ) -> None:
         self._dialogue, self._trials = dialogue, trials
         self._recorder = trials.recorder
-        self._candidates = candidates
+        self._candidates, self._given = candidates, given
         self._empty = 0
 
     def iteration(self, k: int, answer: ModelAnswer) -> str:
@@ -90,13 +95,17 @@ class _Search:
             parent = candidate
             if failure is None or not self._trials.feedback_left:
                 return NO_EPISODES
-            if is_fixed(dialogue.learner) and is_fixed(dialogue.optimizer):
+            if answer is not self._given and self._fixed():
                 return f"{dialogue.learner.name} has one controller"
             if j < run.patience:
                 answer = dialogue.edit(k, j + 1, source, failure)
             elif run.refine:
                 dialogue.summarise(k, j, source, failure)
         return "" if new else f"iteration {k} brought no new code"
+
+    def _fixed(self) -> bool:
+        """Whether the models have nothing else to answer."""
+        return is_fixed(self._dialogue.learner) and is_fixed(self._dialogue.optimizer)
 
     def _known(self, source: str) -> Candidate | None:
         """The candidate with this code, if there is one."""
