@@ -10,7 +10,6 @@ from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.trials import Candidate, Trials
-from tdac_agent.synthesis.calls import OutOfBudget
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
 from tdac_agent.synthesis.loop import MOST_SPENT, given_up
 
@@ -22,8 +21,7 @@ def search(
 ) -> str:
     """Writes and tests candidates until no feedback episodes are left.
 
-    It also ends after K iterations, when an iteration brings no new code, or when the
-    budget of money or tokens is used up.
+    It also ends after K iterations, or when an iteration brings no new code.
 
     Args:
         dialogue: The models.
@@ -35,21 +33,15 @@ def search(
         What ended it early; empty after K iterations.
 
     Raises:
-        OutOfBudget: The budget is used up before a candidate drove.
+        OutOfBudget: The budget of money or tokens is used up.
         Fault: A model does not answer, or gives no code again and again.
     """
-    run = trials.recorder.run
     first = None if given is None else ModelAnswer(given)
     loop = _Search(dialogue, trials, candidates, first)
-    try:
-        for k in range(1, run.iterations + 1):
-            ending = loop.iteration(k, (k == 1 and first) or dialogue.generate(k))
-            if ending:
-                return ending
-    except OutOfBudget as error:
-        if not any(each.drives for each in candidates):
-            raise
-        return str(error)
+    for k in range(1, trials.recorder.run.iterations + 1):
+        ending = loop.iteration(k, (k == 1 and first) or dialogue.generate(k))
+        if ending:
+            return ending
     return ""
 
 

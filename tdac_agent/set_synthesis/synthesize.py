@@ -213,7 +213,13 @@ def _run(writing: _Writing) -> Run:
 def _finish(writing: _Writing) -> None:
     trials, recorder = writing.trials, writing.trials.recorder
     written: list[Candidate] = []
-    stopped = search(writing.dialogue, writing.given, trials, written)
+    try:
+        stopped = search(writing.dialogue, writing.given, trials, written)
+    except OutOfBudget as error:
+        # With more money, the run can go on; what is good for something is selected.
+        if not any(each.feedback_score for each in written):
+            raise
+        stopped = str(error)
     able = [each for each in written if each.drives]
     chosen = None
     if able:

@@ -29,8 +29,8 @@ def out(tmp_path):
 def write(few, out, warm):
     """Runs with few episodes."""
 
-    def run(*answers, **values):
-        model = Script(*answers)
+    def run(*answers, model=None, **values):
+        model = model or Script(*answers)
         given = {"episodes": 12, "feedback_episodes": 2, "seed": 3, "judge": warm}
         given |= {"out": out, "retry": AT_ONCE, "iterations": 3, **values}
         return model, synthesize_on_set(few, model, **given)
@@ -144,6 +144,46 @@ def test_a_broken_run_goes_on_where_it_was(write, solver, out):
     model, again = write()
     assert model.asked() == []
     assert again.status == "selected"
+
+
+class Paid(Script):
+    """A script whose answers cost tokens, as many as are reserved."""
+
+    paid = True
+
+
+FOR_ONE = 30_000
+"""Tokens that are enough for one question and not for two."""
+
+
+def test_a_run_without_success_goes_on_with_more_tokens(few, write, out, warm):
+    """Nothing is selected when the budget ends it, and no answer is paid for twice."""
+    _, run = write(model=Paid(code(STILL)), max_tokens=FOR_ONE, iterations=1)
+    assert run.status == "budget"
+    assert "--max-tokens" in run.enough
+    model = Paid(code(BUMP), NO_RULES)
+    _, run = write(model=model, max_tokens=500_000, iterations=1)
+    assert model.asked()[0] == ("edit", 1, 1)
+    assert run.status == "not verified"
+
+
+@pytest.mark.slow
+def test_the_best_is_selected_when_the_budget_ends(write, solver, out):
+    """One that reaches some goals is worth a selection."""
+    half = f"""{solver}
+
+drive = policy
+
+
+def policy(obs):
+    return drive(obs) if int(obs["goal"][0]) % 2 else (0.0, 0.0)
+"""
+    _, run = write(model=Paid(code(half)), max_tokens=FOR_ONE)
+    assert run.status == "selected"
+    assert "tokens" in run.reason
+    report = selection(out)
+    assert 0.0 < report.optimistic.success < 1.0
+    assert report.stopped == run.reason
 
 
 def test_another_run_is_refused(write):
