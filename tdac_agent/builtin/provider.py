@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any, Generic
 
+from tdac_agent.builtin.level import LevelController
 from tdac_agent.builtin.parameters import P, read_parameters
 from tdac_agent.builtin.repair import learn_bounds, read_rules, repair, write_rules
 from tdac_agent.builtin.template import Template
@@ -13,16 +14,19 @@ from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import Setting
+from tdac_envs.ladder.task_sets import TaskSet
 
 
-def make_builtin(words: str, options: Options) -> Builtin[Any]:
-    """Returns the provider for a task.
+def make_builtin(words: str, options: Options) -> Builtin[Any] | LevelController:
+    """Returns the provider for a task or for a task set.
 
     Raises:
         ProviderError: `words` is not empty.
     """
     if words:
         raise ProviderError(f"'builtin' takes no model name; got 'builtin:{words}'")
+    if isinstance(options.setting, TaskSet):
+        return LevelController(options.setting)
     return Builtin(template_of(options.setting))
 
 

@@ -26,6 +26,7 @@ from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import TEXT_BYTES, read_file
+from tdac_envs.ladder.task_sets import TaskSet
 
 _KINDS: tuple[Kind, ...] = ("generate", "edit")
 
@@ -128,7 +129,7 @@ class Scripted:
         return int(random.choice(len(choices), p=weights / weights.sum()))
 
 
-def _source(choice: Choice, script: Path, setting: Setting) -> str:
+def _source(choice: Choice, script: Path, setting: Setting | TaskSet) -> str:
     """Returns the source of a controller, ending in a newline.
 
     Raises:
@@ -144,7 +145,13 @@ def _source(choice: Choice, script: Path, setting: Setting) -> str:
         raise ProviderError(f"{script}: {file}: {reason}") from error
 
 
-def _filled_in(values: dict[str, float], script: Path, setting: Setting) -> str:
+def _filled_in(
+    values: dict[str, float], script: Path, setting: Setting | TaskSet
+) -> str:
+    if isinstance(setting, TaskSet):
+        raise ProviderError(
+            f"{script}: a task set has no template; name files with `file:` instead"
+        )
     template = template_of(setting)
     known = names_of(template.kind)
     for name in set(values) - set(known):

@@ -12,9 +12,11 @@ from tdac_agent.models.budget import format_usd
 from tdac_agent.models.choice import Options, check_name, missing_for_name
 from tdac_agent.models.prices import SHIPPED, load_prices, price_file
 from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
-from tdac_agent.prompting.prompt import load_template
-from tdac_agent.synthesis.cost_forecast import CostForecast, predict_cost
+from tdac_agent.prompting.prompt import generate_prompt, load_template
+from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
+from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task_file import Profile
+from tdac_envs.ladder.task_sets import TaskSet
 
 
 def run(
@@ -38,31 +40,44 @@ def run(
         refine: Whether failures become rules.
         as_json: Whether to print the forecast as JSON.
     """
-    learner = models["learner"]
-    optimizer = models["optimizer"] or learner
-    for name in (learner, optimizer):
+    for name in _names(models):
         check_name(name)
-    template, prices = load_template(models["prompt"]), load_prices()
+    template = load_template(models["prompt"])
     task = flags.load().with_profile(profile)
-    over_http = models["key_over_http"]
-    options = Options(task.setting, models["base_url"], over_http)
-    missing = [
-        m for name in (learner, optimizer) for m in missing_for_name(name, options)
-    ]
-    forecast = predict_cost(
-        task,
-        learner,
-        optimizer,
-        prices,
-        iterations=k,
-        patience=j,
-        refine=refine,
-        template=template,
-        base_url=models["base_url"],
-        max_output=models["max_output"],
-        max_cost=models["max_cost"],
-        max_tokens=models["max_tokens"],
-    )
+    question = generate_prompt(task, (), template)
+    loop = {"iterations": k, "patience": j, "refine": refine}
+    return show(task.name, task.setting, question, models, loop, as_json)
+
+
+def _names(models: dict[str, Any]) -> tuple[str, str]:
+    """Names of the learner and of the optimizer."""
+    return models["learner"], models["optimizer"] or models["learner"]
+
+
+def show(
+    name: str,
+    setting: Setting | TaskSet,
+    question: str,
+    models: dict[str, Any],
+    loop: dict[str, Any],
+    as_json: bool,
+) -> int:
+    """Prints the first question, and the maximum cost of a run; returns 0.
+
+    Args:
+        name: Name of the task or task set.
+        setting: Setting of the task, or the task set.
+        question: The question.
+        models: As for `run`.
+        loop: `iterations`, `patience` and `refine`.
+        as_json: Whether to print the forecast as JSON.
+    """
+    names = _names(models)
+    options = Options(setting, models["base_url"], models["key_over_http"])
+    missing = [line for each in names for line in missing_for_name(each, options)]
+    limits = ("base_url", "max_output", "max_cost", "max_tokens")
+    terms = {**loop, **{limit: models[limit] for limit in limits}}
+    forecast = cost_of(name, question, *names, load_prices(), **terms)
     if as_json:
         sys.stdout.write(forecast.model_dump_json(indent=2) + "\n")
         return 0

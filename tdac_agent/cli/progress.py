@@ -70,16 +70,20 @@ class Progress:
             self._print_fault(at, record)
         elif kind == "call.reply":
             for note in record["notes"]:
-                self._say(f"  {at}", escape(note), "dim")
+                self.say(f"  {at}", escape(note), "dim")
         elif kind == "call.unused":
             self._print_unused(at, record)
         elif kind == "rules":
             for note in record["notes"]:
-                self._say(f"  k={record['k']}", f"rules: {escape(note)}", "dim")
+                self.say(f"  k={record['k']}", f"rules: {escape(note)}", "dim")
         elif kind == "verify.start":
             self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
         elif kind == "verify.end":
             self._print_attempt(at, record)
+
+    def doing(self, text: str) -> None:
+        """Shows the current activity."""
+        self._spinner.update(text=text)
 
     def _print_heading(self, record: dict[str, Any]) -> None:
         self._console.print(self._heading)
@@ -93,7 +97,7 @@ class Progress:
         wait = record["wait"]
         then = "giving up" if wait is None else f"asking again in {wait:.0f} s"
         line = f"{record['fault']} fault: {record['reason']}; {then}"
-        self._say(f"  {at}", escape(line), "yellow")
+        self.say(f"  {at}", escape(line), "yellow")
 
     def _print_unused(self, at: str, record: dict[str, Any]) -> None:
         """Prints why an answer is requested again; not for the last one."""
@@ -101,26 +105,26 @@ class Progress:
         if asked < most:
             problem = f"answer {asked} of at most {most} cannot be used: "
             problem += f"{record['problem']}; asking again"
-            self._say(f"  {at}", escape(problem), "yellow")
+            self.say(f"  {at}", escape(problem), "yellow")
         if not self._has_quoted:
             self._has_quoted = True
             said = f"it says: “{record['says']}”" if record["says"] else "it is empty"
-            self._say(f"  {at}", escape(said), "dim")
+            self.say(f"  {at}", escape(said), "dim")
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         if record["passed"]:
-            self._say(f"✔ {at}", "all tests passed", "green")
+            self.say(f"✔ {at}", "all tests passed", "green")
         elif not record["valid"]:
             why = "; ".join(record["notes"][-1:])
-            self._say(f"– {at}", escape(why), "yellow")
+            self.say(f"– {at}", escape(why), "yellow")
         elif record["unchanged"]:
-            self._say(f"= {at}", "same code as before", "yellow")
+            self.say(f"= {at}", "same code as before", "yellow")
         else:
             failed = record["failed_tests"]
             names = escape(list_tests(failed, 3))
-            self._say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
+            self.say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
 
-    def _say(self, place: str, text: str, style: str = "") -> None:
+    def say(self, place: str, text: str, style: str = "") -> None:
         """Prints a line in two columns, so that wrapped text stays below the text."""
         line = Table.grid(padding=(0, 2, 0, 0))
         line.add_column(no_wrap=True)

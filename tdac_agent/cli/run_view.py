@@ -18,7 +18,7 @@ def show_run(run: Run, console: Console) -> None:
     """Prints the attempts in a table, then the result and the next commands."""
     if run.attempts:
         console.print(_attempts(run))
-    usage, folder = _usage(run), run.folder
+    usage, folder = usage_of(run), run.folder
     if run.verified:
         ending = (
             f"[bold green]verified[/] in iteration {run.tau}, {run.seconds:.1f} s: "
@@ -30,16 +30,21 @@ def show_run(run: Run, console: Console) -> None:
         drive = shlex.join(["tdac", "play", str(folder), "--video", "drive.mp4"])
         _print_unwrapped(console, f"watch it drive: {drive}")
     elif run.status == "budget":
-        console.print(f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}")
-        _print_indented(console, usage)
-        _print_indented(console, run.outlook)
-        _print_unwrapped(console, f"to continue: {resume_command(run)}")
+        print_budget_end(run, console)
     else:
         times = f"{run.iterations} iteration{'' if run.iterations == 1 else 's'}"
         ending = f"[bold red]not verified[/] after {times}; "
         attempts = escape(str(folder / "iterations"))
         console.print(f"{ending}the attempts are in {attempts}", soft_wrap=True)
         _print_indented(console, usage)
+
+
+def print_budget_end(run: Run, console: Console) -> None:
+    """Prints that the budget ended a run, and how to continue it."""
+    console.print(f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}")
+    _print_indented(console, usage_of(run))
+    _print_indented(console, run.outlook)
+    _print_unwrapped(console, f"to continue: {resume_command(run)}")
 
 
 def _print_indented(console: Console, text: str) -> None:
@@ -53,7 +58,7 @@ def _print_unwrapped(console: Console, text: str) -> None:
     console.print(f"  {escape(text)}", soft_wrap=True)
 
 
-def _usage(run: Run) -> str:
+def usage_of(run: Run) -> str:
     """Tokens and cost in one line; empty if no model was asked."""
     if run.tokens == 0 and run.cost == 0.0 and not run.cost_lost:
         return ""

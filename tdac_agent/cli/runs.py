@@ -38,6 +38,7 @@ WIDE = 100
 _COLOURS = {
     "verified": "green",
     "trained": "green",
+    "selected": "green",
     "not verified": "red",
     "running": "cyan",
     "unreadable": "red",

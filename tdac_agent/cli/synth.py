@@ -13,7 +13,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import TaskFlags, check_tier
 from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import show_run
-from tdac_agent.errors import ControllerFileError, Fault
+from tdac_agent.errors import ControllerFileError, Fault, RunError
 from tdac_agent.runs.resume import check_own, existing_run, resume_arguments
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.synthesis.loop import synthesize
@@ -64,6 +64,7 @@ def resume(
     settings: dict[str, Any],
     trust: bool,
     as_json: bool,
+    then_verify: bool = False,
 ) -> int:
     """Continues a run with its own settings; returns the exit code.
 
@@ -73,10 +74,18 @@ def resume(
         settings: `max_cost` and `max_tokens`, where None keeps the run's limit; `tier`.
         trust: Whether a run from elsewhere may run and contact all that it names.
         as_json: Whether to print the run record as JSON.
+        then_verify: Whether a controller for a task set drives on hidden worlds.
     """
+    before = load_run(folder)
+    if before.on_set:
+        from tdac_agent.cli import synth_set
+
+        own = {**given, **settings}
+        return synth_set.resume(before, own, then_verify, trust, as_json)
+    if then_verify:
+        raise RunError(f"--then-verify is for task sets; {folder} is a run on a task")
     check_tier(settings["tier"])
     console = Console(stderr=as_json)
-    before = load_run(folder)
     if before.finished:
         check_own(before)
         return _show(before, console, before=before)

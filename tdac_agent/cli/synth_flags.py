@@ -29,13 +29,18 @@ from tdac_agent.cli.options import (
 from tdac_agent.cli.task_flags import NamedTask, takes_task
 
 app = typer.Typer()
+SETS = "Task set"
 ALLOWED = (
     *("learner", "optimizer", "base_url", "key_over_http"),
     *("prompt", "suite", "seed"),
 )
 """Flags that, given again with --resume, permit their use by a run from elsewhere."""
 WITH_RESUME = frozenset(
-    {"resume", "max_cost", "max_tokens", "tier", "as_json", "trust", *ALLOWED}
+    {
+        *("resume", "max_cost", "max_tokens", "tier", "as_json", "trust"),
+        "then_verify",
+        *ALLOWED,
+    }
 )
 
 
@@ -43,7 +48,7 @@ WITH_RESUME = frozenset(
     epilog="Examples: `tdac synth`; `tdac synth --map plan.png --start 90 302 "
     "--goal 178 386 --robot-radius 12`; "
     "`tdac synth --learner anthropic:claude-sonnet-5-5`; "
-    "`tdac synth --resume runs/maze-1`"
+    "`tdac synth --set known`; `tdac synth --resume runs/maze-1`"
 )
 @takes_task(without=())
 def synth(
@@ -106,10 +111,47 @@ def synth(
     tier: Tier = "auto",
     trust: Trust = False,
     as_json: Json = False,
+    set_name: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--set",
+            metavar="NAME",
+            help="Task set (`tdac sets`) or set.yaml: write a controller for worlds "
+            "that it has never seen, and select the best one on worlds of dev.",
+            rich_help_panel=SETS,
+        ),
+    ] = None,
+    episodes: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            min=2,
+            help="Most simulated episodes of all candidates: half for feedback, half "
+            "for the selection.  [default: 128]",
+            rich_help_panel=SETS,
+        ),
+    ] = None,
+    feedback_episodes: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            min=1,
+            help="Most episodes of a test of a candidate.  [default: 8]",
+            rich_help_panel=SETS,
+        ),
+    ] = None,
+    then_verify: Annotated[
+        bool,
+        typer.Option(
+            "--then-verify",
+            help="Drive the selected controller on hidden worlds of a new salt, once; "
+            "exit 0 only if a sequential test accepts it.",
+            rich_help_panel=SETS,
+        ),
+    ] = False,
 ) -> None:
     """Write, test and repair a controller until it is verified."""
     with begun():
         from tdac_agent.cli import synth as command
+    from tdac_agent.cli.synth_set_flags import SynthSetFlags
     from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 
     limits = {"max_cost": max_cost, "max_tokens": max_tokens}
@@ -120,7 +162,8 @@ def synth(
             name: value for name, value in given.items() if _is_typed(context, name)
         }
         settings = {**limits, "tier": tier}
-        raise typer.Exit(command.resume(resume, given, settings, trust, as_json))
+        code = command.resume(resume, given, settings, trust, as_json, then_verify)
+        raise typer.Exit(code)
     models = {
         "learner": learner,
         "optimizer": optimizer,
@@ -129,14 +172,25 @@ def synth(
         "prompt": prompt,
         "max_output": MAX_OUTPUT_TOKENS if max_output is None else max_output,
     }
+    loop = {"iterations": k, "patience": j, "refine": refine}
+    on_set = SynthSetFlags(set_name, episodes, feedback_episodes, then_verify)
+    if on_set != SynthSetFlags():
+        from tdac_agent.cli import synth_set
+
+        others = {"--profile": profile, "--suite": suite, "--trust": trust}
+        on_set.check(named_task(), others)
+        if dry_run:
+            terms = {**models, **limits}
+            raise typer.Exit(synth_set.dry_run(on_set, terms, loop, as_json))
+        wanted = {**models, **limits, **loop, "seed": seed, "tier": tier}
+        raise typer.Exit(synth_set.run(on_set, wanted, out, from_, as_json))
     if dry_run:
         from tdac_agent.cli import dry_run as dry
 
         raise typer.Exit(
             dry.run(named_task(), profile, {**models, **limits}, k, j, refine, as_json)
         )
-    loop = {"iterations": k, "patience": j, "refine": refine, "seed": seed}
-    wanted = {**models, **limits, **loop, "tier": tier}
+    wanted = {**models, **limits, **loop, "seed": seed, "tier": tier}
     raise typer.Exit(
         command.run(named_task(), profile, wanted, out, from_, suite, trust, as_json)
     )

@@ -60,7 +60,7 @@ class HiddenCount(_Record):
 
 
 class SetReport(_Record):
-    """Episodes on worlds of a set, from world 0 on."""
+    """Episodes on consecutive worlds of a set."""
 
     schema_version: int = 1
     provenance: SetProvenance

@@ -47,13 +47,14 @@ def verify_on_set(
     split: str = "test",
     worlds: int | None = None,
     *,
+    first: int = 0,
     salt_file: Path | None = None,
     tier: str = "auto",
     out: Path | None = None,
     judge: WarmJudge | None = None,
     watch: Callable[[int, int], None] | None = None,
 ) -> SetReport:
-    """Tests a controller, and drives it on the worlds of a split, from world 0 on.
+    """Tests a controller, and drives it on the worlds of a split, from `first` on.
 
     Each episode has a fresh sandboxed process, which is told neither split nor number.
     Without a pass in the static and contract tests, nothing is driven. An evaluation
@@ -66,6 +67,7 @@ def verify_on_set(
         split: `dev`, `test` or `hidden`.
         worlds: Number of worlds, for scores. By default a sequential test of the set's
             bar decides when to stop; then there are no scores.
+        first: Number of the first world.
         salt_file: File with the salt of the split `hidden`.
         tier: Sandbox tier; `auto` for the best one on this machine.
         out: Folder for `set.json` and `trajectories/`; of hidden worlds, for `set.json`
@@ -81,11 +83,12 @@ def verify_on_set(
     one_of("split", split, JUDGED)
     if worlds is not None:
         whole_number("worlds", worlds, 1, MOST_EPISODES)
-        tasks.check_count(split, worlds, "worlds")
+        tasks.check_count(split, first + worlds, "worlds")
+    whole_number("first", first, 0)
     salt = None if salt_file is None else read_salt(salt_file)
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source = read_source(controller)
-    request = _Request(source, tasks, split, worlds, salt_file, tier)
+    request = _Request(source, tasks, split, worlds, first, salt_file, tier)
     if salt is None:
         return _driven(request, out, judge, watch)
     _check_hiding(request)
@@ -115,6 +118,7 @@ class _Request:
     tasks: TaskSet
     split: str
     worlds: int | None
+    first: int
     salt_file: Path | None
     tier: str
 
@@ -156,6 +160,7 @@ def _driven(
     tasks, worlds, told = request.tasks, request.worlds, request.told
     most = most_worlds(tasks, request.split)
     test = SequentialTest(tasks.file.bar, most) if worlds is None else None
+    count = most if worlds is None else worlds
     compile_first(environment(Map2DTask.env_id))
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         folder = Path(name)
@@ -164,7 +169,7 @@ def _driven(
             set_file=_written(tasks, folder / "set.yaml"),
             split=request.split,
             salt_file=None if salt_file is None else salt_file.resolve(),
-            worlds=tuple(range(most if worlds is None else worlds)),
+            worlds=tuple(range(request.first, request.first + count)),
             controller=folder / "controller.py",
             test=test,
             told=told,

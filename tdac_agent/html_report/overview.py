@@ -45,6 +45,8 @@ class Overview:
 def overview_of(told: Sequence[Told]) -> Overview:
     """Summarises runs of one or several kinds."""
     frames = frames_of([one.run for one in told])
+    if not len(frames.runs):  # only runs on task sets
+        return Overview((), (), ())
     table = summarise(frames).to_dict("records")
     groups = [frames.only(**{name: row[name] for name in KIND}) for row in table]
     working = {str(one.run.folder) for one in told if one.status == "running"}

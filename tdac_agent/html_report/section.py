@@ -15,7 +15,7 @@ from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import CandidateHistory, Told, learner_named
-from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE
+from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE, SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 
@@ -161,7 +161,12 @@ def _verified_with(report: Report) -> Iterator[tuple[str, str]]:
 def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     """Commands to type in the parent of the run's folder, and what each does."""
     run = told.run
-    words = ["tdac", "synth", "--task", name, "--learner", run.learner]
+    about = ["--set", f"{name}/{SET_FILE}"] if run.on_set else ["--task", name]
+    limits = []
+    if run.on_set:
+        limits += ["--episodes", str(run.episodes)]
+        limits += ["--feedback-episodes", str(run.feedback_episodes)]
+    words = ["tdac", "synth", *about, *limits, "--learner", run.learner]
     if run.optimizer != run.learner:
         words += ["--optimizer", run.optimizer]
     if run.base_url is not None:
@@ -174,12 +179,15 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     words += ["-K", str(run.iterations), "-J", str(run.patience)]
     words += [] if run.seed is None else ["--seed", str(run.seed)]
     yield shlex.join(words), "repeat the run with new answers"
-    replay = ["tdac", "synth", "--task", name, "--learner", f"replay:{name}"]
+    replay = ["tdac", "synth", *about, *limits, "--learner", f"replay:{name}"]
     yield shlex.join(replay), "repeat the run with the recorded answers"
     if not run.finished and told.status != "running":
         more = run.enough.split()
         yield shlex.join(["tdac", "synth", "--resume", name, *more]), "resume the run"
-    if run.verified:
+    if run.on_set and run.tau is not None:
+        verify = ["tdac", "verify", f"{name}/controller.py", *about]
+        yield shlex.join(verify), "verify the controller on public worlds"
+    elif run.verified:
         yield shlex.join(["tdac", "verify", name]), "verify the controller again"
         video = ["tdac", "play", name, "--video", "drive.mp4"]
         yield shlex.join(video), "record a video of the drive"

@@ -83,10 +83,12 @@ def load_frames(*folders: Path) -> Frames:
 
 
 def frames_of(runs: Iterable[Run]) -> Frames:
-    """Builds frames from run records."""
+    """Builds frames from run records; those of runs on task sets are left out."""
     rows: list[Row] = []
     candidates: list[Row] = []
     for run in runs:
+        if run.on_set:
+            continue
         rows.append(_row(run))
         candidates += [_candidate(run, attempt) for attempt in run.attempts]
     return _frames(rows, candidates)

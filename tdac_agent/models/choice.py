@@ -13,6 +13,7 @@ from tdac_agent.errors import ProviderError
 from tdac_agent.models.provider import Provider, missing_for
 from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
+from tdac_envs.ladder.task_sets import TaskSet
 
 GROUP = "tdac.providers"
 # A provider and the packages it needs are imported only when it is chosen.
@@ -39,12 +40,13 @@ class Options:
     """Options for making a provider, besides the text after the colon.
 
     Attributes:
-        setting: Setting of the task, for providers that know the environments.
+        setting: Setting of the task, for providers that know the environments, or the
+            task set if the controller is for one.
         base_url: URL of the models' server; None for the default.
         key_over_http: Whether a key may go to another machine unencrypted.
     """
 
-    setting: Setting
+    setting: Setting | TaskSet
     base_url: str | None = None
     key_over_http: bool = False
 
@@ -57,7 +59,7 @@ options, and returns a provider or raises `ProviderError`."""
 def choose_models(
     learner: str | Provider,
     optimizer: str | Provider | None,
-    setting: Setting,
+    setting: Setting | TaskSet,
     base_url: str | None = None,
     *,
     key_over_http: bool = False,
@@ -67,7 +69,7 @@ def choose_models(
     Args:
         learner: A provider or its name.
         optimizer: A provider or its name; None for the learner.
-        setting: Setting of the task.
+        setting: Setting of the task, or the task set.
         base_url: URL of the models' server.
         key_over_http: As in `Options`.
 

@@ -95,8 +95,9 @@ class Provider(Protocol):
             call of a run the test suite is checked.
 
     A provider may also have `served_at`, the URL of its server without secrets (None
-    for the vendor's own); `missing`, a line for each thing that it still needs; and
-    `recorded_seed`, the seed with which its recorded answers were judged.
+    for the vendor's own); `missing`, a line for each thing that it still needs;
+    `recorded_seed`, the seed with which its recorded answers were judged; and `fixed`,
+    whether it gives the same controller whatever it is asked.
     """
 
     name: str
@@ -125,6 +126,12 @@ def recorded_seed(model: Provider) -> int | None:
     """Returns the seed with which a replayed run was judged; None for other models."""
     seed: int | None = getattr(model, "recorded_seed", None)
     return seed
+
+
+def is_fixed(model: Provider) -> bool:
+    """Returns whether a model gives the same controller whatever it is asked."""
+    fixed: bool = getattr(model, "fixed", False)
+    return fixed
 
 
 def missing_for(model: Provider) -> tuple[str, ...]:

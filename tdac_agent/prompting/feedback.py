@@ -24,6 +24,24 @@ _SYNTAX = "the source does not parse"
 
 
 @dataclass(frozen=True, slots=True)
+class Feedback:
+    """How a candidate failed, for the models.
+
+    Attributes:
+        text: Everything that they are told.
+        line: The same in one line, for questions about later candidates.
+        failed: Names of what failed, the evidence of rules.
+        report: The report, for providers that are no language models; None if the
+            candidate was not tested by a suite.
+    """
+
+    text: str
+    line: str
+    failed: tuple[str, ...]
+    report: Report | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Group:
     """Failures with the same root cause.
 
@@ -53,6 +71,12 @@ class Group:
         quoted = "\n".join(f.diagnosis.text for f in self.members if f.diagnosis)
         messages = (f.message for f in self.members)
         return _first([m for m in messages if plain(m) not in quoted])
+
+
+def feedback_of(report: Report) -> Feedback:
+    """What the models are told about a report."""
+    failed = tuple(failure.test for failure in report.failures)
+    return Feedback(render_feedback(report), _in_one_line(report), failed, report)
 
 
 def render_feedback(report: Report) -> str:
@@ -97,10 +121,14 @@ def choose(groups: list[Group]) -> list[Group]:
 
 def tell_attempt(k: int, j: int, report: Report) -> str:
     """Describes a failed attempt in one line: number of tests, causes, figures."""
+    return f"k={k} j={j}: {_in_one_line(report)}"
+
+
+def _in_one_line(report: Report) -> str:
     groups, _ = group_failures(report)
     causes = "; ".join(_short(g, report.provenance.unit) for g in choose(groups))
     count = f"{len(report.failures)} of {report.verdict.expected} tests failed"
-    return " ".join(f"k={k} j={j}: {count}: {causes}".split())
+    return " ".join(f"{count}: {causes}".split())
 
 
 def cut(text: str, limit: int = MAX_CHARS) -> str:

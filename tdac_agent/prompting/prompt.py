@@ -25,6 +25,8 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 VARIANTS = ("full", "underspecified")
+ONE_TASK = "this map or world"
+"""What the scope `task` of a rule means in a run on one task."""
 
 
 class PromptError(TdacError):
@@ -99,8 +101,28 @@ def generate_prompt(
         PromptError: The template is broken, uses an unknown variable, or does not
             contain the rules exactly once.
     """
-    context = {**context_of(task), "rules_block": render_block(rules)}
-    text = _render(template, task.spec.env, context)
+    return fill_in(template, context_of(task), rules, task.spec.env)
+
+
+def fill_in(
+    template: PromptTemplate,
+    context: dict[str, Any],
+    rules: tuple[RepairRule, ...],
+    env_id: str | None = None,
+) -> str:
+    """Returns a prompt for a new controller.
+
+    Args:
+        template: The template.
+        context: Its variables.
+        rules: The rules in force.
+        env_id: The environment whose templates it may include, too.
+
+    Raises:
+        PromptError: As `generate_prompt` does.
+    """
+    context = {**context, "rules_block": render_block(rules)}
+    text = _render(template, env_id, context)
     if text.count(context["rules_block"]) != 1:
         raise PromptError(
             f"the prompt {template.name} must contain {{{{ rules_block }}}} once: the "
@@ -109,7 +131,9 @@ def generate_prompt(
     return text
 
 
-def _render(template: PromptTemplate, env_id: str, context: dict[str, Any]) -> str:
+def _render(
+    template: PromptTemplate, env_id: str | None, context: dict[str, Any]
+) -> str:
     templates = _templates(env_id)
     try:
         if template.text is not None:
@@ -156,16 +180,51 @@ def repair_prompt(
         rules: The rules in force, with their effects.
         unchanged: Whether the last edit returned the same code.
     """
+    return repair_question(
+        kind,
+        prompt,
+        controller,
+        render_feedback(report),
+        earlier=earlier,
+        rules=rules,
+        unchanged=unchanged,
+    )
+
+
+def repair_question(
+    kind: str,
+    prompt: str,
+    controller: str,
+    feedback: str,
+    *,
+    earlier: tuple[str, ...] = (),
+    rules: tuple[RepairRule, ...] = (),
+    unchanged: bool = False,
+    about: str = ONE_TASK,
+) -> str:
+    """Like `repair_prompt`, from the text of the feedback.
+
+    Args:
+        kind: `edit` or `summarise`.
+        prompt: The prompt for a new controller, with the current rules.
+        controller: Source of the failed controller.
+        feedback: How it failed.
+        earlier: Earlier attempts, one line each.
+        rules: The rules in force, with their effects.
+        unchanged: Whether the last edit returned the same code.
+        about: What the scope `task` of a rule means.
+    """
     return (
         _templates()
         .get_template(f"{kind}.md.j2")
         .render(
             prompt=prompt,
             controller=controller.rstrip(),
-            feedback=render_feedback(report),
+            feedback=feedback,
             earlier=earlier,
             rules=rules,
             unchanged=unchanged,
+            about=about,
             most_operations=MAX_OPERATIONS,
             longest_rule=MAX_RULE_CHARS,
         )

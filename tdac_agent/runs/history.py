@@ -46,6 +46,7 @@ class CandidateHistory:
         source: Its code, if there is any.
         diff: Unified diff from the previous candidate.
         learnt: Rules in force when it was written, and later changes to them.
+        on_set: Whether it is for a task set.
     """
 
     k: int
@@ -57,6 +58,7 @@ class CandidateHistory:
     source: str | None
     diff: str
     learnt: RuleChanges
+    on_set: bool = False
 
     @property
     def failed(self) -> tuple[str, ...]:
@@ -80,10 +82,11 @@ class Told:
     Attributes:
         run: Its record.
         status: Its present status; see `status_now`.
-        task: Its task; None if it cannot be read.
+        task: Its task; None if it cannot be read, or for a task set.
         tried: Its candidates, oldest first.
         report: Report on the verified controller, or else the last report.
-        source: The verified controller, or else the last candidate with code.
+        source: The verified or selected controller, or else the last candidate with
+            code.
         book: Its rules.
         problems: What could not be read, one line each.
     """
@@ -121,7 +124,9 @@ def gather_run(source: Path | Run) -> Told:
     reports = [one.report for one in tried if one.report is not None]
     sources = [one.source for one in tried if one.source is not None]
     report = verified_source = None
-    if run.verified:
+    if run.on_set and run.tau is not None:
+        verified_source = read_text(run.controller)
+    elif run.verified:
         report = _report(folder / "report.json", problems)
         verified_source = read_text(run.controller)
         if verified_source is None:
@@ -129,7 +134,7 @@ def gather_run(source: Path | Run) -> Told:
     return Told(
         run,
         status,
-        _try_to(problems, lambda: load_task(folder)),
+        None if run.on_set else _try_to(problems, lambda: load_task(folder)),
         tried,
         report or (reports[-1] if reports else None),
         verified_source or (sources[-1] if sources else None),
@@ -169,6 +174,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
         attempt = judged.get((k, j))
         folder = run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
         has_report = attempt is not None and attempt.valid and not attempt.unchanged
+        has_report = has_report and not run.on_set
         yield CandidateHistory(
             k,
             j,
@@ -179,6 +185,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
             read_text(folder / "controller.py"),
             read_text(folder / "controller.diff") or "",
             learnt.get((k, j), RuleChanges()),
+            run.on_set,
         )
 
 

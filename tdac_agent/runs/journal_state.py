@@ -19,7 +19,8 @@ KEY_SCHEMA = 1
 # Steps that a resumed run repeats, and does not record again.
 REPEATED = (
     *("prove.start", "prove.end", "verify.start", "verify.end"),
-    *("call.unused", "rules"),
+    *("call.unused", "rules", "drive.start", "drive.end"),
+    *("select.end", "hidden.start", "hidden.end"),
 )
 _REPLY = TypeAdapter(Reply)
 _AMOUNT = TypeAdapter(Amount)

@@ -11,7 +11,6 @@ from tdac_agent.models.tariff import MAX_COST
 from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.run_record import PROMPT_FILE, Run
 from tdac_agent.tasks.installation import keyed, lasting_secret
-from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish, tree_sha256
 
 OWN_SUITE = "suite"
@@ -20,12 +19,12 @@ OURS = "builtin"
 """The learner that needs no permission."""
 
 
-def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
+def wishes_of(run: Run, suite: Path | None, given: Container[str]) -> Iterator[Wish]:
     """Yields the permissions that resuming another installation's run needs.
 
     Args:
         run: The run as recorded.
-        task: Its task as recorded.
+        suite: Folder with the user's own tests, as recorded.
         given: Arguments of `synthesize`, or `suite`, which need no permission.
     """
     if "learner" not in given and run.learner != OURS:
@@ -40,8 +39,8 @@ def wishes_of(run: Run, task: Task, given: Container[str]) -> Iterator[Wish]:
         what = f"fill in the template {template}"
         digest = file_sha256(template) if template.is_file() else ""
         yield Wish(what, ("--prompt", str(template)), digest)
-    if task.suite is not None and "suite" not in given:
-        yield suite_wish(task.suite)
+    if suite is not None and "suite" not in given:
+        yield suite_wish(suite)
     if run.seed is not None and "seed" not in given:
         what = f"choose the jittered starts (seed {run.seed})"
         yield Wish(what, ("--seed", str(run.seed)))

@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -75,26 +76,42 @@ class Recorder:
             given: Source of an initial controller, if there is one.
             **facts: Further fields of the journal record.
         """
+        last = TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE)
+        own = self.run.folder / OWN_SUITE if task.suite else None
+        self.begin(partial(_write_task, task), last, template, given, own, **facts)
+
+    def begin(
+        self,
+        write: Callable[[Path], None],
+        last: tuple[str, str],
+        template: PromptTemplate,
+        given: str | None,
+        suite: Path | None = None,
+        **facts: Any,
+    ) -> None:
+        """Writes the files of a new run, and begins the journal.
+
+        Args:
+            write: Writes what the run is about into its folder.
+            last: Name and content of the file that is written last.
+            template: Template of the first question; a copy is kept unless shipped.
+            given: Source of an initial controller, if there is one.
+            suite: Where `write` puts the user's own tests, if there are any.
+            **facts: Further fields of the journal record.
+        """
         folder = self.run.folder
         self.save()
-        write_workdir(folder, task)
-        write_atomic(folder / PREVIEW_FILE, png(task.setting.preview()))
-        if task.suite is not None:
-            ignored = shutil.ignore_patterns("__pycache__")
-            own = folder / OWN_SUITE
-            shutil.copytree(task.suite, own, ignore=ignored, dirs_exist_ok=True)
-        original = task.setting.original
-        if original is not None:
-            write_atomic(folder / original.name, original.file.read_bytes())
+        write(folder)
         if template.text is not None:
             write_atomic(folder / PROMPT_FILE, template.text)
         if given is not None:
             write_atomic(folder / GIVEN_FILE, given)
-        self.run.mark = sign(self.run, folder / OWN_SUITE if task.suite else None)
+        self.run.mark = sign(self.run, suite)
         self.save()
         # Written last: a run with a task but no mark is from another installation.
-        write_atomic(folder / TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE))
-        self.event("run.start", task=task.name, learner=self.run.learner, **facts)
+        write_atomic(folder / last[0], last[1])
+        about = {"task": self.run.task, "learner": self.run.learner}
+        self.event("run.start", **about, **facts)
 
     def resume(self, before: Run, **facts: Any) -> None:
         """Records that the run is resumed, and what is on record already.
@@ -254,6 +271,10 @@ class Recorder:
             notes=notes,
             unchanged=unchanged,
         )
+        return self.attempted(attempt)
+
+    def attempted(self, attempt: Attempt) -> bool:
+        """Records the result of a candidate; returns whether it is new."""
         self.run.attempts.append(attempt)
         new = self.event("verify.end", **attempt.model_dump(mode="json"))
         if new:
@@ -303,6 +324,19 @@ class Recorder:
 
     def _elapsed(self) -> float:
         return self.past.seconds + time.monotonic() - self._clock
+
+
+def _write_task(task: Task, folder: Path) -> None:
+    """Writes what a run on a task is about: the working files, tests, the original."""
+    write_workdir(folder, task)
+    write_atomic(folder / PREVIEW_FILE, png(task.setting.preview()))
+    if task.suite is not None:
+        ignored = shutil.ignore_patterns("__pycache__")
+        own = folder / OWN_SUITE
+        shutil.copytree(task.suite, own, ignore=ignored, dirs_exist_ok=True)
+    original = task.setting.original
+    if original is not None:
+        write_atomic(folder / original.name, original.file.read_bytes())
 
 
 def _about(request: Request, key: str) -> dict[str, Any]:

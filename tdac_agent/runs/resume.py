@@ -38,6 +38,8 @@ CONFIGURATION = {
     "max_output": "max output",
     "given_sha256": "initial controller",
     "prompt_sha256": "first question",
+    "episodes": "number of episodes",
+    "feedback_episodes": "feedback episodes",
 }
 
 
@@ -132,13 +134,22 @@ def resume_arguments(
     flags = {name: value for name, value in (given or {}).items() if value is not None}
     task = _task(folder)
     if not is_own(run, task.suite):
-        permit(folder, wishes_of(run, task, flags), trust=trust)
+        permit(folder, wishes_of(run, task.suite, flags), trust=trust)
     suite = flags.pop("suite", None)
     if task.suite is not None:
         task = replace(task, suite=suite or task.suite, trusted=True)
+    return {**settings_of(run), "task": task, **flags}
+
+
+def settings_of(run: Run) -> dict[str, Any]:
+    """The settings of a run: arguments of `synthesize`, but for what it is about.
+
+    Raises:
+        RunError: Its initial controller cannot be read.
+    """
+    folder = run.folder
     initial, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
-    on_record = {
-        "task": task,
+    return {
         "learner": run.learner,
         "optimizer": None if run.optimizer == run.learner else run.optimizer,
         "iterations": run.iterations,
@@ -152,7 +163,6 @@ def resume_arguments(
         "max_output": run.max_output,
         "out": folder,
     }
-    return {**on_record, **flags}
 
 
 def _text(file: Path) -> str:

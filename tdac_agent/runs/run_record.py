@@ -16,7 +16,13 @@ from tdac_envs.core.errors import nearest, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 Status = Literal[
-    "running", "verified", "not verified", "interrupted", "fault", "budget"
+    "running",
+    "verified",
+    "not verified",
+    "selected",
+    "interrupted",
+    "fault",
+    "budget",
 ]
 Setting = Literal["dual tier", "edit only", "prompt only", "best of N", "one shot"]
 RUN_FILE = "run.json"
@@ -24,6 +30,8 @@ JOURNAL = "journal.jsonl"
 RULES_FILE = "rules.json"
 GIVEN_FILE = "given.py"
 PROMPT_FILE = "prompt.j2"
+SET_FILE = "set.yaml"
+"""The task set of a run on one."""
 
 
 class Attempt(PrintableRecord):
@@ -90,6 +98,17 @@ class Run(PrintableRecord):
     mark: str = Field(
         "", description="MAC by which an installation recognises its own runs."
     )
+    episodes: int | None = Field(
+        None,
+        description="Simulated episodes that the candidates of a run on a task set may "
+        "use; None for a run on one task.",
+    )
+    feedback_episodes: int | None = Field(
+        None, description="Most episodes of a test of a candidate on a task set."
+    )
+    then_verify: bool = Field(
+        False, description="Whether the selected controller drives on hidden worlds."
+    )
     id: str = ""
     started: str
     seconds: float = 0.0
@@ -106,7 +125,12 @@ class Run(PrintableRecord):
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        return self.status in {"verified", "not verified"}
+        return self.status in {"verified", "not verified", "selected"}
+
+    @property
+    def on_set(self) -> bool:
+        """Whether the controller is for a task set, not for one task."""
+        return self.episodes is not None
 
     @property
     def setting(self) -> Setting:
@@ -120,7 +144,7 @@ class Run(PrintableRecord):
 
     @property
     def controller(self) -> Path:
-        """Path of the verified controller."""
+        """Path of the verified or selected controller."""
         return self.folder / "controller.py"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import ConfigDict, Field
 
 from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
@@ -59,14 +61,8 @@ def predict_cost(
     optimizer: str,
     prices: PriceList,
     *,
-    iterations: int = 20,
-    patience: int = 1,
-    refine: bool = True,
     template: PromptTemplate = FULL,
-    base_url: str | None = None,
-    max_output: int = MAX_OUTPUT_TOKENS,
-    max_cost: float | None = None,
-    max_tokens: int | None = None,
+    **limits: Any,
 ) -> CostForecast:
     """Predicts the first prompt and the cost bounds of a run, without a model or key.
 
@@ -75,19 +71,47 @@ def predict_cost(
         learner: Name of LLM1.
         optimizer: Name of LLM2.
         prices: Prices of the models.
-        iterations: K.
-        patience: J.
-        refine: Whether failures become rules.
         template: Template of the question for a new controller.
-        base_url: URL of the models' server; by default the vendor's.
-        max_output: Token limit of an answer.
-        max_cost: Limit in USD; by default 2.
-        max_tokens: Limit of tokens; by default as in `bounds_of`.
+        **limits: Further arguments of `cost_of`.
 
     Raises:
         PromptError: The template cannot be used.
     """
-    prompt = generate_prompt(task, (), template)
+    question = generate_prompt(task, (), template)
+    return cost_of(task.name, question, learner, optimizer, prices, **limits)
+
+
+def cost_of(
+    name: str,
+    prompt: str,
+    learner: str,
+    optimizer: str,
+    prices: PriceList,
+    *,
+    iterations: int = 20,
+    patience: int = 1,
+    refine: bool = True,
+    base_url: str | None = None,
+    max_output: int = MAX_OUTPUT_TOKENS,
+    max_cost: float | None = None,
+    max_tokens: int | None = None,
+) -> CostForecast:
+    """Predicts the cost bounds of a run from its first question.
+
+    Args:
+        name: Name of the task or task set.
+        prompt: The first question.
+        learner: Name of LLM1.
+        optimizer: Name of LLM2.
+        prices: Prices of the models.
+        iterations: K.
+        patience: J.
+        refine: Whether failures become rules.
+        base_url: URL of the models' server; by default the vendor's.
+        max_output: Token limit of an answer.
+        max_cost: Limit in USD; by default 2.
+        max_tokens: Limit of tokens; by default as in `bounds_of`.
+    """
     tokens = estimate_tokens(prompt)
     work = whole(iterations, patience, refine=refine)
     sizes = tokens_asked(tokens, max_output)
@@ -117,7 +141,7 @@ def predict_cost(
     if first_cost != 0.0:
         worst = Tariff(price=first).most(most_tokens(prompt), max_output)
     return CostForecast(
-        task=task.name,
+        task=name,
         learner=learner,
         optimizer=optimizer,
         iterations=iterations,

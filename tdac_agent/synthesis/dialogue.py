@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from tdac_agent.models.provider import Kind, Provider, Reply, Request
 from tdac_agent.prompting.extract import Answer, read_answer
-from tdac_agent.prompting.feedback import tell_attempt
-from tdac_agent.prompting.prompt import (
-    FULL,
-    PromptTemplate,
-    generate_prompt,
-    repair_prompt,
-)
+from tdac_agent.prompting.feedback import Feedback
+from tdac_agent.prompting.prompt import ONE_TASK, repair_question
 from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_operations
-from tdac_agent.prompting.rules import BEGIN, RuleBook
+from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.storage.secrets import one_line
 from tdac_agent.synthesis.calls import Calls
-from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.report import Report
 
 MAX_ASKS = 3
 MAX_EARLIER = 12
@@ -41,21 +35,21 @@ class Dialogue:
     """The Learner (LLM1) and the Optimizer (LLM2) of one run.
 
     Attributes:
-        task: What the controller must do.
+        question: The question for a new controller under some rules.
         learner: Generates controllers.
         optimizer: Edits them and writes rules.
         calls: Asks every question.
         book: Rules of this run, in force and ended.
-        template: Template of the question for a new controller.
+        about: What the scope `task` of a rule means.
         earlier: The attempts so far, one line each.
     """
 
-    task: Task
+    question: Callable[[tuple[RepairRule, ...]], str]
     learner: Provider
     optimizer: Provider
     calls: Calls
     book: RuleBook = field(default_factory=RuleBook)
-    template: PromptTemplate = FULL
+    about: str = ONE_TASK
     earlier: tuple[str, ...] = ()
     _failed: int = 0
     _unchanged: bool = False
@@ -72,18 +66,17 @@ class Dialogue:
         )
         return self._code(self.learner, request)
 
-    def edit(self, k: int, j: int, source: str, report: Report) -> ModelAnswer:
+    def edit(self, k: int, j: int, source: str, failure: Feedback) -> ModelAnswer:
         """Asks for a repaired controller, candidate (k, j)."""
-        request = self._repair("edit", source, report, self._at(k, j))
+        request = self._repair("edit", source, failure, self._at(k, j))
         return self._code(self.optimizer, request)
 
-    def summarise(self, k: int, j: int, source: str, report: Report) -> None:
+    def summarise(self, k: int, j: int, source: str, failure: Feedback) -> None:
         """Asks for changes of the rules after a failure, and applies them.
 
         After a malformed answer, asks up to twice more; then the rules stay unchanged.
         """
-        request = self._repair("summarise", source, report, self._at(k, j))
-        evidence = tuple(failure.test for failure in report.failures)
+        request = self._repair("summarise", source, failure, self._at(k, j))
         for asked in range(1, MAX_ASKS + 1):
             reply = self.calls.ask(self.optimizer, request)
             try:
@@ -93,7 +86,7 @@ class Dialogue:
             except RuleAnswerError as error:
                 request = self._again(request, reply, str(error), asked)
                 continue
-            self.book, notes = apply(self.book, operations, k, evidence)
+            self.book, notes = apply(self.book, operations, k, failure.failed)
             self.calls.recorder.rules(k, self.book, notes or ("no change",))
             return
         self.calls.recorder.rules(k, self.book, ("no usable answer: rules unchanged",))
@@ -103,39 +96,46 @@ class Dialogue:
         self.earlier = (*self.earlier, f"k={k} j={j}: no change: {_SAME}")
         self._unchanged = True
 
-    def saw(self, k: int, j: int, report: Report) -> None:
+    def saw_again(self, k: int, j: int, first: tuple[int, int]) -> None:
+        """Notes that candidate (k, j) has the code of an earlier candidate."""
+        same = f"same code as k={first[0]} j={first[1]}"
+        self.earlier = (*self.earlier, f"k={k} j={j}: {same}")
+        self._unchanged = False
+
+    def saw(self, k: int, j: int, result: Feedback) -> None:
         """Notes the result of candidate (k, j), and updates the rules in force."""
         self._unchanged = False
-        failed = tuple(failure.test for failure in report.failures)
+        failed = result.failed
         if j == 0 and self.book.in_force:
             self.book = self.book.observed(failed, self._failed)
             self.calls.recorder.rules(k, self.book)
         self._failed = len(failed)
         if failed:
-            self.earlier = (*self.earlier, tell_attempt(k, j, report))
+            self.earlier = (*self.earlier, f"k={k} j={j}: {result.line}")
 
     def _question(self) -> str:
-        return generate_prompt(self.task, self.book.in_force, self.template)
+        return self.question(self.book.in_force)
 
     def _repair(
-        self, kind: Kind, source: str, report: Report, sample: tuple[int, int, int]
+        self, kind: Kind, source: str, failure: Feedback, sample: tuple[int, int, int]
     ) -> Request:
-        question = repair_prompt(
+        question = repair_question(
             kind,
             self._question(),
             source,
-            report,
+            failure.text,
             # Without the last attempt, which the question is about.
             earlier=self.earlier[:-1][-MAX_EARLIER:],
             rules=self.book.in_force,
             unchanged=self._unchanged,
+            about=self.about,
         )
         stable = _stable(question)
         return Request(
             kind,
             question,
             source,
-            report,
+            failure.report,
             self._texts(),
             sample,
             stable=stable,

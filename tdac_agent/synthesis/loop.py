@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tdac_agent.errors import Fault
@@ -12,7 +13,8 @@ from tdac_agent.models.choice import choose_models
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.extract import same_code
-from tdac_agent.prompting.prompt import load_template
+from tdac_agent.prompting.feedback import feedback_of
+from tdac_agent.prompting.prompt import generate_prompt, load_template
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
@@ -131,9 +133,8 @@ def synthesize(
             if before.finished:
                 check_own(before)
                 return before
-        recorder = open_record(
-            task, run, before, template, start_from, account, on_event
-        )
+        start = partial(Recorder.start, task=task, template=template, given=start_from)
+        recorder = open_record(start, run, before, account, on_event, task.suite)
         calls = Calls(
             recorder,
             account.budget,
@@ -141,17 +142,19 @@ def synthesize(
             retry or RetryPolicy(),
             max_output,
         )
-        dialogue = Dialogue(task, *models, calls, template=template)
+        question = partial(generate_prompt, task, template=template)
+        dialogue = Dialogue(question, *models, calls)
         paid = any(model.paid for model in models)
         with ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge(task=task))
-            return _run(dialogue, start_from, _Tests(warm, tier), paid=paid)
+            return _run(dialogue, start_from, _Tests(task, warm, tier), paid=paid)
 
 
 @dataclass(frozen=True, slots=True)
 class _Tests:
-    """Where candidates are tested: by which judge, in which sandbox tier."""
+    """Where candidates are tested: on a task, by a judge, in a sandbox tier."""
 
+    task: Task
     judge: WarmJudge
     tier: str
 
@@ -161,7 +164,7 @@ def _run(dialogue: Dialogue, given: str | None, tests: _Tests, *, paid: bool) ->
     recorder = dialogue.calls.recorder
     try:
         if paid:
-            _prove(dialogue.task, recorder, tests)
+            _prove(recorder, tests)
         _search(dialogue, given, tests)
     except OutOfBudget as error:
         facts = {"enough": error.way_on, "outlook": error.outlook}
@@ -186,14 +189,14 @@ def _search(dialogue: Dialogue, given: str | None, tests: _Tests) -> None:
     empty = 0
     for k in range(1, run.iterations + 1):
         candidate = (k == 1 and first) or dialogue.generate(k)
-        parent, report = "", None
+        parent, report, failure = "", None, None
         for j in range(run.patience + 1):
             source, notes = candidate
             if source is None:
                 new = recorder.judged(k, j, None, notes)
                 empty += new and j == 0
                 if dialogue.learner.paid and empty >= MOST_SPENT and k < run.iterations:
-                    raise _given_up(dialogue.learner, empty, notes)
+                    raise given_up(dialogue.learner, empty, notes)
                 break
             empty = 0
             folder = recorder.candidate(k, j, source)
@@ -201,21 +204,23 @@ def _search(dialogue: Dialogue, given: str | None, tests: _Tests) -> None:
                 recorder.judged(k, j, report, notes, unchanged=True)
                 dialogue.saw_no_change(k, j)
             else:
-                report = _verify(dialogue.task, recorder, k, j, source, folder, tests)
+                report = _verify(recorder, k, j, source, folder, tests)
                 recorder.judged(k, j, report, notes)
-                dialogue.saw(k, j, report)
+                failure = feedback_of(report)
+                dialogue.saw(k, j, failure)
             if report.passed:
-                _deliver(recorder, dialogue.task, k, source, report, folder)
+                _deliver(recorder, tests.task, k, source, report, folder)
                 return
             parent = source
+            assert failure is not None
             if j < run.patience:
-                candidate = dialogue.edit(k, j + 1, source, report)
+                candidate = dialogue.edit(k, j + 1, source, failure)
             elif run.refine:
-                dialogue.summarise(k, j, source, report)
+                dialogue.summarise(k, j, source, failure)
     recorder.finish("not verified")
 
 
-def _given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
+def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
     """The fault of a model that gives no code, with the note on its last answers."""
     return Fault(
         f"{model.name}: {count} iterations in a row without a controller; in the last "
@@ -223,7 +228,7 @@ def _given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
     )
 
 
-def _prove(task: Task, recorder: Recorder, tests: _Tests) -> None:
+def _prove(recorder: Recorder, tests: _Tests) -> None:
     """Checks the test suite before an answer is paid for, once per run.
 
     Raises:
@@ -238,13 +243,14 @@ def _prove(task: Task, recorder: Recorder, tests: _Tests) -> None:
 
     recorder.event("prove.start")
     seed, judge = recorder.run.seed, tests.judge
-    proof = prove_suite(task, tier=tests.tier, seed=seed, judge=judge, on_progress=tell)
+    proof = prove_suite(
+        tests.task, tier=tests.tier, seed=seed, judge=judge, on_progress=tell
+    )
     facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
     recorder.event("prove.end", **facts)
 
 
 def _verify(
-    task: Task,
     recorder: Recorder,
     k: int,
     j: int,
@@ -253,7 +259,7 @@ def _verify(
     tests: _Tests,
 ) -> Report:
     """The report on a candidate; a recorded one is reused."""
-    seed = recorder.run.seed
+    task, seed = tests.task, recorder.run.seed
     recorder.event("verify.start", k=k, j=j)
     kept = kept_report(folder, task, source, seed) if recorder.run.mark else None
     return kept or verify(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import secrets
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -80,7 +80,7 @@ def describe(
     start_from: str | None,
     **facts: Any,
 ) -> Run:
-    """The record of a run that has not begun.
+    """The record of a run on a task that has not begun.
 
     Args:
         task: What the controller must do.
@@ -92,18 +92,37 @@ def describe(
     Raises:
         PromptError: The template cannot be used.
     """
-    addresses = {model.name: served_at(model) for model in models}
-    return Run(
+    return new_run(
+        models,
+        generate_prompt(task, (), template),
+        start_from,
         task=task.name,
         task_sha256=task.sha256(),
         profile=task.spec.profile,
+        prompt=template.name,
+        suite_sha256=suite_sha256(task),
+        **facts,
+    )
+
+
+def new_run(
+    models: Sequence[Provider], question: str, start_from: str | None, **facts: Any
+) -> Run:
+    """The record of a run that has not begun.
+
+    Args:
+        models: Learner and optimizer.
+        question: The first question.
+        start_from: Source of an initial controller, if there is one.
+        **facts: Further fields of `Run`.
+    """
+    addresses = {model.name: served_at(model) for model in models}
+    return Run(
         learner=models[0].name,
         optimizer=models[1].name,
         served_at={name: url for name, url in addresses.items() if url is not None},
-        prompt=template.name,
         version=importlib.metadata.version("tdac"),
-        suite_sha256=suite_sha256(task),
-        prompt_sha256=_hash(generate_prompt(task, (), template)),
+        prompt_sha256=_hash(question),
         given_sha256=None if start_from is None else _hash(start_from),
         cost=0.0,
         id=secrets.token_hex(8),
@@ -143,15 +162,23 @@ def hold_folder(out: Path) -> Generator[None]:
 
 
 def open_record(
-    task: Task,
+    start: Callable[..., None],
     run: Run,
     before: Run | None,
-    template: PromptTemplate,
-    given: str | None,
     account: Account,
     on_event: Event | None,
+    suite: Path | None = None,
 ) -> Recorder:
     """The recorder of a new or resumed run; recorded calls count in the budget.
+
+    Args:
+        start: Writes the files of a new run; takes the recorder, and facts for the
+            journal.
+        run: The record.
+        before: The record of an earlier process, if there was one.
+        account: What the run may spend.
+        on_event: Called with each journal record.
+        suite: The user's own tests, if there are any.
 
     Raises:
         RunError: The folder cannot be written.
@@ -167,7 +194,7 @@ def open_record(
         run.id, run.started, run.prompt = before.id, before.started, before.prompt
         # Another installation's run gets no mark, even if it is trusted this time.
         if is_own_folder(before):
-            run.mark = sign(run, run.folder / OWN_SUITE if task.suite else None)
+            run.mark = sign(run, run.folder / OWN_SUITE if suite else None)
     try:
         repair_end(run.folder / JOURNAL)
         past = read_past(read_records(run.folder / JOURNAL))
@@ -177,7 +204,7 @@ def open_record(
             clear_unfinished(run.folder)
             recorder.resume(before, **facts)
         else:
-            recorder.start(task, template, given, **facts)
+            start(recorder, **facts)
     except OSError as error:
         raise RunError(f"cannot write to {run.folder}: {error.strerror}") from error
     return recorder

@@ -1,0 +1,69 @@
+"""Provider `builtin` for task sets: a hand-written controller for each level."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tdac_agent.models.provider import PermanentFault, Reply, Request
+from tdac_envs.ladder.set_file import set_names
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+
+LEVELS = Path(__file__).with_name("levels")
+"""Folder of the controllers, by the name of their level."""
+
+
+class LevelController:
+    """A provider that answers with the controller of a level; see `Provider`.
+
+    Args:
+        tasks: The task set.
+
+    Attributes:
+        missing: Why it cannot answer; empty if there is a controller.
+    """
+
+    name = "builtin"
+    paid = False
+    fixed = True
+
+    def __init__(self, tasks: TaskSet) -> None:
+        level = level_of(tasks)
+        self._file = LEVELS / f"{level}.py"
+        self.missing = () if level is not None else (_none_for(tasks),)
+
+    def complete(self, request: Request) -> Reply:
+        """Answers one request; see `Provider`. Adds no rules.
+
+        Raises:
+            PermanentFault: There is no controller for what is observed in the set.
+        """
+        if self.missing:
+            raise PermanentFault(self.missing[0])
+        if request.kind == "summarise":
+            return Reply("```json\n[]\n```\n")
+        source = self._file.read_text(encoding="utf-8")
+        note = f"the built-in controller of the level {self._file.stem}"
+        return Reply(f"```python\n{source}```\n", notes=(note,))
+
+
+def _none_for(tasks: TaskSet) -> str:
+    known = ", ".join(path.stem for path in sorted(LEVELS.glob("*.py")))
+    return (
+        f"no built-in controller for the task set {tasks.name} (only for {known}, and "
+        "for sets with the same observations): name a model with --learner"
+    )
+
+
+def level_of(tasks: TaskSet) -> str | None:
+    """The level with a built-in controller whose observations are those of a set.
+
+    A set with the name of a level has only the controller of this level.
+    """
+    equal = [name for name in set_names() if _given(load_set(name)) == _given(tasks)]
+    names = [tasks.name] if tasks.name in equal else equal
+    return next((name for name in names if (LEVELS / f"{name}.py").is_file()), None)
+
+
+def _given(tasks: TaskSet) -> tuple[frozenset[str], str, bool]:
+    file = tasks.file
+    return frozenset(file.observed), file.frame, file.map

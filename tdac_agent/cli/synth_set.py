@@ -1,0 +1,257 @@
+"""`tdac synth --set`: writes a controller for worlds that it has never seen."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.markup import escape
+from rich.table import Table
+
+from tdac_agent.cli import dry_run as dry
+from tdac_agent.cli import verify_set
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.progress import Progress
+from tdac_agent.cli.run_view import print_budget_end, usage_of
+from tdac_agent.cli.synth import next_folder, read_text
+from tdac_agent.cli.synth_set_flags import SynthSetFlags
+from tdac_agent.errors import Fault
+from tdac_agent.evaluation.set_report import SetReport
+from tdac_agent.models.choice import check_name
+from tdac_agent.prompting.prompt import load_template
+from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.runs.resume import check_own, existing_run
+from tdac_agent.runs.run_record import SET_FILE, Run
+from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
+from tdac_agent.set_synthesis.resume import resume_set_arguments
+from tdac_agent.set_synthesis.selection import CandidateFigures, Selection
+from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+
+_EXIT = {"verified": 0, "selected": 0, "budget": 4}
+
+
+class SetProgress(Progress):
+    """Shows the journal records of a run on a task set."""
+
+    def __call__(self, record: dict[str, Any]) -> None:
+        """Shows one record."""
+        match record["event"]:
+            case "drive.start":
+                self.doing(f"{_driven(record)}: {record['worlds']} worlds")
+            case "drive.step":
+                so_far = f"{record['reached']} of {record['done']} worlds reached"
+                self.doing(f"{_driven(record)}: {so_far}")
+            case "drive.end" if record["what"] == "validation":
+                result = f"{record['reached']} of {record['driven']} reached"
+                self.say(f"  {_at(record)}", f"validation worlds: {result}", "dim")
+            case "hidden.start":
+                self.doing("driving on hidden worlds")
+            case _:
+                super().__call__(record)
+
+    def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
+        said = escape("; ".join(record["notes"][-1:]))
+        if not record["valid"]:
+            self.say(f"– {at}", said, "yellow")
+        elif record["unchanged"]:
+            self.say(f"= {at}", said, "yellow")
+        elif record["passed"]:
+            self.say(f"✔ {at}", said, "green")
+        else:
+            self.say(f"[red]✘ {at}[/]", f"[red]{said}[/]")
+
+
+def _at(record: dict[str, Any]) -> str:
+    return f"k={record['k']} j={record['j']}"
+
+
+def _driven(record: dict[str, Any]) -> str:
+    """What is being driven, for the spinner."""
+    if record["what"] == "hidden":
+        return "hidden worlds"
+    return f"{_at(record)}  {record['what']}"
+
+
+def run(
+    flags: SynthSetFlags,
+    wanted: dict[str, Any],
+    out: Path | None,
+    start_from: Path | None,
+    as_json: bool,
+) -> int:
+    """Writes a controller for a set and prints the run; returns the exit code.
+
+    Args:
+        flags: Flags that concern task sets.
+        wanted: Further arguments of `synthesize_on_set`.
+        out: Run folder; the next free one by default.
+        start_from: Controller to begin with.
+        as_json: Whether to print the run record as JSON.
+    """
+    check_tier(wanted["tier"])
+    assert flags.name is not None
+    tasks = load_set(flags.name)
+    source = None if start_from is None else read_text(start_from)
+    folder = out if out is not None else next_folder(tasks.name)
+    own = {"tasks": tasks, "out": folder, "start_from": source}
+    return _write({**wanted, **flags.settings(), **own}, Console(stderr=as_json))
+
+
+def resume(
+    before: Run, given: dict[str, Any], then_verify: bool, trust: bool, as_json: bool
+) -> int:
+    """Continues a run with its own settings; returns the exit code.
+
+    Args:
+        before: The run as recorded.
+        given: Flags given again, `max_cost`, `max_tokens` and `tier`.
+        then_verify: Whether to drive on hidden worlds at the end.
+        trust: Whether a run from elsewhere may contact all that it names.
+        as_json: Whether to print the run record as JSON.
+    """
+    check_tier(given["tier"])
+    console = Console(stderr=as_json)
+    if before.finished and not (then_verify and before.status == "selected"):
+        check_own(before)
+        return _show(before, console, before=before)
+    wanted = resume_set_arguments(before, given, trust=trust)
+    return _write({**wanted, "then_verify": then_verify}, console)
+
+
+def dry_run(
+    flags: SynthSetFlags, models: dict[str, Any], loop: dict[str, Any], as_json: bool
+) -> int:
+    """Prints the first question to stdout, the cost to stderr; returns 0.
+
+    Args:
+        flags: Flags that concern task sets.
+        models: As for `dry_run.run`.
+        loop: `iterations`, `patience` and `refine`.
+        as_json: Whether to print the forecast as JSON.
+    """
+    assert flags.name is not None
+    for name in (models["learner"], models["optimizer"] or models["learner"]):
+        check_name(name)
+    tasks = load_set(flags.name)
+    question = set_prompt(tasks, (), load_template(models["prompt"]))
+    return dry.show(tasks.name, tasks, question, models, loop, as_json)
+
+
+def _write(wanted: dict[str, Any], console: Console) -> int:
+    folder = wanted["out"]
+    before = existing_run(folder)
+    try:
+        with SetProgress(console, _heading(wanted)) as progress:
+            result = synthesize_on_set(**wanted, on_event=progress)
+    except (KeyboardInterrupt, Fault, OSError):
+        console.print(_so_far(folder), soft_wrap=True)
+        raise
+    return _show(result, console, before=before)
+
+
+def _so_far(folder: Path) -> str:
+    """Where the unfinished run is, and the command to continue it."""
+    if not (folder / SET_FILE).is_file():
+        return "the run had not begun"
+    return f"the run so far is in {folder}; to continue: tdac synth --resume {folder}"
+
+
+def _heading(wanted: dict[str, Any]) -> str:
+    tasks: TaskSet = wanted["tasks"]
+    learner, optimizer = wanted["learner"], wanted["optimizer"]
+    model = " (no language model)" if learner == "builtin" else ""
+    if optimizer not in (None, learner):
+        model += f", optimizer [bold]{escape(str(optimizer))}[/]"
+    return (
+        f"task set [bold]{escape(tasks.name)}[/] {tasks.sha256[:8]}, worlds of dev; "
+        f"learner [bold]{escape(learner)}[/]{model}"
+    )
+
+
+def _show(run: Run, console: Console, *, before: Run | None) -> int:
+    """Prints a run, as JSON if the console is stderr; returns the exit code."""
+    code = _EXIT.get(run.status, 1)
+    if console.stderr:
+        sys.stdout.write(run.model_dump_json(indent=2) + "\n")
+        return code
+    if before is not None and before.finished and before.status == run.status:
+        note = f"the run in {run.folder} has already finished; nothing was done"
+        console.print(note, soft_wrap=True)
+    if run.status == "budget":
+        print_budget_end(run, console)
+        return code
+    if run.tau is not None:
+        _show_selected(run, console)
+    else:
+        reason = escape(run.reason)
+        console.print(f"[bold red]no controller was selected[/]: {reason}")
+        console.print(f"  the attempts are in {run.folder / 'iterations'}")
+    usage = usage_of(run)
+    if usage:
+        console.print(f"  {escape(usage)}")
+    return code
+
+
+def _show_selected(run: Run, console: Console) -> None:
+    """Prints the selection, the verdict on hidden worlds if any, and next commands."""
+    content = read_file(run.folder / "report.json", RECORD_BYTES)
+    selection = Selection.model_validate_json(content)
+    console.print(_candidates(selection))
+    used = selection.feedback_used + selection.validation_used
+    console.print(
+        f"  goals reached, of worlds of dev; {used} of at most {selection.episodes} "
+        "episodes were driven",
+        highlight=False,
+    )
+    if selection.stopped:
+        console.print(f"  the writing ended: {escape(selection.stopped)}")
+    console.print(
+        f"[bold]selected[/] k={selection.k} j={selection.j}, {run.seconds:.0f} s: "
+        f"{escape(str(run.controller))}",
+        soft_wrap=True,
+    )
+    scores = selection.optimistic
+    if scores is not None:
+        console.print(
+            f"  selected, optimistic: {100 * scores.success:.1f} % reached, time score "
+            f"{scores.time:.3f}",
+            highlight=False,
+        )
+    hidden = run.folder / HIDDEN_REPORT
+    if run.status != "selected" and hidden.is_file():
+        text = read_file(hidden, RECORD_BYTES)
+        verify_set.show(SetReport.model_validate_json(text), console)
+        return
+    console.print(
+        f"  not verified yet: tdac verify {run.controller} --set "
+        f"{run.folder / SET_FILE}",
+        soft_wrap=True,
+        highlight=False,
+    )
+
+
+def _candidates(selection: Selection) -> Table:
+    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
+    for name in ("k", "j", "feedback", "validation", "time score"):
+        table.add_column(name, justify="right")
+    for each in selection.candidates:
+        chosen = (each.k, each.j) == (selection.k, selection.j)
+        table.add_row(*_cells(each), style="bold" if chosen else None)
+    return table
+
+
+def _cells(each: CandidateFigures) -> tuple[str, ...]:
+    time = "" if each.validation_time is None else f"{each.validation_time:.3f}"
+    driven = f"{each.validation_reached}/{each.validation_worlds}"
+    return (
+        str(each.k),
+        str(each.j),
+        f"{each.feedback_reached}/{each.feedback_worlds}",
+        driven if each.validation_worlds else "",
+        time,
+    )

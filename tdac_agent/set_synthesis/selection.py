@@ -1,0 +1,106 @@
+"""Selects a candidate by successive halving on validation worlds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from pydantic import ConfigDict, Field
+
+from tdac_agent.evaluation.set_report import Scores, scores_of
+from tdac_agent.set_synthesis.trials import Candidate
+from tdac_agent.storage.printable_record import PrintableRecord
+
+
+class _Record(PrintableRecord):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CandidateFigures(_Record):
+    """How a candidate drove, in numbers of worlds of `dev`."""
+
+    k: int
+    j: int
+    controller_sha256: str
+    feedback_worlds: int
+    feedback_reached: int
+    validation_worlds: int
+    validation_reached: int
+    validation_time: float | None = Field(
+        description="Mean time score; None without validation worlds."
+    )
+
+
+class Selection(_Record):
+    """`report.json` of a run on a task set: what was selected, and from what.
+
+    The figures of the selected candidate are optimistic: it was chosen by them.
+    """
+
+    schema_version: int = 1
+    set: str
+    set_sha256: str
+    split: str = "dev"
+    first_feedback: int = Field(description="Number of the first feedback world.")
+    first_validation: int = Field(description="Number of the first validation world.")
+    episodes: int = Field(description="Limit of simulated episodes.")
+    feedback_used: int
+    validation_used: int
+    candidates: tuple[CandidateFigures, ...]
+    k: int = Field(description="Iteration of the selected candidate.")
+    j: int = Field(description="Its edit.")
+    controller_sha256: str
+    optimistic: Scores | None = Field(
+        description="Its scores on validation worlds; None without any."
+    )
+    stopped: str = Field("", description="What ended the writing early.")
+
+
+def scores_of_selected(candidate: Candidate) -> Scores | None:
+    """The scores of a candidate on validation worlds; None without any."""
+    return scores_of(candidate.validation) if candidate.validation else None
+
+
+def select(
+    candidates: Sequence[Candidate],
+    episodes: int,
+    drive: Callable[[Candidate, int], None],
+) -> Candidate:
+    """The best candidate; of equals, the earlier one.
+
+    In each round, all candidates drive on the same further worlds, and the better half
+    stays. Each round has about the same number of episodes, the last one also those
+    that are left. A single candidate drives all of them.
+
+    Args:
+        candidates: The candidates, oldest first; at least one.
+        episodes: Number of episodes.
+        drive: Drives a candidate on its next worlds, of this number.
+    """
+    left = list(candidates[:1] if episodes < 2 else _affordable(candidates, episodes))
+    rounds = max(1, math.ceil(math.log2(len(left))))
+    for number in range(rounds):
+        # Those of earlier rounds that could not be divided are for the last one.
+        share = episodes if number == rounds - 1 else episodes // (rounds - number)
+        count = share // len(left)
+        for candidate in left if count else ():
+            drive(candidate, count)
+        episodes -= count * len(left)
+        left = _best(left, math.ceil(len(left) / 2), lambda each: each.score)
+    return left[0]
+
+
+def _affordable(candidates: Sequence[Candidate], episodes: int) -> list[Candidate]:
+    """As many candidates as can drive in each round, the best on feedback worlds."""
+    number = len(candidates)
+    while number * max(1, math.ceil(math.log2(number))) > episodes:
+        number -= 1
+    return _best(candidates, number, lambda each: each.feedback_score)
+
+
+def _best(
+    candidates: Sequence[Candidate], number: int, score: Callable[[Candidate], float]
+) -> list[Candidate]:
+    """The best ones, in their order; of equals, the earlier ones."""
+    ranked = sorted(candidates, key=score, reverse=True)[:number]
+    return [each for each in candidates if any(each is one for one in ranked)]

@@ -1,0 +1,300 @@
+"""Writes a controller for a task set: tests, repairs, selection, budget of episodes."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.models.budget import Budget
+from tdac_agent.models.choice import choose_models
+from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider, recorded_seed
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.prompting.prompt import load_template
+from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.runs.recorder import Event, Recorder
+from tdac_agent.runs.resume import check_own, check_same, existing_run
+from tdac_agent.runs.run_record import SET_FILE, Run
+from tdac_agent.set_synthesis.hidden import verify_hidden
+from tdac_agent.set_synthesis.search import search
+from tdac_agent.set_synthesis.selection import (
+    CandidateFigures,
+    Selection,
+    scores_of_selected,
+    select,
+)
+from tdac_agent.set_synthesis.trials import BLOCKS, MOST_EPISODES, Candidate, Trials
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.dialogue import Dialogue
+from tdac_agent.synthesis.setup import account_of, hold_folder, new_run, open_record
+from tdac_agent.tasks.installation import drawn_seed
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.verification.judge.set_job import level_params
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.arguments import whole_number
+from tdac_envs.ladder.task_sets import TaskSet
+
+EPISODES = 128
+"""Default limit of simulated episodes: half for tests, half for the selection."""
+FEEDBACK_EPISODES = 8
+ABOUT = "this task set"
+
+
+def synthesize_on_set(
+    tasks: TaskSet,
+    learner: str | Provider = "builtin",
+    optimizer: str | Provider | None = None,
+    *,
+    out: Path,
+    episodes: int = EPISODES,
+    feedback_episodes: int = FEEDBACK_EPISODES,
+    then_verify: bool = False,
+    iterations: int = 20,
+    patience: int = 1,
+    seed: int | None = None,
+    start_from: str | None = None,
+    base_url: str | None = None,
+    key_over_http: bool = False,
+    prompt: str = "full",
+    refine: bool = True,
+    max_output: int = MAX_OUTPUT_TOKENS,
+    max_cost: float | None = None,
+    max_tokens: int | None = None,
+    budget: Budget | None = None,
+    index: int = 0,
+    retry: RetryPolicy | None = None,
+    tier: str = "auto",
+    judge: WarmJudge | None = None,
+    on_event: Event | None = None,
+) -> Run:
+    """Writes, tests and repairs controllers for a set, and selects the best one.
+
+    Args:
+        tasks: The task set.
+        learner: As for `synthesize`, like all arguments that are not listed here.
+        optimizer: See there.
+        out: New or empty folder for the run, or one with the same run.
+        episodes: Most simulated episodes of all candidates: half of them for tests,
+            half for the selection.
+        feedback_episodes: Most episodes of a test of a candidate.
+        then_verify: Whether the selected controller drives on hidden worlds at the end,
+            for a verdict; also of a run that has selected one before.
+        iterations: K, the maximum number of iterations.
+        patience: J, edits per iteration.
+        seed: Determines the worlds of `dev`; drawn by default.
+        start_from: Source of an initial controller instead of a generated one.
+        base_url: See `synthesize`.
+        key_over_http: See there.
+        prompt: `full`, or a template file.
+        refine: See there.
+        max_output: See there.
+        max_cost: See there.
+        max_tokens: See there.
+        budget: See there.
+        index: See there.
+        retry: See there.
+        tier: See there.
+        judge: See there.
+        on_event: Called with each journal record.
+
+    Returns:
+        The run: `selected`, `not verified`, or `verified` on hidden worlds. Its
+        `controller` is the selected one.
+
+    Raises:
+        TaskError: A number is out of range.
+        RunError: The folder cannot be used, or contains another run.
+        ProviderError: A model cannot be used.
+        PriceError: The user's price file is broken.
+        PromptError: The template cannot be used.
+        Fault: The sandbox or provider is broken; the fault is also recorded.
+    """
+    episodes = whole_number("episodes", episodes, 2, MOST_EPISODES)
+    block = whole_number("feedback_episodes", feedback_episodes, 1, MOST_EPISODES)
+    template = load_template(prompt)
+    models = choose_models(
+        learner, optimizer, tasks, base_url, key_over_http=key_over_http
+    )
+    question = partial(set_prompt, tasks, template=template)
+    before = existing_run(out)
+    run = new_run(
+        models,
+        question(()),
+        start_from,
+        task=tasks.name,
+        task_sha256=tasks.sha256,
+        profile="policy",
+        prompt=template.name,
+        folder=out,
+        base_url=base_url,
+        max_output=max_output,
+        index=index,
+        iterations=iterations,
+        patience=patience,
+        refine=refine,
+        seed=_seed(seed, models[0], before),
+        episodes=episodes,
+        feedback_episodes=block,
+        then_verify=then_verify or (before is not None and before.then_verify),
+    )
+    account = account_of(models, before, max_cost, max_tokens, budget)
+    with hold_folder(out):
+        before = existing_run(out)
+        if before is not None:
+            check_same(before, run)
+            if before.finished and not (
+                run.then_verify and before.status == "selected"
+            ):
+                check_own(before)
+                return before
+        start = partial(
+            Recorder.begin,
+            write=partial(_write_level, tasks),
+            last=(SET_FILE, _set_text(tasks)),
+            template=template,
+            given=start_from,
+        )
+        recorder = open_record(start, run, before, account, on_event)
+        terms = (account.budget, account.tariffs, retry or RetryPolicy(), max_output)
+        dialogue = Dialogue(question, *models, Calls(recorder, *terms), about=ABOUT)
+        with ExitStack() as stack:
+            warm = judge or stack.enter_context(WarmJudge())
+            half = episodes // 2
+            trials = Trials(tasks, recorder, warm, tier, block, half, episodes - half)
+            return _run(_Writing(dialogue, trials, start_from))
+
+
+def _seed(given: int | None, learner: Provider, before: Run | None) -> int:
+    """The seed of a run: given, recorded, or drawn."""
+    known = recorded_seed(learner) if given is None else given
+    if known is None and before is not None:
+        known = before.seed
+    return drawn_seed() if known is None else known
+
+
+@dataclass(frozen=True, slots=True)
+class _Writing:
+    """A run at work.
+
+    Attributes:
+        dialogue: The models.
+        trials: Tests candidates.
+        given: Source of an initial controller, if there is one.
+    """
+
+    dialogue: Dialogue
+    trials: Trials
+    given: str | None
+
+
+def _run(writing: _Writing) -> Run:
+    """Writes, selects and delivers, and records how it ended."""
+    recorder = writing.trials.recorder
+    try:
+        _finish(writing)
+    except OutOfBudget as error:
+        facts = {"enough": error.way_on, "outlook": error.outlook}
+        recorder.finish("budget", reason=str(error), **facts)
+    except KeyboardInterrupt:
+        recorder.finish("interrupted")
+        raise
+    except Exception as error:
+        # On a full disk, the first error is the one to report.
+        with suppress(OSError):
+            recorder.finish("fault", reason=str(error))
+        raise
+    return recorder.run
+
+
+def _finish(writing: _Writing) -> None:
+    trials, recorder = writing.trials, writing.trials.recorder
+    written: list[Candidate] = []
+    try:
+        stopped = search(writing.dialogue, writing.given, trials, written)
+    except OutOfBudget as error:
+        # With more money, the run can go on; what is good for something is selected.
+        if not any(each.feedback_score for each in written):
+            raise
+        stopped = str(error)
+    able = [each for each in written if each.drives]
+    chosen = None
+    if able:
+        chosen = select(able, trials.validation_left, trials.validate)
+    if chosen is None or not chosen.score:
+        recorder.finish("not verified", reason=_why_none(able))
+        return
+    _deliver(trials, written, chosen, stopped)
+    recorder.run.tau = chosen.k
+    status, facts = "selected", {"k": chosen.k, "j": chosen.j, "reason": stopped}
+    if recorder.run.then_verify:
+        report = verify_hidden(
+            trials.tasks, recorder, chosen.source, trials.judge, trials.tier
+        )
+        status = "verified" if report.passed else "not verified"
+    recorder.finish(status, **facts)  # type: ignore[arg-type]
+
+
+def _why_none(able: list[Candidate]) -> str:
+    if not able:
+        return "no candidate passed the static and contract tests"
+    return "no candidate reached a goal on the validation worlds"
+
+
+def _deliver(
+    trials: Trials, written: list[Candidate], chosen: Candidate, stopped: str
+) -> None:
+    """Writes the selected controller and the report to the top of the run folder."""
+    run, first = trials.recorder.run, trials.first
+    assert run.episodes is not None
+    selection = Selection(
+        set=trials.tasks.name,
+        set_sha256=trials.tasks.sha256,
+        first_feedback=first,
+        first_validation=BLOCKS + first,
+        episodes=run.episodes,
+        feedback_used=trials.feedback_used,
+        validation_used=trials.validation_used,
+        candidates=tuple(map(_figures, written)),
+        k=chosen.k,
+        j=chosen.j,
+        controller_sha256=_sha256(chosen),
+        optimistic=scores_of_selected(chosen),
+        stopped=stopped,
+    )
+    write_atomic(run.controller, chosen.source)
+    write_atomic(run.folder / "report.json", selection.model_dump_json(indent=2) + "\n")
+    values = selection.model_dump(mode="json", exclude={"candidates", "stopped"})
+    trials.recorder.event("select.end", **values)
+
+
+def _figures(candidate: Candidate) -> CandidateFigures:
+    drives = candidate.feedback
+    return CandidateFigures(
+        k=candidate.k,
+        j=candidate.j,
+        controller_sha256=_sha256(candidate),
+        feedback_worlds=sum(report.worlds for report in drives),
+        feedback_reached=sum(report.successes for report in drives),
+        validation_worlds=len(candidate.validation),
+        validation_reached=sum(each.success for each in candidate.validation),
+        validation_time=candidate.score if candidate.validation else None,
+    )
+
+
+def _sha256(candidate: Candidate) -> str:
+    return sha256_of(candidate.source.encode("utf-8", "surrogatepass"))
+
+
+def _write_level(tasks: TaskSet, folder: Path) -> None:
+    """Writes what every controller of the level has in its folder."""
+    text = json.dumps(level_params(tasks.file), indent=2) + "\n"
+    write_atomic(folder / "params.json", text)
+
+
+def _set_text(tasks: TaskSet) -> str:
+    values: Any = tasks.file.model_dump(mode="json", by_alias=True)
+    return json.dumps(values, indent=2) + "\n"  # JSON is YAML

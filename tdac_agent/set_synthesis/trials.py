@@ -1,0 +1,178 @@
+"""Tests of candidates on worlds of `dev`, within the budget of episodes."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import fmean
+
+from pydantic import ValidationError
+
+from tdac_agent.evaluation.set_report import SetReport
+from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.runs.recorder import Recorder
+from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.ladder.task_sets import TaskSet
+
+BLOCKS = 2**30
+"""Feedback worlds have smaller numbers than this, validation worlds larger ones."""
+MOST_EPISODES = 100_000
+SET_REPORT = "set.json"
+
+
+@dataclass(slots=True)
+class Candidate:
+    """A controller that a model wrote, and how it drove.
+
+    Attributes:
+        k: Its iteration.
+        j: Its edit.
+        source: Its source.
+        folder: Its folder.
+        feedback: Reports of its tests, in order.
+        validation: Its episodes on validation worlds.
+    """
+
+    k: int
+    j: int
+    source: str
+    folder: Path
+    feedback: list[SetReport] = field(default_factory=list)
+    validation: list[WorldEpisode] = field(default_factory=list)
+
+    @property
+    def drives(self) -> bool:
+        """Whether it passed the static and contract tests, so that it drove."""
+        return any(report.worlds for report in self.feedback)
+
+    @property
+    def feedback_score(self) -> float:
+        """Mean time score on feedback worlds; 0 if it did not drive."""
+        return _mean([each for report in self.feedback for each in report.episodes])
+
+    @property
+    def score(self) -> float:
+        """Mean time score on validation worlds; 0 if it has not driven on any."""
+        return _mean(self.validation)
+
+
+def _mean(episodes: list[WorldEpisode]) -> float:
+    return fmean(each.time_score for each in episodes) if episodes else 0.0
+
+
+def first_world(seed: int, index: int) -> int:
+    """Number of the first feedback world of a run, below `BLOCKS` - `MOST_EPISODES`."""
+    digest = hashlib.sha256(f"dev block|{seed}|{index}".encode("ascii")).digest()
+    return int.from_bytes(digest[:8], "big") % (BLOCKS - MOST_EPISODES)
+
+
+@dataclass(slots=True)
+class Trials:
+    """Drives candidates, and counts the episodes.
+
+    Attributes:
+        tasks: The task set.
+        recorder: Records the run.
+        judge: A warm judge.
+        tier: Sandbox tier.
+        block: Most episodes of a test.
+        feedback_left: Episodes that are left for tests.
+        validation_left: Episodes that are left for the selection.
+    """
+
+    tasks: TaskSet
+    recorder: Recorder
+    judge: WarmJudge
+    tier: str
+    block: int
+    feedback_left: int
+    validation_left: int
+    feedback_used: int = 0
+    validation_used: int = 0
+
+    @property
+    def first(self) -> int:
+        """Number of the first feedback world."""
+        run = self.recorder.run
+        assert run.seed is not None
+        return first_world(run.seed, run.index)
+
+    def test(self, candidate: Candidate) -> SetReport | None:
+        """The first report with a failure; None if the episodes end without one.
+
+        A candidate that reaches all goals goes on with the next worlds.
+        """
+        while self.feedback_left:
+            count = min(self.block, self.feedback_left)
+            first = self.first + self.feedback_used
+            out = candidate.folder / f"feedback-{len(candidate.feedback) + 1}"
+            report = self._drive(candidate, first, count, out)
+            candidate.feedback.append(report)
+            self.feedback_used += report.worlds
+            self.feedback_left -= report.worlds
+            if report.worlds == 0 or report.successes < report.worlds:
+                return report
+        return None
+
+    def validate(self, candidate: Candidate, count: int) -> None:
+        """Drives on the next `count` validation worlds of this candidate."""
+        done = len(candidate.validation)
+        first = BLOCKS + self.first + done
+        out = candidate.folder / f"validation-{done + 1}"
+        report = self._drive(candidate, first, count, out)
+        candidate.validation.extend(report.episodes)
+        self.validation_used += report.worlds
+        self.validation_left -= report.worlds
+
+    def _drive(
+        self, candidate: Candidate, first: int, count: int, out: Path
+    ) -> SetReport:
+        """Drives on worlds of `dev`; a report on record is reused."""
+        k, j = candidate.k, candidate.j
+        about = {"k": k, "j": j, "what": out.name.partition("-")[0], "worlds": count}
+        self.recorder.event("drive.start", **about)
+        source = candidate.source.encode("utf-8", "surrogatepass")
+        # The record of another installation's run is not trusted.
+        report = None
+        if self.recorder.run.mark:
+            report = kept_report(out, self.tasks, source, first, count)
+        if report is None:
+            report = verify_on_set(
+                source,
+                self.tasks,
+                "dev",
+                count,
+                first=first,
+                tier=self.tier,
+                out=out,
+                judge=self.judge,
+                watch=lambda done, reached: self.recorder.tell(
+                    {"event": "drive.step", **about, "done": done, "reached": reached}
+                ),
+            )
+        self.recorder.event(
+            "drive.end", **about, reached=report.successes, driven=report.worlds
+        )
+        return report
+
+
+def kept_report(
+    folder: Path, tasks: TaskSet, source: bytes, first: int, count: int
+) -> SetReport | None:
+    """The report in a folder if it is about this controller and these worlds."""
+    try:
+        content = parse_json(read_file(folder / SET_REPORT, RECORD_BYTES))
+        report = SetReport.model_validate(content)
+    except (OSError, ValueError, ValidationError):
+        return None
+    about = report.provenance
+    facts = (about.set_sha256, about.split, about.controller_sha256, about.versions)
+    wanted = (tasks.sha256, "dev", sha256_of(source), versions())
+    numbers = [episode.index for episode in report.episodes]
+    # After a failed static test, there are no episodes.
+    complete = numbers in ([], list(range(first, first + count)))
+    return report if facts == wanted and complete else None

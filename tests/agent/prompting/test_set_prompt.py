@@ -1,0 +1,94 @@
+"""The question for a task set: everything of the level, nothing of a world."""
+
+import json
+import math
+import re
+
+import gymnasium as gym
+import pytest
+import yaml
+
+import tdac_envs
+from tdac_agent.prompting.prompt import FULL, PromptError, PromptTemplate
+from tdac_agent.prompting.rules import BEGIN, RuleBook
+from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.verification.judge.set_job import level_params
+from tdac_envs import load_set
+from tdac_envs.ladder.set_file import set_names
+
+
+@pytest.mark.parametrize("name", set_names())
+def test_a_prompt_has_all_of_its_level(name):
+    """The table of observations is that of the environment, and so are the limits."""
+    tasks = load_set(name)
+    text, file = set_prompt(tasks, (), FULL), tasks.file
+    env = gym.make("tdac_envs:TDAC-Ladder-v0", level=name, split="dev")
+    rows = dict(re.findall(r"^\| `(\w+)` \| (\([\d, ]*\)) \|", text, re.MULTILINE))
+    spaces = env.observation_space.spaces
+    assert rows == {key: str(box.shape) for key, box in spaces.items()}
+    limit = math.ceil(float(spaces["goal"].high[0]) - 1e-3)
+    assert f"to {limit} |" in text or f"to {spaces['goal'].high[0]:g} |" in text
+    params = text.partition("```json\n")[2].partition("\n```")[0]
+    assert json.loads(params) == level_params(file)
+    for value in (file.bar, file.goal_tolerance, file.horizon.most, file.robot.n_rays):
+        assert f"{value:g}" in text
+    assert ("occupancy.npy" in text) == file.map
+    assert ("start frame" in text) == (file.frame == "start")
+    assert BEGIN in text
+    assert "sensors" not in text
+    assert max(map(len, text.splitlines())) < 400
+
+
+def test_disturbances_are_told_with_distribution_and_size(tmp_path):
+    """Each that is set, and no other."""
+    sizes = {
+        "wheel_gains": 0.11,
+        "wheel_slip": 0.12,
+        "axle_error": 0.13,
+        "range_noise": 0.14,
+        "range_dropout": 0.15,
+        "odometry_scale": 0.16,
+        "odometry_noise": 0.17,
+        "motor_lag": 0.18,
+        "delay": 3,
+    }
+    told = {
+        "wheel_gains": r"uniform in \[0.89, 1.11\]",
+        "wheel_slip": "mean 1 and SD 0.24;",
+        "axle_error": "uniform within ±0.13",
+        "range_noise": "mean 1 and SD 0.14,",
+        "range_dropout": "probability 0.15",
+        "odometry_scale": "normal with SD 0.16",
+        "odometry_noise": r"mean 1 and SD 0.17\.",
+        "motor_lag": "time constant of 0.18 s",
+        "delay": "3 steps late",
+    }
+    path = tmp_path / "own.yaml"
+    for name, size in sizes.items():
+        level = {
+            "worlds": [{"name": "aisles"}],
+            "dt": 0.025,  # the slip of a step of 0.1 s is half of that of such a step
+            "observed": ["goal", "odometry", "ranges"],
+            "disturbances": {name: size},
+        }
+        path.write_text(yaml.safe_dump(level))
+        text = set_prompt(load_set(path), (), FULL).partition("## Disturbances")[2]
+        text = text.partition("## What the file")[0]
+        found = [each for each, words in told.items() if re.search(words, text)]
+        assert found == [name]
+    assert tdac_envs.load_set("known").file.disturbances.model_dump().keys() == (
+        sizes.keys()
+    )
+
+
+def test_rules_and_templates(tmp_path):
+    """A template of one's own knows the variables; the other names are refused."""
+    tasks = load_set("unknown")
+    rules = RuleBook().add("keep off walls", "task", 1, ()).in_force
+    assert "- keep off walls [R1]" in set_prompt(tasks, rules, FULL)
+    own = PromptTemplate("own", "{{ name }} {{ file.bar }}\n{{ rules_block }}\n")
+    assert set_prompt(tasks, (), own).startswith("unknown 0.95\n")
+    with pytest.raises(PromptError, match=r"known names: .*disturbances"):
+        set_prompt(tasks, (), PromptTemplate("own", "{{ robots }}{{ rules_block }}"))
+    with pytest.raises(PromptError, match="is for a single task"):
+        set_prompt(tasks, (), PromptTemplate("underspecified"))

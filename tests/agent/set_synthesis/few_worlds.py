@@ -1,0 +1,28 @@
+"""A set of small worlds, and controllers that do well and badly on it."""
+
+from pathlib import Path
+
+import yaml
+
+import tdac_agent
+from tdac_envs import load_set
+
+KNOWN = Path(tdac_agent.__file__).parent / "builtin" / "levels" / "known.py"
+STILL_ANSWER = "```python\ndef policy(obs):\n    return 0.0, 0.0\n```\n"
+
+
+def write_set(path, **values):
+    """Writes a set whose level is that of `known`, with small worlds; returns its path.
+
+    An episode takes 300 steps at most.
+    """
+    level = {
+        "worlds": [{"name": "aisles", "width": 130, "height": 110}],
+        "robot": load_set("known").file.robot.model_dump(),
+        "frame": "map",
+        "map": True,
+        "admission": {"steps": 30},
+        "horizon": {"factor": 5, "least": 100, "most": 300},
+    }
+    path.write_text(yaml.safe_dump({**level, **values}))
+    return path

@@ -1,0 +1,223 @@
+"""Writing for a task set: what is asked, driven, selected, and kept."""
+
+import json
+import os
+import stat
+
+import pytest
+from script import NO_RULES, STILL, Script, code
+
+from tdac_agent.errors import Fault, RunError
+from tdac_agent.models.provider import PermanentFault
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.runs.run_record import load_run
+from tdac_agent.set_synthesis.selection import Selection
+from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+
+AT_ONCE = RetryPolicy(first_wait=0.0)
+BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "run"
+
+
+@pytest.fixture
+def write(few, out, warm):
+    """Runs with few episodes."""
+
+    def run(*answers, model=None, **values):
+        model = model or Script(*answers)
+        given = {"episodes": 12, "feedback_episodes": 2, "seed": 3, "judge": warm}
+        given |= {"out": out, "retry": AT_ONCE, "iterations": 3, **values}
+        return model, synthesize_on_set(few, model, **given)
+
+    return run
+
+
+def selection(folder):
+    return Selection.model_validate_json((folder / "report.json").read_text())
+
+
+def test_a_repaired_candidate_is_selected(write, solver, out, few):
+    """The failure is told; all episodes count; a pass on dev is not `verified`."""
+    model, run = write(code(STILL), code(solver))
+    assert run.status == "selected"
+    assert not run.verified
+    assert run.finished
+    assert model.asked() == [("generate", 1, 0), ("edit", 1, 1)]
+    edit = model.requests[1].prompt
+    assert "the goal reached in 0 of 2 worlds; 2 no motion" in edit
+    assert STILL in edit
+    report = selection(out)
+    for number in (report.first_feedback, report.first_feedback + 1):
+        assert f"world {number}: no motion: in" in edit
+    assert (report.k, report.j) == (1, 1)
+    assert report.feedback_used == 6
+    assert report.validation_used <= 6
+    first, second = report.candidates
+    assert (first.feedback_worlds, first.feedback_reached) == (2, 0)
+    assert (second.feedback_worlds, second.feedback_reached) == (4, 4)
+    assert second.validation_time > 0.5 > first.validation_time
+    assert report.optimistic.success == 1.0
+    assert (out / "controller.py").read_text() == solver
+    assert load_set(out / "set.yaml").sha256 == few.sha256
+    assert json.loads((out / "params.json").read_text())["map"] is True
+    assert load_run(out).status == "selected"
+
+
+def test_each_test_has_new_worlds(write, out):
+    """Feedback worlds are never used twice, nor for the selection."""
+    write(code(STILL), code(BUMP), iterations=1, refine=False)
+    driven = {"feedback": [], "validation": []}
+    for path in sorted(out.glob("iterations/*/*/*/set.json")):
+        episodes = json.loads(path.read_text())["episodes"]
+        numbers = [episode["index"] for episode in episodes]
+        driven[path.parent.name.partition("-")[0]].append(numbers)
+    feedback = [number for numbers in driven["feedback"] for number in numbers]
+    assert sorted(feedback) == list(range(min(feedback), min(feedback) + 4))
+    validation = {number for numbers in driven["validation"] for number in numbers}
+    assert validation.isdisjoint(feedback)
+    # Both candidates drove on the same ones first.
+    assert driven["validation"][0] == driven["validation"][1]
+
+
+def test_the_same_code_is_not_driven_again(write, out):
+    """An iteration without new code ends the writing."""
+    # j=1 is unedited, k=2 begins with k=1's code, and its edit changes nothing.
+    answers = [code(STILL), code(STILL), NO_RULES] * 2
+    model, run = write(*answers, iterations=9)
+    assert [(a.unchanged, a.valid) for a in run.attempts] == [
+        (False, True),
+        *[(True, True)] * 3,
+    ]
+    assert "The last edit changed nothing" in model.requests[2].prompt
+    assert "The last edit changed nothing" not in model.requests[4].prompt
+    assert run.status == "not verified"
+    assert "no candidate reached a goal" in run.reason
+    assert not (out / "controller.py").exists()
+
+
+@pytest.mark.slow
+def test_rules_and_categories(write, solver):
+    """A rule's evidence are the categories of failure, and it is told what came."""
+    rule = '```json\n[{"op": "add", "scope": "task", "text": "Do move."}]\n```'
+    rules = type(NO_RULES)(rule)
+    model, run = write(code(STILL), code(BUMP), rules, code(solver))
+    assert run.status == "selected"
+    asked = [("generate", 1, 0), ("edit", 1, 1), ("summarise", 1, 1)]
+    assert model.asked() == [*asked, ("generate", 2, 0)]
+    assert "Do move." in model.requests[3].prompt
+    assert "`task` (this task set)" in model.requests[2].prompt
+    book = json.loads((run.folder / "rules.json").read_text())
+    assert book["rules"][0]["evidence"] == ["collision"]
+
+
+def test_no_question_without_episodes_for_its_answer(write):
+    """Two episodes are for feedback, and the first test uses them."""
+    model, run = write(code(STILL), episodes=4)
+    assert model.asked() == [("generate", 1, 0)]
+    assert selection_or_none(run) is None
+    assert run.status == "not verified"
+
+
+def selection_or_none(run):
+    path = run.folder / "report.json"
+    return selection(run.folder) if path.exists() else None
+
+
+def test_a_broken_run_goes_on_where_it_was(write, solver, out):
+    """What is on record is neither asked nor driven again."""
+    with pytest.raises(Fault, match="no access"):
+        write(code(STILL), PermanentFault("no access"))
+    assert load_run(out).status == "fault"
+    kept = out / "iterations" / "k01" / "j0" / "feedback-1" / "set.json"
+    before = kept.stat().st_mtime_ns
+    model, run = write(code(solver))
+    assert model.asked() == [("edit", 1, 1)]
+    assert run.status == "selected"
+    assert kept.stat().st_mtime_ns == before
+    # A finished run is not repeated at all.
+    model, again = write()
+    assert model.asked() == []
+    assert again.status == "selected"
+
+
+class Paid(Script):
+    """A script whose answers cost tokens, as many as are reserved."""
+
+    paid = True
+
+
+FOR_ONE = 30_000
+"""Tokens that are enough for one question and not for two."""
+
+
+def test_a_run_without_success_goes_on_with_more_tokens(few, write, out, warm):
+    """Nothing is selected when the budget ends it, and no answer is paid for twice."""
+    _, run = write(model=Paid(code(STILL)), max_tokens=FOR_ONE, iterations=1)
+    assert run.status == "budget"
+    assert "--max-tokens" in run.enough
+    model = Paid(code(BUMP), NO_RULES)
+    _, run = write(model=model, max_tokens=500_000, iterations=1)
+    assert model.asked()[0] == ("edit", 1, 1)
+    assert run.status == "not verified"
+
+
+@pytest.mark.slow
+def test_the_best_is_selected_when_the_budget_ends(write, solver, out):
+    """One that reaches some goals is worth a selection."""
+    half = f"""{solver}
+
+drive = policy
+
+
+def policy(obs):
+    return drive(obs) if int(obs["goal"][0]) % 2 else (0.0, 0.0)
+"""
+    _, run = write(model=Paid(code(half)), max_tokens=FOR_ONE)
+    assert run.status == "selected"
+    assert "tokens" in run.reason
+    report = selection(out)
+    assert 0.0 < report.optimistic.success < 1.0
+    assert report.stopped == run.reason
+
+
+def test_another_run_is_refused(write):
+    write(code(STILL), iterations=1, patience=0, refine=False)
+    with pytest.raises(RunError, match="number of episodes 12 instead of 14"):
+        write(episodes=14, iterations=1, patience=0, refine=False)
+
+
+@pytest.mark.slow
+def test_then_verify_drives_once_on_hidden_worlds(write, solver, out):
+    """Also of a finished run; the salt stays in a folder of the user alone."""
+    write(code(solver))
+    model, run = write(then_verify=True)
+    assert model.asked() == []
+    assert run.status == "verified"
+    assert stat.S_IMODE(os.stat(out / "sealed").st_mode) == 0o700
+    salt = out / "sealed" / "salt"
+    assert stat.S_IMODE(salt.stat().st_mode) == 0o600
+    assert len(salt.read_bytes()) == 32
+    text = (out / "hidden.json").read_text()
+    assert json.loads(text)["episodes"] == []
+    secret = salt.read_bytes()
+    for path in out.rglob("*"):
+        if path.is_file() and path != salt:
+            content = path.read_bytes()
+            assert secret not in content
+            assert secret.hex().encode() not in content
+    _, again = write(then_verify=True)
+    assert again.status == "verified"
+    assert (out / "hidden.json").read_text() == text
+
+
+def test_arguments_that_are_refused(write):
+    with pytest.raises(TaskError, match="episodes"):
+        write(episodes=1)
+    with pytest.raises(TaskError, match="feedback_episodes"):
+        write(feedback_episodes=0)
