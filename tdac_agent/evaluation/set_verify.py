@@ -67,7 +67,7 @@ def verify_on_set(
         split: `dev`, `test` or `hidden`.
         worlds: Number of worlds, for scores. By default a sequential test of the set's
             bar decides when to stop; then there are no scores.
-        first: Number of the first world.
+        first: Number of the first world; only with `worlds`, and not of hidden worlds.
         salt_file: File with the salt of the split `hidden`.
         tier: Sandbox tier; `auto` for the best one on this machine.
         out: Folder for `set.json` and `trajectories/`; of hidden worlds, for `set.json`
@@ -81,10 +81,12 @@ def verify_on_set(
         Fault: The sandbox is broken; the controller neither passes nor fails.
     """
     one_of("split", split, JUDGED)
+    whole_number("first", first, 0)
+    if first > 0 and (worlds is None or split == "hidden"):
+        raise TaskError("first: needs worlds, and another split than 'hidden'")
     if worlds is not None:
         whole_number("worlds", worlds, 1, MOST_EPISODES)
         tasks.check_count(split, first + worlds, "worlds")
-    whole_number("first", first, 0)
     salt = None if salt_file is None else read_salt(salt_file)
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source = read_source(controller)
