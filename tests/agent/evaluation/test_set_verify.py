@@ -384,6 +384,34 @@ def test_the_command(tdac, tmp_path):
     assert "not verified: rejected at 95.0 %" in out
 
 
+def test_the_command_tells_a_refused_file(tdac, tmp_path):
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text("def policy(obs):\n    return 0.6\n")
+    code, out, err = tdac("verify", str(wrong), "--set", "unknown", "-n", "3")
+    assert (code, err) == (1, "")
+    first, line, last = out.splitlines()
+    assert first.endswith(": 1 of 11 tests failed, so no world was driven")
+    assert line.startswith("  test_short_rollout_is_stable[10]: policy must return two")
+    assert last == "not verified"
+
+
+def test_the_command_counts_hidden_evaluations(tdac, tmp_path, set_yaml):
+    """The count is the last line; the second time says when it was driven."""
+    set_yaml()
+    salt, still = tmp_path / "a.salt", tmp_path / "still.py"
+    salt.write_bytes(b"a salt of the command line")
+    still.write_text(STILL + "# from the command line\n")
+    words = ("verify", str(still), "--set", str(tmp_path / "few.yaml"))
+    words += ("--split", "hidden", "--salt-file", str(salt), "-n", "2")
+    code, out, _ = tdac(*words)
+    last = "hidden evaluation 1 of this file on few"
+    assert (code, out.splitlines()[-1]) == (0, last)
+    code, again, _ = tdac(*words)
+    assert code == 0
+    assert again.startswith(out.rstrip())
+    assert again.rstrip().endswith("nothing was driven anew")
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
