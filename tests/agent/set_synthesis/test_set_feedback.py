@@ -38,7 +38,12 @@ def test_a_file_that_may_not_drive(few, warm):
 def test_errors_are_told(tmp_path, warm):
     """Where the controller raised, with its message."""
     tasks = load_set(write_set(tmp_path / "few.yaml"))
-    source = "def policy(obs):\n    return obs['posse'][0], 0.0\n"
+    source = """
+STEPS = []
+def policy(obs):
+    STEPS.append(0)
+    return obs["pose" if len(STEPS) < 20 else "posse"][0] * 0.0, 0.0
+"""
     report = verify_on_set(source, tasks, "dev", 2, judge=warm)
     text = set_feedback(report).text
     assert "KeyError" in text
