@@ -24,11 +24,12 @@ from tdac_agent.models.choice import check_name
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.resume import check_own, existing_run
-from tdac_agent.runs.run_record import SET_FILE, Run
+from tdac_agent.runs.run_record import Run
 from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
 from tdac_agent.set_synthesis.resume import resume_set_arguments
 from tdac_agent.set_synthesis.selection import CandidateFigures, Selection
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.tasks.task_file import SET_FILE
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 

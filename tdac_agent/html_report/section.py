@@ -15,7 +15,8 @@ from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import CandidateHistory, Told, learner_named
-from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE, SET_FILE
+from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE
+from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 

@@ -30,8 +30,6 @@ JOURNAL = "journal.jsonl"
 RULES_FILE = "rules.json"
 GIVEN_FILE = "given.py"
 PROMPT_FILE = "prompt.j2"
-SET_FILE = "set.yaml"
-"""The task set of a run on one."""
 
 
 class Attempt(PrintableRecord):

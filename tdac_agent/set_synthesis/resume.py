@@ -8,7 +8,8 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.runs.ownership import is_own, wishes_of
 from tdac_agent.runs.resume import settings_of
-from tdac_agent.runs.run_record import SET_FILE, Run
+from tdac_agent.runs.run_record import Run
+from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.trust import permit
 from tdac_envs.ladder.task_sets import load_set
 

@@ -17,7 +17,7 @@ from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
-from tdac_agent.runs.run_record import SET_FILE, Run
+from tdac_agent.runs.run_record import Run
 from tdac_agent.set_synthesis.hidden import verify_hidden
 from tdac_agent.set_synthesis.search import search
 from tdac_agent.set_synthesis.selection import (
@@ -33,6 +33,7 @@ from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.setup import account_of, hold_folder, new_run, open_record
 from tdac_agent.tasks.installation import drawn_seed
 from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.verification.judge.set_job import level_params
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import whole_number

@@ -15,6 +15,8 @@ from tdac_envs.mapping.params import MOST_RAYS, Length, Place
 
 TASK_FILE = "task.yaml"
 """File name in the folder of a task or a run."""
+SET_FILE = "set.yaml"
+"""File name in the folder of a run on a task set, which has no single task."""
 
 _MAP_FILES = (
     *(".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".gif", ".tif", ".tiff", ".webp"),
@@ -117,6 +119,11 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
     try:
         data = parse_yaml(read_file(path, TEXT_BYTES))
     except OSError as error:
+        if (path.parent / SET_FILE).is_file():
+            raise TaskError(
+                f"{asked} has a task set and no single task: give --set "
+                f"{path.parent / SET_FILE}"
+            ) from error
         known = bundled_tasks()
         raise TaskError(
             f"no task {str(asked)!r}: {error.strerror}{hint(str(asked), known)}; "

@@ -24,6 +24,9 @@ def test_the_built_in_controller(tdac, tmp_path):
     code, out, _ = tdac("synth", "--resume", "run")
     assert code == 0
     assert "has already finished" in out
+    code, out, err = tdac("verify", "run")
+    assert (code, out) == (2, "")
+    assert "no single task: give --set run/set.yaml" in err
     code, out, _ = tdac("runs", ".", "--json")
     (row,) = json.loads(out)
     assert (row["status"], row["go_on"]) == ("selected", "")
