@@ -123,4 +123,4 @@ def raster(
 
 def centres(count: int) -> NDArray[np.float64]:
     """Centres of the pixels along a side of `count` pixels and its walls, mm."""
-    return (2.0 * np.arange(count + 2) - 1.0 - count) * _HALF
+    return _HALF * np.arange(-1 - count, count + 2, 2, dtype=np.float64)
