@@ -52,6 +52,14 @@ class Box:
             self.x / 2000, self.y / 2000, math.radians(self.degrees), *sides
         )
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Half the sides of an upright rectangle around it, mm."""
+        if self.degrees:
+            half = math.hypot(self.length, self.width) / 2
+            return half, half
+        return self.length / 2, self.width / 2
+
     def covered(self, dx: Offsets, dy: Offsets, touched: bool) -> BoolGrid:
         """Which pixels lie in it, or touch it; `dx`, `dy`: from its centre, mm."""
         turn = math.radians(self.degrees)
@@ -87,6 +95,11 @@ class Cylinder:
         """Its footprint, m."""
         return Disc(self.x / 2000, self.y / 2000, self.radius / 1000)
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Half the sides of an upright rectangle around it, mm."""
+        return self.radius, self.radius
+
     def covered(self, dx: Offsets, dy: Offsets, touched: bool) -> BoolGrid:
         """Which pixels lie in it, or touch it; `dx`, `dy`: from its centre, mm."""
         off = -_HALF if touched else _HALF
@@ -116,9 +129,20 @@ def raster(
     cells[[0, -1]] = cells[:, [0, -1]] = True
     xs, ys = centres(columns), centres(rows)
     for block in blocks:
-        dx, dy = xs - block.x / 2, ys - block.y / 2
-        cells |= block.covered(dx[None, :], dy[:, None], touched)
+        x, y = block.x / 2, block.y / 2
+        beside, along = (
+            _window(axis, middle, reach)
+            for axis, middle, reach in zip((xs, ys), (x, y), block.reach, strict=True)
+        )
+        dx, dy = xs[None, beside] - x, ys[along, None] - y
+        cells[along, beside] |= block.covered(dx, dy, touched)
     return cells
+
+
+def _window(axis: Offsets, middle: float, reach: float) -> slice:
+    """The pixels whose centre is at most a pixel beyond a block on either side."""
+    low, high = middle - reach - PIXEL, middle + reach + PIXEL
+    return slice(*np.searchsorted(axis, (low, high)).tolist())
 
 
 def centres(count: int) -> NDArray[np.float64]:
