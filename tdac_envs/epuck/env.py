@@ -22,12 +22,10 @@ from tdac_envs.drive.stepping import info_of
 from tdac_envs.epuck import kernels, observed
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.movables import Movables
-from tdac_envs.epuck.nearby import surroundings
 from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.setup import Setup
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
-from tdac_envs.worlds.bodies import BODY_RADIUS
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
@@ -209,7 +207,6 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             goal_tolerance=goal_tolerance,
             horizon=horizon,
         )
-        reach = BODY_RADIUS + nominal.full_step
         setup = Setup(
             nominal=nominal,
             variation=variation,
@@ -227,20 +224,50 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             ),
             weights=weights_of(reward_weights),
             source=None,
-            around=surroundings(
-                ground, reflectance == "webots", bool(goal_visible), reach
-            ),
+            webots=reflectance == "webots",
+            goal_visible=bool(goal_visible),
         )
+        asked = (ground_sensors, gps, compass, encoders)
+        further = tuple(itertools.compress(observed.INSTRUMENTS, asked))
+        self._prepare(setup, sensor_noise, further, render_mode)
+
+    @classmethod
+    def of(
+        cls,
+        setup: Setup,
+        sensor_noise: float = 0.0,
+        further: Sequence[str] = (),
+        render_mode: str | None = None,
+    ) -> EPuckEnv:
+        """The environment of a setup.
+
+        Args:
+            setup: The setup; its source, if any, may draw tasks in other worlds, unless
+                objects can be pushed.
+            sensor_noise: See the class.
+            further: Those of `observed.INSTRUMENTS` that are observed, in their order.
+            render_mode: See the class.
+        """
+        env = cls.__new__(cls)
+        env._prepare(setup, sensor_noise, tuple(further), render_mode)
+        return env
+
+    def _prepare(
+        self,
+        setup: Setup,
+        sensor_noise: float,
+        further: tuple[str, ...],
+        render_mode: str | None,
+    ) -> None:
         super().__init__(setup, render_mode)
         self.sensor_noise = non_negative("sensor_noise", sensor_noise)
-        asked = (ground_sensors, gps, compass, encoders)
-        self.further = tuple(itertools.compress(observed.INSTRUMENTS, asked))
+        self.further = further
         space = observed.observation_space(self.nominal, self.further)
         if self.disturbances.odometry:
             space = with_odometry(space, self._limits)
         self._has_more = bool(self.further or self.disturbances.odometry)
         self.observation_space = space  # type: ignore[assignment]
-        self._movables = Movables(setup)
+        self._movables = Movables(setup, setup.nominal)
         self.robot = Robot.blank(self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
@@ -258,6 +285,9 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         before = self.task
         task = self._draw(options or {})
+        if task.ground is not before.ground:
+            self._movables = Movables(self.setup, task)
+            self.setup.enter(self.robot.constants, task)
         if task.field is not before.field:
             self._bind()
         self._movables.reset()
@@ -338,6 +368,6 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             readings=robot.readings,
             reaches=robot.hits[:, 0],
             trail=self._trail,
-            solid=self._movables.solid,
+            solid=self._movables.solid if self.setup.pushes else task.ground.solid,
             status=status,
         )

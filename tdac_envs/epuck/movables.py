@@ -12,6 +12,7 @@ from tdac_envs.drive.stepping import FORWARD, TOUCHED, TURN
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.robot import Robot
 from tdac_envs.epuck.setup import Setup
+from tdac_envs.epuck.task import EPuckTask
 
 
 class Movables:
@@ -19,6 +20,7 @@ class Movables:
 
     Args:
         setup: Configuration of the environment.
+        task: A task in the world of the objects.
 
     Attributes:
         solid: Solid parts at their current positions.
@@ -27,9 +29,9 @@ class Movables:
             velocities.
     """
 
-    def __init__(self, setup: Setup) -> None:
-        self._task, self._visible = setup.nominal, setup.around.visible
-        ground = setup.nominal.ground
+    def __init__(self, setup: Setup, task: EPuckTask) -> None:
+        self._task, self._visible = task, setup.around(task).visible
+        ground = task.ground
         # `ground.solid` and `visible` keep the initial positions.
         self.solid, self.seen = ground.solid, self._visible
         self._pushes = setup.pushes

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import finite_numbers
 from tdac_envs.drive.setup import DriveSetup
-from tdac_envs.drive.stepping import UNDISTURBED
+from tdac_envs.drive.stepping import FRICTION, UNDISTURBED
 from tdac_envs.drive.task import Pose
 from tdac_envs.epuck.infrared import RANGE
-from tdac_envs.epuck.kernels import AXLE_LENGTH
-from tdac_envs.epuck.nearby import NearbyParts
+from tdac_envs.epuck.kernels import AXLE_LENGTH, FLOOR, N_CONSTANTS
+from tdac_envs.epuck.nearby import NearbyParts, surroundings
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.task import (
     EPuckTask,
@@ -32,22 +32,28 @@ class Setup(DriveSetup):
     """The part of an environment that does not change between episodes.
 
     Attributes:
-        around: The parts that the robot may touch and see, depending on its position.
+        webots: Whether the sensors see Webots' reflectances; see `Ground.visible`.
+        goal_visible: Whether the sensors see the file's goal marker.
     """
 
     nominal: EPuckTask
-    around: NearbyParts
+    webots: bool
+    goal_visible: bool
 
     @property
     def pushes(self) -> bool:
         """Whether the robot can push objects."""
         return self.on_collision == "block" and len(self.nominal.ground.masses) > 0
 
+    def around(self, task: EPuckTask) -> NearbyParts:
+        """The parts that the robot may touch and see, depending on its position."""
+        reach = BODY_RADIUS + task.full_step
+        return surroundings(task.ground, self.webots, self.goal_visible, reach)
+
     def constants(self) -> NDArray[np.float64]:
         """`Robot.constants` of the nominal task."""
         task = self.nominal
-        ground = task.ground
-        return np.array(
+        constants = np.array(
             [
                 AXLE_LENGTH,
                 task.max_wheel_speed,
@@ -62,14 +68,24 @@ class Setup(DriveSetup):
                 *task.goal,
                 task.goal_tolerance,
                 task.horizon,
-                ground.world.friction,
+                task.ground.world.friction,
                 *UNDISTURBED,
-                ground.floor,
-                *ground.bounds[:2],
-                ground.spacing,
-                self.around.width,
+                *np.zeros(N_CONSTANTS - FLOOR),
             ],
             np.float64,
+        )
+        self.enter(constants, task)
+        return constants
+
+    def enter(self, constants: NDArray[np.float64], task: EPuckTask) -> None:
+        """Sets what `Robot.constants` tells of the world of a task."""
+        ground = task.ground
+        constants[FRICTION] = ground.world.friction
+        constants[FLOOR:] = (
+            ground.floor,
+            *ground.bounds[:2],
+            ground.spacing,
+            self.around(task).width,
         )
 
     def world(
@@ -83,11 +99,13 @@ class Setup(DriveSetup):
         Args:
             task: Task of the episode.
             solid: Solid parts, if objects can be pushed; by default the ground's own.
-            seen: Visible parts, if objects can be pushed; by default `around.visible`.
+            seen: Visible parts, if objects can be pushed; by default those of
+                `around`.
         """
+        around = self.around(task)
         solid = task.ground.solid if solid is None else solid
-        seen = self.around.visible if seen is None else seen
-        near, sighted = self.around.solid, self.around.seen
+        seen = around.visible if seen is None else seen
+        near, sighted = around.solid, around.seen
         return (
             solid.points, solid.first, solid.extent, near.cells, near.listed,
             seen.points, seen.first, seen.extent, sighted.cells, sighted.listed,

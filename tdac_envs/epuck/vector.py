@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         TaskError: A robot would be able to push objects.
     """
 
+    make: Callable[..., EPuckEnv] = EPuckEnv
     step_rows = staticmethod(step_rows)
     copied = ("pose", "wheel_speeds", "wheel_positions", "ps")
 
@@ -61,7 +62,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         **options: Any,
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
-        envs = make_envs(EPuckEnv, each, options, num_envs)
+        envs = make_envs(self.make, each, options, num_envs)
         if any(env.setup.pushes for env in envs):
             raise TaskError(
                 "a batch cannot push objects; expected on_collision='terminate', a "
@@ -107,6 +108,12 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             seen = self._disturbances.measure(robots, self.robots, self._noise)
             observations["odometry"] = seen
 
+    def _assign(self, i: int, task: Any) -> None:
+        if task.ground is not self.tasks[i].ground:
+            self.setups[i].enter(self.robots.constants[i], task)
+            self._floors[i] = task.ground.floor
+        super()._assign(i, task)
+
     def _add_noise(self, robots: Sequence[int]) -> None:
         """Draws new noise for these robots; the others keep their last readings."""
         spreads = self.robots.hits[robots, :, 2] * self._factors[robots, None]
@@ -119,7 +126,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     def _ground(self, i: int) -> Observed:
         """Readings of one robot's ground sensors."""
         env = self._envs[i]
-        seen, floor = env.setup.around.visible, env.task.ground.floor
+        seen, floor = env.setup.around(self.tasks[i]).visible, self._floors[i]
         readings, spreads = ground_readings(seen, floor, self.robots.row(i))
         if i not in self._noisy:
             return readings

@@ -51,6 +51,7 @@ class Rejection(StrEnum):
     STRAIGHT = "a straight drive reaches the goal"
     SHORT = "the shortest path is too short"
     DIRECT = "the detour is too small"
+    LONG = "the shortest path is too long"
 
 
 class Conditions(NamedTuple):

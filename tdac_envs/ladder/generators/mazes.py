@@ -53,7 +53,9 @@ def draw(words: Words, params: Mazes, body: float) -> Draft:
         for y0, y1 in rows:
             cells[y0:y1, x0:x1] = False
     narrowest = whole_pixels(params.corridors[0], body)
-    for one, other in _openings(words, params, len(columns), len(rows)):
+    for one, other in openings(
+        words, params.loops, params.winding, len(columns), len(rows)
+    ):
         (i, j), (k, m) = min(one, other), max(one, other)
         if i == k:
             across = _opening(words, params.pinched, columns[i], narrowest)
@@ -84,14 +86,27 @@ def _lanes(words: Words, params: Mazes, extent: int, body: float) -> list[Lane]:
     return lanes_from(wall + words.integer(0, offset), widths, wall)
 
 
-def _openings(words: Words, params: Mazes, columns: int, rows: int) -> list[Wall]:
-    """The walls to open: those of a spanning tree, and some more for loops."""
+def openings(
+    words: Words, loops: float, winding: float, columns: int, rows: int
+) -> list[Wall]:
+    """The walls to open: those of a spanning tree, and some more for loops.
+
+    Args:
+        words: Random numbers.
+        loops: Share of the other walls that are opened.
+        winding: Chance that a corridor goes on instead of branching.
+        columns: Number of columns of cells.
+        rows: Number of rows of cells.
+
+    Returns:
+        Pairs of neighbouring cells (column, row).
+    """
     if columns * rows == 0:
         return []
     first = (words.integer(0, columns - 1), words.integer(0, rows - 1))
     seen, active, opened = {first}, [first], []
     while active:
-        newest = words.chance(params.winding)
+        newest = words.chance(winding)
         at = len(active) - 1 if newest else words.integer(0, len(active) - 1)
         here = active[at]
         fresh = [cell for cell in _beside(here, columns, rows) if cell not in seen]
@@ -108,7 +123,7 @@ def _openings(words: Words, params: Mazes, columns: int, rows: int) -> list[Wall
             for other in ((i + 1, j), (i, j + 1)):
                 inside = other[0] < columns and other[1] < rows
                 wall = frozenset(((i, j), other))
-                if inside and wall not in known and words.chance(params.loops):
+                if inside and wall not in known and words.chance(loops):
                     opened.append(((i, j), other))
     return opened
 

@@ -1,0 +1,148 @@
+"""Generated worlds for the e-puck: the same key makes the same world everywhere."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_envs.core.errors import TaskError
+from tdac_envs.grid.grid import clearance
+from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
+from tdac_envs.ladder.difficulty import Difficulty
+from tdac_envs.ladder.generators.blocks import PIXEL, Block, centres, raster
+from tdac_envs.ladder.generators.draft import Draft
+from tdac_envs.ladder.generators.plates import Plates, PlatesDraft, draw
+from tdac_envs.ladder.passages import bottleneck
+from tdac_envs.ladder.words import Words, rounded
+from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.footprint import Rectangle
+from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, World
+
+_PIXEL = PIXEL / 1000
+_WALL, _HEIGHT = 0.01, 0.1
+"""Thickness of the arena's wall, and height of everything, m."""
+
+
+class PlatesSpec(BaseModel):
+    """What a generated world for the e-puck is like, and what its task must fulfil."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    generator: Plates = Plates()
+    step: float = Field(
+        0.01256, gt=0, le=1, description="Distance of one step at full speed, m."
+    )
+    dt: float = Field(0.1, gt=0, le=10, description="Duration of a step, s.")
+    tolerance: float = Field(
+        0.08, gt=0, le=1, description="Distance at which the goal is reached, m."
+    )
+    min_gap: float = Field(1.3, ge=1, le=10, description="Least gap.")
+    min_steps: float = Field(60.0, ge=1, description="Least number of steps, OT.")
+    max_seconds: float = Field(40.0, gt=0, description="Largest OT, s.")
+    min_detour: float = Field(1.3, ge=1, description="Least detour.")
+    tries: int = Field(200, ge=1, le=100_000, description="Largest number of drafts.")
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions of admission, in pixels of the rasters."""
+        task = (BODY_RADIUS / _PIXEL, self.step / _PIXEL, self.tolerance / _PIXEL)
+        return Conditions(*task, self.min_gap, self.min_steps, self.min_detour)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlatesWorld:
+    """A world with a feasible task for an e-puck.
+
+    Attributes:
+        world: The world, with its e-puck at the start, and its goal.
+        path: Shape (n, 2): points of the shortest path of the raster that has only
+            pixels in blocks, m. It may cut turned blocks by some mm.
+        difficulty: How hard it is; its `length` is in m. The gap is at most the true
+            one, and `length` and `steps` are at most the true ones.
+        rejected: Reasons of the drafts that were drawn before it.
+    """
+
+    world: World
+    path: NDArray[np.float64]
+    difficulty: Difficulty
+    rejected: tuple[Rejection, ...]
+
+
+def make_plates(spec: PlatesSpec, key: bytes) -> PlatesWorld:
+    """Makes a world for an e-puck.
+
+    Args:
+        spec: What it is like.
+        key: 32 bytes, from `words.world_key`. All that is random follows from it.
+
+    Raises:
+        TaskError: None of the drafts fulfils the conditions.
+        ValueError: The key has another length.
+    """
+    words = Words(key)
+    rejected: list[Rejection] = []
+    while len(rejected) < spec.tries:
+        draft = draw(words, spec.generator)
+        found = _admitted(draft, words, spec)
+        if isinstance(found, Admitted):
+            return _made(draft, found, words, tuple(rejected))
+        rejected.append(found)
+    reasons = ", ".join(f"{n} × {why}" for why, n in Counter(rejected).most_common())
+    raise TaskError(
+        f"no feasible world from {spec.tries} drafts of 'plates' ({reasons}); "
+        "change the generator's sizes or the conditions"
+    )
+
+
+def _admitted(
+    draft: PlatesDraft, words: Words, spec: PlatesSpec
+) -> Admitted | Rejection:
+    """Tests lengths on the pixels within blocks, and the gap on all that they touch."""
+    blocks = (*draft.plates, *draft.things)
+    inner, outer = (raster(draft.columns, draft.rows, blocks, t) for t in (False, True))
+    conditions = spec.conditions
+    found = admit(Draft(inner, draft.places), words, conditions)
+    if isinstance(found, Rejection):
+        return found
+    if found.difficulty.steps * spec.dt > spec.max_seconds:
+        return Rejection.LONG
+    widest = bottleneck(outer, clearance(outer), found.start, found.goal)
+    gap = rounded(widest / conditions.radius)
+    if gap < spec.min_gap:
+        return Rejection.NARROW
+    return replace(found, difficulty=replace(found.difficulty, gap=gap))
+
+
+def _made(
+    draft: PlatesDraft, found: Admitted, words: Words, rejected: tuple[Rejection, ...]
+) -> PlatesWorld:
+    xs, ys = centres(draft.columns) / 1000, centres(draft.rows) / 1000
+    start, goal = ((float(xs[i]), float(ys[j])) for i, j in (found.start, found.goal))
+    heading = words.uniform(-math.pi, math.pi)
+    sides = draft.columns * PIXEL / 1000, draft.rows * PIXEL / 1000
+    floor = Rectangle(0.0, 0.0, 0.0, *sides)
+    world = World(
+        robots=(EPuck("e-puck", *start, heading),),
+        goal=goal,
+        arenas=(Arena(floor, _WALL, _HEIGHT),),
+        obstacles=(
+            *(_obstacle("plate", k, block) for k, block in enumerate(draft.plates)),
+            *(_obstacle("thing", k, block) for k, block in enumerate(draft.things)),
+        ),
+    )
+    path = found.path * _PIXEL + (xs[0], ys[0])
+    length = found.difficulty.length * _PIXEL
+    difficulty = replace(found.difficulty, length=length)
+    return PlatesWorld(world, path, difficulty, rejected)
+
+
+def _obstacle(name: str, number: int, block: Block) -> Obstacle:
+    """A fixed block that a body can hit and the sensors see."""
+    shape = block.shape
+    parts = (Part(shape, 0.0, _HEIGHT),)
+    return Obstacle(f"{name} {number}", "Solid", shape.x, shape.y, parts, parts)
