@@ -18,6 +18,7 @@ from tdac_agent.verification.suite.hygiene import (
     SAVERS,
     SURFACES,
 )
+from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -39,7 +40,13 @@ def set_prompt(
 
     Raises:
         PromptError: The template is broken, or there is none of this name for sets.
+        TaskError: The set's worlds are in files, which are too few.
     """
+    if tasks.files is not None:
+        raise TaskError(
+            f"the worlds of {tasks.name} are in files, and too few to write a "
+            "controller with; write it for generated worlds, then `tdac verify --set`"
+        )
     if template.text is None:
         if template.name != "full":
             raise PromptError(

@@ -5,6 +5,8 @@ import shlex
 import sys
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from few_worlds import STILL_ANSWER, write_set
 
@@ -96,3 +98,19 @@ def test_mistakes_are_one_line(tdac, words, message):
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert message in err
+
+
+@pytest.mark.parametrize("further", [("--dry-run",), ()])
+def test_worlds_in_files_are_too_few(tdac, tmp_path, further):
+    """A controller is written for generated worlds; nothing is asked or made."""
+    cells = np.zeros((80, 120), np.uint8)
+    cells[3:-3, 3:-3] = 255
+    cv2.imwrite(str(tmp_path / "plan.png"), cells)
+    entry = {"file": "plan.png", "start": [20, 40], "goal": [100, 40]}
+    (tmp_path / "index.json").write_text(json.dumps([entry]))
+    path = tmp_path / "mine.yaml"
+    path.write_text("schema: 1\nname: mine\nworlds: {folder: .}\n")
+    code, _, err = tdac("synth", "--set", path, "--out", tmp_path / "run", *further)
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "the worlds of mine are in files" in err
+    assert not (tmp_path / "run").exists()
