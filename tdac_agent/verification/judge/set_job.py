@@ -180,12 +180,13 @@ def judge_set(job: SetJob, child_pool: ChildPool) -> None:
 
 
 def _checked(run: SetRun) -> tuple[Checks, str]:
-    """The static tests, and the first steps on a world of `dev`; also the tier."""
+    """The static tests, and the first steps on a public world; also the tier."""
     results, job = static_checks(run.source), run.job
     if len(results) == 1:  # it does not parse
         return Checks(results=results), job.tier
     # A public world, so that a failure tells nothing of hidden ones.
-    public = job.model_copy(update={"split": "dev", "salt_file": None})
+    split = "dev" if run.env.set.count("dev") != 0 else job.split
+    public = job.model_copy(update={"split": split, "salt_file": None})
     # Here and not in a worker pool, so that its processes share what this loads.
     drive = partial(_driven, replace(run, job=public), 0, CHECKED_STEPS, _loaded)
     rollout, _, tier = drive()

@@ -16,7 +16,7 @@ from tdac_envs.ladder.observed import View
 @pytest.mark.parametrize("index", range(3))
 def test_places_and_headings_are_as_observed(index):
     tasks = load_set("unknown")
-    task, view = tasks.task("dev", index), View(tasks.file, False)
+    task, view = tasks.task("dev", index), View(tasks.file, tasks.largest_side, False)
     poses = np.array([[31.0, 47.0, 2.0], [80.5, 12.25, -3.0]])
     anchors = np.array([view.anchor(task)] * len(poses))
     none = {key: np.zeros((2, 1), np.float32) for key in tasks.file.observed}
