@@ -51,6 +51,8 @@ class SavedPolicy(BaseModel):
     schema_version: Literal[1] = 1
     algo: str = Field(description="Training algorithm: ppo, sac, …")
     tasks: tuple[str, ...] = Field((), description="Tasks of the training.")
+    set: str | None = Field(None, description="Name of its task set, instead of tasks.")
+    set_sha256: str | None = Field(None, description="Hash of this set.")
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
     variation: str = Field("jitter", description="Variation of the training.")
     steps: int | None = Field(None, description="Steps of the training.")

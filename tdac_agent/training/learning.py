@@ -24,10 +24,15 @@ from tdac_agent.training.curve import Point, read_curve, write_curve
 from tdac_agent.training.hyperparameters import model_arguments
 from tdac_agent.training.plan import TrainingPlan, make_batch
 from tdac_agent.training.policy_files import write_policy
+from tdac_agent.training.set_plan import make_set_batch, make_trials
+from tdac_agent.training.set_trials import evaluate_on_worlds
+from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 
 ALGOS = {"ppo": PPO, "sac": SAC, "td3": TD3}
 EVALUATION_SEED = 1_000_000
 """Added to the training seed; `tdac evaluate` uses other episodes."""
+_Trials = VecMonitor | WrappedVectorEnv
+"""The robots of the evaluations: on tasks, or on worlds of a set."""
 Watch = Callable[[int, Point | None, Point | None], None]
 """Called with the steps so far, the new evaluation if any, and the best one."""
 
@@ -51,10 +56,12 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
     """
     # Networks of this size are slower with more than one thread.
     torch.set_num_threads(1)
-    envs = VecMonitor(
-        make_batch(plan, plan.n_envs, training=True), info_keywords=("is_success",)
-    )
-    trials = VecMonitor(make_batch(plan, plan.episodes), info_keywords=("collision",))
+    if plan.set is None:
+        batch = make_batch(plan, plan.n_envs, training=True)
+    else:
+        batch = make_set_batch(plan)
+    envs = VecMonitor(batch, info_keywords=("is_success",))
+    trials = _trials(plan)
     try:
         model = _model(plan, folder, envs)
         done = int(model.num_timesteps)
@@ -68,6 +75,12 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
     finally:
         envs.close()
         trials.close()
+
+
+def _trials(plan: TrainingPlan) -> _Trials:
+    if plan.set is not None:
+        return make_trials(plan)
+    return VecMonitor(make_batch(plan, plan.episodes), info_keywords=("collision",))
 
 
 def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> Point:
@@ -112,7 +125,7 @@ class _Evaluations(BaseCallback):
         self,
         plan: TrainingPlan,
         folder: Path,
-        trials: VecMonitor,
+        trials: _Trials,
         points: list[Point],
         watch: Watch,
     ) -> None:
@@ -141,9 +154,11 @@ class _Evaluations(BaseCallback):
             self._evaluate(steps)
 
     def _evaluate(self, steps: int) -> None:
-        found = evaluate_batch(
-            self.model, self._trials, EVALUATION_SEED + self._plan.seed
-        )
+        if isinstance(self._trials, WrappedVectorEnv):
+            found = evaluate_on_worlds(self.model, self._trials)
+        else:
+            seed = EVALUATION_SEED + self._plan.seed
+            found = evaluate_batch(self.model, self._trials, seed)
         seen = [info["is_success"] for info in self.model.ep_info_buffer or ()]
         point = replace(
             found,

@@ -45,6 +45,10 @@ class TrainingPlan(BaseModel):
         description="Robot i has task i modulo their number."
     )
     task_sha256: tuple[str, ...]
+    set: str | None = Field(
+        None, description="Name or file of a task set, instead of tasks."
+    )
+    set_sha256: str | None = None
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
     variation: Variation = Field("jitter", description="Starts in evaluations.")
     env_kwargs: dict[str, Any] = Field(
@@ -60,6 +64,11 @@ class TrainingPlan(BaseModel):
     hyperparameters: dict[str, Any]
     evaluate_every: int = Field(description="Steps between evaluations.")
     episodes: int = Field(EPISODES, description="Episodes of each evaluation.")
+
+    @property
+    def worlds(self) -> str:
+        """What it trains on, as `training.json` names it."""
+        return ", ".join(self.tasks) if self.set is None else self.set
 
 
 def make_plan(
@@ -124,7 +133,7 @@ def make_plan(
         steps=wanted,
         seed=seed,
         n_envs=max(count, len(tasks)),
-        policy=_policy(given, names),
+        policy=policy_class(given, names),
         hyperparameters=given.model,
         evaluate_every=max(wanted // EVALUATIONS, 1),
         episodes=max(episodes, len(tasks)),
@@ -210,7 +219,7 @@ def _env_kwargs(
     return given.env | ({} if variation is None else {"variation": variation})
 
 
-def _policy(given: Hyperparameters, wrappers: tuple[str, ...]) -> str:
+def policy_class(given: Hyperparameters, wrappers: tuple[str, ...]) -> str:
     """The policy class, for observations of one array or of several."""
     flat = given.policy.replace("MultiInput", "Mlp")
     return flat if "flatten" in wrappers else flat.replace("Mlp", "MultiInput")

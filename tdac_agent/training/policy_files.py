@@ -15,6 +15,7 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import TrainingPlan
+from tdac_agent.training.set_plan import set_of
 
 POLICY, FACTS = "policy.zip", "policy.json"
 LEARNERS = ("stable_baselines3", "torch")
@@ -32,6 +33,8 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> 
     saved = SavedPolicy(
         algo=plan.algo,
         tasks=plan.tasks,
+        set=None if plan.set is None else set_of(plan).name,
+        set_sha256=plan.set_sha256,
         wrappers=plan.wrappers,
         variation=plan.env_kwargs.get("variation", plan.variation),
         steps=found.steps,

@@ -10,9 +10,10 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from tdac_envs.core.arguments import non_negative
+from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.env import Observation
 from tdac_envs.epuck import paths
-from tdac_envs.learning.wrappers import Env, Frame
+from tdac_envs.learning.wrappers import Env, Frame, lacks_pose
 from tdac_envs.map2d import terrain
 from tdac_envs.map2d.task import Map2DTask
 
@@ -66,6 +67,10 @@ class GoalView(
         self.contact_cost = non_negative("contact_cost", contact_cost)
         self.frame = Frame.of(env)
         self.frame.relative_space(env.observation_space)
+        if lacks_pose(env.observation_space):
+            raise TaskError(
+                f"expected observations with a pose, got {env.observation_space}"
+            )
         own: Any = env.observation_space
         low, high = (np.asarray(b, float) for b in (own["goal"].low, own["goal"].high))
         self._centre, self._scale = (low + high) / 2.0, float((high - low).max()) / 2.0

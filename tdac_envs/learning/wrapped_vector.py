@@ -15,9 +15,17 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Addresses
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.slices import Slices
+from tdac_envs.drive.stepping import STEPS
 from tdac_envs.drive.vector import DrivenVectorEnv, Observations
+from tdac_envs.learning.dead_reckoning import DeadReckoning
 from tdac_envs.learning.guidance import Route, look_ahead, route_to_goal
-from tdac_envs.learning.wrappers import Frame, check_wrappers, guided_space
+from tdac_envs.learning.wrappers import (
+    Frame,
+    check_guidance,
+    check_wrappers,
+    guided_space,
+    lacks_pose,
+)
 
 Array = NDArray[np.float64]
 Seen = Any
@@ -104,6 +112,7 @@ class WrappedVectorEnv(VectorWrapper):
         super().__init__(batch)
         self.batch = batch
         self.names = tuple(names)
+        self._reckoned: DeadReckoning | None = None
         self._bind()
         self.single_observation_space = self._space
         self.observation_space = batch_space(self._space, self.num_envs)
@@ -150,8 +159,11 @@ class WrappedVectorEnv(VectorWrapper):
         own, frame = self._space, _frame(self.batch)
         if name == "goal-relative":
             self._space = frame.relative_space(own)
+            if lacks_pose(own):
+                self._reckoned = self._reckoned or DeadReckoning(self.num_envs)
             return lambda seen, _: frame.goal_relative(seen)
         if name == "guidance":
+            check_guidance(self.batch.setups[0])
             self._space = guided_space(own)
             routes = self._routes = self._routes or Routes(self.batch)
             return lambda seen, poses: {
@@ -167,6 +179,10 @@ class WrappedVectorEnv(VectorWrapper):
     def _current(self, observations: Observations) -> Seen:
         if self._routes is not None:
             self._routes.refresh()
+        if self._reckoned is not None:
+            steps = self.batch.robots.state[:, STEPS]
+            pose: Any = self._reckoned.follow(observations["odometry"], steps)
+            observations = {**observations, "pose": pose}
         return self._wrapped(observations, self.batch.pose())
 
     def _wrapped(self, observations: Observations, poses: Array) -> Seen:
@@ -183,6 +199,9 @@ class WrappedVectorEnv(VectorWrapper):
         for i in over:
             for key, value in final[i].items():
                 last[key][i] = value
+        if self._reckoned is not None:
+            final_pose: Any = self._reckoned.ahead(last["odometry"])
+            last["pose"] = final_pose
         seen = self._wrapped(last, self.batch.last_poses)
         for i in over:
             single = not isinstance(seen, dict)

@@ -25,7 +25,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.env import Observation
+from tdac_envs.drive.stepping import STEPS
 from tdac_envs.epuck.infrared import LARGEST
+from tdac_envs.learning.dead_reckoning import DeadReckoning
 from tdac_envs.learning.guidance import REACH, Route, route_to_goal
 from tdac_envs.map2d.task import Map2DTask
 
@@ -87,17 +89,22 @@ class Frame:
         return np.stack([dx * cos + dy * sin, left if self.up else -left], axis=-1)
 
     def goal_relative(self, observation: Observation) -> Observation:
-        """Converts an observation, or a batch, as `GoalRelativeObservation` does."""
+        """Converts an observation, or a batch, as `GoalRelativeObservation` does.
+
+        Args:
+            observation: With the keys `pose` and `goal`.
+        """
         seen = self.seen(observation["pose"], observation["goal"])
         distance = np.hypot(seen[..., 0], seen[..., 1])[..., None]
         near = distance / (distance + MIDDLE * self.radius)
         bearing = seen / np.maximum(distance, 1e-9)
-        readings = observation[self.readings] / np.asarray(self.largest, np.float32)
-        return {
-            "goal": np.concatenate([bearing, near], axis=-1).astype(np.float32),
-            "wheel_speeds": observation["wheel_speeds"],
-            self.readings: np.clip(readings, 0.0, 1.0),
-        }
+        own = {"goal": np.concatenate([bearing, near], axis=-1).astype(np.float32)}
+        if "wheel_speeds" in observation:
+            own["wheel_speeds"] = observation["wheel_speeds"]
+        if self.readings in observation:
+            readings = observation[self.readings] / np.asarray(self.largest, np.float32)
+            own[self.readings] = np.clip(readings, 0.0, 1.0)
+        return own
 
     def guidance(self, route: Route, poses: ArrayLike) -> NDArray[np.float32]:
         """The `guidance` of one route at poses of shape (n, 3)."""
@@ -117,17 +124,41 @@ class Frame:
             own: Space of the original observations.
 
         Raises:
-            TaskError: It has no pose.
+            TaskError: It has no goal, or neither a pose nor odometry.
         """
-        if not isinstance(own, spaces.Dict) or "pose" not in own.spaces:
-            raise TaskError(f"expected observations with a pose, got {own}")
-        readings = own[self.readings].shape
-        return spaces.Dict(
-            {
-                "goal": spaces.Box(-1.0, 1.0, (3,), np.float32),
-                "wheel_speeds": spaces.Box(-1.0, 1.0, (2,), np.float32),
-                self.readings: spaces.Box(0.0, 1.0, readings, np.float32),
-            }
+        keys = set(own.spaces) if isinstance(own, spaces.Dict) else set()
+        if "goal" not in keys or not keys & {"pose", "odometry"}:
+            raise TaskError(
+                f"expected observations with a pose or odometry, and a goal, got {own}"
+            )
+        assert isinstance(own, spaces.Dict)
+        found = {"goal": spaces.Box(-1.0, 1.0, (3,), np.float32)}
+        if "wheel_speeds" in keys:
+            found["wheel_speeds"] = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        if self.readings in keys:
+            shape = own[self.readings].shape
+            found[self.readings] = spaces.Box(0.0, 1.0, shape, np.float32)
+        return spaces.Dict(found)
+
+
+def lacks_pose(own: spaces.Space[Any]) -> bool:
+    """Whether the pose of original observations must come from odometry."""
+    return isinstance(own, spaces.Dict) and "pose" not in own.spaces
+
+
+def check_guidance(setup: Any) -> None:
+    """Checks that an environment's robot may be guided.
+
+    Args:
+        setup: Setup of the environment.
+
+    Raises:
+        TaskError: It drives on a task set.
+    """
+    if setup.source is not None:
+        raise TaskError(
+            "guidance comes from the true map and pose, which no robot knows on a task "
+            "set: leave out the wrapper 'guidance'"
         )
 
 
@@ -158,10 +189,13 @@ class GoalRelativeObservation(
     | `wheel_speeds` | (2,) | [-1, 1] | left, right, as last applied |
     | `ranges` or `ps` | (n,) | [0, 1] | reading / largest possible reading |
 
-    Left is the robot's left in the picture, in both environments.
+    Left is the robot's left in the picture, in both environments. Without a pose, as on
+    some task sets, the goal is relative to the pose that the odometry since the start
+    adds up to, with all its errors. Keys that the environment does not have are left
+    out.
 
     Args:
-        env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0` with its original observations.
+        env: An environment of `tdac_envs` with its original observations.
     """
 
     def __init__(self, env: Env) -> None:
@@ -170,10 +204,16 @@ class GoalRelativeObservation(
         self.frame = Frame.of(env)
         space = self.frame.relative_space(env.observation_space)
         self.observation_space = space  # type: ignore[assignment]
+        self._reckoned = DeadReckoning() if lacks_pose(env.observation_space) else None
 
     def observation(self, observation: Observation) -> Observation:
         """See the class."""
-        return self.frame.goal_relative(observation)
+        if self._reckoned is None:
+            return self.frame.goal_relative(observation)
+        plain: Any = self.unwrapped
+        steps = plain.robot.state[STEPS]
+        pose: Any = self._reckoned.follow(observation["odometry"], steps)
+        return self.frame.goal_relative({**observation, "pose": pose})
 
 
 class Guidance(
@@ -193,7 +233,8 @@ class Guidance(
     the whole map and the true pose, so guidance gives a policy more than sensor data.
 
     Args:
-        env: Either environment; its observations must be a `Dict`.
+        env: Either environment; its observations must be a `Dict`. Task sets have no
+            guidance.
         reach: Distance of the waypoint along the route, in body radii.
     """
 
@@ -201,6 +242,8 @@ class Guidance(
         gym.utils.RecordConstructorArgs.__init__(self, reach=reach)
         gym.ObservationWrapper.__init__(self, env)
         self.frame = Frame.of(env)
+        plain: Any = env.unwrapped
+        check_guidance(plain.setup)
         self.reach = reach
         space = guided_space(env.observation_space)
         self.observation_space = space  # type: ignore[assignment]
@@ -243,7 +286,7 @@ def wrap(env: Env, names: Sequence[str]) -> Env:
     """Wraps an environment, the first wrapper innermost.
 
     Args:
-        env: `TDAC-Map2D-v0` or `TDAC-EPuck-v0`.
+        env: An environment of `tdac_envs`.
         names: Names in `WRAPPERS`; `flatten` concatenates a `Dict` by sorted keys.
 
     Raises:

@@ -11,21 +11,23 @@ from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 from tdac_envs.learning.wrappers import Env, wrap
 
 FOR_RL = ("goal-relative", "guidance", "flatten")
-"""The wrappers of `tdac train`, innermost first."""
+"""The wrappers of `tdac train` on tasks, innermost first."""
+FOR_SETS = ("goal-relative", "flatten")
+"""Those on task sets, where a policy has its sensors alone."""
 
 
 @overload
 def wrap_for_rl(
-    env: VectorEnv[Any, Any, Any], names: Sequence[str] = FOR_RL
+    env: VectorEnv[Any, Any, Any], names: Sequence[str] | None = None
 ) -> WrappedVectorEnv: ...
 
 
 @overload
-def wrap_for_rl(env: Env, names: Sequence[str] = FOR_RL) -> Env: ...
+def wrap_for_rl(env: Env, names: Sequence[str] | None = None) -> Env: ...
 
 
 def wrap_for_rl(
-    env: Env | VectorEnv[Any, Any, Any], names: Sequence[str] = FOR_RL
+    env: Env | VectorEnv[Any, Any, Any], names: Sequence[str] | None = None
 ) -> Env | WrappedVectorEnv:
     """Makes observations flat, scaled to [-1, 1], and relative to robot and goal.
 
@@ -43,17 +45,27 @@ def wrap_for_rl(
     | `wheel_speeds` | 2 | left, right, as last applied |
 
     Guidance is computed from the whole map; `names=("goal-relative", "flatten")` omits
-    it, for policies that use only sensors and the goal. Rewards, actions and the ends
-    of episodes do not change. `tdac train` uses this function.
+    it, for policies that use only sensors and the goal. On a task set
+    (`TDAC-Ladder-v0`) that is the default, and there is no guidance; where the robot
+    has no pose, the goal is relative to the pose that its odometry adds up to. Rewards,
+    actions and the ends of episodes do not change. `tdac train` uses this function.
 
     Args:
-        env: Either environment, single or batched, with its original observations.
-        names: Names in `tdac_envs.wrappers.WRAPPERS`, innermost first.
+        env: An environment, single or batched, with its original observations.
+        names: Names in `tdac_envs.wrappers.WRAPPERS`, innermost first. By default
+            `FOR_RL`, and on a task set `FOR_SETS`.
 
     Raises:
         TaskError: `env` is not from `tdac_envs`, a name is unknown, or a
             wrapper does not support the observations.
     """
     if isinstance(env, VectorEnv):
-        return WrappedVectorEnv(env, names)
+        setups = getattr(env, "setups", None) or [None]
+        return WrappedVectorEnv(env, _names(setups[0]) if names is None else names)
+    if names is None:
+        names = _names(getattr(env.unwrapped, "setup", None))
     return wrap(env, names)
+
+
+def _names(setup: Any) -> tuple[str, ...]:
+    return FOR_RL if getattr(setup, "source", None) is None else FOR_SETS

@@ -1,0 +1,137 @@
+"""Promises of the wrappers on task sets: sensors alone, for one robot and for many."""
+
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import yaml
+from gymnasium.vector import SyncVectorEnv
+
+from tdac_envs import wrap_for_rl
+from tdac_envs.core.errors import TaskError
+from tdac_envs.learning.dead_reckoning import DeadReckoning
+
+LADDER = "TDAC-Ladder-v0"
+LEVELS = ["known", "unknown", "lost"]
+SIZE = 3 + 2
+"""Numbers besides the ranges: goal, wheel speeds."""
+
+
+@pytest.fixture
+def few(tmp_path):
+    """Writes a set of small worlds and short episodes; gives its path."""
+
+    def write(**values):
+        aisles = {"name": "aisles", "width": 220, "height": 180}
+        short = {"factor": 1.0, "least": 12, "most": 12}
+        path = tmp_path / "few.yaml"
+        path.write_text(
+            yaml.safe_dump({"worlds": [aisles], "horizon": short, **values})
+        )
+        return path
+
+    return write
+
+
+LOST = {
+    "observed": ["odometry", "goal", "wheel_speeds", "ranges"],
+    "disturbances": {"odometry_scale": 0.05, "odometry_noise": 0.05, "delay": 1},
+}
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_the_default_is_sensors_alone(level):
+    """Flat, scaled, without guidance; the same space for one robot and for many."""
+    env = wrap_for_rl(gym.make(LADDER, level=level, split="dev"))
+    rays = env.unwrapped.observation_space["ranges"].shape[0]
+    assert env.observation_space.shape == (SIZE + rays,)
+    batch = wrap_for_rl(gym.make_vec(LADDER, 2, level=level, split="dev"))
+    assert batch.single_observation_space == env.observation_space
+    seen, _ = env.reset(options={"index": 1})
+    assert seen in env.observation_space
+    plain, _ = env.unwrapped.reset(options={"index": 1})
+    assert np.array_equal(seen[-2:], plain["wheel_speeds"])
+    assert np.allclose(seen[3:-2], plain["ranges"] / env.unwrapped.task.robot.range_max)
+    batch.close()
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+@pytest.mark.parametrize("values", [{}, LOST])
+def test_a_batch_tells_what_single_environments_tell(few, mode, values):
+    """To the last bit, also at the ends of episodes and after them."""
+    given = {"level": few(**values), "train_pool": 3}
+    single = [lambda: wrap_for_rl(gym.make(LADDER, **given)) for _ in range(3)]
+    many = SyncVectorEnv(single, autoreset_mode=mode)
+    ours = wrap_for_rl(gym.make_vec(LADDER, 3, autoreset_mode=mode, **given))
+    np.testing.assert_array_equal(many.reset(seed=5)[0], ours.reset(seed=5)[0])
+    random, ends = np.random.default_rng(1), 0
+    for _ in range(30):
+        actions = random.uniform(-1.0, 1.0, (3, 2)).astype(np.float32)
+        first, second = many.step(actions), ours.step(actions)
+        np.testing.assert_array_equal(first[0], second[0])
+        over = first[2] | first[3]
+        ends += over.sum()
+        if mode == "SameStep":
+            for i in np.flatnonzero(over):
+                final = first[4]["final_obs"][i], second[4]["final_obs"][i]
+                np.testing.assert_array_equal(*final)
+    assert ends >= 6
+    copy = pickle.loads(pickle.dumps(ours))
+    actions = np.ones((3, 2), np.float32)
+    np.testing.assert_array_equal(ours.step(actions)[0], copy.step(actions)[0])
+    ours.close()
+    copy.close()
+
+
+def test_exact_odometry_adds_up_to_the_true_pose(few):
+    """So the goal is where a robot with a pose sees it; also in the next episode."""
+    exact = {**LOST, "disturbances": {}}
+    env = wrap_for_rl(gym.make(LADDER, level=few(**exact), split="dev"))
+    told = wrap_for_rl(gym.make(LADDER, level=few(), split="dev"))
+    random = np.random.default_rng(2)
+    for index in (4, 5):
+        env.reset(options={"index": index})
+        # The set with a pose has other worlds: its environment takes this one's.
+        plain, frame = env.unwrapped, told.unwrapped.view
+        anchor = frame.anchor(plain.task)
+        for _ in range(12):
+            action = random.uniform(-1.0, 1.0, 2).astype(np.float32)
+            seen, *_, ended, _, _ = env.step(action)
+            whole = {"ranges": seen, "wheel_speeds": seen[-2:], "goal": seen}
+            pose = frame.seen(whole, plain.pose(), anchor)["pose"]
+            goal = anchor[5:].astype(np.float32)
+            ahead, left = told.env.frame.seen(pose, goal)
+            distance = np.hypot(ahead, left)
+            assert np.allclose(seen[:2], [ahead / distance, left / distance], atol=1e-4)
+            if ended:
+                break
+
+
+def test_poses_do_not_move_twice_in_a_step():
+    """Whoever asks again for the same step gets the same pose."""
+    reckoned = DeadReckoning()
+    reckoned.follow([0.0, 0.0], 0)
+    first = reckoned.follow([2.0, np.pi], 1)
+    assert np.array_equal(reckoned.follow([2.0, np.pi], 1), first)
+    # A half circle of length 2 has the diameter 4 / pi.
+    assert np.allclose(first, [0.0, 4.0 / np.pi, np.pi])
+    assert np.array_equal(reckoned.follow([1.0, 1.0], 0), np.zeros(3))
+
+
+@pytest.mark.parametrize("made", [gym.make, gym.make_vec])
+def test_what_a_robot_cannot_know_is_refused(few, made):
+    """In one line that says what to do."""
+    with pytest.raises(TaskError, match="leave out the wrapper 'guidance'"):
+        wrap_for_rl(made(LADDER, level="unknown", split="dev"), ["guidance"])
+    blind = few(observed=["goal", "ranges"])
+    with pytest.raises(TaskError, match="expected observations with a pose or odom"):
+        wrap_for_rl(made(LADDER, level=blind, split="dev"))
+
+
+def test_a_set_may_observe_less(few):
+    """Wheel speeds that the set does not have are left out."""
+    level = few(observed=["pose", "goal", "ranges"])
+    env = wrap_for_rl(gym.make(LADDER, level=level, split="dev"))
+    rays = env.unwrapped.observation_space["ranges"].shape[0]
+    assert env.reset(seed=0)[0].shape == env.observation_space.shape == (3 + rays,)
