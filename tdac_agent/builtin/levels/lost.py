@@ -1,10 +1,10 @@
 """Drives to a goal without a map and without a pose, on wheels that slip.
 
-A Kalman filter holds the pose, the errors of the odometry and the gains of the wheels. Each
-scan is matched with the robot's own map: cells that hold the mean of the hits in them. What
-is planned, is planned from where the robot will be when the next action takes effect. Arcs
-are tried out against the hits, and must begin in space that rays have found free; the less
-room an arc leaves for what slip may do, the dearer it is.
+A Kalman filter holds the pose, the errors of the odometry and the gains of the wheels.
+Each scan is matched with the robot's own map: cells that hold the mean of the hits in
+them. What is planned, is planned from where the robot will be when the next action takes
+effect. Arcs are tried out against the hits, and must begin in space that rays have found
+free; the less room an arc leaves for what slip may do, the dearer it is.
 """
 
 import json
@@ -58,25 +58,29 @@ class Filter:
     """A Kalman filter over what the robot does not know.
 
     Attributes:
-        state: x, y, heading, odometry factors of distance and turn, gains of the wheels.
+        state: x, y, heading, odometry factors of distance and turn, wheel gains.
         spread: Its covariance.
     """
 
     def __init__(self):
         self.state = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
         bound = GAINS / math.sqrt(3.0)
-        self.spread = np.diag([1e-6, 1e-6, 1e-8, SCALE**2, SCALE**2, bound**2, bound**2])
+        self.spread = np.diag(
+            [1e-6, 1e-6, 1e-8, SCALE**2, SCALE**2, bound**2, bound**2]
+        )
 
     def pose(self):
         """x, y and heading."""
         return tuple(self.state[:3].tolist())
 
     def moved(self, wheels, odometry):
-        """Takes a step by the command that was driven and by what was measured of it."""
+        """Takes a step by the command that was driven and what was measured of it."""
         if not np.any(wheels):
             return
         state = np.concatenate([self.state, [0.0, 0.0]])
-        driven = [wheel(float(c), g) for c, g in zip(wheels, state[5:7].tolist(), strict=True)]
+        driven = [
+            wheel(float(c), g) for c, g in zip(wheels, state[5:7].tolist(), strict=True)
+        ]
         (left, by_left, left_sd), (right, by_right, right_sd) = driven
         state[7], state[8] = 0.5 * (left + right), (left - right) / AXLE
         mix = np.array([[0.5, 0.5], [1.0 / AXLE, -1.0 / AXLE]])
@@ -86,7 +90,9 @@ class Filter:
         spread[7:, :7] = by_gain @ self.spread[5:7]
         spread[:7, 7:] = spread[7:, :7].T
         slips = np.diag([left_sd**2 + 1e-4, right_sd**2 + 1e-4])
-        spread[7:, 7:] = by_gain @ self.spread[5:7, 5:7] @ by_gain.T + mix @ slips @ mix.T
+        spread[7:, 7:] = (
+            by_gain @ self.spread[5:7, 5:7] @ by_gain.T + mix @ slips @ mix.T
+        )
         for factor, motion, value in (3, 7, odometry[0]), (4, 8, odometry[1]):
             row = np.zeros(9)
             row[factor], row[motion] = state[motion], state[factor]
@@ -161,7 +167,7 @@ def wheel(command, gain):
 
 
 class Surfaces:
-    """Hits in cells of CELL px: their number, by weight, and the sum of their places."""
+    """Hits in cells of CELL px: their weight, and the sum of their places."""
 
     def __init__(self, half):
         self.half = half // CELL
@@ -187,9 +193,15 @@ class Surfaces:
         weight = np.minimum(weight, 4.0) * np.exp(-far / 12.0)
         total = weight.sum(axis=1)
         held = np.maximum(total, 1e-9)[:, None]
-        mx, my = ((weight * x).sum(axis=1) / held[:, 0]), ((weight * y).sum(axis=1) / held[:, 0])
+        mx, my = (
+            ((weight * x).sum(axis=1) / held[:, 0]),
+            ((weight * y).sum(axis=1) / held[:, 0]),
+        )
         dx, dy = x - mx[:, None], y - my[:, None]
-        xx, yy = (weight * dx * dx / held).sum(axis=1), (weight * dy * dy / held).sum(axis=1)
+        xx, yy = (
+            (weight * dx * dx / held).sum(axis=1),
+            (weight * dy * dy / held).sum(axis=1),
+        )
         xy = (weight * dx * dy / held).sum(axis=1)
         root = np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
         small, large = 0.5 * (xx + yy) - root, 0.5 * (xx + yy) + root
@@ -290,7 +302,10 @@ class Maps:
         (px, py), at = self.surfaces.points(x, y, RANGE)
         dx, dy = px - x, py - y
         distance = np.hypot(dx, dy)
-        bearing = np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi) - math.pi
+        bearing = (
+            np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
+            - math.pi
+        )
         place = (bearing + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
         nearest = np.clip(np.rint(place).astype(int), 0, RAYS - 1)
         beside = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1))
@@ -325,7 +340,9 @@ class Maps:
         gaps = np.hypot(around[None, :] - self.goal[0], around[:, None] - self.goal[1])
         least = max(TOLERANCE, float(gaps[passable].min()) + 1.0)
         starts = np.nonzero((passable & (gaps <= least)).ravel())[0]
-        self.cost[:] = wave(passable, price, starts, gaps.ravel()[starts], self.cell(x, y))
+        self.cost[:] = wave(
+            passable, price, starts, gaps.ravel()[starts], self.cell(x, y)
+        )
 
     def cell(self, x, y):
         """Row and column of the place of the search that is nearest."""
@@ -352,11 +369,13 @@ def moves(width):
 def wave(passable, price, starts, first_costs, robot, beyond=48.0):
     """Costs to the goal over places, in bands of equal cost; inf where there is no way.
 
-    Stops somewhat beyond the robot. No move is shorter than a band is wide, so each band
-    is final when its turn comes.
+    Stops somewhat beyond the robot. No move is shorter than a band is wide, so each
+    band is final when its turn comes.
     """
     width = passable.shape[1]
-    shifts, lengths, first, second = (np.array(each) for each in zip(*moves(width), strict=True))
+    shifts, lengths, first, second = (
+        np.array(each) for each in zip(*moves(width), strict=True)
+    )
     lengths = 0.5 * lengths
     passable, price = passable.ravel(), price.ravel()
     cost = np.full(passable.shape, np.inf)
@@ -399,7 +418,8 @@ def extended(cost, turns):
         padded = np.pad(cost, 1, constant_values=np.inf)
         height, width = cost.shape
         around = [
-            padded[j : j + height, i : i + width] + CELL * 1.5 * math.hypot(i - 1, j - 1)
+            padded[j : j + height, i : i + width]
+            + CELL * 1.5 * math.hypot(i - 1, j - 1)
             for i in range(3)
             for j in range(3)
         ]
@@ -416,7 +436,9 @@ def between(field, x, y, half, half_y, scale=1.0):
     u, v = x - i, y - j
     flat, at = field.ravel(), j * width + i
     top = flat[at] * (1.0 - u) + flat[at + 1] * u
-    return top * (1.0 - v) + (flat[at + width] * (1.0 - u) + flat[at + width + 1] * u) * v
+    return (
+        top * (1.0 - v) + (flat[at + width] * (1.0 - u) + flat[at + width + 1] * u) * v
+    )
 
 
 class Near:
@@ -481,7 +503,7 @@ def clearances(cells, reach):
 
 
 def wheel_pairs():
-    """Speeds of the wheels to try: one at full speed, forward or back, or both slower."""
+    """Speeds of the wheels to try: one at full speed, or both slower."""
     ends = np.concatenate([np.linspace(-1.0, 0.6, 9), np.linspace(0.7, 1.0, 13)])
     pairs = [(1.0, e) for e in ends] + [(e, 1.0) for e in ends]
     pairs += [(0.6 * a, 0.6 * b) for a, b in pairs[::2]]
@@ -570,10 +592,16 @@ def best_arc(near, courses, x, y, heading, slack, unsure):
     there = fits & ready[:, None]
     there &= np.hypot(px - goal[0], py - goal[1]) <= 0.6 * TOLERANCE
     left = near.left(px, py)
-    worth = left + courses.step * TIMES + turns_left(near, px, py, heading + courses.facing, left)
+    worth = (
+        left
+        + courses.step * TIMES
+        + turns_left(near, px, py, heading + courses.facing, left)
+    )
     worth = np.where(there, courses.step * TIMES - 20.0, worth)
     able = np.where(fits, worth, np.inf)
-    worth = np.minimum(able[:, SOON - 1 :].min(axis=1), np.where(there, able, np.inf).min(axis=1))
+    worth = np.minimum(
+        able[:, SOON - 1 :].min(axis=1), np.where(there, able, np.inf).min(axis=1)
+    )
     worth += PEEK * ~ready + danger
     k = int(worth.argmin())
     unseen = None if ready[k] else (px[k, :NEXT], py[k, :NEXT])
@@ -600,7 +628,7 @@ def best_line(near, courses, x, y, heading, slack, unsure):
         worth = left + LENGTHS + spun[:, None]
         worth += turns_left(near, px, py, facing[:, None], left)
         worth = np.where(able, worth, np.inf)[:, LENGTHS >= 6.0]
-        ready = seen[:, LENGTHS <= courses.step].all(axis=1)
+        ready = seen[:, courses.step >= LENGTHS].all(axis=1)
         price = worth.min(axis=1) + PEEK * ~ready + danger
         k = int(price.argmin())
         if price[k] < best[0]:
@@ -609,7 +637,7 @@ def best_line(near, courses, x, y, heading, slack, unsure):
             if spun[k] == 0.0:
                 pair = sign, sign
                 if not ready[k]:
-                    some = LENGTHS <= courses.step
+                    some = courses.step >= LENGTHS
                     unseen = px[k, some], py[k, some]
             best = float(price[k]), np.array(pair), unseen
     return best
@@ -631,14 +659,16 @@ def away_from_hits(near, courses, x, y, heading):
     """Speeds of the short arc that leaves most room at its end."""
     cosine, sine = math.cos(heading), math.sin(heading)
     ahead, aside = courses.ahead[:, :NEXT], courses.aside[:, :NEXT]
-    room = near.room(x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside)
+    room = near.room(
+        x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
+    )
     slow = np.abs(courses.pairs).max(axis=1) < 0.7
     value = room[:, -1] + np.minimum(room.min(axis=1) - float(room[0, 0]), 0.0)
     return courses.pairs[int(np.where(slow, value, -np.inf).argmax())]
 
 
 def search(maps, x, y):
-    """Goes around where the goal must be, in rings, if it is not where it is believed."""
+    """Goes around the goal in rings, if it is not where it is believed."""
     if math.hypot(x - maps.goal[0], y - maps.goal[1]) > 0.5 * TOLERANCE:
         return
     gx, gy = STATE["goal"]
@@ -648,7 +678,9 @@ def search(maps, x, y):
             for k in range(count):
                 angle = 2.0 * math.pi * k / count
                 away = 1.2 * TOLERANCE * ring
-                STATE["goals"].append((gx + away * math.cos(angle), gy + away * math.sin(angle)))
+                STATE["goals"].append(
+                    (gx + away * math.cos(angle), gy + away * math.sin(angle))
+                )
     maps.goal = list(STATE["goals"].pop(0))
     maps.age = 99
 
