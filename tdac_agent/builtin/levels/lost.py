@@ -2,9 +2,9 @@
 
 A Kalman filter holds the pose, the errors of the odometry and the gains of the wheels.
 Each scan is matched with the robot's own map: cells that hold the mean of the hits in
-them. What is planned, is planned from where the robot will be when the next action takes
-effect. Arcs are tried out against the hits, and must begin in space that rays have found
-free; the less room an arc leaves for what slip may do, the dearer it is.
+them. What is planned, is planned from where the robot will be when the next action
+takes effect. Arcs are tried out against the hits, and must begin in space that rays
+have found free; the less room an arc leaves for what slip may do, the dearer it is.
 """
 
 import json
