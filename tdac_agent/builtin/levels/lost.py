@@ -30,10 +30,13 @@ DELAY = int(NOISES.get("delay", 0))
 FAR = RANGE * (1.0 - 3.0 * RAY_NOISE) - 1e-3  # a ray that reads more has hit nothing
 ROUGH = 0.3  # px by which walls differ from lines
 MARGIN = 0.15  # px that are kept from hits
+WAIT, STUCK = 25, 6.0  # steps within so many px after which something else is tried
+NEARBY = 6.0 * TOLERANCE  # px to the goal
+STRICT, PATIENCE = -0.6, 200  # LOOSE for so many steps after that
 LOOSE = 0.8  # px by which the search may come too near to a hit
 SLIVER = 1.5  # px around hits in which unseen space is no matter
 SLACK = 0.7  # px by which the body may come too near to the centre of an unseen px
-CHORD = 5.0  # px between two hits that are taken for one surface
+CHORD = 5.0  # px between two hits that are taken for one borders
 ROOM = 1.5 * RADIUS  # clearance from which a px costs nothing extra
 REACH = int(ROOM) + 1
 PRICE = 0.3  # how much more a px beside a wall costs
@@ -286,12 +289,12 @@ class Maps:
         k = np.minimum(place.astype(int), RAYS - 2)
         least = np.minimum(ranges[:-1], ranges[1:])
         tx, ty = ranges * np.cos(FAN), ranges * np.sin(FAN)
-        # A px is before the chord of two hits on one surface, or nearer than both hits.
+        # A px is before the chord of two hits on one borders, or nearer than both hits.
         nx, ny = np.diff(ty), -np.diff(tx)
         gap = np.hypot(nx, ny)
-        surface = hit[:-1] & hit[1:] & (gap < CHORD)
+        borders = hit[:-1] & hit[1:] & (gap < CHORD)
         before = nx[k] * (ahead - tx[k]) + ny[k] * (aside - ty[k]) <= 0.0
-        is_free = np.where(surface[k], before, distance <= least[k])
+        is_free = np.where(borders[k], before, distance <= least[k])
         nearest = np.minimum((place + 0.5).astype(int), RAYS - 1)
         on_ray = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1)) < 0.5
         is_free |= on_ray & (distance <= ranges[nearest] - 0.7)
@@ -561,6 +564,8 @@ def reset(obs):
         queue=[(0.0, 0.0)] * DELAY,
         goals=[],
         goal=[float(value) for value in obs["goal"]],
+        trail=[],
+        strict=0,
         steps=0,
     )
 
@@ -667,9 +672,26 @@ def away_from_hits(near, courses, x, y, heading):
     return courses.pairs[int(np.where(slow, value, -np.inf).argmax())]
 
 
+def is_stuck(x, y):
+    """Whether the robot has stayed in one place."""
+    STATE["trail"] = [*STATE["trail"][-WAIT:], (x, y)]
+    if len(STATE["trail"]) <= WAIT or np.ptp(STATE["trail"], axis=0).max() > STUCK:
+        return False
+    STATE["trail"] = []
+    return True
+
+
 def search(maps, x, y):
-    """Goes around the goal in rings, if it is not where it is believed."""
-    if math.hypot(x - maps.goal[0], y - maps.goal[1]) > 0.5 * TOLERANCE:
+    """Goes around the goal in rings, if it is not where it is believed.
+
+    A robot that gets no further tries the next place, or far from the goal passages
+    with more room.
+    """
+    gap = math.hypot(x - maps.goal[0], y - maps.goal[1])
+    stuck = is_stuck(x, y)
+    if stuck and gap > NEARBY:
+        STATE["strict"] = STATE["steps"] + PATIENCE
+    if gap > 0.5 * TOLERANCE and not (stuck and gap <= NEARBY):
         return
     gx, gy = STATE["goal"]
     if not STATE["goals"]:
@@ -730,7 +752,7 @@ def policy(obs):
     x, y, heading, slipped = expected((x, y, heading), gains, STATE["queue"])
     maps.age += 1
     if maps.age > 1 or STATE["steps"] < 3:
-        maps.plan(x, y, LOOSE)
+        maps.plan(x, y, LOOSE if STATE["steps"] > STATE["strict"] else STRICT)
         if not np.isfinite(maps.cost[maps.cell(x, y)]):
             maps.plan(x, y, 2.0 * LOOSE)
         maps.age = 0
