@@ -165,6 +165,11 @@ class Units:
         return f"x {x}, y {y}"
 
     @property
+    def printed_place(self) -> str:
+        """Unit of printed places."""
+        return self.place if self.shown is None else self.shown.name
+
+    @property
     def _decimals(self) -> int:
         return self.decimals if self.shown is None else self.shown.decimals
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from tdac_envs.mapping.preprocessing import Source
 
 FILES = ("occupancy.npy", "occupancy.png", "params.json", "preview.png")
+REFUSED_FILES = ("refused.png", "preview-dark.png", "preview-light.png")
+"""Pictures of a refused map; see `write_pictures`."""
 
 
 def write_map(
@@ -65,6 +67,8 @@ def write_map(
             (Path(work) / "preview.png").write_bytes(png(preview))
             for name in FILES:
                 os.replace(Path(work) / name, folder / name)
+        for name in REFUSED_FILES:  # of an earlier attempt
+            (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise MapError(
             f"{folder}: cannot be written: {error.strerror}; choose another folder"

@@ -220,7 +220,7 @@ def _last_poses(trajectory: Trajectory, units: Units) -> str:
         f"{first}{f'-{last}' if last > first else ''}: {row}"
         for first, last, row in reversed(groups)
     ]
-    what = f"x y in {units.place}, heading in ° [left right]"
+    what = f"x y in {units.printed_place}, heading in ° [left right]"
     return f"Last poses (step: {what}): {'; '.join(rows)}."
 
 

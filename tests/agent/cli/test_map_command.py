@@ -76,6 +76,16 @@ def test_refusals_are_in_metres(tdac, ros, command, start, reason):
     assert Path("plan-map/refused.png").is_file()
 
 
+def test_a_map_replaces_the_picture_of_its_refusal(tdac, ros):
+    """The folder does not show why an earlier attempt failed."""
+    words = ("map", ros, "--metres", "--goal", *GOAL, *RADIUS)
+    assert tdac(*words, "--start", "90", "5")[0] == 2
+    assert Path("plan-map/refused.png").is_file()
+    assert tdac(*words, "--start", "1.05", "5.95")[0] == 0
+    assert not Path("plan-map/refused.png").exists()
+    assert Path("plan-map/preview.png").is_file()
+
+
 def test_a_task_in_metres_is_the_one_in_pixels(ros):
     """Start, heading, goal, radius and tolerance are converted; words stay metres."""
     flags = {"map_image": str(ros), "metres": True}

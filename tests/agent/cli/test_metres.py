@@ -70,7 +70,8 @@ def test_a_failed_verification(tdac, plan):
     )
     assert re.search(r"must fall from \d+\.\d+ m to \d+\.\d+ m or less", told)
     assert "Path left: " in told
-    assert not re.search(r"\d px", told)
+    assert "Last poses (step: x y in m, heading" in told
+    assert not re.search(r"\bpx\b", told)
     report = json.loads((plan.parent / "here" / "seen" / "report.json").read_text())
     assert report["provenance"]["unit"] == "px"
     texts = [f["diagnosis"]["text"] for f in report["failures"] if f["diagnosis"]]

@@ -15,6 +15,7 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.evaluation.ledger import user_ledger
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.judge.set_checks import static_checks
 from tdac_agent.verification.judge.set_job import level_params, write_files
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs import load_set
@@ -22,7 +23,8 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.env import LadderEnv
 from tdac_envs.ladder.set_file import set_names
 
-KNOWN = Path(tdac_agent.__file__).parent / "builtin" / "levels" / "known.py"
+LEVELS = Path(tdac_agent.__file__).parent / "builtin" / "levels"
+KNOWN = LEVELS / "known.py"
 SALT = b"a salt of enough bytes"
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 
@@ -206,6 +208,24 @@ def test_failures_are_counted_and_three_are_told(judge, set_yaml):
         "path": 0.0,
         "barn": 0.0,
     }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", ["unknown", "lost"])
+def test_the_built_in_controllers_without_a_map(judge, level):
+    """They pass the tests, and reach most goals within the CPU budget."""
+    file = LEVELS / f"{level}.py"
+    report = verify_on_set(file, load_set(level), "dev", 10, judge=judge)
+    assert report.worlds == 10
+    assert report.successes >= 8
+    assert report.scores.time > 0.4
+
+
+@pytest.mark.parametrize(
+    "file", sorted(LEVELS.glob("*.py")), ids=lambda file: file.stem
+)
+def test_built_in_controllers_pass_the_static_tests(file):
+    assert set(static_checks(file.read_bytes()).values()) == {None}
 
 
 def test_hidden_worlds_are_told_in_sums_alone(judge, set_yaml, tmp_path):

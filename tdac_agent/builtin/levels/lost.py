@@ -1,0 +1,781 @@
+"""Drives to a goal without a map and without a pose, on wheels that slip.
+
+A Kalman filter holds the pose, the errors of the odometry and the gains of the wheels.
+Each scan is matched with the robot's own map: cells that hold the mean of the hits in
+them. What is planned, is planned from where the robot will be when the next action
+takes effect. Arcs are tried out against the hits, and must begin in space that rays
+have found free; the less room an arc leaves for what slip may do, the dearer it is.
+"""
+
+import json
+import math
+
+import numpy as np
+
+with open("params.json") as file:
+    PARAMS = json.load(file)
+ROBOT, NOISES = PARAMS["robot"], PARAMS.get("disturbances", {})
+RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
+DT, TOLERANCE = PARAMS["dt"], PARAMS["goal_tolerance"]
+STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
+RAYS = ROBOT["n_rays"]
+VIEW = math.radians(ROBOT["field_of_view_deg"])
+FAN = VIEW * (np.arange(RAYS) / max(RAYS - 1, 1) - 0.5)
+SLIP = max(NOISES.get("wheel_slip", 0.0) * math.sqrt(0.1 / DT), 0.01)
+GAINS = max(NOISES.get("wheel_gains", 0.0), 0.01)
+SCALE = max(NOISES.get("odometry_scale", 0.0), 0.005)
+ODOMETRY = max(NOISES.get("odometry_noise", 0.0), 0.01)
+RAY_NOISE = max(NOISES.get("range_noise", 0.0), 0.002)
+DELAY = int(NOISES.get("delay", 0))
+FAR = RANGE * (1.0 - 3.0 * RAY_NOISE) - 1e-3  # a ray that reads more has hit nothing
+ROUGH = 0.3  # px by which walls differ from lines
+MARGIN = 0.15  # px that are kept from hits
+WAIT, STUCK = 25, 6.0  # steps within so many px after which something else is tried
+NEARBY = 6.0 * TOLERANCE  # px to the goal
+STRICT, PATIENCE = -0.6, 200  # LOOSE for so many steps after that
+LOOSE = 0.8  # px by which the search may come too near to a hit
+SLIVER = 1.5  # px around hits in which unseen space is no matter
+SLACK = 0.7  # px by which the body may come too near to the centre of an unseen px
+CHORD = 5.0  # px between two hits that are taken for one borders
+ROOM = 1.5 * RADIUS  # clearance from which a px costs nothing extra
+REACH = int(ROOM) + 1
+PRICE = 0.3  # how much more a px beside a wall costs
+PEEK = 6.0  # px that a look costs
+RISK = 60.0  # px that a contact costs
+UNSURE = 0.35  # px by which pose and map may be wrong
+CELL = 2  # px between the places of the search, and the size of a cell of hits
+LOOK, TURN = 6.0, 10.0  # px ahead; px that a turn by a right angle costs
+WINDOW = 36  # px around the robot in which arcs lie
+TRUST = 12.0  # the most hits of 1 px that a cell holds, before it forgets
+# Steps after which an arc is looked at: often in the first ones, which will be driven.
+TIMES = np.array(
+    [0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0]
+)
+NEXT, RISKY, SOON = 5, 9, 11  # entries of TIMES up to one, three and four steps
+TURNS = np.arange(120) * (2.0 * math.pi / 120)  # directions of lines from the heading
+FULL_SPINS = np.remainder(TURNS + math.pi, 2.0 * math.pi) - math.pi
+LENGTHS = np.arange(1, 33) * 0.75  # px
+
+
+class Filter:
+    """A Kalman filter over what the robot does not know.
+
+    Attributes:
+        state: x, y, heading, odometry factors of distance and turn, wheel gains.
+        spread: Its covariance.
+    """
+
+    def __init__(self):
+        self.state = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+        bound = GAINS / math.sqrt(3.0)
+        self.spread = np.diag(
+            [1e-6, 1e-6, 1e-8, SCALE**2, SCALE**2, bound**2, bound**2]
+        )
+
+    def pose(self):
+        """x, y and heading."""
+        return tuple(self.state[:3].tolist())
+
+    def moved(self, wheels, odometry):
+        """Takes a step by the command that was driven and what was measured of it."""
+        if not np.any(wheels):
+            return
+        state = np.concatenate([self.state, [0.0, 0.0]])
+        driven = [
+            wheel(float(c), g) for c, g in zip(wheels, state[5:7].tolist(), strict=True)
+        ]
+        (left, by_left, left_sd), (right, by_right, right_sd) = driven
+        state[7], state[8] = 0.5 * (left + right), (left - right) / AXLE
+        mix = np.array([[0.5, 0.5], [1.0 / AXLE, -1.0 / AXLE]])
+        by_gain = mix * [by_left, by_right]
+        spread = np.zeros((9, 9))
+        spread[:7, :7] = self.spread
+        spread[7:, :7] = by_gain @ self.spread[5:7]
+        spread[:7, 7:] = spread[7:, :7].T
+        slips = np.diag([left_sd**2 + 1e-4, right_sd**2 + 1e-4])
+        spread[7:, 7:] = (
+            by_gain @ self.spread[5:7, 5:7] @ by_gain.T + mix @ slips @ mix.T
+        )
+        for factor, motion, value in (3, 7, odometry[0]), (4, 8, odometry[1]):
+            row = np.zeros(9)
+            row[factor], row[motion] = state[motion], state[factor]
+            size = max(abs(state[motion]), abs(float(value)))
+            noise = (ODOMETRY * size) ** 2 + 1e-5
+            gain = spread @ row / (row @ spread @ row + noise)
+            state += gain * (float(value) - state[factor] * state[motion])
+            spread -= np.outer(gain, row @ spread)
+        self.turn_by(state, spread)
+
+    def turn_by(self, state, spread):
+        """Moves the pose by distance and turn, the last two values of the state."""
+        distance, turn = state[7:].tolist()
+        middle = state[2] + 0.5 * turn
+        cosine, sine = math.cos(middle), math.sin(middle)
+        step = np.eye(9)
+        step[0, 2], step[1, 2] = -distance * sine, distance * cosine
+        step[0, 7:] = cosine, -0.5 * distance * sine
+        step[1, 7:] = sine, 0.5 * distance * cosine
+        step[2, 8] = 1.0
+        state[:3] += distance * cosine, distance * sine, turn
+        self.state = state[:7]
+        self.spread = (step @ spread @ step.T)[:7, :7]
+        self.spread = 0.5 * (self.spread + self.spread.T)
+
+    def match(self, surfaces, ranges, hit):
+        """Corrects the state by a scan and the surfaces that are known."""
+        prior, spread = self.state.copy(), self.spread
+        distances, fan = ranges[hit], FAN[hit]
+        for turn in range(4):
+            angles = self.state[2] + fan
+            rays = np.column_stack([np.cos(angles), np.sin(angles)])
+            offsets = distances[:, None] * rays
+            means, normals, rough, good = surfaces.lines(self.state[:2] + offsets)
+            gaps = ((self.state[:2] + offsets - means) * normals).sum(axis=1)
+            slant = (rays * normals).sum(axis=1)
+            sd = np.sqrt((RAY_NOISE * distances * slant) ** 2 + ROUGH**2 + rough)
+            good &= np.abs(gaps) < 2.5 + 3.0 * sd
+            if good.sum() < 3:
+                return
+            weights = good / sd**2 / np.maximum(1.0, np.abs(gaps) / (1.5 * sd)) * 0.6
+            lever = normals[:, 1] * offsets[:, 0] - normals[:, 0] * offsets[:, 1]
+            slopes = np.column_stack([normals, lever])
+            shift = slopes @ (self.state[:3] - prior[:3]) - gaps
+            known = slopes.T @ (weights[:, None] * slopes)
+            pull = slopes.T @ (weights * shift)
+            solved = np.linalg.solve(np.eye(3) + known @ spread[:3, :3], np.eye(3))
+            change = prior + spread[:, :3] @ (solved @ pull) - self.state
+            self.state = self.state + change
+            if turn and np.abs(change[:3]).max() < 0.01:
+                break
+        self.spread = spread - spread[:, :3] @ solved @ known @ spread[:3]
+        self.spread = 0.5 * (self.spread + self.spread.T)
+
+
+def wheel(command, gain):
+    """Mean way of a wheel in a step, its derivative by the gain, and its deviation."""
+    way = abs(command) * gain * STEP
+    capped = way >= STEP
+    way = min(way, STEP)
+    sd = SLIP * way + 1e-6
+    z = min((STEP - way) / sd, 6.0)
+    below = 0.5 * (1.0 + math.erf(z / math.sqrt(2.0)))
+    mean = STEP - sd * (z * below + math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
+    mean = mean if z < 6.0 else way
+    slope = 0.2 if capped else below
+    return (
+        math.copysign(mean, command),
+        command * STEP * slope,
+        sd * (0.6 + 0.4 * min(z / 1.5, 1.0)),
+    )
+
+
+class Surfaces:
+    """Hits in cells of CELL px: their weight, and the sum of their places."""
+
+    def __init__(self, half):
+        self.half = half // CELL
+        self.side = 2 * self.half + 1
+        self.weight = np.zeros(self.side * self.side)
+        self.sums = np.zeros((2, self.side * self.side))
+        span = np.arange(-2, 3)
+        self.around = (span[:, None] * self.side + span).ravel()
+
+    def index(self, places):
+        """Index of the cell of each place."""
+        cells = np.rint(places / CELL).astype(int) + self.half
+        cells = np.clip(cells, 3, self.side - 4)
+        return cells[..., 1] * self.side + cells[..., 0]
+
+    def lines(self, places):
+        """Mean, normal and squared roughness of the hits around places, and if any."""
+        near = self.index(places)[:, None] + self.around
+        weight = self.weight[near]
+        held = np.maximum(weight, 1e-9)
+        x, y = self.sums[0][near] / held, self.sums[1][near] / held
+        far = (x - places[:, :1]) ** 2 + (y - places[:, 1:]) ** 2
+        weight = np.minimum(weight, 4.0) * np.exp(-far / 12.0)
+        total = weight.sum(axis=1)
+        held = np.maximum(total, 1e-9)[:, None]
+        mx, my = (
+            ((weight * x).sum(axis=1) / held[:, 0]),
+            ((weight * y).sum(axis=1) / held[:, 0]),
+        )
+        dx, dy = x - mx[:, None], y - my[:, None]
+        xx, yy = (
+            (weight * dx * dx / held).sum(axis=1),
+            (weight * dy * dy / held).sum(axis=1),
+        )
+        xy = (weight * dx * dy / held).sum(axis=1)
+        root = np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+        small, large = 0.5 * (xx + yy) - root, 0.5 * (xx + yy) + root
+        angle = 0.5 * np.arctan2(2.0 * xy, xx - yy) + 0.5 * math.pi
+        normals = np.column_stack([np.cos(angle), np.sin(angle)])
+        good = (total > 0.2) & (large > 0.6) & (large > 6.0 * small)
+        return np.column_stack([mx, my]), normals, np.maximum(small, 0.0), good
+
+    def add(self, tips, sd):
+        """Adds hits; old ones are forgotten where there are many."""
+        at = self.index(tips)
+        weight = 1.0 / (0.1 + sd**2) * 0.2
+        np.add.at(self.weight, at, weight)
+        np.add.at(self.sums[0], at, weight * tips[:, 0])
+        np.add.at(self.sums[1], at, weight * tips[:, 1])
+        share = np.minimum(TRUST / np.maximum(self.weight[at], 1e-9), 1.0)
+        at, first = np.unique(at, return_index=True)
+        self.weight[at] *= share[first]
+        self.sums[:, at] *= share[first]
+
+    def points(self, x, y, reach):
+        """Places of the hits in a square, and the indices of their cells."""
+        i, j = round(x / CELL) + self.half, round(y / CELL) + self.half
+        k = int(reach / CELL)
+        rows = np.arange(max(j - k, 0), min(j + k + 1, self.side))
+        columns = np.arange(max(i - k, 0), min(i + k + 1, self.side))
+        at = (rows[:, None] * self.side + columns).ravel()
+        at = at[self.weight[at] > 0.05]
+        return self.sums[:, at] / self.weight[at], at
+
+    def drop(self, at):
+        """Weakens hits that a ray has passed through."""
+        self.weight[at] *= 0.6
+        self.sums[:, at] *= 0.6
+        gone = at[self.weight[at] < 0.05]
+        self.weight[gone] = 0.0
+        self.sums[:, gone] = 0.0
+
+
+class Maps:
+    """What is known in a square around the start, in px.
+
+    Attributes:
+        half: Index of the start.
+        surfaces: The hits.
+        free: Whether rays or the body have found a px free.
+        cost: Cost of the way to the goal, for every CELL-th px.
+    """
+
+    def __init__(self, goal):
+        self.goal = [float(value) for value in goal]
+        half = int(max(320.0, max(map(abs, self.goal)) + 160.0)) // CELL * CELL
+        self.half, self.side = half, 2 * half + 1
+        self.surfaces = Surfaces(half)
+        self.free = np.zeros((self.side, self.side), bool)
+        self.cost = np.full((half + 1, half + 1), np.inf)
+        self.age = 0
+        self.looks = 0
+
+    def square(self, x, y, reach):
+        """Slices of the px around a place, and their x and y relative to it."""
+        i, j = round(x) + self.half, round(y) + self.half
+        i = min(max(i, reach), self.side - 1 - reach)
+        j = min(max(j, reach), self.side - 1 - reach)
+        around = np.arange(-reach, reach + 1)
+        rows, columns = slice(j - reach, j + reach + 1), slice(i - reach, i + reach + 1)
+        return rows, columns, around + (i - self.half - x), around + (j - self.half - y)
+
+    def carve(self, x, y, heading, ranges, hit):
+        """Marks as free what the rays have crossed, and the place of the body."""
+        rows, columns, dx, dy = self.square(x, y, int(RANGE) + 1)
+        dx, dy = dx[None, :], dy[:, None]
+        cosine, sine = math.cos(heading), math.sin(heading)
+        ahead, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
+        distance = np.sqrt(ahead * ahead + aside * aside)
+        part = self.free[rows, columns]
+        part |= distance <= RADIUS
+        seen = np.nonzero((ahead > -0.1 * distance) & (distance <= RANGE))
+        ahead, aside, distance = ahead[seen], aside[seen], distance[seen]
+        place = (np.arctan2(aside, ahead) + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
+        place = np.clip(place, 0.0, RAYS - 1)
+        k = np.minimum(place.astype(int), RAYS - 2)
+        least = np.minimum(ranges[:-1], ranges[1:])
+        tx, ty = ranges * np.cos(FAN), ranges * np.sin(FAN)
+        # A px is before the chord of two hits on one borders, or nearer than both hits.
+        nx, ny = np.diff(ty), -np.diff(tx)
+        gap = np.hypot(nx, ny)
+        borders = hit[:-1] & hit[1:] & (gap < CHORD)
+        before = nx[k] * (ahead - tx[k]) + ny[k] * (aside - ty[k]) <= 0.0
+        is_free = np.where(borders[k], before, distance <= least[k])
+        nearest = np.minimum((place + 0.5).astype(int), RAYS - 1)
+        on_ray = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1)) < 0.5
+        is_free |= on_ray & (distance <= ranges[nearest] - 0.7)
+        part[seen] |= is_free
+
+    def clean(self, x, y, heading, ranges):
+        """Weakens hits that rays pass through, and those within the body."""
+        (px, py), at = self.surfaces.points(x, y, RANGE)
+        dx, dy = px - x, py - y
+        distance = np.hypot(dx, dy)
+        bearing = (
+            np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
+            - math.pi
+        )
+        place = (bearing + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
+        nearest = np.clip(np.rint(place).astype(int), 0, RAYS - 1)
+        beside = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1))
+        reading = ranges[nearest]
+        passed = (beside < 0.5) & (distance < reading - 1.5 - 3.0 * RAY_NOISE * reading)
+        passed |= distance < RADIUS - 1.0
+        if passed.any():
+            self.surfaces.drop(at[passed])
+
+    def plan(self, x, y, slack):
+        """Costs of the way to the goal, up to somewhat beyond the robot."""
+        (px, py), at = self.surfaces.points(0.0, 0.0, self.half)
+        side = self.half + 1
+        away = np.full(side * side, float(ROOM) ** 2)
+        dx, dy = px + self.half, py + self.half
+        i, j = at % side, at // side
+        some = (i > 6) & (j > 6) & (i < side - 7) & (j < side - 7)
+        at, dx, dy = at[some], (dx - CELL * i)[some], (dy - CELL * j)[some]
+        for k in range(-6, 7):
+            for m in range(-6, 7):
+                if k * k + m * m > 40:
+                    continue
+                to = at + k * side + m
+                away[to] = np.minimum(
+                    away[to], (CELL * m - dx) ** 2 + (CELL * k - dy) ** 2
+                )
+        away = np.sqrt(away).reshape(side, side)
+        price = 1.0 + PRICE * np.clip((ROOM - away) / (ROOM - RADIUS), 0.0, 1.0) ** 2
+        passable = away >= RADIUS - slack
+        passable[:3], passable[-3:], passable[:, :3], passable[:, -3:] = (False,) * 4
+        around = CELL * (np.arange(side) - self.half // CELL)
+        gaps = np.hypot(around[None, :] - self.goal[0], around[:, None] - self.goal[1])
+        least = max(TOLERANCE, float(gaps[passable].min()) + 1.0)
+        starts = np.nonzero((passable & (gaps <= least)).ravel())[0]
+        self.cost[:] = wave(
+            passable, price, starts, gaps.ravel()[starts], self.cell(x, y)
+        )
+
+    def cell(self, x, y):
+        """Row and column of the place of the search that is nearest."""
+        half = self.half // CELL
+        return round(y / CELL) + half, round(x / CELL) + half
+
+
+def moves(width):
+    """Shifts, lengths, and both places that are passed, of moves in 16 directions."""
+    found = []
+    for dx in range(-2, 3):
+        for dy in range(-2, 3):
+            if math.gcd(dx, dy) != 1:
+                continue
+            shift, over = dy * width + dx, (0, 0)
+            if max(abs(dx), abs(dy)) == 2:
+                sx, sy = (dx > 0) - (dx < 0), (dy > 0) - (dy < 0)
+                straight = sx if abs(dx) == 2 else sy * width
+                over = straight, sy * width + sx
+            found.append((shift, CELL * math.hypot(dx, dy), *over))
+    return found
+
+
+def wave(passable, price, starts, first_costs, robot, beyond=48.0):
+    """Costs to the goal over places, in bands of equal cost; inf where there is no way.
+
+    Stops somewhat beyond the robot. No move is shorter than a band is wide, so each
+    band is final when its turn comes.
+    """
+    width = passable.shape[1]
+    shifts, lengths, first, second = (
+        np.array(each) for each in zip(*moves(width), strict=True)
+    )
+    lengths = 0.5 * lengths
+    passable, price = passable.ravel(), price.ravel()
+    cost = np.full(passable.shape, np.inf)
+    until = math.inf
+    target = robot[0] * width + robot[1]
+    around = target + np.array([0, 1, -1, width, -width])
+    cost[starts] = first_costs
+    bands, band = {}, 0
+    for k in np.unique((first_costs / CELL).astype(int)).tolist():
+        bands[k] = [starts[(first_costs / CELL).astype(int) == k]]
+    while bands and band * CELL < until:
+        parts = bands.pop(band, None)
+        band += 1
+        if parts is None:
+            continue
+        at = np.concatenate(parts)
+        so_far = cost[at]
+        at = np.unique(at[so_far >= (band - 1) * CELL])
+        to = at[:, None] + shifts
+        further = cost[at][:, None] + lengths * (price[at][:, None] + price[to])
+        better = passable[to] & (further < cost[to])
+        better &= passable[at[:, None] + first] & passable[at[:, None] + second]
+        to, further = to[better], further[better]
+        if not to.size:
+            continue
+        np.minimum.at(cost, to, further)
+        where = (further * (1.0 / CELL)).astype(int)
+        for k in range(int(where.min()), int(where.max()) + 1):
+            some = to[where == k]
+            if some.size:
+                bands.setdefault(k, []).append(some)
+        if until == math.inf and np.isfinite(cost[around]).any():
+            until = float(cost[around].min()) + beyond
+    return cost.reshape(-1, width)
+
+
+def extended(cost, turns):
+    """The costs, also of places a little beyond, so that one can interpolate."""
+    for _ in range(turns):
+        padded = np.pad(cost, 1, constant_values=np.inf)
+        height, width = cost.shape
+        around = [
+            padded[j : j + height, i : i + width]
+            + CELL * 1.5 * math.hypot(i - 1, j - 1)
+            for i in range(3)
+            for j in range(3)
+        ]
+        cost = np.where(np.isfinite(cost), cost, np.min(around, axis=0))
+    return np.where(np.isfinite(cost), cost, 1e5)
+
+
+def between(field, x, y, half, half_y, scale=1.0):
+    """The field between its places, by bilinear interpolation."""
+    height, width = field.shape
+    x = np.clip(x / scale + half, 0.0, width - 1.001)
+    y = np.clip(y / scale + half_y, 0.0, height - 1.001)
+    i, j = x.astype(int), y.astype(int)
+    u, v = x - i, y - j
+    flat, at = field.ravel(), j * width + i
+    top = flat[at] * (1.0 - u) + flat[at + 1] * u
+    return (
+        top * (1.0 - v) + (flat[at + width] * (1.0 - u) + flat[at + width + 1] * u) * v
+    )
+
+
+class Near:
+    """The maps around the robot, as the arcs need them."""
+
+    def __init__(self, maps, x, y):
+        self.maps = maps
+        rows, columns, dx, dy = maps.square(x, y, WINDOW)
+        self.x0, self.y0 = dx[0] + x, dy[0] + y
+        self.hits = self.distances(x, y)
+        unseen = ~maps.free[rows, columns] & (self.hits > SLIVER)
+        self.places = np.argwhere(unseen)[:, ::-1] + [self.x0, self.y0]
+        self.unseen = clearances(unseen, int(RADIUS) + 1)
+        half, reach = maps.half // CELL, WINDOW // CELL + 6
+        j, i = maps.cell(x, y)
+        i, j = max(i - reach, 0), max(j - reach, 0)
+        part = maps.cost[j : j + 2 * reach + 1, i : i + 2 * reach + 1]
+        self.part, self.i, self.j = extended(part, 4), half - i, half - j
+
+    def distances(self, x, y):
+        """Distance to the nearest hit from each px of the window, at most REACH."""
+        points, _ = self.maps.surfaces.points(x, y, WINDOW + REACH)
+        side = 2 * WINDOW + 1
+        pad = 2 * REACH
+        field = np.full((side + 2 * pad, side + 2 * pad), float(REACH) ** 2)
+        span = np.arange(-REACH, REACH + 1)
+        for px, py in (points.T - [self.x0, self.y0] + pad).tolist():
+            i, j = round(px), round(py)
+            if not (REACH <= i < side + 3 * REACH and REACH <= j < side + 3 * REACH):
+                continue
+            part = field[j - REACH : j + REACH + 1, i - REACH : i + REACH + 1]
+            across, down = (span + (i - px)) ** 2, (span + (j - py)) ** 2
+            np.minimum(part, across[None, :] + down[:, None], out=part)
+        return np.sqrt(field[pad : pad + side, pad : pad + side])
+
+    def room(self, x, y):
+        """Room between the body and hits, px."""
+        return between(self.hits, x, y, -self.x0, -self.y0) - RADIUS
+
+    def seen(self, x, y):
+        """Room between the body and unseen space, px."""
+        return between(self.unseen, x, y, -self.x0, -self.y0) - RADIUS
+
+    def left(self, x, y):
+        """Cost of the way to the goal."""
+        return between(self.part, x, y, self.i, self.j, CELL)
+
+
+def clearances(cells, reach):
+    """Distance from each px to the nearest one that is set, at most reach."""
+    padded = np.pad(cells, reach)
+    height, width = cells.shape
+    away = np.full((padded.shape[0], width), float(reach))
+    for k in range(reach, -1, -1):
+        for shift in (-k, k):
+            away[padded[:, reach + shift : reach + shift + width]] = k
+    away *= away
+    best = np.full((height, width), float(reach) ** 2)
+    for k in range(-reach, reach + 1):
+        np.minimum(best, away[reach + k : reach + k + height] + k * k, out=best)
+    return np.sqrt(best)
+
+
+def wheel_pairs():
+    """Speeds of the wheels to try: one at full speed, or both slower."""
+    ends = np.concatenate([np.linspace(-1.0, 0.6, 9), np.linspace(0.7, 1.0, 13)])
+    pairs = [(1.0, e) for e in ends] + [(e, 1.0) for e in ends]
+    pairs += [(0.6 * a, 0.6 * b) for a, b in pairs[::2]]
+    pairs += [(0.3 * a, 0.3 * b) for a, b in pairs[:44:4]]
+    return np.array(pairs + [(-a, -b) for a, b in pairs[::2]])
+
+
+class Courses:
+    """An arc of one, two, four or all steps and then a straight line, at TIMES.
+
+    Attributes:
+        pairs: Speeds of the wheels, as fractions of the robot's best speed.
+        ahead, aside, facing: The pose, from one at the origin.
+        spread: How far the body may be off by slip, px.
+    """
+
+    def __init__(self, step):
+        self.step = step
+        pairs, parts, sizes = [], [], []
+        for left, right in wheel_pairs():
+            forward, turn = 0.5 * step * (left + right), step * (left - right) / AXLE
+            line = step * max(abs(left), abs(right))
+            for steps in (1.0, 2.0, 4.0, TIMES[-1]):
+                on_arc = np.minimum(TIMES, steps)
+                half = 0.5 * turn * on_arc
+                chord = forward * on_arc * np.sinc(half / math.pi)
+                after = math.copysign(line, forward) * (TIMES - on_arc)
+                facing = turn * on_arc
+                pairs.append((left, right))
+                parts.append(
+                    (
+                        chord * np.cos(half) + after * np.cos(facing),
+                        chord * np.sin(half) + after * np.sin(facing),
+                        facing,
+                    )
+                )
+                sizes.append((0.5 * step * (abs(left) + abs(right)), abs(forward)))
+        self.pairs = np.array(pairs)
+        self.ahead, self.aside, self.facing = np.array(parts).transpose(1, 0, 2)
+        size, way = np.array(sizes).T[:, :, None] * np.sqrt(TIMES)
+        bend = SLIP * math.sqrt(2.0) / AXLE * size * way * np.sqrt(TIMES / 3.0)
+        self.spread = np.sqrt((SLIP * size) ** 2 / 2.0 + bend**2)
+        self.forward = self.pairs.sum(axis=1) > 0.0
+
+
+STATE = {}
+
+
+def reset(obs):
+    """Forgets everything."""
+    STATE.update(
+        maps=Maps(obs["goal"]),
+        filter=Filter(),
+        courses=Courses(STEP),
+        queue=[(0.0, 0.0)] * DELAY,
+        goals=[],
+        goal=[float(value) for value in obs["goal"]],
+        trail=[],
+        strict=0,
+        steps=0,
+    )
+
+
+def turns_left(near, x, y, facing, left):
+    """Price of the turn into the way that is still to come, forwards."""
+    ahead = near.left(x + LOOK * np.cos(facing), y + LOOK * np.sin(facing))
+    return TURN * np.clip((ahead - left) / LOOK + 1.0, 0.0, 2.0)
+
+
+def risk(room, spread):
+    """Price of what may touch something."""
+    return RISK * np.exp(-0.5 * (np.maximum(room, 0.0) / spread) ** 2)
+
+
+def best_arc(near, courses, x, y, heading, slack, unsure):
+    """The best course that begins with an arc: price, speeds, unseen place or None."""
+    goal = near.maps.goal
+    cosine, sine = math.cos(heading), math.sin(heading)
+    px = x + cosine * courses.ahead - sine * courses.aside
+    py = y + sine * courses.ahead + cosine * courses.aside
+    room = near.room(px, py)
+    fits = np.logical_and.accumulate(room >= MARGIN, axis=1)
+    seen = near.seen(px, py) >= -slack
+    ready = seen[:, :NEXT].all(axis=1)
+    back = ~courses.forward
+    fits[back] &= np.logical_and.accumulate(seen[back], axis=1)
+    danger = risk(room, np.hypot(courses.spread, unsure))[:, :RISKY].max(axis=1)
+    there = fits & ready[:, None]
+    there &= np.hypot(px - goal[0], py - goal[1]) <= 0.6 * TOLERANCE
+    left = near.left(px, py)
+    worth = (
+        left
+        + courses.step * TIMES
+        + turns_left(near, px, py, heading + courses.facing, left)
+    )
+    worth = np.where(there, courses.step * TIMES - 20.0, worth)
+    able = np.where(fits, worth, np.inf)
+    worth = np.minimum(
+        able[:, SOON - 1 :].min(axis=1), np.where(there, able, np.inf).min(axis=1)
+    )
+    worth += PEEK * ~ready + danger
+    k = int(worth.argmin())
+    unseen = None if ready[k] else (px[k, :NEXT], py[k, :NEXT])
+    return float(worth[k]), courses.pairs[k], unseen
+
+
+def best_line(near, courses, x, y, heading, slack, unsure):
+    """The best turn on the spot and straight line: price, speeds, unseen or None."""
+    bearings = heading + TURNS
+    px = x + np.outer(np.cos(bearings), LENGTHS)
+    py = y + np.outer(np.sin(bearings), LENGTHS)
+    room = near.room(px, py)
+    fits = np.logical_and.accumulate(room >= MARGIN, axis=1)
+    danger = risk(room, math.hypot(unsure, 0.2))[:, :8].max(axis=1)
+    seen = near.seen(px, py) >= -slack
+    left = near.left(px, py)
+    spin = 2.0 * courses.step / AXLE
+    best = math.inf, None, None
+    for sign, spins in (1.0, FULL_SPINS), (-1.0, np.roll(FULL_SPINS, 60)):
+        able = fits if sign > 0.0 else fits & np.logical_and.accumulate(seen, axis=1)
+        spun = courses.step * np.maximum(np.abs(spins) / spin, 1.0)
+        spun[np.abs(spins) < 1e-6] = 0.0
+        facing = bearings if sign > 0.0 else bearings + math.pi
+        worth = left + LENGTHS + spun[:, None]
+        worth += turns_left(near, px, py, facing[:, None], left)
+        worth = np.where(able, worth, np.inf)[:, LENGTHS >= 6.0]
+        ready = seen[:, courses.step >= LENGTHS].all(axis=1)
+        price = worth.min(axis=1) + PEEK * ~ready + danger
+        k = int(price.argmin())
+        if price[k] < best[0]:
+            share = min(max(spins[k] / spin, -1.0), 1.0)
+            pair, unseen = (share, -share), None
+            if spun[k] == 0.0:
+                pair = sign, sign
+                if not ready[k]:
+                    some = courses.step >= LENGTHS
+                    unseen = px[k, some], py[k, some]
+            best = float(price[k]), np.array(pair), unseen
+    return best
+
+
+def look(near, x, y, heading, unseen, spin):
+    """A turn on the spot towards the unseen place that is in the way."""
+    px, py = unseen
+    places = near.places
+    gaps = np.hypot(places[:, :1] - px, places[:, 1:] - py).min(axis=1)
+    dx, dy = (places[int(gaps.argmin())] - (x, y)).tolist()
+    bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
+    turn = math.copysign(max(abs(bearing) - 0.35 * VIEW, 0.15), bearing)
+    share = min(max(turn / spin, -1.0), 1.0)
+    return share, -share
+
+
+def away_from_hits(near, courses, x, y, heading):
+    """Speeds of the short arc that leaves most room at its end."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    ahead, aside = courses.ahead[:, :NEXT], courses.aside[:, :NEXT]
+    room = near.room(
+        x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
+    )
+    slow = np.abs(courses.pairs).max(axis=1) < 0.7
+    value = room[:, -1] + np.minimum(room.min(axis=1) - float(room[0, 0]), 0.0)
+    return courses.pairs[int(np.where(slow, value, -np.inf).argmax())]
+
+
+def is_stuck(x, y):
+    """Whether the robot has stayed in one place."""
+    STATE["trail"] = [*STATE["trail"][-WAIT:], (x, y)]
+    if len(STATE["trail"]) <= WAIT or np.ptp(STATE["trail"], axis=0).max() > STUCK:
+        return False
+    STATE["trail"] = []
+    return True
+
+
+def search(maps, x, y):
+    """Goes around the goal in rings, if it is not where it is believed.
+
+    A robot that gets no further tries the next place, or far from the goal passages
+    with more room.
+    """
+    gap = math.hypot(x - maps.goal[0], y - maps.goal[1])
+    stuck = is_stuck(x, y)
+    if stuck and gap > NEARBY:
+        STATE["strict"] = STATE["steps"] + PATIENCE
+    if gap > 0.5 * TOLERANCE and not (stuck and gap <= NEARBY):
+        return
+    gx, gy = STATE["goal"]
+    if not STATE["goals"]:
+        for ring in range(1, 8):
+            count = 6 * ring
+            for k in range(count):
+                angle = 2.0 * math.pi * k / count
+                away = 1.2 * TOLERANCE * ring
+                STATE["goals"].append(
+                    (gx + away * math.cos(angle), gy + away * math.sin(angle))
+                )
+    maps.goal = list(STATE["goals"].pop(0))
+    maps.age = 99
+
+
+def expected(pose, gains, queue):
+    """The pose after the actions that are still on their way, and how far slip goes."""
+    x, y, heading = pose
+    spread = 0.0
+    for action in queue:
+        left, right = (wheel(c, g)[0] for c, g in zip(action, gains, strict=True))
+        way, turn = 0.5 * (left + right), (left - right) / AXLE
+        x += way * math.cos(heading + 0.5 * turn)
+        y += way * math.sin(heading + 0.5 * turn)
+        heading += turn
+        spread = math.hypot(spread, SLIP * 0.5 * (abs(left) + abs(right)))
+    return x, y, heading, spread
+
+
+def commands(pair, gains, best):
+    """Commands that let the wheels turn at these shares of the best speed."""
+    left, right = best * pair[0] / gains[0], best * pair[1] / gains[1]
+    most = max(abs(left), abs(right), 1.0)
+    return left / most, right / most
+
+
+def policy(obs):
+    """Commands of the wheels (left, right)."""
+    maps, filter_ = STATE["maps"], STATE["filter"]
+    ranges = np.asarray(obs["ranges"], float)
+    hit = ranges < FAR
+    filter_.moved(np.asarray(obs["wheel_speeds"], float), obs["odometry"])
+    if STATE["steps"]:
+        filter_.match(maps.surfaces, ranges, hit)
+    STATE["steps"] += 1
+    x, y, heading = filter_.pose()
+    angles = heading + FAN
+    tips = np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles)])
+    maps.clean(x, y, heading, ranges)
+    maps.surfaces.add(tips[hit], RAY_NOISE * ranges[hit])
+    maps.carve(x, y, heading, ranges, hit)
+    gains = filter_.state[5:7].tolist()
+    best = min(0.98, *gains)
+    courses = STATE["courses"]
+    if abs(courses.step - best * STEP) > 0.03 * STEP:
+        courses = STATE["courses"] = Courses(best * STEP)
+    search(maps, x, y)
+    x, y, heading, slipped = expected((x, y, heading), gains, STATE["queue"])
+    maps.age += 1
+    if maps.age > 1 or STATE["steps"] < 3:
+        maps.plan(x, y, LOOSE if STATE["steps"] > STATE["strict"] else STRICT)
+        if not np.isfinite(maps.cost[maps.cell(x, y)]):
+            maps.plan(x, y, 2.0 * LOOSE)
+        maps.age = 0
+    pair = chosen(maps, courses, x, y, heading, math.hypot(UNSURE, slipped))
+    left, right = commands(pair, gains, best)
+    STATE["queue"] = [*STATE["queue"], (left, right)][1 if DELAY else 0 :][:DELAY]
+    return float(left), float(right)
+
+
+def chosen(maps, courses, x, y, heading, unsure):
+    """Speeds of the wheels, as fractions of the robot's best speed."""
+    near = Near(maps, x, y)
+    slack = SLACK + 0.4 * max(maps.looks - 2, 0)
+    price, pair, unseen = best_arc(near, courses, x, y, heading, slack, unsure)
+    other, line, hidden = best_line(near, courses, x, y, heading, slack, unsure)
+    if other < price:
+        price, pair, unseen = other, line, hidden
+    if not math.isfinite(price):
+        maps.age = 99
+        return away_from_hits(near, courses, x, y, heading)
+    if unseen is not None:
+        maps.looks += 1
+        return look(near, x, y, heading, unseen, 2.0 * courses.step / AXLE)
+    if abs(pair[0] + pair[1]) > 0.1:
+        maps.looks = 0
+    return pair
