@@ -118,7 +118,7 @@ def _training(folder: Path) -> dict[str, Any]:
     done = last >= plan.steps
     return {
         "run": str(folder),
-        "task": ", ".join(plan.tasks),
+        "task": plan.worlds,
         "learner": plan.algo,
         "status": "trained" if done else "not at its end",
         "steps": last,

@@ -11,6 +11,33 @@ from tdac_agent.cli.robust_flags import RobustFlags
 from tdac_envs.core.errors import TaskError
 
 
+def check_set(
+    name: str | None, own: Mapping[str, object], others: Mapping[str, object]
+) -> None:
+    """Refuses flags that do not belong together.
+
+    Args:
+        name: The task set, if any.
+        own: Values of the flags that only a task set has, by flag.
+        others: Values of the flags that only a single task has, by flag.
+
+    Raises:
+        TaskError: One does not.
+    """
+    wrong = others if name is not None else own
+    flag = next((flag for flag, value in wrong.items() if value is not None), None)
+    if flag is None:
+        return
+    if name is None:
+        raise TaskError(f"{flag} needs --set NAME; tdac sets lists the task sets")
+    raise TaskError(f"--set brings its own tasks; leave out {flag}")
+
+
+def task_words(task: TaskFlags) -> dict[str, object]:
+    """The given flags of a single task, for `check_set`."""
+    return {word: word for word in task.words() if word.startswith("--")}
+
+
 @dataclass(frozen=True, slots=True)
 class SetFlags:
     """The flags that name a task set and its worlds; see `tdac verify --help`."""

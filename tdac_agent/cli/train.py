@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.evaluate import wrapper_names
 from tdac_agent.cli.flags import flag
+from tdac_agent.cli.set_flags import check_set
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import (
@@ -26,12 +27,13 @@ from tdac_agent.training.plan import (
     read_plan,
 )
 from tdac_agent.training.policy_files import POLICY
+from tdac_agent.training.set_plan import SELECTED, TRAINED, make_set_plan, set_of
 from tdac_agent.training.train import check_extra, train
 from tdac_envs.core.errors import TaskError
 
 NOISES = tuple(field.name for field in fields(Disturbance))
 LEARNT_AT = 0.95
-"""Success rate from which a policy counts as having learnt its task."""
+"""Success rate from which a policy counts as having learnt its tasks."""
 
 
 def run(
@@ -78,7 +80,12 @@ def run(
         sys.stdout.write(json.dumps(found, indent=2) + "\n")
     else:
         _show(plan, folder, best, points[-1], console)
-    return 0 if best.success_rate >= LEARNT_AT else 1
+    return 0 if best.success_rate >= _learnt_at(plan) else 1
+
+
+def _learnt_at(plan: TrainingPlan) -> float:
+    """Success rate from which the policy has learnt: on a set, the set's bar."""
+    return LEARNT_AT if plan.set is None else set_of(plan).file.bar
 
 
 class _Watch:
@@ -122,23 +129,24 @@ def _plan_and_folder(
             update = {"steps": steps, "evaluate_every": interval}
             plan = plan.model_copy(update=update)
         return plan, resume
+    only_tasks = {flag(name): given.get(name) for name in ("task", "variation", *NOISES)}
+    check_set(given.get("set"), {}, only_tasks)
     wanted = {name: v for name, v in given.items() if name not in NOISES}
+    if "wrapper" in wanted:
+        wanted["wrappers"] = tuple(wrapper_names(wanted.pop("wrapper")))
+    if "set" in wanted:
+        plan = make_set_plan(wanted.pop("set"), steps=steps, **wanted)
+        return plan, out or _next_folder(plan)
     tasks = tuple(wanted.pop("task", ("maze",)))
-    wrappers = wanted.pop("wrapper", None)
     noise: dict[str, Any] = dict.fromkeys(NOISES, 0)
     noise |= {name: given[name] for name in NOISES if name in given}
-    plan = make_plan(
-        tasks,
-        steps=steps,
-        disturbance=Disturbance(**noise),
-        wrappers=None if wrappers is None else tuple(wrapper_names(wrappers)),
-        **wanted,
-    )
+    plan = make_plan(tasks, steps=steps, disturbance=Disturbance(**noise), **wanted)
     return plan, out or _next_folder(plan)
 
 
 def _next_folder(plan: TrainingPlan) -> Path:
-    name = f"{plan.algo}-{Path(plan.tasks[0]).stem}"
+    first = plan.tasks[0] if plan.set is None else plan.set
+    name = f"{plan.algo}-{Path(first).stem}"
     folders = (Path("runs") / f"{name}-{number}" for number in itertools.count(1))
     return next(folder for folder in folders if not folder.exists())
 
@@ -146,13 +154,15 @@ def _next_folder(plan: TrainingPlan) -> Path:
 def _heading(plan: TrainingPlan, folder: Path) -> str:
     wrappers = ", ".join(plan.wrappers) or "none"
     return (
-        f"[bold]{plan.algo.upper()}[/] on [bold]{escape(', '.join(plan.tasks))}[/]: "
+        f"[bold]{plan.algo.upper()}[/] on [bold]{escape(plan.worlds)}[/]: "
         f"{plan.steps:,} steps of {plan.n_envs} robots, {_starts(plan)}, seed "
         f"{plan.seed}; observation wrappers: {wrappers}; {escape(str(folder))}"
     )
 
 
 def _starts(plan: TrainingPlan) -> str:
+    if plan.set is not None:
+        return f"worlds of {TRAINED} ({plan.episodes} of {SELECTED} in evaluations)"
     trained = plan.env_kwargs.get("variation", plan.variation)
     if trained == plan.variation:
         return f"{trained} starts"
@@ -170,7 +180,8 @@ def _line(point: Point, best: bool) -> str:
 def _show(
     plan: TrainingPlan, folder: Path, best: Point, last: Point, console: Console
 ) -> None:
-    mark = "[green]✔[/]" if best.success_rate >= LEARNT_AT else "[red]✘ not learnt:[/]"
+    learnt = best.success_rate >= _learnt_at(plan)
+    mark = "[green]✔[/]" if learnt else "[red]✘ not learnt:[/]"
     file = folder / POLICY
     console.print(
         f"{mark} {best.success_rate:.0%} of {plan.episodes} evaluation episodes "
@@ -187,9 +198,12 @@ def _show(
             highlight=False,
             soft_wrap=True,
         )
-    tasks = " ".join(f"--task {shlex.quote(name)}" for name in plan.tasks)
-    command = f"tdac evaluate {shlex.quote(str(file))} follow-guidance reference"
-    line = escape(f"to compare: {command} {tasks}")
+    names = " ".join(f"--task {shlex.quote(name)}" for name in plan.tasks)
+    others = "follow-guidance reference"
+    if plan.set is not None:
+        names, others = f"--set {shlex.quote(plan.set)}", "builtin"
+    command = f"tdac evaluate {shlex.quote(str(file))} {others} {names}"
+    line = escape(f"to compare: {command}")
     console.print(line, soft_wrap=True, highlight=False)
 
 

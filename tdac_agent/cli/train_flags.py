@@ -31,7 +31,8 @@ TRAINING, DISTURBED = "Training", "Variation and noise"
 
 @app.command(
     epilog="Examples: `tdac train --task maze`; `tdac train --task epuck --algo sac "
-    "--seed 1`; `tdac train --task maze --task office --variation random`"
+    "--seed 1`; `tdac train --task maze --task office --variation random`; "
+    "`tdac train --set unknown --steps 100000`"
 )
 def train(
     tasks: Annotated[
@@ -41,6 +42,15 @@ def train(
             metavar="PATH",
             help=f"{TASK}; repeatable, for several maps or several worlds.  "
             "[default: maze]",
+        ),
+    ] = None,
+    set_name: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--set",
+            metavar="NAME",
+            help="Task set (`tdac sets`) or set.yaml, instead of tasks: train on its "
+            "worlds of the split train, and evaluate on those of dev.",
         ),
     ] = None,
     algo: Annotated[
@@ -60,7 +70,7 @@ def train(
     ] = None,
     out: Annotated[
         Optional[Path],  # noqa: UP045
-        dir_flag("--out", help="Training folder.  [default: runs/ALGO-TASK-N]"),
+        dir_flag("--out", help="Training folder.  [default: runs/ALGO-NAME-N]"),
     ] = None,
     resume: Annotated[
         Optional[Path],  # noqa: UP045
@@ -91,7 +101,7 @@ def train(
         Optional[int],  # noqa: UP045
         number_flag(
             min=1,
-            help="Episodes per evaluation.  [default: 100]",
+            help="Episodes per evaluation, or worlds.  [default: 100]",
             rich_help_panel=TRAINING,
         ),
     ] = None,
@@ -141,7 +151,7 @@ def train(
     trust: Trust = False,
     as_json: Json = False,
 ) -> None:
-    """Train a baseline policy with stable-baselines3 on the tasks."""
+    """Train a baseline policy with stable-baselines3 on tasks or a task set."""
     from tdac_agent.cli import train as command
 
     noise = {
@@ -155,6 +165,7 @@ def train(
     }
     given = {
         "task": tasks,
+        "set": set_name,
         "algo": algo,
         "seed": seed,
         "wrapper": wrappers,
