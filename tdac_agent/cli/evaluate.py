@@ -7,7 +7,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -19,13 +19,15 @@ from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.evaluation.entrants import entrants_of
 from tdac_agent.evaluation.evaluate import evaluate, load_tasks
-from tdac_agent.evaluation.evaluation_report import Evaluation
 from tdac_agent.evaluation.unfinished import count_kept
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NO_WRAPPERS = "none"
 
@@ -47,7 +49,7 @@ def run(
     check_tier(tier)
     names = None if wrappers is None else wrapper_names(wrappers)
     entrants_of(policies, names)  # fails early on a wrong name
-    _check_outputs(csv, out)
+    check_outputs(csv, out)
     console = Console(stderr=as_json)
     columns = (
         TextColumn("{task.fields[doing]}"),
@@ -89,7 +91,7 @@ def run(
                 watch=watch,
             )
     if csv is not None:
-        _write(found, csv)
+        write_csv(found.to_frame(), csv)
     if as_json:
         sys.stdout.write(found.model_dump_json(indent=2) + "\n")
     else:
@@ -152,7 +154,7 @@ def wrapper_names(words: list[str]) -> list[str]:
     return words
 
 
-def _check_outputs(csv: Path | None, out: Path | None) -> None:
+def check_outputs(csv: Path | None, out: Path | None) -> None:
     """Checks before the work begins that the outputs can be written.
 
     Raises:
@@ -170,8 +172,13 @@ def _check_outputs(csv: Path | None, out: Path | None) -> None:
             raise ControllerFileError(f"cannot write to {out}: {reason}") from error
 
 
-def _write(found: Evaluation, csv: Path) -> None:
+def write_csv(rows: pd.DataFrame, csv: Path) -> None:
+    """Writes a row for each episode.
+
+    Raises:
+        ControllerFileError: The file cannot be written.
+    """
     try:
-        write_atomic(csv, found.to_frame().to_csv(index=False))
+        write_atomic(csv, rows.to_csv(index=False))
     except OSError as error:
         raise ControllerFileError(f"cannot write {csv}: {error.strerror}") from error

@@ -24,7 +24,8 @@ app = typer.Typer()
 
 @app.command(
     epilog="Examples: `tdac evaluate reference builtin go-to-goal --task maze "
-    "--task epuck`; `tdac evaluate runs/maze-1 ppo.zip --task maze --out compared`"
+    "--task epuck`; `tdac evaluate runs/maze-1 ppo.zip --task maze --out compared`; "
+    "`tdac evaluate builtin ppo.zip --set unknown`"
 )
 @takes_task(without=(*ONLY_FOR_SYNTH, "task"))
 def evaluate(
@@ -45,14 +46,20 @@ def evaluate(
     *,
     named_task: NamedTask,
     episodes: Annotated[
-        int, number_flag(min=1, help="Episodes per policy and task.")
-    ] = 100,
+        Optional[int],  # noqa: UP045
+        number_flag(min=1, help="Episodes per policy and task.  [default: 100]"),
+    ] = None,
     seed: Annotated[
-        int, number_flag(min=0, help="Seed of the episodes, the same for all policies.")
-    ] = 0,
+        Optional[int],  # noqa: UP045
+        number_flag(
+            min=0,
+            help="Seed of the episodes, the same for all policies.  [default: 0]",
+        ),
+    ] = None,
     variation: Annotated[
-        Literal["nominal", "jitter", "mixed", "random"], typer.Option(help=VARIATION)
-    ] = "jitter",
+        Optional[Literal["nominal", "jitter", "mixed", "random"]],  # noqa: UP045
+        typer.Option(help=f"{VARIATION}  [default: jitter]"),
+    ] = None,
     wrappers: Annotated[
         Optional[list[str]],  # noqa: UP045
         typer.Option(
@@ -70,13 +77,67 @@ def evaluate(
         dir_flag(
             "--out",
             help="Folder for evaluation.json, episodes.csv, timing.csv and, per task, "
-            "a picture of all trajectories.",
+            "a picture of all trajectories; on a task set, for the trajectories.",
         ),
     ] = None,
     tier: Tier = "auto",
     as_json: Json = False,
+    set_name: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--set",
+            metavar="NAME",
+            help="Task set (`tdac sets`) or set.yaml, instead of tasks: the same "
+            "worlds for all policies.",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
+    split: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            metavar="NAME",
+            help="dev or test.  [default: test]",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
+    worlds: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            "-n",
+            "--worlds",
+            min=1,
+            help="Number of worlds.  [default: 100]",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
 ) -> None:
-    """Compare policies of any kind on the same tasks and seeds."""
+    """Compare policies of any kind on the same tasks and seeds, or on a task set."""
+    from tdac_agent.cli.set_flags import check_set, task_words
+
+    single = {
+        "--task": tasks,
+        **task_words(named_task()),
+        "--episodes": episodes,
+        "--seed": seed,
+        "--variation": variation,
+    }
+    check_set(set_name, {"--split": split, "-n": worlds}, single)
+    if set_name is not None:
+        from tdac_agent.cli import evaluate_set
+
+        raise typer.Exit(
+            evaluate_set.run(
+                policies,
+                set_name,
+                split,
+                worlds,
+                wrappers,
+                csv,
+                out,
+                tier,
+                as_json,
+            )
+        )
     from tdac_agent.cli import evaluate as command
 
     raise typer.Exit(
@@ -84,9 +145,9 @@ def evaluate(
             policies,
             tasks or [],
             named_task(),
-            episodes,
-            seed,
-            variation,
+            100 if episodes is None else episodes,
+            0 if seed is None else seed,
+            variation or "jitter",
             wrappers,
             csv,
             out,

@@ -129,7 +129,9 @@ def _plan_and_folder(
             update = {"steps": steps, "evaluate_every": interval}
             plan = plan.model_copy(update=update)
         return plan, resume
-    only_tasks = {flag(name): given.get(name) for name in ("task", "variation", *NOISES)}
+    only_tasks = {
+        flag(name): given.get(name) for name in ("task", "variation", *NOISES)
+    }
     check_set(given.get("set"), {}, only_tasks)
     wanted = {name: v for name, v in given.items() if name not in NOISES}
     if "wrapper" in wanted:

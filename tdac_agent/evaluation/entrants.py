@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tdac_agent.episodes.learned import check_kind
-from tdac_agent.episodes.sb3_file import MOST_BYTES, load_weights, read_policy
+from tdac_agent.episodes.sb3_file import (
+    MOST_BYTES,
+    SavedPolicy,
+    load_weights,
+    read_policy,
+)
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.controller_file import check_controller
 from tdac_agent.synthesis.loop import synthesize
@@ -35,12 +40,14 @@ class Entrant:
             each task, a controller without a file.
         sha256: Hash of its file.
         env: Environment of its run folder, if it has one.
+        saved: What a learned policy records about its training, if anything.
     """
 
     name: str
     policy: PolicySpec
     sha256: str | None = None
     env: str | None = None
+    saved: SavedPolicy | None = None
 
     @property
     def is_builtin(self) -> bool:
@@ -134,7 +141,7 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     check_kind(found)
     load_weights(found.weights)
     sha256 = sha256_of(read_file(file, MOST_BYTES))
-    return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256)
+    return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256, saved=saved)
 
 
 def write_builtin(task: Task, tier: str = "auto") -> tuple[bytes, bool]:

@@ -107,6 +107,13 @@ def evaluate(
     whole_number("seed", seed, 0)
     one_of("variation", variation, VARIATIONS)
     entrants = entrants_of(policies, wrappers)
+    for entrant in entrants:
+        if entrant.saved is not None and entrant.saved.set is not None:
+            own = entrant.saved.set
+            raise TaskError(
+                f"{entrant.name} was trained on the task set {own!r}, not on tasks: "
+                "evaluate it with --set"
+            )
     loaded = load_tasks(tasks)
     for entrant, task in itertools.product(entrants, loaded):
         if entrant.env not in (None, task.spec.env):

@@ -168,7 +168,7 @@ def _driven(
         folder = Path(name)
         salt_file = request.salt_file
         job = SetJob(
-            set_file=_written(tasks, folder / "set.yaml"),
+            set_file=write_set(tasks, folder / "set.yaml"),
             split=request.split,
             salt_file=None if salt_file is None else salt_file.resolve(),
             worlds=tuple(range(request.first, request.first + count)),
@@ -218,7 +218,8 @@ def limits_of(tasks: TaskSet) -> Limits:
     return Limits(cpu_seconds=math.ceil(2.0 * most) + 1)
 
 
-def _written(tasks: TaskSet, path: Path) -> Path:
+def write_set(tasks: TaskSet, path: Path) -> Path:
+    """Writes the set file of a set, for other processes; returns its path."""
     values = tasks.file.model_dump(mode="json", by_alias=True)
     path.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
     return path

@@ -44,13 +44,14 @@ def evaluate_on_worlds(model: Any, trials: WrappedVectorEnv) -> Point:
     def mean(values: NDArray[np.float64]) -> float:
         return round(float(values.mean()), 6)
 
-    results = map(mean, (reached, hit, returns, lengths))
-    return Point(0, 0.0, *results, float("nan"))
+    return Point(
+        0, 0.0, mean(reached), mean(hit), mean(returns), mean(lengths), float("nan")
+    )
 
 
 def _begun(trials: WrappedVectorEnv) -> Seen:
     """The first observations, of robot i in world i."""
-    rows = []
+    rows: list[Any] = []
     # In descending order, so that the last world made is 0.
     for i in reversed(range(trials.num_envs)):
         mask = np.arange(trials.num_envs) == i

@@ -132,7 +132,9 @@ class Frame:
                 f"expected observations with a pose or odometry, and a goal, got {own}"
             )
         assert isinstance(own, spaces.Dict)
-        found = {"goal": spaces.Box(-1.0, 1.0, (3,), np.float32)}
+        found: dict[str, spaces.Space[Any]] = {
+            "goal": spaces.Box(-1.0, 1.0, (3,), np.float32)
+        }
         if "wheel_speeds" in keys:
             found["wheel_speeds"] = spaces.Box(-1.0, 1.0, (2,), np.float32)
         if self.readings in keys:

@@ -148,13 +148,6 @@ class SetRun:
         driver.load()
         return driver
 
-    @property
-    def shown(self) -> Units:
-        """Units of diagnoses, in the frame that the controller observes."""
-        if self.file.frame == "map":
-            return PIXELS
-        return PIXELS.from_start(StartFrame(self.env.task.start))
-
 
 def judge_set(job: SetJob, child_pool: ChildPool) -> None:
     """Runs the tests, and if they pass the episodes, with a line for each in order."""
@@ -206,7 +199,8 @@ def drive_world(run: SetRun, index: int, skip: bool) -> WorldSummary:  # noqa: A
     """Drives the episode of a world, in a fresh child that is told nothing of it."""
     rollout, cpu_seconds, tier = _driven(run, index, FOREVER, run.budgeted)
     late = rollout.outcome == "error" and rollout.timed_out
-    figures = _figures(run, index, rollout, cpu_seconds)
+    job = run.job
+    figures = figures_of(run.env, job.split, index, rollout, cpu_seconds, told=job.told)
     if run.job.trajectories is not None:
         run.job.trajectories.mkdir(parents=True, exist_ok=True)
         rollout.trajectory.save(run.job.trajectories / f"{index}.npz")
@@ -285,25 +279,41 @@ def level_params(file: SetFile) -> dict[str, Any]:
     }
 
 
-def _figures(
-    run: SetRun, index: int, rollout: Rollout, cpu_seconds: float
+def figures_of(
+    env: LadderEnv,
+    split: str,
+    index: int,
+    rollout: Rollout,
+    cpu_seconds: float,
+    *,
+    told: bool,
 ) -> WorldEpisode:
-    world = run.env.setup.source.world(index)
+    """The figures of an episode that has just been driven.
+
+    Args:
+        env: The environment in which it was driven.
+        split: Split of its world.
+        index: Number of its world.
+        rollout: The episode.
+        cpu_seconds: CPU time of the policy, s.
+        told: Whether it may have a diagnosis.
+    """
+    world = env.setup.source.world(index)
     hard = world.difficulty
-    barn_steps = world.barn_steps or hard.length / run.file.full_step
+    barn_steps = world.barn_steps or hard.length / env.set.file.full_step
     steps = rollout.trajectory.steps
     places = rollout.trajectory.poses[:, :2]
     driven = float(np.hypot(*np.diff(places, axis=0).T).sum())
     reached, failure = rollout.reached, {}
     if not reached:
-        found = diagnose(rollout, run.env.task, run.shown)
-        failure = {"cause": found.cause, "text": found.text if run.job.told else None}
+        found = diagnose(rollout, env.task, _shown(env))
+        failure = {"cause": found.cause, "text": found.text if told else None}
     return WorldEpisode(
         index=index,
-        generator=run.env.set.kind(run.job.split, index),
+        generator=env.set.kind(split, index),
         outcome=rollout.outcome,
         steps=steps,
-        horizon=run.env.task.horizon,
+        horizon=env.task.horizon,
         time_score=time_score(reached, steps, hard.steps),
         path_score=path_score(reached, driven, hard.length),
         barn_score=barn_score(reached, steps, barn_steps),
@@ -318,3 +328,10 @@ def _figures(
         cpu_seconds=round(cpu_seconds, 3),
         **failure,
     )
+
+
+def _shown(env: LadderEnv) -> Units:
+    """Units of diagnoses, in the frame that the policy observes."""
+    if env.set.file.frame == "map":
+        return PIXELS
+    return PIXELS.from_start(StartFrame(env.task.start))

@@ -1,0 +1,120 @@
+"""Drives a learned policy on worlds of a task set, with its sensors alone."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.episodes.episode import Record, not_driven, run_policy
+from tdac_agent.episodes.learned import Learned
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.evaluation.entrants import Entrant
+from tdac_agent.evaluation.kept_sets import keep_report
+from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
+from tdac_agent.evaluation.set_verify import write_set
+from tdac_agent.sandbox import ControllerFault
+from tdac_agent.tasks.provenance import versions
+from tdac_agent.verification.judge.driving import FOREVER
+from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of
+from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.ladder.task_sets import TaskSet
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LearnedRuns:
+    """A learned policy and the environment in which it drives.
+
+    Attributes:
+        entrant: The policy.
+        tasks: The task set.
+        split: `dev` or `test`.
+        env: The judge's environment; the policy gets its observations alone.
+    """
+
+    entrant: Entrant
+    tasks: TaskSet
+    split: str
+    env: LadderEnv
+
+    @classmethod
+    def of(cls, entrant: Entrant, tasks: TaskSet, split: str) -> LearnedRuns:
+        """Prepares the episodes.
+
+        Raises:
+            ControllerFileError: The policy does not fit what the set observes.
+        """
+        with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
+            level = write_set(tasks, Path(name) / "set.yaml")
+            env = LadderEnv(level, split, privileged=True)
+        runs = cls(entrant, tasks, split, env)
+        try:
+            runs._driver()
+        except ControllerFault as fault:
+            raise ControllerFileError(f"{entrant.name}: {fault}") from fault
+        return runs
+
+    def report(
+        self,
+        worlds: int,
+        out: Path | None = None,
+        watch: Callable[[int, int], None] | None = None,
+    ) -> SetReport:
+        """Drives on the first worlds of the split.
+
+        Args:
+            worlds: Number of worlds.
+            out: Folder for `set.json` and `trajectories/`.
+            watch: Called with the numbers of episodes and successes so far.
+        """
+        began, episodes = time.monotonic(), []
+        for episode in self._episodes(worlds, out):
+            episodes.append(episode)
+            if watch is not None:
+                watch(len(episodes), sum(each.success for each in episodes))
+        assert self.entrant.sha256 is not None
+        provenance = SetProvenance(
+            set=self.tasks.name,
+            set_sha256=self.tasks.sha256,
+            split=self.split,
+            salt_sha256=None,
+            controller_sha256=self.entrant.sha256,
+            sandbox="none",
+            limits={},
+            versions=dict(versions()),
+        )
+        seconds = time.monotonic() - began
+        report = summarise(provenance, episodes, None, seconds, told=True)
+        if out is not None:
+            keep_report(report, out)
+        return report
+
+    def _episodes(self, worlds: int, out: Path | None) -> Iterator[WorldEpisode]:
+        kept = None if out is None else out / "trajectories"
+        if kept is not None:
+            kept.mkdir(parents=True, exist_ok=True)
+        for index in range(worlds):
+            before = time.process_time()
+            rollout = self._rollout(index)
+            cpu = time.process_time() - before
+            if kept is not None:
+                rollout.trajectory.save(kept / f"{index}.npz")
+            yield figures_of(self.env, self.split, index, rollout, cpu, told=True)
+
+    def _rollout(self, index: int) -> Rollout:
+        name = f"world {index}"
+        record = Record(self.env, None, FOREVER, options={"index": index})
+        try:
+            driver = self._driver()
+        except ControllerFault as fault:
+            return not_driven(record, name, fault)
+        return run_policy(driver, record, name, held_out=False, deadline=math.inf)
+
+    def _driver(self) -> Learned:
+        policy = self.entrant.policy
+        assert policy.file is not None
+        return Learned(policy.file, policy.wrappers, self.env)
