@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 from tdac_agent.cli.console import Console
@@ -27,6 +29,7 @@ from tdac_agent.verification.judge.judge import Judge
 from tdac_agent.verification.suite.starts import JITTERS
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.video import write_video
 from tdac_envs.drawing.window import Window
 
@@ -50,10 +53,7 @@ def run(
     elif episode is not None:
         raise TaskError("give --episode or --seed, not both")
     name, disturbance = _checked(episode), disturbed.disturbance()
-    if video is None and not has_display():
-        raise TaskError("there is no display: give --video FILE.mp4 (or .gif)")
-    if video is not None and video.suffix not in SUFFIXES:
-        raise TaskError(f"--video must end in .mp4 or .gif, got {video.name!r}")
+    check_video(video)
     file, task = controller_and_task(controller, flags)
     if seed is None:
         rollout = drive(task, read_source(file), name, tier)
@@ -61,30 +61,57 @@ def run(
         task.disturbed_options(disturbance)
         driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
         rollout = driven.rollout
-    _show(rollout, task, video, speed)
-    show_printed(rollout.printed, Console())
-    steps = rollout.trajectory.steps
-    print(f"{rollout.name}: {rollout.outcome} after {steps} steps" + _because(rollout))
-    return 0 if rollout.reached else 1
+    pictures = pictures_of(task.setting)
+    return show(rollout, partial(pictures.frames, rollout), task.name, video, speed)
 
 
-def _show(
-    rollout: Rollout, task: Task, video: Path | None, speed: float | None
-) -> None:
-    """Writes the episode as a video, or shows it in a window."""
-    steps, dt = rollout.trajectory.steps, task.nominal.dt
+def check_video(video: Path | None) -> None:
+    """Checks before the work begins that an episode can be shown.
+
+    Raises:
+        TaskError: It cannot.
+    """
+    if video is None and not has_display():
+        raise TaskError("there is no display: give --video FILE.mp4 (or .gif)")
+    if video is not None and video.suffix not in SUFFIXES:
+        raise TaskError(f"--video must end in .mp4 or .gif, got {video.name!r}")
+
+
+def show(
+    rollout: Rollout,
+    frames_of: Callable[[int], Iterator[Image]],
+    title: str,
+    video: Path | None,
+    speed: float | None,
+) -> int:
+    """Writes an episode as a video, or shows it in a window; prints how it ended.
+
+    Args:
+        rollout: The episode.
+        frames_of: Draws every n-th step.
+        title: Name of the task.
+        video: File of the video; None for a window.
+        speed: Simulated time / playing time, if given.
+
+    Returns:
+        0 if the goal was reached, else 1.
+    """
+    steps, dt = rollout.trajectory.steps, rollout.trajectory.dt
     # A window can be closed at any time: it shows real time, however long it lasts.
     speed = 1.0 if video is None and speed is None else speed
     film = film_of(steps, dt, speed, video)
-    frames = pictures_of(task.setting).frames(rollout, film.stride)
+    frames = frames_of(film.stride)
     if video is not None:
         write_video(frames, video, film.fps)
         print(f"wrote {video} ({film})")
-        return
-    window = Window(f"tdac: {task.name}", film.fps)
-    for frame in frames:
-        window.show(frame)
-    window.close()
+    else:
+        window = Window(f"tdac: {title}", film.fps)
+        for frame in frames:
+            window.show(frame)
+        window.close()
+    show_printed(rollout.printed, Console())
+    print(f"{rollout.name}: {rollout.outcome} after {steps} steps" + _because(rollout))
+    return 0 if rollout.reached else 1
 
 
 def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:

@@ -29,7 +29,8 @@ app = typer.Typer()
 
 @app.command(
     epilog="Examples: `tdac play runs/maze-1 --video maze.mp4`; "
-    "`tdac play runs/maze-1 --seed 17`"
+    "`tdac play runs/maze-1 --seed 17`; "
+    "`tdac play builtin --set unknown --index 3 --video unknown.gif`"
 )
 @takes_task()
 def play(
@@ -62,11 +63,62 @@ def play(
     wheel_gains: WheelGains = None,
     axle_error: AxleError = None,
     range_dropout: RangeDropout = None,
+    set_name: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--set",
+            metavar="NAME",
+            help="Task set (`tdac sets`) or set.yaml: play a world of it; the policy "
+            "may also be builtin or a .zip of stable-baselines3.",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
+    index: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            "--index",
+            min=0,
+            help="Number of the world.  [default: 0]",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
+    split: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            metavar="NAME",
+            help="train, dev or test.  [default: dev]",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
 ) -> None:
     """Show one episode of a controller, run in the sandbox.
 
-    The episode is one of `tdac verify`, or with --seed one of `tdac verify --robust`.
+    The episode is one of `tdac verify`, or with --seed one of `tdac verify --robust`,
+    or with --set one of `tdac verify --set`.
     """
+    from tdac_agent.cli.set_flags import check_set, task_words
+
+    single = {
+        **task_words(named_task()),
+        "--episode": episode,
+        "--seed": seed,
+        "--range-noise": range_noise,
+        "--wheel-slip": wheel_slip,
+        "--motor-lag": motor_lag,
+        "--delay": delay,
+        "--wheel-gains": wheel_gains,
+        "--axle-error": axle_error,
+        "--range-dropout": range_dropout,
+    }
+    check_set(set_name, {"--index": index, "--split": split}, single)
+    if set_name is not None:
+        from tdac_agent.cli import play_set
+
+        raise typer.Exit(
+            play_set.run(
+                controller, set_name, split or "dev", index or 0, video, speed, tier
+            )
+        )
     from tdac_agent.cli import play as command
     from tdac_agent.cli.robust_flags import DisturbanceFlags
 

@@ -99,13 +99,14 @@ class LearnedRuns:
             kept.mkdir(parents=True, exist_ok=True)
         for index in range(worlds):
             before = time.process_time()
-            rollout = self._rollout(index)
+            rollout = self.drive(index)
             cpu = time.process_time() - before
             if kept is not None:
                 rollout.trajectory.save(kept / f"{index}.npz")
             yield figures_of(self.env, self.split, index, rollout, cpu, told=True)
 
-    def _rollout(self, index: int) -> Rollout:
+    def drive(self, index: int) -> Rollout:
+        """Drives the episode of a world."""
         name = f"world {index}"
         record = Record(self.env, None, FOREVER, options={"index": index})
         try:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from tdac_agent.environments.map2d.setting import Map2DSetting
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.units import Points
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.runs import Status
-from tdac_envs.map2d.picture import MapScene
+from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.map2d.picture import ROBOT_IMAGE, MapScene
 from tdac_envs.map2d.run_picture import Background, trajectory_picture
+from tdac_envs.map2d.task import Map2DTask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,21 +46,43 @@ class MapPictures:
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
         """Draws frames of the robot with its rays."""
-        nominal, trajectory = self.setting.nominal, rollout.trajectory
-        scene = MapScene(
-            nominal.terrain.grid.cells,
-            trajectory.poses[0].tolist(),
-            nominal.goal,
-            goal_tolerance=nominal.goal_tolerance,
-            robot=nominal.robot,
-            path=nominal.shortest_path(nominal.start),
-            robot_image=self.setting.robot_image,
-            units=self.setting.shown_in,
+        setting = self.setting
+        return frames_of(
+            setting.nominal, rollout, stride, setting.robot_image, setting.shown_in
         )
-        gaps, last = rollout.distances("euclidean"), trajectory.steps
-        for step in rollout.trajectory.every(stride):
-            outcome = rollout.outcome if step == last else ""
-            status = Status(step, nominal.horizon, float(gaps[step]), outcome)
-            trail = trajectory.poses[: step + 1, :2]
-            pose = trajectory.poses[step].tolist()
-            yield scene.frame(pose, trajectory.ranges[step], trail, status)
+
+
+def frames_of(
+    nominal: Map2DTask,
+    rollout: Rollout,
+    stride: int,
+    robot_image: Path = ROBOT_IMAGE,
+    units: MapUnits = PIXELS,
+) -> Iterator[Image]:
+    """Draws every `stride`-th step of an episode and the last one.
+
+    Args:
+        nominal: Task of the episode.
+        rollout: The episode.
+        stride: Steps between two frames.
+        robot_image: Picture of the robot.
+        units: Units of the figures shown.
+    """
+    trajectory = rollout.trajectory
+    scene = MapScene(
+        nominal.terrain.grid.cells,
+        trajectory.poses[0].tolist(),
+        nominal.goal,
+        goal_tolerance=nominal.goal_tolerance,
+        robot=nominal.robot,
+        path=nominal.shortest_path(nominal.start),
+        robot_image=robot_image,
+        units=units,
+    )
+    gaps, last = rollout.distances("euclidean"), trajectory.steps
+    for step in rollout.trajectory.every(stride):
+        outcome = rollout.outcome if step == last else ""
+        status = Status(step, nominal.horizon, float(gaps[step]), outcome)
+        trail = trajectory.poses[: step + 1, :2]
+        pose = trajectory.poses[step].tolist()
+        yield scene.frame(pose, trajectory.ranges[step], trail, status)

@@ -197,7 +197,7 @@ def _episodes(run: SetRun, worlds: tuple[int, ...]) -> Generator[WorldSummary]:
 
 def drive_world(run: SetRun, index: int, skip: bool) -> WorldSummary:  # noqa: ARG001
     """Drives the episode of a world, in a fresh child that is told nothing of it."""
-    rollout, cpu_seconds, tier = _driven(run, index, FOREVER, run.budgeted)
+    rollout, cpu_seconds, tier = drive_once(run, index)
     late = rollout.outcome == "error" and rollout.timed_out
     job = run.job
     figures = figures_of(run.env, job.split, index, rollout, cpu_seconds, told=job.told)
@@ -205,6 +205,15 @@ def drive_world(run: SetRun, index: int, skip: bool) -> WorldSummary:  # noqa: A
         run.job.trajectories.mkdir(parents=True, exist_ok=True)
         rollout.trajectory.save(run.job.trajectories / f"{index}.npz")
     return WorldSummary(figures, tier, late, rollout.is_retryable)
+
+
+def drive_once(run: SetRun, index: int) -> tuple[Rollout, float, str]:
+    """Drives the episode of a world within the CPU budget.
+
+    Returns:
+        The episode, the CPU time of the controller, s, and the sandbox tier.
+    """
+    return _driven(run, index, FOREVER, run.budgeted)
 
 
 def _driven(
