@@ -223,7 +223,8 @@ def test_a_kept_world_is_the_world_that_was_made():
 @pytest.mark.parametrize("damage", [b"", b"nothing", None])
 def test_a_damaged_file_is_made_anew(damage):
     tasks = load_set("unknown")
-    made = TrainingPool(tasks).task(0)
+    made = tasks.task("train", 0)
+    TrainingPool(tasks).task(0)
     path = pool_folder(tasks.sha256) / "0.bin"
     whole = path.read_bytes()
     broken = bytearray(whole)
@@ -232,6 +233,19 @@ def test_a_damaged_file_is_made_anew(damage):
     again = TrainingPool(tasks).task(0)
     assert np.array_equal(again.field, made.field)
     assert path.read_bytes() == whole
+
+
+def test_a_drawn_world_stays_at_hand():
+    """The same task again, also after its file is gone; a copy has the same world."""
+    tasks = load_set("unknown")
+    pool = TrainingPool(tasks)
+    task = pool.task(2)
+    (pool_folder(tasks.sha256) / "2.bin").unlink()
+    assert pool.task(2) is task
+    assert np.array_equal(task.field, tasks.task("train", 2).field)
+    copy = pickle.loads(pickle.dumps(pool))
+    assert len(pickle.dumps(pool)) < 100_000
+    assert np.array_equal(copy.task(2).field, task.field)
 
 
 def test_without_a_cache_worlds_are_made_each_time(tmp_path, monkeypatch):
