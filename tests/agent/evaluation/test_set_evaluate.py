@@ -1,0 +1,194 @@
+"""Policies on the same worlds of a set; what is kept, played, and refused."""
+
+import json
+
+import cv2
+import pytest
+import yaml
+
+from tdac_agent.builtin.level import LEVELS
+from tdac_agent.errors import ControllerFileError, RunError
+from tdac_agent.evaluation.set_evaluate import evaluate_on_set
+from tdac_agent.evaluation.set_evaluation import SetEvaluation
+from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+
+STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
+
+
+@pytest.fixture(scope="module")
+def judge():
+    with WarmJudge() as warm:
+        yield warm
+
+
+@pytest.fixture
+def level(tmp_path):
+    """A set of small worlds, in which nothing arrives."""
+    size = {"width": 240, "height": 240}
+    worlds = [{"name": "aisles", **size}, {"name": "clutter", **size}]
+    short = {"factor": 1.0, "least": 40, "most": 40}
+    path = tmp_path / "few.yaml"
+    path.write_text(yaml.safe_dump({"name": "few", "worlds": worlds, "horizon": short}))
+    return path
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Controllers that do not arrive: one stands, one drives ahead, one is broken."""
+    sources = {
+        "still": STILL,
+        "ahead": AHEAD,
+        "broken": "def policy(obs):\n    return 1\n",
+    }
+    for name, source in sources.items():
+        (tmp_path / f"{name}.py").write_text(source)
+    return [str(tmp_path / f"{name}.py") for name in sources]
+
+
+def test_a_row_is_what_verify_says(judge, tmp_path, level, files):
+    """Scores, generators and causes; a refused file has a row without figures."""
+    tasks, out = load_set(level), tmp_path / "out"
+    found = evaluate_on_set(files, tasks, "dev", 4, judge=judge, out=out)
+    for file, row in zip(files[:2], found.rows, strict=False):
+        alone = verify_on_set(file, tasks, "dev", 4, judge=judge)
+        assert row.scores == alone.scores
+        assert row.by_generator == alone.by_generator
+        assert row.causes == alone.causes
+        assert row.interval == alone.interval
+        assert row.hit + row.timeouts + row.errors == 4
+    still, ahead, broken = found.rows
+    assert (still.timeouts, still.hit) == (4, 0)
+    assert ahead.hit > 0
+    assert (broken.scores, broken.worlds) == (None, 0)
+    assert "two finite numbers" in broken.told[0]
+    (pair,) = found.comparisons
+    assert (pair.neither, pair.p) == (4, 1.0)
+    assert len(found.to_frame()) == 8
+    kept = json.loads((out / "evaluation.json").read_text())
+    assert SetEvaluation.model_validate({**kept, "reports": ()}).rows == found.rows
+    names = sorted(path.name for path in (out / "policies").iterdir())
+    assert [name.split("-")[0] for name in names] == ["ahead", "broken", "still"]
+    assert len(list((out / "policies" / names[0] / "trajectories").iterdir())) == 4
+
+
+def test_finished_policies_are_not_driven_again(judge, tmp_path, level, files):
+    """After an interruption, and of a finished evaluation; another one is refused."""
+    tasks, out, driven = load_set(level), tmp_path / "out", []
+
+    def interrupt(policy, episodes, successes):
+        if policy == files[1]:
+            raise KeyboardInterrupt
+
+    def note(policy, episodes, successes):
+        driven.append(policy)
+
+    given = {"split": "dev", "worlds": 2, "judge": judge, "out": out}
+    with pytest.raises(KeyboardInterrupt):
+        evaluate_on_set(files[:2], tasks, watch=interrupt, **given)
+    first = evaluate_on_set(files[:2], tasks, watch=note, **given)
+    assert set(driven) == {files[1]}
+    written = (out / "evaluation.json").read_bytes()
+    driven.clear()
+    assert evaluate_on_set(files[:2], tasks, watch=note, **given) == first
+    assert driven == []
+    assert (out / "evaluation.json").read_bytes() == written
+    with pytest.raises(RunError, match="has another evaluation"):
+        evaluate_on_set(files[:1], tasks, **given)
+
+
+def test_builtin_is_the_controller_of_the_level(judge, level):
+    """A set with the observations of `unknown` has that of `unknown`."""
+    known = evaluate_on_set(["builtin"], load_set("known"), "dev", 2, judge=judge)
+    (policy,), (row,) = known.policies, known.rows
+    assert (policy.knows, row.successes) == ("+ map", 2)
+    own = verify_on_set(LEVELS / "known.py", load_set("known"), "dev", 2, judge=judge)
+    assert row.scores == own.scores
+    (policy,) = evaluate_on_set(
+        ["builtin"], load_set(level), "dev", 1, judge=judge
+    ).policies
+    assert policy.knows == "sensors"
+
+
+@pytest.mark.parametrize(
+    ("policies", "split", "message"),
+    [
+        (["reference"], "test", "reference does not drive on a task set"),
+        (["random"], "test", "random does not drive on a task set"),
+        (["builtin"], "hidden", "tdac verify FILE --set few --split hidden"),
+        (["builtin"], "train", "expected split to be one of 'dev', 'test'"),
+        ([], "test", "expected at least one policy"),
+    ],
+)
+def test_what_is_refused(level, policies, split, message):
+    with pytest.raises(TaskError, match=message):
+        evaluate_on_set(policies, load_set(level), split, 1)
+
+
+def test_a_level_without_a_controller_of_our_own(tmp_path):
+    path = tmp_path / "blind.yaml"
+    path.write_text(
+        yaml.safe_dump(
+            {"name": "blind", "worlds": [{"name": "rooms"}], "observed": ["ranges"]}
+        )
+    )
+    with pytest.raises(TaskError, match="no built-in controller for the task set bli"):
+        evaluate_on_set(["builtin"], load_set(path), "dev", 1)
+    with pytest.raises(ControllerFileError, match=r"no policy 'no\.py'"):
+        evaluate_on_set(["no.py"], load_set(path), "dev", 1)
+
+
+def test_the_command(tdac, level, files):
+    """A table with scores, failures and generators; JSON with the same figures."""
+    words = ("evaluate", *files, "--set", level, "--split", "dev", "-n", "4")
+    code, out, _ = tdac(*words)
+    assert code == 0
+    for said in ("4 dev worlds each", "SCT", "BARN", "0/4", "aisles", "clutter"):
+        assert said in out
+    assert "still.py, failures: 4 " in out
+    assert "broken.py, not driven: " in out
+    record = json.loads(tdac(*words, "--json")[1])
+    assert [row["successes"] for row in record["rows"]] == [0, 0, 0]
+
+
+def test_playing_a_world(tdac, level, files):
+    """As a film; the exit code says whether the goal was reached."""
+    words = ("--set", level, "--index", "1", "--video", "a.gif", "--speed", "20")
+    code, out, _ = tdac("play", files[0], *words)
+    assert code == 1
+    assert "wrote a.gif" in out
+    assert "world 1: out of time after 40 steps" in out
+    film = cv2.VideoCapture("a.gif")
+    assert film.read()[0]
+    code, out, _ = tdac("play", "builtin", "--set", "known", *words[2:])
+    assert code == 0
+    assert "world 1: reached after" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("play", "--index", "1"), "--index needs --set NAME"),
+        (
+            ("play", "--set", "known", "--split", "hidden"),
+            "hidden worlds are not shown",
+        ),
+        (("play", "--set", "known", "--seed", "1"), "leave out --seed"),
+        (("play", "--set", "known", "--task", "maze"), "leave out --task"),
+        (("evaluate", "-n", "3"), "-n needs --set NAME"),
+        (("evaluate", "--split", "dev"), "--split needs --set NAME"),
+        (("evaluate", "--set", "known", "--episodes", "3"), "leave out --episodes"),
+        (("evaluate", "--set", "known", "--map", "a.png"), "leave out --map"),
+        (("evaluate", "--set", "known", "--split", "hidden"), "tdac verify FILE"),
+        (("evaluate", "--set", "know"), "did you mean 'known'?"),
+    ],
+)
+def test_mistakes_are_one_line(tdac, words, message):
+    video = ("--video", "a.gif") if words[0] == "play" else ()
+    code, out, err = tdac(words[0], "builtin", *words[1:], *video)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert message in err

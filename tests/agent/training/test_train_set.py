@@ -1,0 +1,209 @@
+"""Training on a task set: its worlds, its record, what it refuses."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+from tdac_agent.episodes.sb3_file import read_metadata
+from tdac_agent.errors import ControllerFileError, RunError
+from tdac_agent.evaluation.evaluate import evaluate
+from tdac_agent.evaluation.set_evaluate import evaluate_on_set
+from tdac_agent.training.curve import read_curve
+from tdac_agent.training.hyperparameters import config_file
+from tdac_agent.training.plan import read_plan
+from tdac_agent.training.set_plan import make_set_plan, make_trials
+from tdac_agent.training.train import train
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+
+pytest.importorskip("stable_baselines3")
+torch = pytest.importorskip("torch")
+
+SMALL = {"n_envs": 8, "n_steps": 16, "batch_size": 64, "n_epochs": 2}
+LOST = {
+    "observed": ["odometry", "goal", "wheel_speeds", "ranges"],
+    "disturbances": {"odometry_scale": 0.05, "wheel_gains": 0.1, "delay": 1},
+}
+
+
+@pytest.fixture(autouse=True)
+def threads():
+    """Training sets the number of threads of the whole process."""
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture
+def config(tmp_path):
+    """Writes the shipped hyperparameters, made small; gives the file."""
+
+    def write(**changes):
+        own = yaml.safe_load(config_file("ppo").read_text())["TDAC-Ladder-v0"]
+        small = own | SMALL | {"policy_kwargs": {"net_arch": [8]}} | changes
+        file = tmp_path / "ppo.yml"
+        file.write_text(yaml.safe_dump({"TDAC-Ladder-v0": small}))
+        return file
+
+    return write
+
+
+@pytest.fixture
+def few(tmp_path):
+    """Writes a set of small worlds and short episodes; gives its path."""
+
+    def write(name="few", **values):
+        aisles = {"name": "aisles", "width": 220, "height": 180}
+        short = {"factor": 1.0, "least": 30, "most": 30}
+        path = tmp_path / f"{name}.yaml"
+        given = {"name": name, "worlds": [aisles], "horizon": short, **values}
+        path.write_text(yaml.safe_dump(given))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def trained(tmp_path, few, config):
+    """A short training, and the set that it was on."""
+
+    def run(**values):
+        level = few(**values)
+        plan = make_set_plan(level, steps=256, episodes=4, config=config())
+        points = train(plan, tmp_path / "out")
+        return load_set(level), plan, points, tmp_path / "out"
+
+    return run
+
+
+@pytest.mark.parametrize("level", ["known", "unknown", "lost"])
+def test_a_plan_is_sensors_alone(level):
+    """Without guidance or a map, on any level; 64 robots."""
+    plan = make_set_plan(level, steps=1000)
+    assert plan.wrappers == ("goal-relative", "flatten")
+    assert (plan.set, plan.set_sha256) == (level, load_set(level).sha256)
+    assert (plan.n_envs, plan.episodes, plan.tasks) == (64, 100, ())
+
+
+@pytest.mark.parametrize("values", [{}, LOST])
+def test_a_training_records_its_set(trained, values):
+    """Name and hash, in the plan, the facts, and the policy itself."""
+    tasks, plan, points, out = trained(**values)
+    assert points[-1].steps == 256
+    assert read_plan(out) == plan
+    saved = read_metadata(out / "policy.zip")
+    assert (saved.set, saved.set_sha256, saved.tasks) == ("few", tasks.sha256, ())
+    facts = json.loads((out / "policy.json").read_text())
+    assert facts["set_sha256"] == tasks.sha256
+    assert len(read_curve(out)) == len(points)
+
+
+def test_its_evaluation_is_that_of_the_judge(trained):
+    """World i of dev for robot i: the judge drives the same, one after the other."""
+    tasks, _, points, out = trained(**LOST)
+    best = max(points, key=lambda point: point.worth)
+    found = evaluate_on_set([out / "policy.zip"], tasks, "dev", 4)
+    (row,), (report,) = found.rows, found.reports
+    assert row.successes / 4 == best.success_rate
+    assert row.hit / 4 == best.collision_rate
+    steps = np.mean([episode.steps for episode in report.episodes])
+    assert steps == pytest.approx(best.mean_length)
+
+
+def test_trials_begin_in_their_own_worlds(few, config):
+    """Robot i is in world i of dev, and none of train is among them."""
+    level = few()
+    plan = make_set_plan(level, steps=64, episodes=3, config=config())
+    trials = make_trials(plan)
+    tasks = load_set(level)
+    for i in (2, 1, 0):
+        mask = np.arange(3) == i
+        trials.reset(options={"index": i, "reset_mask": mask})
+    for i, task in enumerate(trials.batch.tasks):
+        assert np.array_equal(task.field, tasks.task("dev", i).field)
+    trials.close()
+
+
+def test_a_training_goes_on(trained):
+    """Longer; a set that has changed since is refused."""
+    _, plan, points, out = trained()
+    longer = plan.model_copy(update={"steps": 512})
+    more = train(longer, out)
+    assert more[: len(points)] == points
+    assert more[-1].steps == 512
+    other = plan.model_copy(update={"set_sha256": "0" * 64})
+    with pytest.raises(RunError, match="contains another training"):
+        train(other, out)
+
+
+def test_a_changed_set_is_refused(tmp_path, few, config):
+    plan = make_set_plan(few(), steps=64, config=config())
+    few(goal_tolerance=5)
+    with pytest.raises(TaskError, match="has changed since the training began"):
+        train(plan, tmp_path / "out")
+
+
+def test_a_policy_of_another_training_is_refused(trained, few):
+    """One line for another set, another version, and tasks."""
+    _, _, _, out = trained()
+    file = str(out / "policy.zip")
+    other = load_set(few(name="others"))
+    with pytest.raises(ControllerFileError, match=r"the task set 'few', not on 'oth"):
+        evaluate_on_set([file], other, "dev", 1)
+    changed = load_set(few(goal_tolerance=5))
+    with pytest.raises(ControllerFileError, match="on another version of the task set"):
+        evaluate_on_set([file], changed, "dev", 1)
+    with pytest.raises(TaskError, match="the task set 'few', not on tasks: evaluate"):
+        evaluate([file], ["maze"], 1)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "--set brings its own tasks; leave out --task"),
+        (("--variation", "mixed"), "leave out --variation"),
+        (("--delay", "1"), "leave out --delay"),
+        (("--set", "unknow"), "did you mean 'unknown'?"),
+        (("--wrapper", "guidance"), "leave out the wrapper 'guidance'"),
+        (("--episodes", "0"), "--episodes"),
+    ],
+)
+def test_mistakes_are_one_line(tdac, words, message):
+    given = ("--set", "unknown") if "--set" not in words else ()
+    task = () if words else ("--task", "maze")
+    code, out, err = tdac("train", *given, *task, *words)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert message in err
+
+
+def test_hyperparameters_do_not_choose_the_worlds(few, config):
+    """A training on `test` would be no training for others to compare with."""
+    with pytest.raises(TaskError, match="env_kwargs: split is set by the training"):
+        make_set_plan(few(), config=config(env_kwargs={"split": "test"}))
+    with pytest.raises(TaskError, match="env_kwargs: privileged is set by the train"):
+        make_set_plan(few(), config=config(env_kwargs={"privileged": True}))
+
+
+def test_the_commands_in_turn(tdac, tmp_path, few, config):
+    """train, runs, evaluate: what each prints leads to the next."""
+    level = few()
+    words = ("--set", level, "--steps", 128, "--episodes", 2, "--config", config())
+    code, out, _ = tdac("train", *words, "--out", "out")
+    assert code == 1  # after two rollouts
+    assert "worlds of train (2 of dev in evaluations)" in out
+    assert "not learnt" in out
+    assert f"to compare: tdac evaluate out/policy.zip builtin --set {level}" in out
+    assert str(level) in tdac("runs", ".")[1]
+    code, out, _ = tdac(
+        "evaluate", "out/policy.zip", "--set", level, "-n", 2, "--csv", "rows.csv"
+    )
+    assert code == 0
+    assert "few" in out
+    with (tmp_path / "here" / "rows.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["index"] for row in rows] == ["0", "1"]
+    assert {row["knows"] for row in rows} == {"sensors"}
