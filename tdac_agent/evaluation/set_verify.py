@@ -31,6 +31,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
+from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
@@ -164,6 +165,8 @@ def _driven(
     test = SequentialTest(tasks.file.bar, most) if worlds is None else None
     count = most if worlds is None else worlds
     compile_first(environment(Map2DTask.env_id))
+    if tasks.file.unit == "m":
+        compile_first(environment(EPuckTask.env_id))
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         folder = Path(name)
         salt_file = request.salt_file

@@ -46,7 +46,9 @@ class TrainingPool:
     def __init__(self, task_set: TaskSet) -> None:
         self._set = task_set
         self._tasks: OrderedDict[int, Map2DTask] = OrderedDict()
-        self._folder = pool_folder(task_set.sha256)
+        # Tasks of the e-puck are kept in memory alone.
+        on_maps = task_set.file.unit == "px"
+        self._folder = pool_folder(task_set.sha256) if on_maps else None
 
     def task(self, index: int) -> Map2DTask:
         """The task of a training world.
