@@ -2,9 +2,9 @@
 
 All numbers are drawn from the environment's own generator, in this order and only if
 their option is not 0. At a reset, after the start and goal: wheel gains (left, right),
-axle error, wheel radii (left, right), odometry scales (distance, turn). In each step: slip (left, right), noise of
-the distance sensors, dropouts of the rays, odometry noise (distance, turn). The first
-observation of an episode has sensor noise and dropouts, too.
+axle error, wheel radii (left, right), odometry scales (distance, turn). In each step:
+slip (left, right), noise of the distance sensors, dropouts of the rays, odometry noise
+(distance, turn). The first observation of an episode has sensor noise, and dropouts.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.setup import Setup as EPuckSetup
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.observed import View
+from tdac_envs.ladder.plate_pool import MOST
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import find_set_file
 from tdac_envs.ladder.source import SetSource, read_salt
@@ -139,7 +140,8 @@ class LadderEnv(OnSet, Map2DEnv):
         level: Name of a task set, or path of a `set.yaml`.
         split: `"train"`, `"dev"`, `"test"` or `"hidden"`.
         train_pool: Number of training worlds. A world is made when it is first drawn,
-            and kept in the user's cache folder. 0 for a new world in each episode.
+            and kept in the user's cache folder; those of an e-puck (by default 512)
+            are kept in memory. 0 for a new world in each episode.
         salt_file: File with the salt of the split `"hidden"`, 16 bytes or more.
         privileged: Whether `info` is complete. A rival or a judge never sets it.
         reward_weights: Reward weights by name, where they differ from the defaults.
@@ -180,7 +182,7 @@ class EPuckLadderEnv(OnSet, EPuckEnv):
         self,
         level: str | Path = "epuck",
         split: str = "train",
-        train_pool: int = TRAIN_POOL,
+        train_pool: int = MOST,
         salt_file: str | Path | None = None,
         privileged: bool = False,
         reward_weights: Mapping[str, float] | None = None,

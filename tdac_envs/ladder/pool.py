@@ -26,6 +26,7 @@ from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
+from tdac_envs.mapping.params import RobotParams
 
 Bytes = NDArray[np.uint8]
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -46,9 +47,7 @@ class TrainingPool:
     def __init__(self, task_set: TaskSet) -> None:
         self._set = task_set
         self._tasks: OrderedDict[int, Map2DTask] = OrderedDict()
-        # Tasks of the e-puck are kept in memory alone.
-        on_maps = task_set.file.unit == "px"
-        self._folder = pool_folder(task_set.sha256) if on_maps else None
+        self._folder = pool_folder(task_set.sha256)
 
     def task(self, index: int) -> Map2DTask:
         """The task of a training world.
@@ -69,12 +68,17 @@ class TrainingPool:
     def _found(self, index: int) -> Map2DTask:
         """The task from its file, or made and written to it if possible."""
         if self._folder is None:
-            return self._set.task("train", index)
+            return self._made(index)
         path = self._folder / f"{index}.bin"
         task = _read(path, self._set)
         if task is None:
-            task = self._set.task("train", index)
+            task = self._made(index)
             _write(path, task)
+        return task
+
+    def _made(self, index: int) -> Map2DTask:
+        task = self._set.task("train", index)
+        assert isinstance(task, Map2DTask)
         return task
 
 
@@ -151,12 +155,13 @@ def _task(data: Bytes, task_set: TaskSet) -> Map2DTask:
     clear = part(np.float32, *padded)
     leaps = part(np.uint8, 4, *padded)
     grid = OccupancyGrid(part(np.bool_, *shape))
-    file = task_set.file
+    file, robot = task_set.file, task_set.file.robot
+    assert isinstance(robot, RobotParams)
     return Map2DTask(
         terrain=Terrain(grid, clear[1:-1, 1:-1], clear, leaps),
         start=Pose(x, y, heading),
         goal=(goal[0], goal[1]),
-        robot=file.robot,
+        robot=robot,
         goal_tolerance=file.goal_tolerance,
         dt=file.dt,
         horizon=int(horizon),

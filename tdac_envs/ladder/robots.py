@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_envs.drive.disturbances import MOST_HIDDEN
+from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -43,6 +44,7 @@ class EPuckParams(BaseModel):
             "axle_length": AXLE_LENGTH,
             "wheel_radius": WHEEL_RADIUS,
             "max_wheel_speed": self.max_wheel_speed,
+            "sensor_range": RANGE,
         }
 
     @property

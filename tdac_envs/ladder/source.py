@@ -10,6 +10,7 @@ import numpy as np
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import read_file
+from tdac_envs.ladder.plate_pool import PlatePool
 from tdac_envs.ladder.pool import TrainingPool
 from tdac_envs.ladder.task_sets import MOST_SALT, AnyTask, AnyWorld, TaskSet
 
@@ -41,7 +42,8 @@ class SetSource:
         self._set, self._split, self._salt = task_set, split, salt
         size = whole_number("train_pool", train_pool, 0, MOST_WORLDS)
         kept = split == "train" and size > 0
-        self._pool = TrainingPool(task_set) if kept else None
+        pool = PlatePool if task_set.file.unit == "m" else TrainingPool
+        self._pool = pool(task_set) if kept else None
         most, count = size if kept else MOST_WORLDS, task_set.count(split)
         self._count = most if count is None else min(count, most)
         self._last: tuple[int, AnyWorld, AnyTask] | None = None

@@ -17,9 +17,9 @@ from tdac_envs.epuck.task import EPuckTask, make_task
 from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
-from tdac_envs.ladder.set_file import SetFile, Split, find_set_file
 from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
 from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.set_file import SetFile, Split, find_set_file
 from tdac_envs.ladder.words import world_key
 from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 from tdac_envs.map2d.task import Map2DTask

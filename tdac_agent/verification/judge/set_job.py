@@ -44,8 +44,8 @@ from tdac_agent.verification.judge.set_checks import (
 )
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.env import EPuckLadderEnv, LadderEnv, make
-from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import AnyTask
 from tdac_envs.map2d.task import Map2DTask
