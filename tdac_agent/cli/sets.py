@@ -217,7 +217,8 @@ def _world_rows(world: dict[str, Any], unit: str) -> dict[str, str]:
     sides = f"{world['width']:g} x {world['height']:g} {unit}"
     return {
         f"{world['split']} {world['index']}": f"{world['generator']}, "
-        f"{sides}, start ({x:g}, {y:g}), heading {heading:.3f} rad, goal ({goal_x:g}, {goal_y:g})",
+        f"{sides}, start ({x:g}, {y:g}), heading {heading:.3f} rad, goal "
+        f"({goal_x:g}, {goal_y:g})",
         "shortest": f"{world['length']:.4g} {unit}, {world['detour']:.2f} times the "
         f"straight distance; OT {world['steps']:.1f} steps, horizon "
         f"{world['horizon']}",
