@@ -89,6 +89,6 @@ gym.register(
 )
 gym.register(
     "TDAC-Ladder-v0",
-    entry_point="tdac_envs.ladder.env:LadderEnv",
-    vector_entry_point="tdac_envs.ladder.vector:LadderVectorEnv",
+    entry_point="tdac_envs.ladder.env:make",
+    vector_entry_point="tdac_envs.ladder.vector:make",
 )

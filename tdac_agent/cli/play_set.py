@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.play import check_video, show
-from tdac_agent.environments.map2d.pictures import frames_of
+from tdac_agent.environments.epuck import pictures as on_worlds
+from tdac_agent.environments.map2d import pictures as on_maps
+from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.evaluation.set_entrants import set_entrants
 from tdac_agent.evaluation.set_play import check_shown, play_world
-from tdac_agent.tasks.first_run import compile_first
-from tdac_agent.tasks.registry import environment
-from tdac_envs.ladder.task_sets import load_set
+from tdac_agent.evaluation.set_verify import compile_for_set
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.ladder.task_sets import AnyTask, load_set
 from tdac_envs.map2d.task import Map2DTask
 
 
@@ -31,7 +34,13 @@ def run(
     check_video(video)
     tasks = load_set(name)
     (entrant,) = set_entrants([controller], tasks)
-    compile_first(environment(Map2DTask.env_id))
+    compile_for_set(tasks)
     rollout, task = play_world(entrant, tasks, split, index, tier)
     title = f"{tasks.name}, {split} {index}"
-    return show(rollout, partial(frames_of, task, rollout), title, video, speed)
+    return show(rollout, partial(_frames, task, rollout), title, video, speed)
+
+
+def _frames(task: AnyTask, rollout: Rollout, stride: int) -> Iterator[Image]:
+    if isinstance(task, Map2DTask):
+        return on_maps.frames_of(task, rollout, stride)
+    return on_worlds.frames_of(task, rollout, stride)

@@ -19,11 +19,16 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
+from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.ladder.dead_ends import Sensor, dead_ends
+from tdac_envs.ladder.generators.blocks import PIXEL
 from tdac_envs.ladder.picture import contact_sheet, draw_world
-from tdac_envs.ladder.set_file import DisturbanceSpec, set_names
-from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.plate_worlds import PlatesWorld
+from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.set_file import SetFile, set_names
+from tdac_envs.ladder.task_sets import AnyWorld, TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
+from tdac_envs.worlds.bodies import BODY_RADIUS
 
 ON_A_SHEET = 24
 """Worlds of a contact sheet."""
@@ -87,9 +92,8 @@ def show(
         _print_json(record)
     else:
         _print_set(Console(), tasks, record)
-    sizes = tasks.file.robot.radius, tasks.file.goal_tolerance
     if png is not None and world is not None:
-        _write(draw_world(world, *sizes), png, as_json)
+        _write(draw_world(tasks, world), png, as_json)
     if sheet is not None:
         count = tasks.count(split)
         last = first + ON_A_SHEET if count is None else min(first + ON_A_SHEET, count)
@@ -100,7 +104,7 @@ def show(
             _caption(tasks.label(split, index).split()[-1], each, index)
             for index, each in zip(numbers, worlds, strict=True)
         ]
-        _write(contact_sheet(worlds, captions, *sizes), sheet, as_json)
+        _write(contact_sheet(tasks, worlds, captions), sheet, as_json)
     return 0
 
 
@@ -116,18 +120,20 @@ def _record(tasks: TaskSet) -> dict[str, Any]:
 
 
 def _world_record(
-    tasks: TaskSet, world: LadderWorld, split: str, index: int
+    tasks: TaskSet, world: AnyWorld, split: str, index: int
 ) -> dict[str, Any]:
-    robot = tasks.file.robot
-    view = math.radians(robot.field_of_view_deg)
-    lost = dead_ends(world, robot.radius, Sensor(robot.n_rays, view, robot.range_max))
-    height, width = world.cells.shape
+    file, raster, pixel = tasks.file, world, 1.0
+    if isinstance(raster, PlatesWorld):
+        raster, pixel = raster.raster, PIXEL / 1000
+    assert isinstance(raster, LadderWorld)
+    lost = dead_ends(raster, file.robot.radius / pixel, _sensor(file, pixel))
+    height, width = raster.cells.shape
     return {
         "split": split,
         "index": index,
         "generator": tasks.label(split, index),
-        "width": width,
-        "height": height,
+        "width": round(width * pixel, 3),
+        "height": round(height * pixel, 3),
         "start": list(world.start),
         "goal": list(world.goal),
         "horizon": tasks.file.horizon.steps(world.difficulty.steps),
@@ -138,29 +144,32 @@ def _world_record(
     }
 
 
+def _sensor(file: SetFile, pixel: float) -> Sensor:
+    """The robot's sensor for `dead_ends`; that of an e-puck looks all around."""
+    robot = file.robot
+    if isinstance(robot, EPuckParams):
+        return Sensor(8, math.radians(315.0), (BODY_RADIUS + RANGE) / pixel)
+    return Sensor(robot.n_rays, math.radians(robot.field_of_view_deg), robot.range_max)
+
+
 def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None:
-    file, robot = tasks.file, tasks.file.robot
+    file = tasks.file
     console.print(f"[bold]{escape(tasks.name)}[/]  {tasks.sha256[:12]}")
     if file.description:
         print_sentences(console, file.description)
-    drive = (
-        f"radius {robot.radius:g} px, {robot.max_wheel_speed:g} px/s, "
-        f"{robot.n_rays} rays over {robot.field_of_view_deg:g}° up to "
-        f"{robot.range_max:g} px, steps of {file.dt:g} s"
-    )
     frame = "the map's frame" if file.frame == "map" else "the start's frame"
     rows = {
         "worlds": _worlds(tasks),
-        "robot": drive,
+        "robot": f"{_robot(file)}, steps of {file.dt:g} s",
         "observed": f"{', '.join(file.observed)}, in {frame}"
         + ("; the map is given" if file.map else ""),
-        "disturbed": _disturbed(file.disturbances) or "nothing",
+        "disturbed": _disturbed(file) or "nothing",
         "horizon": f"{file.horizon.factor:g} OT, {file.horizon.least} to "
         f"{file.horizon.most} steps",
     }
     world = record.get("world")
     if world is not None:
-        rows |= _world_rows(world)
+        rows |= _world_rows(world, file.unit)
     table = Table.grid(padding=(0, 2))
     for label, text in rows.items():
         table.add_row(label, escape(text))
@@ -182,26 +191,41 @@ def _worlds(tasks: TaskSet) -> str:
     return text
 
 
-def _disturbed(own: DisturbanceSpec) -> str:
-    given = {name: value for name, value in own.model_dump().items() if value}
+def _robot(file: SetFile) -> str:
+    robot = file.robot
+    speed = f"{file.full_step / file.dt:g} {file.unit}/s"
+    if isinstance(robot, EPuckParams):
+        return f"e-puck, radius {robot.radius:g} m, {speed}"
+    return (
+        f"radius {robot.radius:g} px, {speed}, {robot.n_rays} rays over "
+        f"{robot.field_of_view_deg:g}° up to {robot.range_max:g} px"
+    )
+
+
+def _disturbed(file: SetFile) -> str:
+    values = file.disturbances.model_dump()
+    if isinstance(file.robot, EPuckParams):
+        values |= file.robot.errors
+    given = {name: value for name, value in values.items() if value}
     return ", ".join(f"{name} {value:g}" for name, value in given.items())
 
 
-def _world_rows(world: dict[str, Any]) -> dict[str, str]:
+def _world_rows(world: dict[str, Any], unit: str) -> dict[str, str]:
     """The figures of a world, by label."""
     x, y, heading = world["start"]
     goal_x, goal_y = world["goal"]
+    sides = f"{world['width']:g} x {world['height']:g} {unit}"
     return {
         f"{world['split']} {world['index']}": f"{world['generator']}, "
-        f"{world['width']} x {world['height']} px, start ({x:g}, {y:g}), heading "
-        f"{heading:.3f} rad, goal ({goal_x:g}, {goal_y:g})",
-        "shortest": f"{world['length']:.1f} px, {world['detour']:.2f} times the "
+        f"{sides}, start ({x:g}, {y:g}), heading {heading:.3f} rad, goal "
+        f"({goal_x:g}, {goal_y:g})",
+        "shortest": f"{world['length']:.4g} {unit}, {world['detour']:.2f} times the "
         f"straight distance; OT {world['steps']:.1f} steps, horizon "
         f"{world['horizon']}",
         "gap": f"{world['gap']:.2f} body diameters at the narrowest place",
         "dead ends": _dead_ends(world["dead_ends"], world["excess"]),
         "in sight": f"the goal, from {world['in_sight']:.0%} of the path; "
-        f"{world['density']:.0%} of the map is occupied",
+        f"{world['density']:.0%} of the floor is occupied",
     }
 
 
@@ -212,7 +236,7 @@ def _dead_ends(depth: float, excess: float) -> str:
     return f"up to {depth:.2f} of the shortest path deep; {farther}"
 
 
-def _caption(name: str, world: LadderWorld, index: int) -> str:
+def _caption(name: str, world: AnyWorld, index: int) -> str:
     hard = world.difficulty
     if len(name) > LONGEST_CAPTION:
         name = f"{name[: LONGEST_CAPTION - 2]}.."

@@ -21,7 +21,7 @@ from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.driving import FOREVER
 from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of
-from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.task_sets import TaskSet
 
 
@@ -39,7 +39,7 @@ class LearnedRuns:
     entrant: Entrant
     tasks: TaskSet
     split: str
-    env: LadderEnv
+    env: OnSet
 
     @classmethod
     def of(cls, entrant: Entrant, tasks: TaskSet, split: str) -> LearnedRuns:
@@ -50,7 +50,7 @@ class LearnedRuns:
         """
         with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
             level = write_set(tasks, Path(name) / "set.yaml")
-            env = LadderEnv(level, split, privileged=True)
+            env = make(level, split=split, privileged=True)
         runs = cls(entrant, tasks, split, env)
         try:
             runs._driver()

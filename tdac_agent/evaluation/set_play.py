@@ -16,15 +16,14 @@ from tdac_agent.verification.judge.set_job import SetJob, SetRun, drive_once
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import one_of
 from tdac_envs.core.errors import TaskError
-from tdac_envs.ladder.task_sets import TaskSet
-from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 
 SHOWN = ("train", "dev", "test")
 
 
 def play_world(
     entrant: Entrant, tasks: TaskSet, split: str, index: int, tier: str = "auto"
-) -> tuple[Rollout, Map2DTask]:
+) -> tuple[Rollout, AnyTask]:
     """Drives the episode that `tdac verify --set` and `evaluate --set` drive.
 
     In the split `train`, the disturbances are new each time.

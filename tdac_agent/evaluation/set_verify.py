@@ -31,6 +31,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
+from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
@@ -163,7 +164,7 @@ def _driven(
     most = most_worlds(tasks, request.split)
     test = SequentialTest(tasks.file.bar, most) if worlds is None else None
     count = most if worlds is None else worlds
-    compile_first(environment(Map2DTask.env_id))
+    compile_for_set(tasks)
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         folder = Path(name)
         salt_file = request.salt_file
@@ -203,6 +204,13 @@ def _driven(
         elif out is not None:
             keep_sealed(ended, out)
     return report
+
+
+def compile_for_set(tasks: TaskSet) -> None:
+    """Compiles what worlds and robot of a set need, unless compiled code is cached."""
+    compile_first(environment(Map2DTask.env_id))  # measures generated worlds, too
+    if tasks.file.unit == "m":
+        compile_first(environment(EPuckTask.env_id))
 
 
 def most_worlds(tasks: TaskSet, split: str) -> int:

@@ -1,11 +1,11 @@
-"""The frame of reference of a start pose, for texts about a map in pixels."""
+"""The frame of reference of a start pose, for texts about an episode."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
+from tdac_agent.tasks.units import Units
 from tdac_envs.drive.task import Pose
 
 Point = tuple[float, float]
@@ -13,28 +13,43 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class StartFrame:
-    """Pixels from the start: x ahead along its heading, y to the right.
+    """Coordinates from the start: x ahead along its heading.
 
-    A robot without a map observes this frame (`frame: start` of a task set).
+    A robot without a map observes this frame (`frame: start` of a task set). y points
+    to the right on maps, and to the left in worlds.
 
     Attributes:
-        start: Start pose on the map, px and rad.
+        start: Start pose on the screen; see `Units`.
+        name: Unit of the coordinates.
+        per_pixel: Size of a screen length in this unit.
+        decimals: Decimals of printed coordinates.
+        up: Whether y points to the left, with counter-clockwise headings.
     """
 
     start: Pose
-    name: ClassVar[str] = "px"
-    per_pixel: ClassVar[float] = 1.0
-    decimals: ClassVar[int] = 1
+    name: str = "px"
+    per_pixel: float = 1.0
+    decimals: int = 1
+    up: bool = False
+
+    @classmethod
+    def of(cls, start: Pose, units: Units) -> StartFrame:
+        """The frame of a start pose in the units of its environment."""
+        screen = Pose(*units.on_screen([start])[0].tolist())
+        size = 1.0 / units.scale
+        return cls(screen, units.place, size, units.decimals, units.up)
 
     def coordinates(self, x: float, y: float) -> Point:
-        """The coordinates of a place of the map."""
+        """The coordinates of a place on the screen."""
         dx, dy = x - self.start.x, y - self.start.y
         cosine, sine = math.cos(self.start.heading), math.sin(self.start.heading)
-        return cosine * dx + sine * dy, cosine * dy - sine * dx
+        ahead, right = cosine * dx + sine * dy, cosine * dy - sine * dx
+        return self.per_pixel * ahead, self.per_pixel * (-right if self.up else right)
 
     def pixels(self, place: Point) -> Point:
-        """The place of the map with these coordinates."""
-        x, y = place
+        """The place on the screen with these coordinates."""
+        x, y = (side / self.per_pixel for side in place)
+        y = -y if self.up else y
         cosine, sine = math.cos(self.start.heading), math.sin(self.start.heading)
         return (
             self.start.x + cosine * x - sine * y,
@@ -42,14 +57,16 @@ class StartFrame:
         )
 
     def heading(self, in_pixels: float) -> float:
-        """Converts a heading of the map, rad."""
-        return in_pixels - self.start.heading
+        """Converts a heading on the screen, rad."""
+        turned = in_pixels - self.start.heading
+        return -turned if self.up else turned
 
     def point(self, x: float, y: float) -> str:
-        """Formats a place of the map: `(12, -40)`."""
+        """Formats a place on the screen: `(12, -40)`."""
         first, second = self.coordinates(x, y)
-        return f"({first:z.0f}, {second:z.0f})"
+        digits = self.decimals - 1
+        return f"({first:z.{digits}f}, {second:z.{digits}f})"
 
     def length(self, length: float) -> str:
-        """Formats a length with its unit: `12.5 px`."""
-        return f"{length:.3g} px"
+        """Formats a screen length with its unit: `12.5 px`."""
+        return f"{self.per_pixel * length:.3g} {self.name}"

@@ -73,8 +73,8 @@ class Units:
         return replace(self, length=shown.name, shown=shown)
 
     def from_start(self, frame: ShownUnits) -> Units:
-        """These units, but places are printed in the frame of a start pose."""
-        return replace(self, shown=frame)
+        """These units, but printed in the frame of a start pose and its unit."""
+        return replace(self, length=frame.name, shown=frame)
 
     def on_screen(self, points: ArrayLike) -> Points:
         """Converts places, shape (n, 2), or poses, shape (n, 3), to the screen."""

@@ -20,10 +20,10 @@ from tdac_agent.training.plan import (
 )
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
-from tdac_envs.ladder.vector import LadderVectorEnv
+from tdac_envs.ladder.vector import make as make_batch
 from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 from tdac_envs.learning.wrapping import wrap_for_rl
 
@@ -64,13 +64,13 @@ def make_set_plan(
     for argument, number in (("n_envs", n_envs), ("episodes", episodes)):
         if number is not None:
             whole_number(argument, number, 1, MOST_ROBOTS)
-    given = read_hyperparameters(config or config_file(algo), LadderEnv.title)
+    given = read_hyperparameters(config or config_file(algo), OnSet.title)
     names = given.wrappers if wrappers is None else wrappers
     for own in _OWN & given.env.keys():
         raise TaskError(f"env_kwargs: {own} is set by the training; leave it out")
     tasks.check_count(TRAINED, 1, "training worlds")
     tasks.check_count(SELECTED, episodes or 1, "episodes")
-    env: Any = LadderEnv(name, SELECTED)
+    env: Any = make(name, split=SELECTED)
     wrap_for_rl(env, names)  # checks that they support what is observed
     count = tasks.count(SELECTED)
     wanted = steps or given.steps
@@ -133,10 +133,10 @@ def _batch(
 ) -> WrappedVectorEnv:
     set_of(plan)
     try:
-        batch = LadderVectorEnv(
+        batch = make_batch(
             count,
             autoreset_mode=mode,
-            level=plan.set,
+            level=str(plan.set),
             split=split,
             **own,
         )

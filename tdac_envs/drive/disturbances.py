@@ -2,9 +2,9 @@
 
 All numbers are drawn from the environment's own generator, in this order and only if
 their option is not 0. At a reset, after the start and goal: wheel gains (left, right),
-axle error, odometry scales (distance, turn). In each step: slip (left, right), noise of
-the distance sensors, dropouts of the rays, odometry noise (distance, turn). The first
-observation of an episode has sensor noise and dropouts, too.
+axle error, wheel radii (left, right), odometry scales (distance, turn). In each step:
+slip (left, right), noise of the distance sensors, dropouts of the rays, odometry noise
+(distance, turn). The first observation of an episode has sensor noise, and dropouts.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ from tdac_envs.drive.stepping import (
     STEPS,
     TURN,
     TURN_SCALE,
+    WHEEL_LEFT,
+    WHEEL_RIGHT,
 )
 
 Array = NDArray[np.float64]
@@ -37,11 +39,12 @@ Observed = NDArray[np.float32]
 Random = np.random.Generator
 
 MOST_HIDDEN = 0.9
-"""Largest bound of `wheel_gains` and `axle_error`: wheels and axle stay positive."""
+"""Largest bound of hidden errors: wheels and axle stay positive."""
 _MOST_DEVIATIONS = 10.0
 # Parts of the arrays of a robot.
 _ARC, _SCALES = slice(FORWARD, TURN + 1), slice(DISTANCE_SCALE, TURN_SCALE + 1)
 _GAINS, _SLIPS = slice(GAIN_LEFT, GAIN_RIGHT + 1), slice(SLIP_LEFT, SLIP_RIGHT + 1)
+_WHEELS = slice(WHEEL_LEFT, WHEEL_RIGHT + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,8 @@ class Disturbances:
         odometry: Whether the odometry is observed.
         odometry_scale: Standard deviation of its two scale errors in an episode.
         odometry_noise: Relative standard deviation of each measurement.
+        wheel_radius_error: Bound of each wheel's hidden relative error of its radius,
+            uniform; of robots that observe the angles of their wheels.
 
     Raises:
         TaskError: A value is out of range, or has no effect without `odometry`.
@@ -66,11 +71,13 @@ class Disturbances:
     odometry: bool = False
     odometry_scale: float = 0.0
     odometry_noise: float = 0.0
+    wheel_radius_error: float = 0.0
 
     def __post_init__(self) -> None:
         limits = {
             "wheel_gains": MOST_HIDDEN,
             "axle_error": MOST_HIDDEN,
+            "wheel_radius_error": MOST_HIDDEN,
             "odometry_scale": 1.0,
             "odometry_noise": 1.0,
         }
@@ -89,14 +96,15 @@ class Disturbances:
     @property
     def hidden(self) -> bool:
         """Whether an episode has hidden errors, which are drawn at its reset."""
-        return bool(self.wheel_gains or self.axle_error or self.odometry_scale)
+        own = self.wheel_gains, self.axle_error, self.wheel_radius_error
+        return any((*own, self.odometry_scale))
 
     def hide(self, constants: Array, axle_length: float, random: Random) -> None:
         """Draws the hidden errors of an episode.
 
         Args:
-            constants: The robot's constants; gains, axle length and odometry scales are
-                overwritten.
+            constants: The robot's constants; gains, axle length, wheel radii and
+                odometry scales are overwritten.
             axle_length: Axle length without error.
             random: Random number generator of the environment.
         """
@@ -106,6 +114,9 @@ class Disturbances:
         if self.axle_error:
             error = random.uniform(-self.axle_error, self.axle_error)
             constants[AXLE] = axle_length * (1.0 + error)
+        if self.wheel_radius_error:
+            most = self.wheel_radius_error
+            constants[_WHEELS] = random.uniform(1.0 - most, 1.0 + most, 2)
         if self.odometry_scale:
             constants[_SCALES] = random.normal(1.0, self.odometry_scale, 2)
 

@@ -24,7 +24,8 @@ Flags = NDArray[np.bool_]
 AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
 PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 17)
 FRICTION, GAIN_LEFT, GAIN_RIGHT, DISTANCE_SCALE, TURN_SCALE = range(17, 22)
-N_CONSTANTS = 22
+WHEEL_LEFT, WHEEL_RIGHT = range(22, 24)
+N_CONSTANTS = 24
 # Entries of `state`.
 X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS, FORWARD, TURN = range(10)
 N_STATE = 10
@@ -32,8 +33,8 @@ N_STATE = 10
 REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
 GAP, REMAINING, ROOM = range(7, 10)
 N_OUTCOME = 10
-UNDISTURBED = 1.0, 1.0, 1.0, 1.0
-"""The gains and scales in `constants` of a robot without errors."""
+UNDISTURBED = 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
+"""Gains, scales and relative wheel radii in `constants` of a robot without errors."""
 
 
 @subkernel

@@ -139,6 +139,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         wheel_gains: Bound b of the wheels' hidden gains, uniform in [1 - b, 1 + b] and
             drawn at each reset. `wheel_speeds` are commands: they do not show gains.
         axle_error: Bound of the hidden relative error of the axle length, uniform, too.
+        wheel_radius_error: Bound of each wheel's hidden relative error of its radius,
+            uniform; `wheel_positions` and `encoders` do not show it.
         odometry: Whether to observe the distance and turn of each step's arc, (0, 0)
             after a reset; `docs/disturbances.md` defines them.
         odometry_scale: Standard deviation of the hidden scale errors of `odometry`.
@@ -180,6 +182,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         wheel_slip: float = 0.0,
         wheel_gains: float = 0.0,
         axle_error: float = 0.0,
+        wheel_radius_error: float = 0.0,
         odometry: bool = False,
         odometry_scale: float = 0.0,
         odometry_noise: float = 0.0,
@@ -221,6 +224,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 odometry,
                 odometry_scale,
                 odometry_noise,
+                wheel_radius_error,
             ),
             weights=weights_of(reward_weights),
             source=None,

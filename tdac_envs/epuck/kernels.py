@@ -32,6 +32,8 @@ from tdac_envs.drive.stepping import (
     TOLERANCE,
     TOUCHED,
     TURN,
+    WHEEL_LEFT,
+    WHEEL_RIGHT,
     X,
     Y,
     apply_command,
@@ -163,7 +165,8 @@ def _turn_wheels(
     left, right = turned_wheels(constants, wheel_speeds)
     state[LEFT_TURNED] += swept * left
     state[RIGHT_TURNED] += swept * right
-    left, right = left * state[SLIP_LEFT], right * state[SLIP_RIGHT]
+    left *= state[SLIP_LEFT] * constants[WHEEL_LEFT]
+    right *= state[SLIP_RIGHT] * constants[WHEEL_RIGHT]
     left, right = swept * clip_unit(left), swept * clip_unit(right)
     state[FORWARD] = 0.5 * (left + right) * WHEEL_RADIUS
     state[TURN] = (right - left) * WHEEL_RADIUS / constants[AXLE]

@@ -94,7 +94,7 @@ class EPuckScene:
         values = np.asarray(readings, np.float64)
         _draw_rays(view, (x, y, heading), values, np.asarray(reaches, np.float64))
         radius = max(BODY_RADIUS * view.scale, SMALLEST_BODY)
-        _draw_epuck(view, (x, y, heading), radius, TRAIL)
+        draw_epuck(view, (x, y, heading), radius, TRAIL)
         draw_outcome(canvas, view.at((x, y))[0], radius, status.outcome)
         _write_status(view, status)
         _draw_bars(view, values)
@@ -118,7 +118,7 @@ class EPuckScene:
 
     def _draw_other(self, robot: EPuck) -> None:
         radius = max(BODY_RADIUS * self._view.scale, SMALLEST_BODY)
-        _draw_epuck(self._view, robot.pose, radius, _OTHER)
+        draw_epuck(self._view, robot.pose, radius, _OTHER)
 
 
 def draw_task(view: View, task: EPuckTask) -> None:
@@ -168,7 +168,7 @@ def _draw_rays(
             view.canvas.disc(wedge[1:].mean(axis=0), 2.5, colour)
 
 
-def _draw_epuck(
+def draw_epuck(
     view: View, pose: tuple[float, float, float], radius: float, colour: Colour
 ) -> None:
     """Draws a disc with two wheels and a nose ahead; `radius` is in frame px."""

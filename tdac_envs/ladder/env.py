@@ -10,10 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.drive.disturbances import Disturbances
-from tdac_envs.drive.env import Observation
+from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.epuck.setup import Setup as EPuckSetup
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.observed import View
+from tdac_envs.ladder.plate_pool import MOST
+from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.set_file import find_set_file
 from tdac_envs.ladder.source import SetSource, read_salt
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.map2d.env import Map2DEnv
@@ -23,88 +28,31 @@ TRAIN_POOL = 4096
 """Default number of training worlds."""
 
 
-class LadderEnv(Map2DEnv):
-    """A robot drives to a goal in worlds that are new to it, one for each episode.
+class OnSet(DrivenEnv):
+    """What the environments of both robots add for a task set.
 
-    ## Description
-    Robot and physics are those of TDAC-Map2D-v0; a task set defines the worlds, the
-    robot, what it observes, and the disturbances (`docs/task-sets.md`). `tdac sets`
-    lists the levels:
-    - `known`: the map and the exact pose on it,
-    - `unknown`: the exact pose and short ranges, no map,
-    - `lost`: odometry with errors and noisy ranges; wheels that slip and are not
-      equally fast; neither a pose nor a map.
-
-    ## Action Space
-    As in TDAC-Map2D-v0.
-
-    ## Observation Space
-    `Dict` of float32 arrays, the same for all worlds of a level. Without a map, the
-    frame of reference has its origin and its x axis at the start pose.
-
-    | key | levels | content |
-    |---|---|---|
-    | `pose` | `known`, `unknown` | x, y (px), heading (rad, in (-pi, pi]) |
-    | `goal` | all | x, y, px |
-    | `wheel_speeds` | all | left, right, as last applied, fraction |
-    | `ranges` | all | distance to the first wall along each ray, px |
-    | `odometry` | `lost` | measured distance (px) and turn (rad) of the last step |
-
-    ## Rewards
-    As in TDAC-Map2D-v0. They use the length of the true shortest path, which no
-    observation shows: they are for training only.
-
-    ## Starting State
-    In `reset(seed=...)`, the seed draws a world of the split;
-    `reset(options={"index": 3})` chooses one.
-
-    ## Info
-    `collisions` and `clipped`; at the end of an episode also `is_success` and
-    `collision`. With `privileged=True`, all entries of TDAC-Map2D-v0 and `pose`, the
-    true pose on the map.
-
-    ## Episode End
-    As in TDAC-Map2D-v0: a contact ends the episode.
-
-    ## Arguments
-    Args:
-        level: Name of a task set, or path of a `set.yaml`.
-        split: `"train"`, `"dev"`, `"test"` or `"hidden"`.
-        train_pool: Number of training worlds. A world is made when it is first drawn,
-            and kept in the user's cache folder. 0 for a new world in each episode.
-        salt_file: File with the salt of the split `"hidden"`, 16 bytes or more.
-        privileged: Whether `info` is complete. A rival or a judge never sets it.
-        reward_weights: Reward weights by name, where they differ from the defaults.
-        render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
-
-    ## Version History
-    * v0: Initial version.
+    Attributes:
+        set: The task set.
+        view: What is observed.
+        readings: Observation key of the distance sensors.
     """
 
     title = "TDAC-Ladder-v0"
+    set: TaskSet
+    view: View
+    readings: str
 
-    def __init__(
-        self,
-        level: str | Path = "unknown",
-        split: str = "train",
-        train_pool: int = TRAIN_POOL,
-        salt_file: str | Path | None = None,
-        privileged: bool = False,
-        reward_weights: Mapping[str, float] | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        salt = None if salt_file is None else read_salt(salt_file)
-        self.set = load_set(level)
-        source = SetSource(self.set, split, train_pool, salt)
-        self._prepare(_setup(self.set, source, reward_weights), render_mode)
-        self.view = View(self.set.file, self.set.largest_side, bool(privileged))
+    def _look(self, task_set: TaskSet, privileged: bool) -> None:
+        """Observes what the set says, after all else has been prepared."""
+        self.set = task_set
+        self.view = View(task_set.file, task_set.largest_side, privileged)
         self._anchor = self.view.anchor(self.nominal)
         self.observation_space = self.view.space(self.observation_space)  # type: ignore[assignment, arg-type]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; the class documents `options`.
+        """Starts an episode; `LadderEnv` documents `options`.
 
         Raises:
             TaskError: An option is unknown, or there is no feasible world.
@@ -141,29 +89,172 @@ class LadderEnv(Map2DEnv):
         return self.view.seen(super()._observation(), self.pose(), self._anchor)
 
 
-def _setup(
+class LadderEnv(OnSet, Map2DEnv):
+    """A robot drives to a goal in worlds that are new to it, one for each episode.
+
+    ## Description
+    Robot and physics are those of TDAC-Map2D-v0, or of TDAC-EPuck-v0 where the worlds
+    are plates (`EPuckLadderEnv`); a task set defines the worlds, the robot, what it
+    observes, and the disturbances (`docs/task-sets.md`). `tdac sets` lists the levels:
+    - `known`: the map and the exact pose on it,
+    - `unknown`: the exact pose and short ranges, no map,
+    - `lost`: odometry with errors and noisy ranges; wheels that slip and are not
+      equally fast; neither a pose nor a map,
+    - `epuck`: infra-red sensors and wheel encoders of an e-puck whose wheels slip;
+      neither a pose nor a map.
+
+    ## Action Space
+    `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a fraction
+    of the largest one.
+
+    ## Observation Space
+    `Dict` of float32 arrays, the same for all worlds of a level. Without a map, the
+    frame of reference has its origin and its x axis at the start pose.
+
+    | key | levels | content |
+    |---|---|---|
+    | `pose` | `known`, `unknown` | x, y (px), heading (rad, in (-pi, pi]) |
+    | `goal` | all | x, y, px; on `epuck` m |
+    | `wheel_speeds` | all | left, right, as last applied, fraction |
+    | `ranges` | all but `epuck` | distance to the first wall along each ray, px |
+    | `odometry` | `lost` | measured distance (px) and turn (rad) of the last step |
+    | `ps` | `epuck` | readings of the infra-red sensors, as in TDAC-EPuck-v0 |
+    | `encoders` | `epuck` | angles that the wheels have turned, rad |
+
+    ## Rewards
+    As in TDAC-Map2D-v0. They use the length of the true shortest path, which no
+    observation shows: they are for training only.
+
+    ## Starting State
+    In `reset(seed=...)`, the seed draws a world of the split;
+    `reset(options={"index": 3})` chooses one.
+
+    ## Info
+    `collisions` and `clipped`; at the end of an episode also `is_success` and
+    `collision`. With `privileged=True`, all entries of TDAC-Map2D-v0 and `pose`, the
+    true pose on the map.
+
+    ## Episode End
+    As in TDAC-Map2D-v0: a contact ends the episode.
+
+    ## Arguments
+    Args:
+        level: Name of a task set, or path of a `set.yaml`.
+        split: `"train"`, `"dev"`, `"test"` or `"hidden"`.
+        train_pool: Number of training worlds. A world is made when it is first drawn,
+            and kept in the user's cache folder; those of an e-puck (by default 512)
+            are kept in memory. 0 for a new world in each episode.
+        salt_file: File with the salt of the split `"hidden"`, 16 bytes or more.
+        privileged: Whether `info` is complete. A rival or a judge never sets it.
+        reward_weights: Reward weights by name, where they differ from the defaults.
+        render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
+
+    ## Version History
+    * v0: Initial version.
+    """
+
+    def __init__(
+        self,
+        level: str | Path = "unknown",
+        split: str = "train",
+        train_pool: int = TRAIN_POOL,
+        salt_file: str | Path | None = None,
+        privileged: bool = False,
+        reward_weights: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        task_set, source = _opened(level, split, train_pool, salt_file)
+        file = task_set.file
+        setup = Setup(
+            **_shared(task_set, source, reward_weights),
+            range_noise=file.disturbances.range_noise,
+            range_dropout=file.disturbances.range_dropout,
+        )
+        self._prepare(setup, render_mode)
+        self._look(task_set, bool(privileged))
+
+
+class EPuckLadderEnv(OnSet, EPuckEnv):
+    """TDAC-Ladder-v0 with an e-puck; `LadderEnv` documents both.
+
+    Headings, and a positive turn, are counter-clockwise here, as in TDAC-EPuck-v0.
+    """
+
+    def __init__(
+        self,
+        level: str | Path = "epuck",
+        split: str = "train",
+        train_pool: int = MOST,
+        salt_file: str | Path | None = None,
+        privileged: bool = False,
+        reward_weights: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        task_set, source = _opened(level, split, train_pool, salt_file)
+        robot, seen = task_set.file.robot, task_set.file.observed
+        assert isinstance(robot, EPuckParams)
+        shared = _shared(task_set, source, reward_weights)
+        setup = EPuckSetup(**shared, webots=False, goal_visible=False)
+        further = tuple(key for key in ("encoders",) if key in seen)
+        EPuckEnv._prepare(self, setup, robot.sensor_noise, further, render_mode)
+        self._look(task_set, bool(privileged))
+
+
+def make(level: str | Path = "unknown", **options: Any) -> LadderEnv | EPuckLadderEnv:
+    """The environment of a task set, as `gym.make("TDAC-Ladder-v0")` calls it.
+
+    Args:
+        level: Name of a task set, or path of a `set.yaml`.
+        **options: Further arguments of `LadderEnv`.
+
+    Raises:
+        TaskError: There is no such set, or an argument is not valid.
+    """
+    return env_class(level)(level, **options)
+
+
+def env_class(level: str | Path) -> type[LadderEnv | EPuckLadderEnv]:
+    """The class of the environments of a task set, which depends on its robot.
+
+    Raises:
+        TaskError: There is no such set, or it is not valid.
+    """
+    is_epuck = find_set_file(level).unit == "m"
+    return EPuckLadderEnv if is_epuck else LadderEnv
+
+
+def _opened(
+    level: str | Path, split: str, train_pool: int, salt_file: str | Path | None
+) -> tuple[TaskSet, SetSource]:
+    """A set, and the source of its tasks."""
+    salt = None if salt_file is None else read_salt(salt_file)
+    task_set = load_set(level)
+    return task_set, SetSource(task_set, split, train_pool, salt)
+
+
+def _shared(
     task_set: TaskSet, source: SetSource, weights: Mapping[str, float] | None
-) -> Setup:
-    """The setup of a set's environment; its nominal task is that of world 0."""
+) -> dict[str, Any]:
+    """What the setups of both robots have; the nominal task is that of world 0."""
     file = task_set.file
-    own = file.disturbances
-    return Setup(
-        nominal=source.task(0),
-        variation="nominal",
-        fixed_horizon=True,
-        on_collision="terminate",
-        motor_lag=own.motor_lag,
-        delay=own.delay,
-        disturbances=Disturbances(
+    own, robot = file.disturbances, file.robot
+    hidden = robot.wheel_radius_error if isinstance(robot, EPuckParams) else 0.0
+    return {
+        "nominal": source.task(0),
+        "variation": "nominal",
+        "fixed_horizon": True,
+        "on_collision": "terminate",
+        "motor_lag": own.motor_lag,
+        "delay": own.delay,
+        "disturbances": Disturbances(
             wheel_slip=file.slip,
             wheel_gains=own.wheel_gains,
             axle_error=own.axle_error,
             odometry="odometry" in file.observed,
             odometry_scale=own.odometry_scale,
             odometry_noise=own.odometry_noise,
+            wheel_radius_error=hidden,
         ),
-        weights=weights_of(weights),
-        source=source,
-        range_noise=own.range_noise,
-        range_dropout=own.range_dropout,
-    )
+        "weights": weights_of(weights),
+        "source": source,
+    }

@@ -25,13 +25,15 @@ class View:
 
     Args:
         file: The set.
-        side: Largest width or height of its worlds, px.
+        side: Largest width or height of its worlds, px or m.
         privileged: Whether infos are complete, with the true pose.
     """
 
-    def __init__(self, file: SetFile, side: int, privileged: bool) -> None:
+    def __init__(self, file: SetFile, side: float, privileged: bool) -> None:
         self._keys = tuple(sorted(file.observed))
         self._from_start = file.frame == "start"
+        # Worlds of an e-puck have their origin in the middle.
+        self._low = -0.5 if file.unit == "px" else -side / 2
         self._side = side
         self.privileged = privileged
 
@@ -45,8 +47,8 @@ class View:
             far = math.hypot(self._side, self._side)
             low, high = np.full(2, -far, np.float32), np.full(2, far, np.float32)
         else:
-            low = np.full(2, -0.5, np.float32)
-            high = np.full(2, self._side - 0.5, np.float32)
+            low = np.full(2, self._low, np.float32)
+            high = np.full(2, self._low + self._side, np.float32)
         pi = np.float32(math.pi)
         own = {
             **whole.spaces,

@@ -1,4 +1,4 @@
-"""Pictures of generated worlds: one, or a contact sheet of many."""
+"""Pictures of the worlds of a task set: one, or a contact sheet of many."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from tdac_envs.drawing.canvas import (
     INK,
     PAPER,
+    TRAIL,
     Canvas,
     Image,
     blank,
@@ -17,7 +18,13 @@ from tdac_envs.drawing.canvas import (
     write_text,
 )
 from tdac_envs.drawing.marks import draw_disc, draw_task
+from tdac_envs.epuck.picture import draw_epuck
+from tdac_envs.epuck.run_picture import task_view
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.ladder.task_sets import AnyWorld, TaskSet
 from tdac_envs.ladder.worlds import LadderWorld
+from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.picture import SIDE
 
 COLUMNS = 6
 """Worlds in a row of a contact sheet."""
@@ -25,44 +32,44 @@ _LARGEST_TILE = 260
 _MARGIN, _LINE = 10, 22
 
 
-def draw_world(
-    world: LadderWorld, radius: float, tolerance: float, scale: float | None = None
-) -> Image:
+def draw_world(tasks: TaskSet, world: AnyWorld, side: int | None = None) -> Image:
     """A world with the robot at its start, the goal, and the shortest path, uint8 RGB.
 
     Args:
-        world: The world.
-        radius: Radius of the body, px.
-        tolerance: Distance at which the goal is reached, px.
-        scale: Frame pixels per pixel of the world; by default that of all frames.
+        tasks: The set.
+        world: One of its worlds.
+        side: Longest side of the picture, px; by default that of all frames.
     """
+    if isinstance(world, LadderWorld):
+        return _drawn_map(tasks, world, side)
+    task = tasks.task_of(world)
+    assert isinstance(task, EPuckTask)
+    view = task_view(task, task.ground.bounds, strip=0, side=side or SIDE, margin=0.0)
+    draw_epuck(view, world.start, BODY_RADIUS * view.scale, TRAIL)
+    return view.canvas.image
+
+
+def _drawn_map(tasks: TaskSet, world: LadderWorld, side: int | None) -> Image:
     height, width = world.cells.shape
-    scale = frame_scale(width, height) if scale is None else scale
+    scale = side / max(height, width) if side else frame_scale(width, height)
     canvas = Canvas(world.cells, strip=0, scale=scale, narrowest=0)
+    tolerance = tasks.file.goal_tolerance
     draw_task(canvas, world.start, world.goal, tolerance, world.path)
-    draw_disc(canvas, world.start, radius * scale)
+    draw_disc(canvas, world.start, tasks.file.robot.radius * scale)
     return canvas.image
 
 
 def contact_sheet(
-    worlds: Sequence[LadderWorld],
-    captions: Sequence[str],
-    radius: float,
-    tolerance: float,
+    tasks: TaskSet, worlds: Sequence[AnyWorld], captions: Sequence[str]
 ) -> Image:
     """Many worlds, each as large as its tile, with a line of text below; uint8 RGB.
 
     Args:
-        worlds: The worlds.
+        tasks: The set.
+        worlds: Some of its worlds.
         captions: ASCII text for each.
-        radius: Radius of the body, px.
-        tolerance: Distance at which the goal is reached, px.
     """
-    sides = [max(world.cells.shape) for world in worlds]
-    tiles = [
-        draw_world(world, radius, tolerance, _LARGEST_TILE / side)
-        for world, side in zip(worlds, sides, strict=True)
-    ]
+    tiles = [draw_world(tasks, world, _LARGEST_TILE) for world in worlds]
     height = max(tile.shape[0] for tile in tiles) + _LINE + _MARGIN
     width = _LARGEST_TILE + _MARGIN
     columns = min(COLUMNS, len(tiles))

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import clearance
 from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
 from tdac_envs.ladder.difficulty import Difficulty
@@ -19,6 +21,7 @@ from tdac_envs.ladder.generators.draft import Draft
 from tdac_envs.ladder.generators.plates import Plates, PlatesDraft, draw
 from tdac_envs.ladder.passages import bottleneck
 from tdac_envs.ladder.words import Words, rounded
+from tdac_envs.ladder.worlds import LadderWorld
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.footprint import Rectangle
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, World
@@ -65,12 +68,26 @@ class PlatesWorld:
         difficulty: How hard it is; its `length` is in m. The gap is at most the true
             one, and `length` and `steps` are at most the true ones.
         rejected: Reasons of the drafts that were drawn before it.
+        raster: The same as a map of pixels in blocks, of 5 mm.
     """
 
     world: World
     path: NDArray[np.float64]
     difficulty: Difficulty
     rejected: tuple[Rejection, ...]
+    raster: LadderWorld
+    barn_steps: ClassVar[None] = None
+
+    @property
+    def start(self) -> Pose:
+        """Pose, m and rad."""
+        return Pose(*self.world.robots[0].pose)
+
+    @property
+    def goal(self) -> tuple[float, float]:
+        """Point (x, y), m."""
+        assert self.world.goal is not None
+        return self.world.goal
 
 
 def make_plates(spec: PlatesSpec, key: bytes) -> PlatesWorld:
@@ -138,7 +155,14 @@ def _made(
     path = found.path * _PIXEL + (xs[0], ys[0])
     length = found.difficulty.length * _PIXEL
     difficulty = replace(found.difficulty, length=length)
-    return PlatesWorld(world, path, difficulty, rejected)
+    return PlatesWorld(world, path, difficulty, rejected, _raster(found, heading))
+
+
+def _raster(found: Admitted, heading: float) -> LadderWorld:
+    start = Pose(float(found.start[0]), float(found.start[1]), heading)
+    goal = float(found.goal[0]), float(found.goal[1])
+    rest = (found.field, found.path, found.difficulty, ())
+    return LadderWorld(found.terrain, start, goal, *rest)
 
 
 def _obstacle(name: str, number: int, block: Block) -> Obstacle:

@@ -27,6 +27,7 @@ from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
+from tdac_envs.mapping.params import RobotParams
 
 Bytes = NDArray[np.uint8]
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -71,11 +72,13 @@ class TrainingPool:
         """The task from its file, or made and written to it if possible."""
         path = None if self._folder is None else self._folder / f"{index}.bin"
         task = None if path is None else _mapped_task(path, self._set)
-        if task is None:
-            made = self._set.task("train", index)
-            if path is not None:
-                _write(path, made)
-                task = _mapped_task(path, self._set)
+        if task is not None:
+            return _keep(self._mapped, index, task, _MAPPED)
+        made = self._set.task("train", index)
+        assert isinstance(made, Map2DTask)
+        if path is not None:
+            _write(path, made)
+            task = _mapped_task(path, self._set)
         if task is None:
             return _keep(self._made, index, made, _IN_MEMORY)
         return _keep(self._mapped, index, task, _MAPPED)
@@ -165,12 +168,13 @@ def _task(data: Bytes, task_set: TaskSet) -> Map2DTask:
     clear = part(np.float32, *padded)
     leaps = part(np.uint8, 4, *padded)
     grid = OccupancyGrid(part(np.bool_, *shape))
-    file = task_set.file
+    file, robot = task_set.file, task_set.file.robot
+    assert isinstance(robot, RobotParams)
     return Map2DTask(
         terrain=Terrain(grid, clear[1:-1, 1:-1], clear, leaps),
         start=Pose(x, y, heading),
         goal=(goal[0], goal[1]),
-        robot=file.robot,
+        robot=robot,
         goal_tolerance=file.goal_tolerance,
         dt=file.dt,
         horizon=int(horizon),

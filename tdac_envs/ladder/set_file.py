@@ -21,13 +21,20 @@ from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.drive.disturbances import MOST_HIDDEN
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.ladder.files.spec import FilesSpec
+from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.generators.registry import AnyParameters
+from tdac_envs.ladder.plate_worlds import PlatesSpec
+from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
 
-Observed = Literal["pose", "goal", "wheel_speeds", "ranges", "odometry"]
+Observed = Literal[
+    "pose", "goal", "wheel_speeds", "ranges", "odometry", "ps", "encoders"
+]
 """Observation keys that a set may have."""
+_ALL_ROBOTS = {"pose", "goal", "wheel_speeds", "odometry"}
 Split = Literal["train", "dev", "test", "hidden"]
 Share = Annotated[float, Field(ge=0, le=1)]
 SLIP_STEP = 0.1
@@ -107,15 +114,15 @@ class SetFile(_Strict):
     schema_version: Literal[1] = Field(1, alias="schema")
     name: str = Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][\w.-]*$")
     description: str = Field("", max_length=2000)
-    worlds: tuple[AnyParameters, ...] = Field(
-        max_length=16, description="Generators, with equal shares."
-    )
+    worlds: tuple[
+        Annotated[AnyParameters | Plates, Field(discriminator="name")], ...
+    ] = Field(max_length=16, description="Generators, with equal shares.")
     files: FilesSpec | None = Field(
         None, description="Worlds from files; `worlds: {folder: …}` is short for it."
     )
-    robot: RobotParams = RobotParams.disc(8.0)
+    robot: RobotParams | EPuckParams = RobotParams.disc(8.0)
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
-    goal_tolerance: Length = Field(4.0, le=100, description="px")
+    goal_tolerance: Length = Field(4.0, le=100, description="px or m")
     observed: Annotated[tuple[Observed, ...], AfterValidator(_distinct)] = Field(
         ("pose", "goal", "wheel_speeds", "ranges"), min_length=1
     )
@@ -152,36 +159,75 @@ class SetFile(_Strict):
             raise ValueError("errors of the odometry need `odometry` in `observed`")
         if self.map and self.frame != "map":
             raise ValueError("a set with `map: true` needs `frame: map`")
+        self._check_robot()
         for number in range(len(self.worlds)):
             self.spec(number)  # checks the sizes of the robot and of a step
         return self
 
-    @property
-    def full_step(self) -> float:
-        """Distance of one step at full speed, px."""
-        return self.robot.max_wheel_speed * self.dt
+    def _check_robot(self) -> None:
+        """Checks that worlds and observations are those of the robot."""
+        epuck = isinstance(self.robot, EPuckParams)
+        whose = "an e-puck" if epuck else "a robot on maps"
+        if epuck and (self.files is not None or self.map):
+            raise ValueError("an e-puck drives in generated worlds, without a map")
+        if any(isinstance(each, Plates) != epuck for each in self.worlds):
+            raise ValueError("`robot: {kind: epuck}` and the worlds plates go together")
+        own = {"ps", "encoders"} if epuck else {"ranges"}
+        for key in self.observed:
+            if key not in _ALL_ROBOTS | own:
+                raise ValueError(f"{whose} does not observe `{key}`")
+        rays = self.disturbances.range_noise or self.disturbances.range_dropout
+        if epuck and rays:
+            raise ValueError("an e-puck has no ranges; expected `robot.sensor_noise`")
 
     @property
-    def largest_side(self) -> int:
-        """Largest width or height of a generated world, px."""
-        return max(max(each.width, each.height) for each in self.worlds)
+    def unit(self) -> Literal["px", "m"]:
+        """Unit of lengths."""
+        return "m" if isinstance(self.robot, EPuckParams) else "px"
+
+    @property
+    def full_step(self) -> float:
+        """Distance of one step at full speed, px or m."""
+        rim = WHEEL_RADIUS if isinstance(self.robot, EPuckParams) else 1.0
+        return self.robot.max_wheel_speed * rim * self.dt
+
+    @property
+    def largest_side(self) -> float:
+        """Largest width or height of a generated world, px or m."""
+        return max(
+            each.sides[1] if isinstance(each, Plates) else max(each.width, each.height)
+            for each in self.worlds
+        )
 
     @property
     def slip(self) -> float:
         """Relative standard deviation of a wheel's slip in a step of `dt`."""
         return self.disturbances.wheel_slip * math.sqrt(SLIP_STEP / self.dt)
 
-    def spec(self, index: int) -> WorldSpec:
+    def spec(self, index: int) -> WorldSpec | PlatesSpec:
         """What generated world `index` is like; generators take turns."""
+        generator, own = self.worlds[index % len(self.worlds)], self.admission
+        if isinstance(generator, Plates):
+            detour = {} if own.detour is None else {"min_detour": own.detour}
+            return PlatesSpec(
+                generator=generator,
+                step=self.full_step,
+                dt=self.dt,
+                tolerance=self.goal_tolerance,
+                min_gap=own.gap,
+                min_steps=own.steps,
+                tries=own.tries,
+                **detour,
+            )
         return WorldSpec(
-            generator=self.worlds[index % len(self.worlds)],
+            generator=generator,
             radius=self.robot.radius,
             step=self.full_step,
             tolerance=self.goal_tolerance,
-            min_gap=self.admission.gap,
-            min_steps=self.admission.steps,
-            min_detour=self.admission.detour,
-            tries=self.admission.tries,
+            min_gap=own.gap,
+            min_steps=own.steps,
+            min_detour=own.detour,
+            tries=own.tries,
         )
 
     def sha256(self, files_sha256: str | None = None) -> str:
@@ -242,7 +288,7 @@ BUILT_IN = Path(__file__).parent / "sets"
 
 def set_names() -> tuple[str, ...]:
     """Names of the sets that come with the package, the easiest first."""
-    order = {"known": 0, "unknown": 1, "lost": 2}
+    order = {"known": 0, "unknown": 1, "lost": 2, "epuck": 3}
     names = [path.stem for path in BUILT_IN.glob("*.yaml")]
     return tuple(sorted(names, key=lambda name: (order.get(name, len(order)), name)))
 

@@ -10,10 +10,9 @@ import numpy as np
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import read_file
+from tdac_envs.ladder.plate_pool import PlatePool
 from tdac_envs.ladder.pool import TrainingPool
-from tdac_envs.ladder.task_sets import MOST_SALT, TaskSet
-from tdac_envs.ladder.worlds import LadderWorld
-from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.ladder.task_sets import MOST_SALT, AnyTask, AnyWorld, TaskSet
 
 MOST_WORLDS = 2**31
 """Numbers of worlds that are drawn at random are below it."""
@@ -43,12 +42,13 @@ class SetSource:
         self._set, self._split, self._salt = task_set, split, salt
         size = whole_number("train_pool", train_pool, 0, MOST_WORLDS)
         kept = split == "train" and size > 0
-        self._pool = TrainingPool(task_set) if kept else None
+        pool = PlatePool if task_set.file.unit == "m" else TrainingPool
+        self._pool = pool(task_set) if kept else None
         most, count = size if kept else MOST_WORLDS, task_set.count(split)
         self._count = most if count is None else min(count, most)
-        self._last: tuple[int, LadderWorld, Map2DTask] | None = None
+        self._last: tuple[int, AnyWorld, AnyTask] | None = None
 
-    def task(self, index: int) -> Map2DTask:
+    def task(self, index: int) -> AnyTask:
         """The task of a world.
 
         Raises:
@@ -59,7 +59,7 @@ class SetSource:
             return self._pool.task(index)
         return self._made(index)[2]
 
-    def world(self, index: int) -> LadderWorld:
+    def world(self, index: int) -> AnyWorld:
         """A world with its figures, made anew unless it was the last one.
 
         Raises:
@@ -67,7 +67,7 @@ class SetSource:
         """
         return self._made(whole_number("index", index, 0))[1]
 
-    def _made(self, index: int) -> tuple[int, LadderWorld, Map2DTask]:
+    def _made(self, index: int) -> tuple[int, AnyWorld, AnyTask]:
         if self._last is None or self._last[0] != index:
             world = self._set.world(self._split, index, self._salt)
             self._last = index, world, self._set.task_of(world)
@@ -75,7 +75,7 @@ class SetSource:
 
     def draw(
         self, options: dict[str, Any], random: np.random.Generator
-    ) -> tuple[Map2DTask, np.random.Generator]:
+    ) -> tuple[AnyTask, np.random.Generator]:
         """As `drive.setup.TaskSource` says; the only option is `index`."""
         unknown = sorted(map(str, options.keys() - {"index"}))
         if unknown:

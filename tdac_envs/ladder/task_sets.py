@@ -12,12 +12,16 @@ import numpy as np
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import printable
+from tdac_envs.epuck.ground import Ground
+from tdac_envs.epuck.task import EPuckTask, make_task
 from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
+from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
+from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import SetFile, Split, find_set_file
 from tdac_envs.ladder.words import world_key
-from tdac_envs.ladder.worlds import LadderWorld, make_world
+from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 from tdac_envs.map2d.task import Map2DTask
 
 SPLITS = get_args(Split)
@@ -25,6 +29,9 @@ SPLITS = get_args(Split)
 LEAST_SALT = 16
 """Least length of the salt of a hidden split, bytes."""
 MOST_SALT = 4096
+AnyWorld = LadderWorld | PlatesWorld
+"""A world of maps, or of plates for the e-puck."""
+AnyTask = Map2DTask | EPuckTask
 _PUBLIC_SALT = b"tdac ladder, public worlds, 2026"
 
 
@@ -51,8 +58,8 @@ class TaskSet:
         return self.file.sha256(self.files.sha256 if self.files else None)
 
     @property
-    def largest_side(self) -> int:
-        """Largest width or height of a world, px."""
+    def largest_side(self) -> float:
+        """Largest width or height of a world, px or m."""
         return (self.files or self.file).largest_side
 
     def count(self, split: str) -> int | None:
@@ -101,8 +108,8 @@ class TaskSet:
                 f"split {split!r}"
             )
 
-    def world(self, split: str, index: int, salt: bytes | None = None) -> LadderWorld:
-        """World `index` of a split: map, start, goal, difficulty.
+    def world(self, split: str, index: int, salt: bytes | None = None) -> AnyWorld:
+        """World `index` of a split: obstacles, start, goal, difficulty.
 
         Args:
             split: One of `SPLITS`.
@@ -119,23 +126,37 @@ class TaskSet:
             file = self.file
             sizes = file.robot.radius, file.full_step, file.goal_tolerance
             return placed_world(self._found(split, index), *sizes, file.dt)
-        spec = self.file.spec(index)
+        spec, key = self.file.spec(index), self.key(split, index, "world", salt)
         try:
-            return make_world(spec, self.key(split, index, "world", salt))
+            if isinstance(spec, WorldSpec):
+                return make_world(spec, key)
+            return make_plates(spec, key)
         except TaskError as error:
             raise TaskError(f"set {self.name!r}, world {index}: {error}") from None
 
-    def task(self, split: str, index: int, salt: bytes | None = None) -> Map2DTask:
-        """The task of a world, as TDAC-Map2D-v0 drives it.
+    def task(self, split: str, index: int, salt: bytes | None = None) -> AnyTask:
+        """The task of a world, as TDAC-Map2D-v0 or TDAC-EPuck-v0 drives it.
 
         Raises:
             TaskError: As `world` does.
         """
         return self.task_of(self.world(split, index, salt))
 
-    def task_of(self, world: LadderWorld) -> Map2DTask:
+    def task_of(self, world: AnyWorld) -> AnyTask:
         """The task of a world of this set."""
         file, start = self.file, world.start
+        horizon = file.horizon.steps(world.difficulty.steps)
+        if isinstance(world, PlatesWorld):
+            return make_task(
+                Ground.of(world.world),
+                start,
+                world.goal,
+                max_wheel_speed=file.robot.max_wheel_speed,
+                dt=file.dt,
+                goal_tolerance=file.goal_tolerance,
+                horizon=horizon,
+            )
+        assert not isinstance(file.robot, EPuckParams)
         shortest = float(world.field[round(start.y), round(start.x)])
         return Map2DTask(
             terrain=world.terrain,
@@ -144,7 +165,7 @@ class TaskSet:
             robot=file.robot,
             goal_tolerance=file.goal_tolerance,
             dt=file.dt,
-            horizon=file.horizon.steps(world.difficulty.steps),
+            horizon=horizon,
             field=world.field,
             shortest=shortest,
         )

@@ -1,54 +1,32 @@
-"""The vector environment of TDAC-Ladder-v0."""
+"""The vector environments of TDAC-Ladder-v0."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from tdac_envs.drive.vector import Actions, Observations, Result
-from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
+from tdac_envs.epuck.vector import EPuckVectorEnv
+from tdac_envs.ladder.env import EPuckLadderEnv, LadderEnv, env_class
+from tdac_envs.ladder.observed import View
 from tdac_envs.map2d.vector import Map2DVectorEnv
 
 
-class LadderVectorEnv(Map2DVectorEnv, VectorEnv[Observations, Actions, Any]):
-    """A vector of `LadderEnv` that steps in one compiled call on all cores.
+class OnSetVector(DrivenVectorEnv):
+    """What the vector environments of both robots add for a task set.
 
-    Made by `gym.make_vec("TDAC-Ladder-v0", num_envs=64, level="unknown")`. Robot i
-    behaves bit for bit as a `LadderEnv` does with the same seed and actions. The
-    formats are those of Gymnasium's `SyncVectorEnv`.
-
-    Args:
-        num_envs: Number of robots.
-        autoreset_mode: `"NextStep"`, `"SameStep"`, `"Disabled"`, or a member of
-            `gymnasium.vector.AutoresetMode`.
-        threads: Number of threads, which does not affect the results. Default: the
-            number of cores.
-        render_mode: `"rgb_array"`, for up to 64 robots, or None.
-        **options: Arguments of `LadderEnv`.
+    Attributes:
+        view: What is observed.
     """
 
-    make = LadderEnv
+    view: View
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int | None = None,
-        render_mode: str | None = None,
-        **options: Any,
-    ) -> None:
-        super().__init__(
-            num_envs,
-            each=({},),
-            autoreset_mode=autoreset_mode,
-            threads=threads,
-            render_mode=render_mode,
-            **options,
-        )
+    def _look(self) -> None:
+        """Observes what the set says, after all else has been prepared."""
         self.view = view = self._first.view
         self._anchors = np.array([view.anchor(task) for task in self.tasks])
 
@@ -90,3 +68,87 @@ class LadderVectorEnv(Map2DVectorEnv, VectorEnv[Observations, Actions, Any]):
     def _assign(self, i: int, task: Any) -> None:
         super()._assign(i, task)
         self._anchors[i] = self.view.anchor(task)
+
+
+class LadderVectorEnv(
+    OnSetVector, Map2DVectorEnv, VectorEnv[Observations, Actions, Any]
+):
+    """A vector of `LadderEnv` that steps in one compiled call on all cores.
+
+    Made by `gym.make_vec("TDAC-Ladder-v0", num_envs=64, level="unknown")`. Robot i
+    behaves bit for bit as a `LadderEnv` does with the same seed and actions. The
+    formats are those of Gymnasium's `SyncVectorEnv`.
+
+    Args:
+        num_envs: Number of robots.
+        autoreset_mode: `"NextStep"`, `"SameStep"`, `"Disabled"`, or a member of
+            `gymnasium.vector.AutoresetMode`.
+        threads: Number of threads, which does not affect the results. Default: the
+            number of cores.
+        render_mode: `"rgb_array"`, for up to 64 robots, or None.
+        **options: Arguments of `LadderEnv`.
+    """
+
+    make = LadderEnv
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(
+            num_envs,
+            autoreset_mode=autoreset_mode,
+            threads=threads,
+            render_mode=render_mode,
+            **options,
+        )
+        self._look()
+
+
+class EPuckLadderVectorEnv(
+    OnSetVector, EPuckVectorEnv, VectorEnv[Observations, Actions, Any]
+):
+    """A vector of `EPuckLadderEnv`, as `LadderVectorEnv` is one of `LadderEnv`."""
+
+    make = EPuckLadderEnv
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(
+            num_envs,
+            autoreset_mode=autoreset_mode,
+            threads=threads,
+            render_mode=render_mode,
+            **options,
+        )
+        self._look()
+
+
+def make(
+    num_envs: int = 1, level: str | Path = "unknown", **options: Any
+) -> LadderVectorEnv | EPuckLadderVectorEnv:
+    """The batch of a task set, as `gym.make_vec("TDAC-Ladder-v0")` calls it.
+
+    Args:
+        num_envs: Number of robots.
+        level: Name of a task set, or path of a `set.yaml`.
+        **options: Further arguments of `LadderVectorEnv`.
+
+    Raises:
+        TaskError: There is no such set, or an argument is not valid.
+    """
+    if env_class(level) is EPuckLadderEnv:
+        return EPuckLadderVectorEnv(num_envs, level=level, **options)
+    return LadderVectorEnv(num_envs, level=level, **options)

@@ -1,11 +1,14 @@
-"""Poses from odometry: what a robot without a pose knows of its own place."""
+"""Poses from odometry or encoders: what a robot without a pose knows of its place."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
+
+from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 
 Array = NDArray[np.float64]
 
@@ -50,3 +53,38 @@ class DeadReckoning:
             [x + chord * np.cos(middle), y + chord * np.sin(middle), heading + turn],
             axis=-1,
         )
+
+
+class WheelReckoning(DeadReckoning):
+    """Adds up the angles of an e-puck's wheels; poses in m and rad.
+
+    Args:
+        robots: See `DeadReckoning`.
+    """
+
+    def __init__(self, robots: int | None = None) -> None:
+        super().__init__(robots)
+        self._angles = np.zeros((2,) if robots is None else (robots, 2))
+
+    def follow(self, odometry: ArrayLike, steps: ArrayLike) -> Array:
+        """The poses after the last step, from angles of shape (..., 2), rad."""
+        poses = super().follow(odometry, steps)
+        self._angles = np.array(odometry, np.float64)
+        return poses
+
+    def ahead(self, odometry: ArrayLike) -> Array:
+        """The poses one step further, which are not kept; see `follow`."""
+        turned = np.asarray(odometry, np.float64) - self._angles
+        left, right = np.moveaxis(WHEEL_RADIUS * turned, -1, 0)
+        distance, turn = (left + right) / 2.0, (right - left) / AXLE_LENGTH
+        return super().ahead(np.stack([distance, turn], axis=-1))
+
+
+SOURCES = {"odometry": DeadReckoning, "encoders": WheelReckoning}
+"""What adds up to a pose, by the key of the observation; the first one is used."""
+
+
+def source_of(own: spaces.Space[object]) -> str | None:
+    """The key of an observation space that adds up to a pose; None if none does."""
+    keys = own.spaces if isinstance(own, spaces.Dict) else {}
+    return next((key for key in SOURCES if key in keys), None)

@@ -17,7 +17,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.slices import Slices
 from tdac_envs.drive.stepping import STEPS
 from tdac_envs.drive.vector import DrivenVectorEnv, Observations
-from tdac_envs.learning.dead_reckoning import DeadReckoning
+from tdac_envs.learning.dead_reckoning import SOURCES, DeadReckoning, source_of
 from tdac_envs.learning.guidance import Route, look_ahead, route_to_goal
 from tdac_envs.learning.wrappers import (
     Frame,
@@ -160,7 +160,9 @@ class WrappedVectorEnv(VectorWrapper):
         if name == "goal-relative":
             self._space = frame.relative_space(own)
             if lacks_pose(own):
-                self._reckoned = self._reckoned or DeadReckoning(self.num_envs)
+                self._source = str(source_of(own))
+                made = SOURCES[self._source](self.num_envs)
+                self._reckoned = self._reckoned or made
             return lambda seen, _: frame.goal_relative(seen)
         if name == "guidance":
             check_guidance(self.batch.setups[0])
@@ -181,7 +183,7 @@ class WrappedVectorEnv(VectorWrapper):
             self._routes.refresh()
         if self._reckoned is not None:
             steps = self.batch.robots.state[:, STEPS]
-            pose: Any = self._reckoned.follow(observations["odometry"], steps)
+            pose: Any = self._reckoned.follow(observations[self._source], steps)
             observations = {**observations, "pose": pose}
         return self._wrapped(observations, self.batch.pose())
 
@@ -200,7 +202,7 @@ class WrappedVectorEnv(VectorWrapper):
             for key, value in final[i].items():
                 last[key][i] = value
         if self._reckoned is not None:
-            final_pose: Any = self._reckoned.ahead(last["odometry"])
+            final_pose: Any = self._reckoned.ahead(last[self._source])
             last["pose"] = final_pose
         seen = self._wrapped(last, self.batch.last_poses)
         for i in over:

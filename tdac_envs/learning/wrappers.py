@@ -27,7 +27,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.stepping import STEPS
 from tdac_envs.epuck.infrared import LARGEST
-from tdac_envs.learning.dead_reckoning import DeadReckoning
+from tdac_envs.learning.dead_reckoning import SOURCES, source_of
 from tdac_envs.learning.guidance import REACH, Route, route_to_goal
 from tdac_envs.map2d.task import Map2DTask
 
@@ -124,12 +124,13 @@ class Frame:
             own: Space of the original observations.
 
         Raises:
-            TaskError: It has no goal, or neither a pose nor odometry.
+            TaskError: It has no goal, or nothing that tells of the pose.
         """
         keys = set(own.spaces) if isinstance(own, spaces.Dict) else set()
-        if "goal" not in keys or not keys & {"pose", "odometry"}:
+        if "goal" not in keys or not keys & {"pose", *SOURCES}:
             raise TaskError(
-                f"expected observations with a pose or odometry, and a goal, got {own}"
+                "expected observations with a goal, and a pose, odometry or encoders, "
+                f"got {own}"
             )
         assert isinstance(own, spaces.Dict)
         found: dict[str, spaces.Space[Any]] = {
@@ -206,7 +207,9 @@ class GoalRelativeObservation(
         self.frame = Frame.of(env)
         space = self.frame.relative_space(env.observation_space)
         self.observation_space = space  # type: ignore[assignment]
-        self._reckoned = DeadReckoning() if lacks_pose(env.observation_space) else None
+        self._source = source_of(env.observation_space)
+        lacks = self._source is not None and lacks_pose(env.observation_space)
+        self._reckoned = SOURCES[str(self._source)]() if lacks else None
 
     def observation(self, observation: Observation) -> Observation:
         """See the class."""
@@ -214,7 +217,7 @@ class GoalRelativeObservation(
             return self.frame.goal_relative(observation)
         plain: Any = self.unwrapped
         steps = plain.robot.state[STEPS]
-        pose: Any = self._reckoned.follow(observation["odometry"], steps)
+        pose: Any = self._reckoned.follow(observation[str(self._source)], steps)
         return self.frame.goal_relative({**observation, "pose": pose})
 
 

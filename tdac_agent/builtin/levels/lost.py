@@ -751,7 +751,7 @@ def policy(obs):
     search(maps, x, y)
     x, y, heading, slipped = expected((x, y, heading), gains, STATE["queue"])
     maps.age += 1
-    if maps.age > 1 or STATE["steps"] < 3:
+    if maps.age > 3 or STATE["steps"] < 3:
         maps.plan(x, y, LOOSE if STATE["steps"] > STATE["strict"] else STRICT)
         if not np.isfinite(maps.cost[maps.cell(x, y)]):
             maps.plan(x, y, 2.0 * LOOSE)

@@ -16,6 +16,7 @@ from tdac_envs.drawing.runs import Status
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.picture import EPuckScene
 from tdac_envs.epuck.run_picture import WorldBackground, trajectory_picture
+from tdac_envs.epuck.task import EPuckTask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,20 +38,31 @@ class WorldPictures:
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
         """Draws frames of the e-puck with its sensors."""
-        nominal, trajectory = self.setting.nominal, rollout.trajectory
-        scene = EPuckScene(nominal, movable=False)
-        gaps, last = rollout.distances("euclidean"), trajectory.steps
-        for step in rollout.trajectory.every(stride):
-            outcome = rollout.outcome if step == last else ""
-            readings = trajectory.ranges[step]
-            yield scene.frame(
-                trajectory.poses[step].tolist(),
-                readings=readings,
-                reaches=reaches(readings),
-                trail=trajectory.poses[: step + 1, :2],
-                solid=nominal.ground.solid,
-                status=Status(step, nominal.horizon, float(gaps[step]), outcome),
-            )
+        return frames_of(self.setting.nominal, rollout, stride)
+
+
+def frames_of(nominal: EPuckTask, rollout: Rollout, stride: int) -> Iterator[Image]:
+    """Draws every `stride`-th step of an episode and the last one.
+
+    Args:
+        nominal: Task of the episode.
+        rollout: The episode.
+        stride: Steps between two frames.
+    """
+    trajectory = rollout.trajectory
+    scene = EPuckScene(nominal, movable=False)
+    gaps, last = rollout.distances("euclidean"), trajectory.steps
+    for step in trajectory.every(stride):
+        outcome = rollout.outcome if step == last else ""
+        readings = trajectory.ranges[step]
+        yield scene.frame(
+            trajectory.poses[step].tolist(),
+            readings=readings,
+            reaches=reaches(readings),
+            trail=trajectory.poses[: step + 1, :2],
+            solid=nominal.ground.solid,
+            status=Status(step, nominal.horizon, float(gaps[step]), outcome),
+        )
 
 
 def reaches(readings: NDArray[np.float32]) -> Points:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.tasks.start_frame import StartFrame
 from tdac_agent.tasks.units import METRES, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
@@ -32,19 +33,19 @@ BLUNTEST = math.radians(135.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldSurroundings:
-    """The world of a task; see `Surroundings`."""
+    """The world of a task; see `Surroundings`.
+
+    Attributes:
+        task: The task.
+        units: Metres, printed in mm, or in the frame of a start pose.
+    """
 
     task: EPuckTask
-
-    @property
-    def units(self) -> Units:
-        """Metres, printed in mm."""
-        return METRES
+    units: Units = METRES
 
     def shown_in(self, units: Units) -> WorldSurroundings:
-        """Returns itself: a world has no other units."""
-        assert units == METRES
-        return self
+        """Returns the same with texts in the frame of a start pose."""
+        return replace(self, units=units)
 
     @property
     def radius(self) -> float:
@@ -110,6 +111,13 @@ class WorldSurroundings:
     def mistaken_goals(self) -> dict[str, Point]:
         """Returns where typical coordinate mistakes put the goal, by description."""
         x, y = self.task.goal
+        frame = self.units.shown
+        if isinstance(frame, StartFrame):
+            x, y = frame.coordinates(*_on_screen((x, y)))
+            return {
+                "x and y swapped": frame.pixels((y, x)),
+                "y counted to the right": frame.pixels((x, -y)),
+            }
         places = {
             "x and y swapped": (y, x),
             "the sign of y wrong": (x, -y),

@@ -22,7 +22,7 @@ from tdac_agent.sandbox import Child, ControllerFault, Limits, SandboxError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.start_frame import StartFrame
-from tdac_agent.tasks.units import PIXELS, Units
+from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.report import Cause
 from tdac_agent.verification.judge.child_pool import ChildPool
@@ -43,9 +43,11 @@ from tdac_agent.verification.judge.set_checks import (
     static_checks,
 )
 from tdac_envs.core.intake import RECORD_BYTES, read_file
-from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.ladder.env import OnSet, make
+from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.set_file import SetFile
+from tdac_envs.ladder.task_sets import AnyTask
 from tdac_envs.map2d.task import Map2DTask
 
 
@@ -72,7 +74,7 @@ class SetJob(BaseModel):
 
 
 class WorldEpisode(PrintableRecord):
-    """Figures of an episode on a world; lengths in px.
+    """Figures of an episode on a world; lengths in px or m.
 
     `length`, `gap`, `detour`, `in_sight` and `density` describe the world;
     `least_steps` is OT. `cause` and `text` are the diagnosis of a failure; the text
@@ -132,10 +134,16 @@ class SetRun:
     child_pool: ChildPool
 
     @cached_property
-    def env(self) -> LadderEnv:
+    def env(self) -> OnSet:
         """The environment, with complete infos for the judge."""
         job = self.job
-        return LadderEnv(job.set_file, job.split, 0, job.salt_file, privileged=True)
+        return make(
+            job.set_file,
+            split=job.split,
+            train_pool=0,
+            salt_file=job.salt_file,
+            privileged=True,
+        )
 
     @property
     def file(self) -> SetFile:
@@ -239,7 +247,7 @@ def _driven(
     return rollout, usage.cpu_seconds, child.tier
 
 
-def supply(child: Child, run: SetRun, task: Map2DTask) -> None:
+def supply(child: Child, run: SetRun, task: AnyTask) -> None:
     """Gives a child the files of an episode: all that it is told.
 
     Raises:
@@ -255,7 +263,7 @@ def _loaded(child: Child) -> Driver:
     return child
 
 
-def write_files(folder: Path, file: SetFile, task: Map2DTask) -> None:
+def write_files(folder: Path, file: SetFile, task: AnyTask) -> None:
     """Writes what a controller may read, equal for all worlds but for the map.
 
     Args:
@@ -266,7 +274,7 @@ def write_files(folder: Path, file: SetFile, task: Map2DTask) -> None:
     params = folder / "params.json"
     params.write_text(json.dumps(level_params(file), indent=2) + "\n")
     written = [params]
-    if file.map:
+    if file.map and isinstance(task, Map2DTask):
         written.append(folder / "occupancy.npy")
         np.save(written[-1], task.terrain.grid.cells)
     for path in written:
@@ -275,21 +283,28 @@ def write_files(folder: Path, file: SetFile, task: Map2DTask) -> None:
 
 def level_params(file: SetFile) -> dict[str, Any]:
     """What `params.json` tells a controller: the robot and its budget, no world."""
+    robot, disturbances = file.robot, file.disturbances.model_dump()
+    sizes: dict[str, Any]
+    if isinstance(robot, EPuckParams):
+        sizes = {"kind": robot.kind, **robot.sizes}
+        disturbances |= robot.errors
+    else:
+        sizes = robot.model_dump()
     return {
         "schema_version": 1,
-        "robot": file.robot.model_dump(),
+        "robot": sizes,
         "dt": file.dt,
         "goal_tolerance": file.goal_tolerance,
         "observed": list(file.observed),
         "frame": file.frame,
         "map": file.map,
-        "disturbances": file.disturbances.model_dump(),
+        "disturbances": disturbances,
         "cpu": file.cpu.model_dump(),
     }
 
 
 def figures_of(
-    env: LadderEnv,
+    env: OnSet,
     split: str,
     index: int,
     rollout: Rollout,
@@ -326,7 +341,7 @@ def figures_of(
         time_score=time_score(reached, steps, hard.steps),
         path_score=path_score(reached, driven, hard.length),
         barn_score=barn_score(reached, steps, barn_steps),
-        d_min=round(float(rollout.distances().min()), 1),
+        d_min=round(float(rollout.distances().min()), UNITS[env.set.file.unit].digits),
         length=hard.length,
         least_steps=hard.steps,
         gap=hard.gap,
@@ -339,8 +354,9 @@ def figures_of(
     )
 
 
-def _shown(env: LadderEnv) -> Units:
+def _shown(env: OnSet) -> Units:
     """Units of diagnoses, in the frame that the policy observes."""
+    units = UNITS[env.set.file.unit]
     if env.set.file.frame == "map":
-        return PIXELS
-    return PIXELS.from_start(StartFrame(env.task.start))
+        return units
+    return units.from_start(StartFrame.of(env.task.start, units))

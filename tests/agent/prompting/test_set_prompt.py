@@ -26,16 +26,18 @@ def test_a_prompt_has_all_of_its_level(name):
     rows = dict(re.findall(r"^\| `(\w+)` \| (\([\d, ]*\)) \|", text, re.MULTILINE))
     spaces = env.observation_space.spaces
     assert rows == {key: str(box.shape) for key, box in spaces.items()}
-    limit = math.ceil(float(spaces["goal"].high[0]) - 1e-3)
-    assert f"to {limit} |" in text or f"to {spaces['goal'].high[0]:g} |" in text
+    ceil = 1.0 if file.unit == "px" else 100.0
+    limit = math.ceil(ceil * float(spaces["goal"].high[0]) - 1e-3) / ceil
+    assert f"to {limit:g} |" in text or f"to {spaces['goal'].high[0]:g} |" in text
     params = text.partition("```json\n")[2].partition("\n```")[0]
     assert json.loads(params) == level_params(file)
-    for value in (file.bar, file.goal_tolerance, file.horizon.most, file.robot.n_rays):
+    for value in (file.bar, file.goal_tolerance, file.horizon.most, file.full_step):
         assert f"{value:g}" in text
     assert ("occupancy.npy" in text) == file.map
     assert ("start frame" in text) == (file.frame == "start")
     assert BEGIN in text
-    assert "sensors" not in text
+    assert "import sensors" not in text
+    assert ("infra-red" in text) == ("ps" in file.observed)
     assert max(map(len, text.splitlines())) < 400
 
 

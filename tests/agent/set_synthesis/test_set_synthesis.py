@@ -69,6 +69,7 @@ def test_a_repaired_candidate_is_selected(write, solver, out, few):
     assert load_run(out).status == "selected"
 
 
+@pytest.mark.slow
 def test_each_test_has_new_worlds(write, out):
     """Feedback worlds are never used twice, nor for the selection."""
     write(code(STILL), code(BUMP), iterations=1, refine=False)
@@ -129,6 +130,7 @@ def selection_or_none(run):
     return selection(run.folder) if path.exists() else None
 
 
+@pytest.mark.slow
 def test_a_broken_run_goes_on_where_it_was(write, solver, out):
     """What is on record is neither asked nor driven again."""
     with pytest.raises(Fault, match="no access"):
@@ -156,6 +158,7 @@ FOR_ONE = 30_000
 """Tokens that are enough for one question and not for two."""
 
 
+@pytest.mark.slow
 def test_a_run_without_success_goes_on_with_more_tokens(few, write, out, warm):
     """Nothing is selected when the budget ends it, and no answer is paid for twice."""
     _, run = write(model=Paid(code(STILL)), max_tokens=FOR_ONE, iterations=1)

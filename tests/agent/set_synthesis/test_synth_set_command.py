@@ -17,6 +17,7 @@ def test_the_built_in_controller(tdac, tmp_path):
     """It is selected without a model; the report and the list show the run."""
     few = write_set(tmp_path / "few.yaml")
     words = ("synth", "--set", few, "--episodes", "4", "--feedback-episodes", "2")
+    words += ("--seed", "1")
     code, out, err = tdac(*words, "--out", "run")
     assert (code, err) == (0, "")
     assert "the built-in controller of the level known" in out

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from tdac_agent.environments.epuck.surroundings import WorldSurroundings
 from tdac_agent.environments.map2d.surroundings import MapSurroundings
 from tdac_agent.tasks.start_frame import StartFrame
-from tdac_agent.tasks.units import PIXELS
+from tdac_agent.tasks.units import METRES, PIXELS
 from tdac_envs import load_set
 from tdac_envs.drive.task import Pose
 from tdac_envs.ladder.observed import View
@@ -29,6 +30,24 @@ def test_places_and_headings_are_as_observed(index):
         assert frame.pixels(frame.coordinates(x, y)) == pytest.approx((x, y))
     goal = seen["goal"][0].tolist()
     assert frame.coordinates(*task.goal) == pytest.approx(goal, abs=1e-4)
+
+
+def test_places_in_worlds_are_as_observed():
+    """In metres, with y to the left of the start."""
+    tasks = load_set("epuck")
+    task, view = tasks.task("dev", 1), View(tasks.file, tasks.largest_side, False)
+    frame = StartFrame.of(task.start, METRES)
+    goal = METRES.on_screen([task.goal])[0].tolist()
+    seen = view.anchor(task)[5:].tolist()
+    assert frame.coordinates(*goal) == pytest.approx(seen, abs=1e-9)
+    assert frame.pixels(frame.coordinates(*goal)) == pytest.approx(goal)
+    around = WorldSurroundings(task).shown_in(METRES.from_start(frame))
+    mistaken = around.mistaken_goals()["y counted to the right"]
+    assert frame.coordinates(*mistaken) == pytest.approx((seen[0], -seen[1]))
+    units = METRES.from_start(StartFrame.of(Pose(1.0, 2.0, math.pi / 2), METRES))
+    assert units.point(500.0, -2250.0) == "(0.250, 0.500)"
+    assert units.pose(1000.0, -2000.0, 0.0) == "0.000 0.000 -90"
+    assert units.far(12.34) == "0.012 m"
 
 
 def test_texts_use_it():

@@ -305,6 +305,24 @@ class TestEncoders:
         assert np.abs(rest).max() <= ENCODER_STEP / 2 + 1e-6
         assert (two["encoders"] > 100 * ENCODER_STEP).all()
 
+    def test_they_do_not_show_the_radii_of_the_wheels(self):
+        """Each wheel has a radius of its own, which lasts an episode."""
+        env, drawn = in_world(encoders=True, wheel_radius_error=0.1), []
+        env.reset(seed=3)
+        half = env.task.axle_length / 2
+        for _ in range(300):
+            first, _ = env.reset()
+            forward, turn = motion(env, HALF)
+            rims = np.array([forward - half * turn, forward + half * turn])
+            turned = env.robot.turned - first["wheel_positions"]
+            drawn.append(rims / turned / 0.02)
+            usual = 0.5 * env.task.max_wheel_speed * env.task.dt
+            np.testing.assert_allclose(turned, usual, rtol=1e-5)
+        found = np.array(drawn)
+        assert 0.9 - 1e-4 <= found.min() < 0.91
+        assert 1.09 < found.max() <= 1.1 + 1e-4
+        assert abs(np.corrcoef(found.T)[0, 1]) < 0.2
+
     def test_a_revolution_has_1000_steps(self):
         """Rounded as in Webots' model of the robot."""
         assert round(2 * math.pi / 1000, 5) == ENCODER_STEP

@@ -18,6 +18,7 @@ KEYS = {
     "known": {"pose", "goal", "wheel_speeds", "ranges"},
     "unknown": {"pose", "goal", "wheel_speeds", "ranges"},
     "lost": {"goal", "wheel_speeds", "ranges", "odometry"},
+    "epuck": {"goal", "wheel_speeds", "ps", "encoders"},
 }
 LEVELS = sorted(KEYS)
 

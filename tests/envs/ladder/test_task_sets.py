@@ -26,22 +26,21 @@ def set_yaml(tmp_path):
 
 
 def test_the_easiest_is_first():
-    assert set_names() == ("known", "unknown", "lost")
+    assert set_names() == ("known", "unknown", "lost", "epuck")
 
 
 @pytest.mark.parametrize("name", set_names())
 def test_a_world_follows_from_set_split_and_number(name):
     one, again = load_set(name), load_set(name)
     task, same = one.task("dev", 3), again.task("dev", 3)
-    assert np.array_equal(task.terrain.grid.cells, same.terrain.grid.cells)
+    assert np.array_equal(task.field, same.field)
     assert (task.start, task.goal, task.horizon) == (
         same.start,
         same.goal,
         same.horizon,
     )
     others = [one.task("dev", 8), one.task("test", 3), one.task("hidden", 3, SALT)]
-    cells = [other.terrain.grid.cells for other in others]
-    assert not any(np.array_equal(task.terrain.grid.cells, other) for other in cells)
+    assert not any(np.array_equal(task.field, other.field) for other in others)
 
 
 def test_a_task_is_that_of_a_map():
@@ -148,7 +147,43 @@ def test_a_set_without_a_feasible_world(set_yaml):
 
 
 def test_built_in_sets_have_every_generator_once():
-    for name in set_names():
+    for name in ("known", "unknown", "lost"):
         generators = [each.name for each in load_set(name).file.worlds]
         assert len(set(generators)) == len(generators) == 5
     assert isinstance(load_set("known").file, SetFile)
+
+
+def test_a_task_of_plates_is_that_of_a_world():
+    """TDAC-EPuck-v0 drives it: from the e-puck of the world to its goal."""
+    tasks = load_set("epuck")
+    world = tasks.world("test", 1)
+    task, robot = tasks.task_of(world), world.world.robots[0]
+    assert task.ground.world is world.world
+    assert task.start[:2] == (robot.x, robot.y)
+    assert task.goal == world.world.goal
+    assert task.horizon == tasks.file.horizon.steps(world.difficulty.steps)
+    assert task.full_step == pytest.approx(tasks.file.full_step)
+    # The figures are lower bounds; grid paths are longer.
+    assert world.difficulty.length <= task.shortest
+
+
+EPUCK = {"worlds": [{"name": "plates"}], "robot": {"kind": "epuck"}}
+
+
+@pytest.mark.parametrize(
+    ("values", "problem"),
+    [
+        ({**EPUCK, "robot": {"radius": 8, "axle_length": 11}}, "go together"),
+        ({"robot": {"kind": "epuck"}, "goal_tolerance": 0.08}, "go together"),
+        ({**EPUCK, "observed": ["goal", "ranges"]}, "an e-puck does not observe"),
+        ({"observed": ["goal", "ps"]}, "a robot on maps does not observe `ps`"),
+        ({**EPUCK, "map": True, "frame": "map"}, "without a map"),
+        (
+            {**EPUCK, "observed": ["ps"], "disturbances": {"range_noise": 0.1}},
+            "an e-puck has no ranges",
+        ),
+    ],
+)
+def test_worlds_and_observations_are_those_of_the_robot(set_yaml, values, problem):
+    with pytest.raises(TaskError, match=problem):
+        load_set(set_yaml(**values))

@@ -10,7 +10,7 @@ from gymnasium.vector import SyncVectorEnv
 
 from tdac_envs import wrap_for_rl
 from tdac_envs.core.errors import TaskError
-from tdac_envs.learning.dead_reckoning import DeadReckoning
+from tdac_envs.learning.dead_reckoning import DeadReckoning, WheelReckoning
 
 LADDER = "TDAC-Ladder-v0"
 LEVELS = ["known", "unknown", "lost"]
@@ -135,3 +135,36 @@ def test_a_set_may_observe_less(few):
     env = wrap_for_rl(gym.make(LADDER, level=level, split="dev"))
     rays = env.unwrapped.observation_space["ranges"].shape[0]
     assert env.reset(seed=0)[0].shape == env.observation_space.shape == (3 + rays,)
+
+
+def test_wheel_angles_add_up_to_a_pose():
+    """The same pose as the odometry of the same steps."""
+    reckoned, wheels = DeadReckoning(), WheelReckoning()
+    angles = np.zeros(2)
+    random = np.random.default_rng(4)
+    for step in range(50):
+        turned = random.uniform(-0.6, 0.6, 2) if step else np.zeros(2)
+        angles = angles + turned
+        left, right = 0.02 * turned
+        odometry = [(left + right) / 2, (right - left) / 0.052]
+        ahead = wheels.ahead(angles)
+        pose = wheels.follow(angles, step)
+        np.testing.assert_allclose(pose, reckoned.follow(odometry, step), atol=1e-12)
+        if step:
+            np.testing.assert_array_equal(pose, ahead)
+    assert np.array_equal(wheels.follow(np.zeros(2), 0), np.zeros(3))
+
+
+def test_a_policy_on_epuck_has_a_goal_and_eight_readings():
+    """Alone and in a batch the same."""
+    one = wrap_for_rl(gym.make("TDAC-Ladder-v0", level="epuck", split="dev"))
+    many = wrap_for_rl(
+        gym.make_vec("TDAC-Ladder-v0", num_envs=2, level="epuck", split="dev")
+    )
+    assert one.observation_space.shape == (3 + 8 + 2,)
+    single, _ = one.reset(options={"index": 3})
+    batch, _ = many.reset(options={"index": 3})
+    for _ in range(20):
+        np.testing.assert_allclose(batch[0], single, atol=1e-6)
+        single = one.step(np.array([0.3, 0.5], np.float32))[0]
+        batch = many.step(np.full((2, 2), (0.3, 0.5), np.float32))[0]

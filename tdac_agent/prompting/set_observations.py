@@ -1,0 +1,163 @@
+"""What a robot of a task set observes, and what disturbs it, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, TABLE
+from tdac_envs.epuck.observed import ENCODER_STEP
+from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.set_file import SetFile
+
+
+def observation_rows(file: SetFile) -> Iterator[str]:
+    """Yields the rows of the table of observations."""
+    rows = {**_places(file), **_readings(file)}
+    for key in sorted(file.observed):
+        yield f"| `{key}` | {' | '.join(rows[key])} |"
+
+
+def _places(file: SetFile) -> dict[str, tuple[str, str, str, str]]:
+    """Rows of what all robots observe."""
+    side, unit = file.largest_side, file.unit
+    decimals = 0 if unit == "px" else 2
+    far = math.ceil(math.hypot(side, side) * 10**decimals) / 10**decimals
+    low = -0.5 if unit == "px" else -side / 2
+    if file.frame == "start":
+        place, frame = f"-{far:g} to {far:g}", "start frame"
+    else:
+        place, frame = f"{low:g} to {low + side:g}", "frame of the map"
+    odometry = "measured arc length (negative backwards) and turn of the last step"
+    return {
+        "pose": (
+            "(3,)",
+            f"{place}; heading in (-pi, pi]",
+            f"{unit}, {unit}, rad",
+            f"x, y, heading of the robot in the {frame}; exact",
+        ),
+        "goal": (
+            "(2,)",
+            place,
+            unit,
+            f"x, y of the goal in the {frame}; constant in an episode, exact",
+        ),
+        "wheel_speeds": (
+            "(2,)",
+            "-1 to 1",
+            "fraction",
+            "command of the left and right wheel in the last step"
+            + (", after the delay" if file.disturbances.delay else ""),
+        ),
+        "odometry": (
+            "(2,)",
+            "small",
+            f"{unit}, rad",
+            f"{odometry}; (0, 0) at the start",
+        ),
+    }
+
+
+def _readings(file: SetFile) -> dict[str, tuple[str, str, str, str]]:
+    """Rows of the sensors of a robot."""
+    robot = file.robot
+    if isinstance(robot, EPuckParams):
+        return {
+            "ps": (
+                f"({N_SENSORS},)",
+                f"0 to {LARGEST:g}",
+                "",
+                "readings of the infra-red sensors ps0 to ps7",
+            ),
+            "encoders": (
+                "(2,)",
+                "-10000 to 10000",
+                "rad",
+                "angles that the left and right wheel have turned since the start, in "
+                f"steps of {ENCODER_STEP:g} rad",
+            ),
+        }
+    return {
+        "ranges": (
+            f"({robot.n_rays},)",
+            f"0 to {robot.range_max:g}",
+            "px",
+            "distance from the robot's centre to the first obstacle along each ray",
+        )
+    }
+
+
+def disturbance_lines(file: SetFile) -> Iterator[str]:
+    """Yields a line for each disturbance of the set: its distribution and size."""
+    own = file.disturbances
+    if own.wheel_gains:
+        low, high = 1.0 - own.wheel_gains, 1.0 + own.wheel_gains
+        yield (
+            "Hidden wheel gains: each wheel turns at the command times "
+            f"a gain of their own, each uniform in [{low:g}, {high:g}], drawn anew for "
+            "each episode and constant in it; never faster than max_wheel_speed."
+        )
+    if own.axle_error:
+        yield (
+            "Hidden axle length: axle_length times 1 + e, e uniform within "
+            f"±{own.axle_error:g}, constant in an episode."
+        )
+    if own.wheel_slip:
+        yield (
+            "Slip: in each step, the speed of each wheel over ground is multiplied by "
+            f"a normal number with mean 1 and SD {file.slip:.3g}; again never faster "
+            "than max_wheel_speed."
+        )
+    if own.motor_lag:
+        yield (
+            f"Lag: wheel speeds follow the commands with a time constant of "
+            f"{own.motor_lag:g} s."
+        )
+    if own.delay:
+        steps = "1 step" if own.delay == 1 else f"{own.delay} steps"
+        yield (
+            f"Delay: an action takes effect {steps} late; until the first one does, "
+            "the wheels stand still."
+        )
+    if own.range_noise:
+        yield (
+            "Noise of the ranges: each ray in each step times a normal number with "
+            f"mean 1 and SD {own.range_noise:g}, limited to [0, range_max]."
+        )
+    if own.range_dropout:
+        yield (
+            f"Dropouts: each ray reads range_max with probability "
+            f"{own.range_dropout:g} in each step."
+        )
+    if own.odometry_scale:
+        yield (
+            "Scale errors of the odometry: distance and turn are each multiplied by "
+            f"1 + e, e normal with SD {own.odometry_scale:g}, one for distance and one "
+            "for turn, drawn for each episode and constant in it."
+        )
+    if own.odometry_noise:
+        yield (
+            "Noise of the odometry: distance and turn of each step are each multiplied "
+            f"by a normal number with mean 1 and SD {own.odometry_noise:g}."
+        )
+    if isinstance(file.robot, EPuckParams):
+        yield from _epuck_errors(file.robot)
+
+
+def _epuck_errors(robot: EPuckParams) -> Iterator[str]:
+    if robot.wheel_radius_error:
+        yield (
+            "Hidden wheel radii: each wheel's radius is wheel_radius times 1 + e, e "
+            f"uniform within ±{robot.wheel_radius_error:g}, drawn for each wheel, "
+            "constant in an episode; `encoders` do not show it."
+        )
+    if robot.sensor_noise:
+        listed = ", ".join(
+            f"{1e3 * distance:g}: {robot.sensor_noise * spread:.2g}"
+            for distance, _, spread in TABLE.tolist()
+        )
+        yield (
+            "Noise of the infra-red sensors: each reading in each step times a normal "
+            "number with mean 1 and an SD that follows from the length of the ray "
+            f"(mm: SD): {listed}, linearly in between; limited to [0, {LARGEST:g}]."
+        )
