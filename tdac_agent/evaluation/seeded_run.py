@@ -24,6 +24,7 @@ from tdac_agent.verification.judge.seeded import (
 from tdac_agent.verification.judge.set_job import WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import DEADLINE_SECONDS
+from tdac_envs.core.errors import TaskError
 
 E = TypeVar("E", SeededEpisode, Measured, WorldEpisode)
 # Wall time / simulated time: a policy is stopped at 2, a time-out is repeated once.
@@ -73,6 +74,7 @@ def run_job(
 
     Raises:
         Fault: The judge or the sandbox is broken.
+        TaskError: A world cannot be made.
     """
     out.mkdir()
     request = out.parent / f"{out.name}.json"
@@ -95,6 +97,8 @@ def _ending(path: Path, output: Path) -> JobEnding:
         raise Fault(f"the judge did not finish the episodes: {said}") from error
     if ending.fault is not None:
         raise Fault(ending.fault)
+    if ending.problem is not None:
+        raise TaskError(ending.problem)
     return ending
 
 

@@ -37,6 +37,15 @@ Observed = Literal[
 _ALL_ROBOTS = {"pose", "goal", "wheel_speeds", "odometry"}
 Split = Literal["train", "dev", "test", "hidden"]
 Share = Annotated[float, Field(ge=0, le=1)]
+LEVEL_ROBOT = RobotParams(
+    radius=8.0,
+    axle_length=11.0,
+    max_wheel_speed=30.0,
+    n_rays=18,
+    field_of_view_deg=110.0,
+    range_max=60.0,
+)
+"""The robot of the levels on maps, and the default of a set."""
 SLIP_STEP = 0.1
 """Duration of the step for which `wheel_slip` of a set is stated, s."""
 
@@ -120,7 +129,7 @@ class SetFile(_Strict):
     files: FilesSpec | None = Field(
         None, description="Worlds from files; `worlds: {folder: …}` is short for it."
     )
-    robot: RobotParams | EPuckParams = RobotParams.disc(8.0)
+    robot: RobotParams | EPuckParams = LEVEL_ROBOT
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
     goal_tolerance: Length = Field(4.0, le=100, description="px or m")
     observed: Annotated[tuple[Observed, ...], AfterValidator(_distinct)] = Field(

@@ -93,12 +93,16 @@ class SeededEpisode(PrintableRecord):
 
 
 class JobEnding(PrintableRecord):
-    """What the judge's process found in addition to the episodes."""
+    """What the judge's process found in addition to the episodes.
+
+    `fault` is why the sandbox failed, `problem` what is wrong with the task.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     tier: str
     fault: str | None = None
+    problem: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

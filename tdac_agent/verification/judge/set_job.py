@@ -42,6 +42,7 @@ from tdac_agent.verification.judge.set_checks import (
     Checks,
     static_checks,
 )
+from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.robots import EPuckParams
@@ -161,7 +162,7 @@ def judge_set(job: SetJob, child_pool: ChildPool) -> None:
     """Runs the tests, and if they pass the episodes, with a line for each in order."""
     job.out.mkdir(exist_ok=True)
     run = SetRun(job, read_file(job.controller, RECORD_BYTES), child_pool)
-    counts, tier, fault = [0, 0], job.tier, None
+    counts, tier, fault, problem = [0, 0], job.tier, None, None
     with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
         try:
             checks, tier = _checked(run)
@@ -176,7 +177,9 @@ def judge_set(job: SetJob, child_pool: ChildPool) -> None:
                     break
         except SandboxError as error:
             fault = f"the sandbox failed: {error}"
-    ending = JobEnding(tier=tier, fault=fault)
+        except TaskError as error:  # there is no feasible world
+            problem = str(error)
+    ending = JobEnding(tier=tier, fault=fault, problem=problem)
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 
 

@@ -27,9 +27,8 @@ def judge():
 
 @pytest.fixture
 def level(tmp_path):
-    """A set of small worlds, in which nothing arrives."""
-    size = {"width": 240, "height": 240}
-    worlds = [{"name": "aisles", **size}, {"name": "clutter", **size}]
+    """A set of short episodes, in which nothing arrives."""
+    worlds = [{"name": "aisles"}, {"name": "clutter"}]
     short = {"factor": 1.0, "least": 40, "most": 40}
     path = tmp_path / "few.yaml"
     path.write_text(yaml.safe_dump({"name": "few", "worlds": worlds, "horizon": short}))

@@ -451,3 +451,13 @@ def test_mistakes_are_one_line(tdac, words, message):
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert any(part in err for part in message.split("|"))
+
+
+def test_a_set_without_a_feasible_world(tmp_path):
+    """One line, after the tries that the set allows; no verdict."""
+    (tmp_path / "own.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")
+    path = tmp_path / "mine.yaml"
+    level = {"worlds": [{"name": "aisles"}], "admission": {"gap": 10, "tries": 3}}
+    path.write_text(yaml.safe_dump(level))
+    with pytest.raises(TaskError, match="set 'mine', world 0: no feasible world from"):
+        verify_on_set(tmp_path / "own.py", load_set(path), "dev", 2)

@@ -123,7 +123,7 @@ def test_what_it_cannot_show_is_refused():
     """In one line that says what was expected."""
     with pytest.raises(TaskError, match="expected an environment of tdac_envs"):
         GoalView(gym.make("CartPole-v1"))
-    with pytest.raises(TaskError, match="observations with a pose or odometry"):
+    with pytest.raises(TaskError, match="observations with a goal, and a pose"):
         GoalView(wrap(gym.make("TDAC-Map2D-v0"), ["goal-relative"]))
     with pytest.raises(TaskError, match="contact_cost"):
         GoalView(gym.make("TDAC-Map2D-v0"), contact_cost=-1.0)

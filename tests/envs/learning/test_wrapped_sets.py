@@ -125,7 +125,7 @@ def test_what_a_robot_cannot_know_is_refused(few, made):
     with pytest.raises(TaskError, match="leave out the wrapper 'guidance'"):
         wrap_for_rl(made(LADDER, level="unknown", split="dev"), ["guidance"])
     blind = few(observed=["goal", "ranges"])
-    with pytest.raises(TaskError, match="expected observations with a pose or odom"):
+    with pytest.raises(TaskError, match="expected observations with a goal, and a p"):
         wrap_for_rl(made(LADDER, level=blind, split="dev"))
 
 

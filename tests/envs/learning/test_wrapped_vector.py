@@ -80,7 +80,7 @@ def test_what_cannot_be_wrapped_is_refused():
         batch(2, ["relative"])
     with pytest.raises(TaskError, match="expected observations in a Dict"):
         batch(2, ["flatten", "guidance"])
-    with pytest.raises(TaskError, match="observations with a pose or odometry"):
+    with pytest.raises(TaskError, match="observations with a goal, and a pose"):
         batch(2, ["goal-relative", "goal-relative"])
     with pytest.raises(TaskError, match="expected a batch made by"):
         WrappedVectorEnv(gym.make_vec("CartPole-v1", 2), ())

@@ -195,7 +195,7 @@ def test_what_cannot_be_wrapped_is_refused():
         wrap(env, ["relative"])
     with pytest.raises(TaskError, match="expected observations in a Dict"):
         wrap(env, ["flatten", "guidance"])
-    with pytest.raises(TaskError, match="observations with a pose or odometry"):
+    with pytest.raises(TaskError, match="observations with a goal, and a pose"):
         wrap(env, ["goal-relative", "goal-relative"])
     with pytest.raises(TaskError, match="expected an environment of tdac_envs"):
         GoalRelativeObservation(gym.make("CartPole-v1"))
