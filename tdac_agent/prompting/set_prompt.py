@@ -12,7 +12,7 @@ from tdac_agent.prompting.set_observations import (
     observation_rows,
 )
 from tdac_agent.sandbox import Limits
-from tdac_agent.verification.judge.set_job import level_params
+from tdac_agent.verification.judge.set_files import level_params
 from tdac_agent.verification.suite.contract import ALLOWED_IMPORTS
 from tdac_agent.verification.suite.hygiene import (
     FORBIDDEN_ATTRIBUTES,

@@ -34,7 +34,7 @@ from tdac_agent.synthesis.setup import account_of, hold_folder, new_run, open_re
 from tdac_agent.tasks.installation import drawn_seed
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task_file import SET_FILE
-from tdac_agent.verification.judge.set_job import level_params
+from tdac_agent.verification.judge.set_files import level_params
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.ladder.task_sets import TaskSet

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import tempfile
 from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -42,14 +40,13 @@ from tdac_agent.verification.judge.set_checks import (
     Checks,
     static_checks,
 )
+from tdac_agent.verification.judge.set_files import write_files
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.env import OnSet, make
-from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import AnyTask
-from tdac_envs.map2d.task import Map2DTask
 
 
 class SetJob(BaseModel):
@@ -264,46 +261,6 @@ def supply(child: Child, run: SetRun, task: AnyTask) -> None:
 def _loaded(child: Child) -> Driver:
     child.load()
     return child
-
-
-def write_files(folder: Path, file: SetFile, task: AnyTask) -> None:
-    """Writes what a controller may read, equal for all worlds but for the map.
-
-    Args:
-        folder: The folder.
-        file: The task set.
-        task: The task of a world, whose map is given if the set says so.
-    """
-    params = folder / "params.json"
-    params.write_text(json.dumps(level_params(file), indent=2) + "\n")
-    written = [params]
-    if file.map and isinstance(task, Map2DTask):
-        written.append(folder / "occupancy.npy")
-        np.save(written[-1], task.terrain.grid.cells)
-    for path in written:
-        os.utime(path, (0, 0))
-
-
-def level_params(file: SetFile) -> dict[str, Any]:
-    """What `params.json` tells a controller: the robot and its budget, no world."""
-    robot, disturbances = file.robot, file.disturbances.model_dump()
-    sizes: dict[str, Any]
-    if isinstance(robot, EPuckParams):
-        sizes = {"kind": robot.kind, **robot.sizes}
-        disturbances |= robot.errors
-    else:
-        sizes = robot.model_dump()
-    return {
-        "schema_version": 1,
-        "robot": sizes,
-        "dt": file.dt,
-        "goal_tolerance": file.goal_tolerance,
-        "observed": list(file.observed),
-        "frame": file.frame,
-        "map": file.map,
-        "disturbances": disturbances,
-        "cpu": file.cpu.model_dump(),
-    }
 
 
 def figures_of(

@@ -16,7 +16,7 @@ from tdac_agent.evaluation.ledger import user_ledger
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.verification.judge.set_checks import static_checks
-from tdac_agent.verification.judge.set_job import level_params, write_files
+from tdac_agent.verification.judge.set_files import level_params, write_files
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError

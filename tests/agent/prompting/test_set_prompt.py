@@ -12,7 +12,7 @@ import tdac_envs
 from tdac_agent.prompting.prompt import FULL, PromptError, PromptTemplate
 from tdac_agent.prompting.rules import BEGIN, RuleBook
 from tdac_agent.prompting.set_prompt import set_prompt
-from tdac_agent.verification.judge.set_job import level_params
+from tdac_agent.verification.judge.set_files import level_params
 from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
 
