@@ -139,6 +139,8 @@ def _counted(hidden: HiddenCount, name: str) -> str:
     text = f"hidden evaluation {hidden.number} of this file on {escape(name)}"
     if hidden.count > 1:
         text += f", {hidden.count} in all; the first one counts"
+    if hidden.lineage is not None and hidden.lineage > hidden.count:
+        text += f"; {hidden.lineage} of controllers of its run"
     if hidden.recorded is not None:
         text += f"; recorded {hidden.recorded}, nothing was driven anew"
     return text

@@ -19,7 +19,7 @@ from tdac_agent.evaluation.controller_file import check_controller
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
-from tdac_agent.tasks.task_file import TASK_FILE, read_task_file
+from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
 from tdac_agent.verification.judge.drivers import Kind, PolicySpec
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError, hint
@@ -40,6 +40,7 @@ class Entrant:
             each task, a controller without a file.
         sha256: Hash of its file.
         env: Environment of its run folder, if it has one.
+        set_file: Task set of its run folder, if it was written for one.
         saved: What a learned policy records about its training, if anything.
     """
 
@@ -47,6 +48,7 @@ class Entrant:
     policy: PolicySpec
     sha256: str | None = None
     env: str | None = None
+    set_file: Path | None = None
     saved: SavedPolicy | None = None
 
     @property
@@ -90,7 +92,8 @@ def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
         return Entrant(given, PolicySpec("controller"))
     path = Path(given)
     if path.is_dir():
-        return replace(_controller(given, path / "controller.py"), env=_env_of(path))
+        found = _controller(given, path / "controller.py")
+        return replace(found, env=_env_of(path), set_file=_set_of(path))
     if not path.is_file():
         names = (*OURS, BUILTIN)
         raise ControllerFileError(
@@ -122,6 +125,11 @@ def _env_of(run_folder: Path) -> str | None:
         return read_task_file(file, file).env
     except TaskError:
         return None
+
+
+def _set_of(run_folder: Path) -> Path | None:
+    file = run_folder / SET_FILE
+    return file if file.is_file() else None
 
 
 def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:

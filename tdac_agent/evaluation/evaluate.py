@@ -98,7 +98,7 @@ def evaluate(
 
     Raises:
         TaskError: A task or a number is invalid, or a run folder is for another
-            environment than a task.
+            environment than a task, or for a task set.
         ControllerFileError: A policy's file cannot be read, or is no policy.
         RunError: Another evaluation is in `out`, or writes to it.
         Fault: The sandbox is broken.
@@ -108,6 +108,11 @@ def evaluate(
     one_of("variation", variation, VARIATIONS)
     entrants = entrants_of(policies, wrappers)
     for entrant in entrants:
+        if entrant.set_file is not None:
+            raise TaskError(
+                f"{entrant.name} was written for a task set, not for tasks: evaluate "
+                f"it with --set {entrant.set_file}"
+            )
         if entrant.saved is not None and entrant.saved.set is not None:
             own = entrant.saved.set
             raise TaskError(

@@ -1,14 +1,15 @@
 """The ledger of hidden evaluations: an append-only file of the user.
 
 Before hidden worlds are driven, a line says which controller is judged on which set,
-with which salt and how many worlds. After that, a line has the report. An evaluation
+with which salt and how many worlds, and by which run it was written. After that, a
+line has the report. An evaluation
 that is in the ledger is answered from it.
 """
 
 from __future__ import annotations
 
 import secrets
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -49,6 +50,7 @@ class _Line(BaseModel):
 class _Begun(_Line):
     event: Literal["begun"] = "begun"
     about: HiddenEvaluation
+    lineage: str | None = Field(None, description="Id of the run that wrote the file.")
 
 
 class _Ended(_Line):
@@ -88,14 +90,18 @@ class Ledger:
                     ) from None
         return None
 
-    def begin(self, about: HiddenEvaluation) -> str:
+    def begin(self, about: HiddenEvaluation, lineage: str | None = None) -> str:
         """Records that an evaluation begins; returns the id of its lines.
+
+        Args:
+            about: What is evaluated.
+            lineage: Id of the run that wrote the controller, if one did.
 
         Raises:
             TaskError: The ledger cannot be written.
         """
         number = secrets.token_hex(8)
-        self._append(_Begun(id=number, time=_now(), about=about))
+        self._append(_Begun(id=number, time=_now(), about=about, lineage=lineage))
         return number
 
     def end(self, number: str, about: HiddenEvaluation, report: SetReport) -> SetReport:
@@ -159,15 +165,21 @@ def _count(
     begun: Sequence[_Begun], about: HiddenEvaluation, recorded: str | None
 ) -> HiddenCount:
     """The place of an evaluation among all of its controller on sets of this name."""
-    own = [
-        each.about
-        for each in begun
-        if (each.about.entrant, each.about.set) == (about.entrant, about.set)
-    ]
-    different = list(dict.fromkeys(own))
+    on_set = [each for each in begun if each.about.set == about.set]
+    own = _different(each for each in on_set if each.about.entrant == about.entrant)
+    runs = {each.lineage for each in on_set if each.about == about} - {None}
+    related = _different(each for each in on_set if each.lineage in runs)
     return HiddenCount(
-        number=different.index(about) + 1, count=len(different), recorded=recorded
+        number=own.index(about) + 1,
+        count=len(own),
+        lineage=len(related) or None,
+        recorded=recorded,
     )
+
+
+def _different(begun: Iterable[_Begun]) -> list[HiddenEvaluation]:
+    """Evaluations that differ; one that was interrupted and driven again is one."""
+    return list(dict.fromkeys(each.about for each in begun))
 
 
 def _now() -> str:

@@ -54,6 +54,11 @@ class HiddenCount(_Record):
 
     number: int = Field(description="Its number among those of this controller, set.")
     count: int = Field(description="How many there are so far.")
+    lineage: int | None = Field(
+        None,
+        description="How many there are so far of controllers that the same run wrote; "
+        "None if no run wrote this one.",
+    )
     recorded: str | None = Field(
         None, description="When it was driven, if it was not driven anew (UTC)."
     )

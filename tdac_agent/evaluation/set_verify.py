@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import json
 import math
 import tempfile
@@ -10,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from tdac_agent.errors import RunError
 from tdac_agent.evaluation.kept_sets import (
     keep_report,
     keep_sealed,
@@ -18,6 +21,7 @@ from tdac_agent.evaluation.kept_sets import (
 from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, user_ledger
 from tdac_agent.evaluation.seeded_run import run_job
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
@@ -39,6 +43,8 @@ from tdac_envs.map2d.task import Map2DTask
 MOST_WORLDS = 400
 """Worlds after which a sequential test is undecided."""
 MOST_EPISODES = 100_000
+DEEPEST = 5
+"""How many folders above a controller file its run may be."""
 JUDGED = ("dev", "test", "hidden")
 
 
@@ -50,6 +56,7 @@ def verify_on_set(
     *,
     first: int = 0,
     salt_file: Path | None = None,
+    lineage: str | None = None,
     tier: str = "auto",
     out: Path | None = None,
     judge: WarmJudge | None = None,
@@ -70,6 +77,8 @@ def verify_on_set(
             bar decides when to stop; then there are no scores.
         first: Number of the first world; only with `worlds`, and not of hidden worlds.
         salt_file: File with the salt of the split `hidden`.
+        lineage: Id of the run that wrote the controller, for the ledger; by default
+            that of the run folder that the file is in, if it is in one.
         tier: Sandbox tier; `auto` for the best one on this machine.
         out: Folder for `set.json` and `trajectories/`; of hidden worlds, for `set.json`
             and `sealed/`, which only this user can read.
@@ -105,7 +114,7 @@ def verify_on_set(
     ledger = user_ledger()
     report = ledger.recorded(about)
     if report is None:
-        number = ledger.begin(about)
+        number = ledger.begin(about, lineage or written_by(controller))
         report = _driven(request, out, judge, watch)
         report = ledger.end(number, about, report)
     if out is not None:
@@ -204,6 +213,16 @@ def _driven(
         elif out is not None:
             keep_sealed(ended, out)
     return report
+
+
+def written_by(controller: str | bytes | Path) -> str | None:
+    """Id of the run in whose folder a controller file is; None if it is in none."""
+    if isinstance(controller, bytes) or "\n" in str(controller):
+        return None
+    for folder in itertools.islice(Path(controller).resolve().parents, DEEPEST):
+        with contextlib.suppress(RunError):
+            return load_run(folder).id or None
+    return None
 
 
 def compile_for_set(tasks: TaskSet) -> None:

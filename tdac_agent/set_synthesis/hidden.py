@@ -49,6 +49,7 @@ def verify_hidden(
             "hidden",
             # A salt in a folder from elsewhere may be known.
             salt_file=drawn_salt(folder / SEALED, reuse=bool(recorder.run.mark)),
+            lineage=recorder.run.id,
             tier=tier,
             judge=judge,
             watch=lambda done, reached: recorder.tell(

@@ -76,6 +76,17 @@ def test_others_are_counted_apart(ledger, other):
     assert driven(ledger, evaluation(**other)).hidden.count == 1
 
 
+def test_controllers_of_one_run_are_counted_together(ledger):
+    """Each shows how often hidden worlds have judged what its run wrote."""
+    first, second = evaluation(), evaluation(entrant="f" * 64)
+    ledger.end(ledger.begin(first, "one run"), first, report())
+    found = ledger.end(ledger.begin(second, "one run"), second, report())
+    assert (found.hidden.count, found.hidden.lineage) == (1, 2)
+    assert ledger.recorded(first).hidden.lineage == 2
+    other = evaluation(entrant="d" * 64)
+    assert driven(ledger, other).hidden.lineage is None
+
+
 def test_lines_are_only_appended(ledger):
     driven(ledger, evaluation())
     before = ledger.path.read_bytes()

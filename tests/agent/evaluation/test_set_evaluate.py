@@ -8,6 +8,7 @@ import yaml
 
 from tdac_agent.builtin.level import LEVELS
 from tdac_agent.errors import ControllerFileError, RunError
+from tdac_agent.evaluation.evaluate import evaluate
 from tdac_agent.evaluation.set_evaluate import evaluate_on_set
 from tdac_agent.evaluation.set_evaluation import SetEvaluation
 from tdac_agent.evaluation.set_verify import verify_on_set
@@ -191,3 +192,13 @@ def test_mistakes_are_one_line(tdac, words, message):
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
     assert message in err
+
+
+def test_a_run_on_a_set_is_not_driven_on_tasks(tmp_path):
+    """Its controller observes what the set says; another map would tell nothing."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "controller.py").write_text(STILL)
+    (tmp_path / "run" / "set.yaml").write_text("name: few\n")
+    told = r"run was written for a task set, .* --set .*run/set\.yaml"
+    with pytest.raises(TaskError, match=told):
+        evaluate([tmp_path / "run"], ["maze"], 1)

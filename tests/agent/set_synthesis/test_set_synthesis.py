@@ -208,6 +208,7 @@ def test_then_verify_drives_once_on_hidden_worlds(write, solver, out):
     assert len(salt.read_bytes()) == 32
     text = (out / "hidden.json").read_text()
     assert json.loads(text)["episodes"] == []
+    assert json.loads(text)["hidden"]["lineage"] == 1
     secret = salt.read_bytes()
     for path in out.rglob("*"):
         if path.is_file() and path != salt:
