@@ -480,7 +480,7 @@ def look(near, x, y, heading, unseen):
     gaps = np.hypot(places[:, :1] - px, places[:, 1:] - py).min(axis=1)
     dx, dy = (places[int(gaps.argmin())] - (x, y)).tolist()
     bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
-    turn = math.copysign(max(abs(bearing) - 0.35 * VIEW, 0.15), bearing)
+    turn = math.copysign(max(abs(bearing) - 0.48 * VIEW, 0.15), bearing)
     share = min(max(turn / SPIN, -1.0), 1.0)
     return share, -share
 
