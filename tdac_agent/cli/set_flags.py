@@ -46,6 +46,7 @@ class SetFlags:
     split: str | None = None
     worlds: int | None = None
     salt_file: Path | None = None
+    hidden_folder: Path | None = None
 
     def check(
         self, task: TaskFlags, robust: RobustFlags, others: Mapping[str, object]
@@ -61,9 +62,16 @@ class SetFlags:
             TaskError: One does not.
         """
         if self.name is None:
-            flags = {"--split": self.split, "--salt-file": self.salt_file, "-n": True}
+            flags: dict[str, object] = {
+                "--split": self.split,
+                "--salt-file": self.salt_file,
+                "--hidden-folder": self.hidden_folder,
+                "-n": True,
+            }
             flag = next(flag for flag, value in flags.items() if value)
             raise TaskError(f"{flag} needs --set NAME; tdac sets lists the task sets")
+        if self.hidden_folder is not None and self.split != "hidden":
+            raise TaskError("--hidden-folder needs --split hidden")
         words = [word for word in task.words() if word.startswith("--")]
         words += [flag for flag, value in others.items() if value]
         if robust != RobustFlags():

@@ -138,6 +138,15 @@ def verify(
             rich_help_panel="Task set",
         ),
     ] = None,
+    hidden_folder: Annotated[
+        Optional[Path],  # noqa: UP045
+        dir_flag(
+            "--hidden-folder",
+            help="For a set of real maps: a folder of maps that was kept back, with an "
+            "index.json; with --split hidden.",
+            rich_help_panel="Task set",
+        ),
+    ] = None,
 ) -> None:
     """Test a controller in the sandbox; exit 0 only if all tests pass."""
     # Imported objects live until exit: collecting them is a waste of time.
@@ -160,7 +169,7 @@ def verify(
             range_dropout=range_dropout,
         )
         wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
-        on_set = SetFlags(set_name, split, worlds, salt_file)
+        on_set = SetFlags(set_name, split, worlds, salt_file, hidden_folder)
         if on_set != SetFlags():
             from tdac_agent.cli import verify_set
 

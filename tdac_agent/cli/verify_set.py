@@ -41,7 +41,8 @@ def run(
     if out is not None:
         check_folder(out)
     assert flags.name is not None
-    tasks, file = load_set(flags.name), controller_file(controller)
+    tasks = load_set(flags.name, flags.hidden_folder)
+    file = controller_file(controller)
     if flags.worlds is not None:
         tasks.check_count(flags.split or "test", flags.worlds, "-n")
     gc.freeze()

@@ -33,7 +33,10 @@ class SetProvenance(_Record):
     set: str
     set_sha256: str
     split: str
-    salt_sha256: str | None = Field(description="None for a public salt.")
+    salt_sha256: str | None = Field(
+        description="None for a public salt. For a hidden folder, the hash of its "
+        "worlds."
+    )
     controller_sha256: str
     sandbox: str = Field(description="Sandbox tier.")
     limits: dict[str, float] = Field(description="Limits of each episode.")

@@ -71,7 +71,8 @@ def verify_on_set(
 
     Args:
         controller: Path of the file, or its source (text of several lines, or bytes).
-        tasks: The task set.
+        tasks: The task set; one of files with its `hidden_folder`, if `split` is
+            `hidden`.
         split: `dev`, `test` or `hidden`.
         worlds: Number of worlds, for scores. By default a sequential test of the set's
             bar decides when to stop; then there are no scores.
@@ -101,7 +102,7 @@ def verify_on_set(
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source = read_source(controller)
     request = _Request(source, tasks, split, worlds, first, salt_file, tier)
-    if salt is None:
+    if request.told:
         return _driven(request, out, judge, watch)
     _check_hiding(request)
     about = HiddenEvaluation(
@@ -109,7 +110,7 @@ def verify_on_set(
         set=tasks.name,
         set_sha256=tasks.sha256,
         worlds=SEQUENTIAL if worlds is None else worlds,
-        salt_sha256=sha256_of(salt),
+        salt_sha256=request.secret_sha256,
     )
     ledger = user_ledger()
     report = ledger.recorded(about)
@@ -139,25 +140,42 @@ class _Request:
         """Whether single worlds may be reported."""
         return self.split != "hidden"
 
+    @property
+    def hidden_folder(self) -> Path | None:
+        """Folder of the hidden worlds, if they are files."""
+        files = self.tasks.files
+        return None if files is None or self.told else files.hidden_folder
+
+    @property
+    def secret_sha256(self) -> str:
+        """Hash of what hides the worlds: the salt, or the worlds of a folder."""
+        if self.salt_file is not None:
+            return sha256_of(read_salt(self.salt_file))
+        assert self.tasks.files is not None
+        assert self.tasks.files.hidden_sha256 is not None
+        return self.tasks.files.hidden_sha256
+
 
 def _check_hiding(request: _Request) -> None:
     """Refuses hidden worlds that a controller could find.
 
     Raises:
-        TaskError: The sandbox does not hide files, or the salt lies where it shows
-            them.
+        TaskError: The sandbox does not hide files, or the salt or the folder lies
+            where it shows them.
     """
-    assert request.salt_file is not None
+    secret = request.salt_file or request.hidden_folder
+    assert secret is not None
     if request.tier not in ("auto", *(each.name for each in CONFINING)):
         raise TaskError(
             f"the sandbox tier {request.tier!r} cannot keep a controller from reading "
             "files, and so not from hidden worlds; leave out --tier"
         )
-    seen, path = exposure(), request.salt_file.resolve()
+    seen, path = exposure(), secret.resolve()
     if any(path.is_relative_to(folder) for folder in (*seen.system, *seen.packages)):
+        what, move = ("salt file", "file") if request.salt_file else ("", "folder")
         raise TaskError(
-            f"salt file {request.salt_file}: controllers can read this folder, which "
-            "belongs to Python or its packages; move the file"
+            f"{what or 'hidden folder'} {secret}: controllers can read this place, "
+            f"which belongs to Python or its packages; move the {move}"
         )
 
 
@@ -189,17 +207,17 @@ def _driven(
             limits=limits_of(tasks),
             out=folder / "results",
             trajectories=folder / "trajectories" if out is not None and told else None,
+            hidden_folder=request.hidden_folder,
         )
         write_atomic(job.controller, request.source)
         longest = tasks.file.horizon.most * tasks.file.dt * len(job.worlds)
         ended, ending = run_job(job, job.out, longest, WorldEpisode, judge, watch)
         checks = Checks.model_validate_json((job.out / CHECKS_FILE).read_bytes())
-        salt = None if salt_file is None else read_salt(salt_file)
         provenance = SetProvenance(
             set=tasks.name,
             set_sha256=tasks.sha256,
             split=request.split,
-            salt_sha256=None if salt is None else sha256_of(salt),
+            salt_sha256=None if told else request.secret_sha256,
             controller_sha256=sha256_of(request.source),
             sandbox=ending.tier,
             limits=asdict(job.limits),

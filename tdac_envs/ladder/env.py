@@ -148,6 +148,7 @@ class LadderEnv(OnSet, Map2DEnv):
         privileged: Whether `info` is complete. A rival or a judge never sets it.
         reward_weights: Reward weights by name, where they differ from the defaults.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
+        hidden_folder: Folder of maps with the split `"hidden"` of a set of files.
 
     ## Version History
     * v0: Initial version.
@@ -162,8 +163,9 @@ class LadderEnv(OnSet, Map2DEnv):
         privileged: bool = False,
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
+        hidden_folder: str | Path | None = None,
     ) -> None:
-        task_set, source = _opened(level, split, train_pool, salt_file)
+        task_set, source = _opened(level, split, train_pool, salt_file, hidden_folder)
         file = task_set.file
         setup = Setup(
             **_shared(task_set, source, reward_weights),
@@ -224,11 +226,15 @@ def env_class(level: str | Path) -> type[LadderEnv | EPuckLadderEnv]:
 
 
 def _opened(
-    level: str | Path, split: str, train_pool: int, salt_file: str | Path | None
+    level: str | Path,
+    split: str,
+    train_pool: int,
+    salt_file: str | Path | None,
+    hidden_folder: str | Path | None = None,
 ) -> tuple[TaskSet, SetSource]:
     """A set, and the source of its tasks."""
     salt = None if salt_file is None else read_salt(salt_file)
-    task_set = load_set(level)
+    task_set = load_set(level, None if hidden_folder is None else Path(hidden_folder))
     return task_set, SetSource(task_set, split, train_pool, salt)
 
 

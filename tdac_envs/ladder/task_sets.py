@@ -188,20 +188,27 @@ class TaskSet:
             self._check_file_split(split)
         if split != "hidden" and salt is not None:
             raise TaskError(f"split {split!r} has a public salt; leave out the salt")
-        if split == "hidden" and salt is None:
+        if self.files is not None and salt is not None:
+            raise TaskError(
+                f"set {self.name!r} has worlds from files; leave out the salt"
+            )
+        if self.files is None and split == "hidden" and salt is None:
             raise TaskError("split 'hidden' needs a salt; give a salt file")
         if salt is not None and not LEAST_SALT <= len(salt) <= MOST_SALT:
             raise TaskError(
                 f"expected a salt of {LEAST_SALT} to {MOST_SALT} bytes, got {len(salt)}"
             )
+        if self.files is not None and split == "hidden":
+            salt = bytes.fromhex(self.files.hidden_sha256 or "")
         return world_key(salt or _PUBLIC_SALT, self.sha256, split, index, purpose)
 
     def _check_file_split(self, split: str) -> None:
         assert self.files is not None
-        if split == "hidden":
+        if split == "hidden" and "hidden" not in self.files.splits:
             raise TaskError(
                 f"set {self.name!r} has no split 'hidden': its worlds are files, which "
-                "an author of a controller may have seen"
+                "an author of a controller may have seen; a hidden folder has further "
+                "ones"
             )
         if split not in self.files.splits:
             own = ", ".join(self.files.splits)
@@ -232,17 +239,29 @@ class TaskSet:
         return np.random.Generator(np.random.Philox(key=key))
 
 
-def load_set(name: str | Path) -> TaskSet:
+def load_set(name: str | Path, hidden_folder: Path | None = None) -> TaskSet:
     """A task set by its name (`tdac sets` lists them), or from a `set.yaml`.
+
+    Args:
+        name: Its name, or path.
+        hidden_folder: Folder of maps with the split `hidden` of a set of files.
 
     Raises:
         TaskError: There is none, or it is not valid, or a file of its worlds is not.
     """
     file = find_set_file(name)
     if file.files is None:
+        if hidden_folder is not None:
+            raise TaskError(
+                f"set {file.name!r} makes its worlds: its split 'hidden' needs a salt "
+                "file, and no hidden folder"
+            )
         return TaskSet(file)
+    sizes = file.robot.radius, file.goal_tolerance
     try:
-        files = opened(file.files, file.robot.radius, file.goal_tolerance)
+        files = opened(file.files, *sizes)
+        if hidden_folder is not None:
+            files = files.with_hidden(hidden_folder, file.files, *sizes)
     except TaskError as error:
         raise TaskError(f"set {file.name!r}: {error}") from None
     return TaskSet(file, files)

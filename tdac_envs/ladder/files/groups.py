@@ -33,17 +33,20 @@ def shared_out(
 
 def groups(worlds: Sequence[FoundWorld]) -> list[str]:
     """The name of each world's group: its first origin, or its first map's hash."""
-    links = [
-        {f"map {each.content}", *([f"from {each.origin}"] if each.origin else [])}
-        for each in worlds
-    ]
+    names = [links(each) for each in worlds]
     group: dict[str, set[str]] = {}
-    for link in links:
+    for link in names:
         joined = set().union(link, *(group.get(name, set()) for name in link))
         for name in joined:
             group[name] = joined
     # "from …" comes before "map …".
-    return [min(group[next(iter(link))]) for link in links]
+    return [min(group[next(iter(link))]) for link in names]
+
+
+def links(world: FoundWorld) -> set[str]:
+    """What makes a world one of a group: its map, and its origin if that is known."""
+    origin = [f"from {world.origin}"] if world.origin else []
+    return {f"map {world.content}", *origin}
 
 
 def _split_of(group: str, splits: Sequence[FileSplit]) -> FileSplit:

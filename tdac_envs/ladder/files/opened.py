@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.ladder.files.barn import read_barn
 from tdac_envs.ladder.files.found import FoundWorld
-from tdac_envs.ladder.files.groups import shared_out
+from tdac_envs.ladder.files.groups import links, shared_out
 from tdac_envs.ladder.files.index import files_of, read_folder
 from tdac_envs.ladder.files.spec import FileSplit, FilesSpec
 
 Stamp = tuple[tuple[str, int, int], ...]
+_SHARED = {"map": "map", "from": "origin"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,16 +28,53 @@ class FileWorlds:
         splits: The worlds of each split.
         skipped: Why the other tasks cannot be used, a line for each.
         sha256: Hash of the worlds' maps and tasks; files elsewhere have the same.
+        hidden_folder: Folder of the split `hidden`, if there is one; it is no part of
+            the other attributes but `splits`.
+        hidden_sha256: Hash of its worlds.
     """
 
-    splits: Mapping[FileSplit, tuple[FoundWorld, ...]]
+    splits: Mapping[Literal[FileSplit, "hidden"], tuple[FoundWorld, ...]]
     skipped: tuple[str, ...]
     sha256: str
+    hidden_folder: Path | None = None
+    hidden_sha256: str | None = None
 
     @property
     def counts(self) -> dict[str, int]:
         """Number of worlds of each split."""
         return {split: len(worlds) for split, worlds in self.splits.items()}
+
+    def with_hidden(
+        self, folder: Path, spec: FilesSpec, radius: float, tolerance: float
+    ) -> FileWorlds:
+        """The same with a split `hidden`: a folder of maps that was kept back.
+
+        Args:
+            folder: Its folder, with an index as that of the set.
+            spec: Where the other worlds are.
+            radius: Radius of the body, px.
+            tolerance: Distance at which the goal is reached, px.
+
+        Raises:
+            TaskError: As `opened` does, or it has a map or an origin of the set.
+        """
+        own = FilesSpec(folder=folder, splits=("test",), infeasible=spec.infeasible)
+        found = opened(own, radius, tolerance)
+        worlds = found.splits["test"]
+        public = set().union(*(links(each) for s in self.splits.values() for each in s))
+        for world in worlds:
+            if shared := links(world) & public:
+                what = sorted(shared)[0].partition(" ")[0]
+                raise TaskError(
+                    f"{world.file}: its {_SHARED[what]} is also in the public part of "
+                    "the set, so its author may have seen it"
+                )
+        return replace(
+            self,
+            splits={**self.splits, "hidden": worlds},
+            hidden_folder=folder.resolve(),
+            hidden_sha256=found.sha256,
+        )
 
     @property
     def largest_side(self) -> int:
@@ -100,4 +139,4 @@ def _opened(
         )
     joined = "".join(sorted(world.sha256 for world in feasible))
     digest = hashlib.sha256(joined.encode()).hexdigest()
-    return FileWorlds(shared_out(feasible, spec.splits), tuple(skipped), digest)
+    return FileWorlds({**shared_out(feasible, spec.splits)}, tuple(skipped), digest)

@@ -2,7 +2,10 @@
 
 import json
 
+import cv2
+import numpy as np
 import pytest
+import yaml
 
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_envs import load_set
@@ -46,3 +49,27 @@ def test_more_worlds_than_there_are(barn):
     """One line says how many there are."""
     with pytest.raises(TaskError, match="worlds 3: set 'barn' has 2 worlds in its"):
         verify_on_set(AHEAD, barn, "test", 3)
+
+
+def test_a_folder_that_was_kept_back(tmp_path, monkeypatch):
+    """Sums alone are told, and the ledger knows the worlds by their hash."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    task = {"file": "a.png", "start": [20, 40], "goal": [100, 40]}
+    for name, wall in (("maps", 4), ("hidden", 6)):
+        (tmp_path / name).mkdir()
+        picture = np.zeros((80, 120), np.uint8)
+        picture[wall:-wall, wall:-wall] = 255
+        cv2.imwrite(str(tmp_path / name / "a.png"), picture)
+        (tmp_path / name / "index.json").write_text(json.dumps([task]))
+    path = tmp_path / "mine.yaml"
+    worlds = {"folder": "maps", "splits": ["test"]}
+    path.write_text(yaml.safe_dump({"worlds": worlds}))
+    tasks = load_set(path, tmp_path / "hidden")
+    report = verify_on_set(AHEAD, tasks, "hidden", 1)
+    assert (report.successes, report.episodes, report.told) == (1, (), ())
+    assert report.provenance.salt_sha256 == tasks.files.hidden_sha256
+    assert report.hidden.count == 1
+    again = verify_on_set(AHEAD, tasks, "hidden", 1)
+    assert again.hidden.recorded is not None
+    with pytest.raises(TaskError, match="has no split 'hidden'"):
+        verify_on_set(AHEAD, load_set(path), "hidden", 1)

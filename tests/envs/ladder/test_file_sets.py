@@ -249,6 +249,46 @@ def test_worlds_that_do_not_exist(folder, arguments, message):
         load_set(folder([20])).world(*arguments)
 
 
+def kept_back(folder, tmp_path, gaps, **more):
+    """Moves the maps of a set to another folder, and writes the set anew."""
+    folder(gaps, [entry(f"{gap}.png", **more) for gap in gaps])
+    (tmp_path / "maps").rename(tmp_path / "hidden")
+    return tmp_path / "hidden"
+
+
+def test_a_folder_that_was_kept_back(folder, tmp_path):
+    """It is the split `hidden`, and changes nothing of the others."""
+    hidden = kept_back(folder, tmp_path, (34, 36))
+    path = folder((30, 32))
+    public, tasks = load_set(path), load_set(path, hidden)
+    assert tasks.sha256 == public.sha256
+    assert tasks.count("hidden") == 2
+    assert public.count("hidden") == 0
+    options = {"level": path, "split": "hidden", "hidden_folder": hidden}
+    env = gym.make("TDAC-Ladder-v0", **options).unwrapped
+    env.reset(options={"index": 1})
+    cells = tasks.world("hidden", 1).cells
+    assert np.array_equal(env.task.terrain.grid.cells, cells)
+    assert any(np.array_equal(cells, floor(gap)) for gap in (34, 36))
+    assert tasks.key("hidden", 0, "noise") != public.key("test", 0, "noise")
+
+
+@pytest.mark.parametrize(
+    ("gaps", "origin", "what"), [((30,), None, "map"), ((34,), "here", "origin")]
+)
+def test_hidden_maps_that_are_public(folder, tmp_path, gaps, origin, what):
+    """Nothing of the set may be in the folder that was kept back."""
+    hidden = kept_back(folder, tmp_path, gaps, origin=origin)
+    path = folder((30, 32), [entry(f"{gap}.png", origin="here") for gap in (30, 32)])
+    with pytest.raises(TaskError, match=f"its {what} is also in the public part"):
+        load_set(path, hidden)
+
+
+def test_a_hidden_folder_is_for_files(tmp_path):
+    with pytest.raises(TaskError, match=r"'known' makes its worlds: .* a salt file"):
+        load_set("known", tmp_path)
+
+
 def test_a_split_without_worlds(folder):
     """One map cannot be in three splits."""
     tasks = load_set(folder([20], worlds={"splits": ["train", "dev", "test"]}))
