@@ -172,10 +172,10 @@ def _check_hiding(request: _Request) -> None:
         )
     seen, path = exposure(), secret.resolve()
     if any(path.is_relative_to(folder) for folder in (*seen.system, *seen.packages)):
-        what, move = ("salt file", "file") if request.salt_file else ("", "folder")
+        what = "salt file" if request.salt_file else "hidden folder"
         raise TaskError(
-            f"{what or 'hidden folder'} {secret}: controllers can read this place, "
-            f"which belongs to Python or its packages; move the {move}"
+            f"{what} {secret}: controllers can read this folder, which belongs to "
+            f"Python or its packages; move the {what.split()[-1]}"
         )
 
 

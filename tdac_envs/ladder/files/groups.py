@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import accumulate
 
 from tdac_envs.ladder.files.found import FoundWorld
-from tdac_envs.ladder.files.spec import FileSplit
+from tdac_envs.ladder.files.spec import AnySplit, FileSplit
 
 SHARES: dict[FileSplit, int] = {"train": 3, "dev": 1, "test": 1}
 """Expected shares of the splits; of those that a set has."""
@@ -15,14 +15,14 @@ SHARES: dict[FileSplit, int] = {"train": 3, "dev": 1, "test": 1}
 
 def shared_out(
     worlds: Sequence[FoundWorld], splits: Sequence[FileSplit]
-) -> dict[FileSplit, tuple[FoundWorld, ...]]:
+) -> dict[AnySplit, tuple[FoundWorld, ...]]:
     """The worlds of each split, in an order that follows from their hashes.
 
     Worlds with the same map or the same origin belong to a group, and so do those that
     are linked by others. The hash of its name decides where a group goes, so further
     files do not move it.
     """
-    shared: dict[FileSplit, list[FoundWorld]] = {split: [] for split in splits}
+    shared: dict[AnySplit, list[FoundWorld]] = {split: [] for split in splits}
     for world, group in zip(worlds, groups(worlds), strict=True):
         shared[_split_of(group, splits)].append(world)
     return {

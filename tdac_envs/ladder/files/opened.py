@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
 
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.ladder.files.barn import read_barn
 from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.ladder.files.groups import links, shared_out
 from tdac_envs.ladder.files.index import files_of, read_folder
-from tdac_envs.ladder.files.spec import FileSplit, FilesSpec
+from tdac_envs.ladder.files.spec import AnySplit, FilesSpec
 
 Stamp = tuple[tuple[str, int, int], ...]
 _SHARED = {"map": "map", "from": "origin"}
@@ -33,7 +32,7 @@ class FileWorlds:
         hidden_sha256: Hash of its worlds.
     """
 
-    splits: Mapping[Literal[FileSplit, "hidden"], tuple[FoundWorld, ...]]
+    splits: Mapping[AnySplit, tuple[FoundWorld, ...]]
     skipped: tuple[str, ...]
     sha256: str
     hidden_folder: Path | None = None
@@ -139,4 +138,4 @@ def _opened(
         )
     joined = "".join(sorted(world.sha256 for world in feasible))
     digest = hashlib.sha256(joined.encode()).hexdigest()
-    return FileWorlds({**shared_out(feasible, spec.splits)}, tuple(skipped), digest)
+    return FileWorlds(shared_out(feasible, spec.splits), tuple(skipped), digest)

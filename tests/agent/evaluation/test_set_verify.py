@@ -437,6 +437,15 @@ def test_the_command_counts_hidden_evaluations(tdac, tmp_path, set_yaml):
     [
         (("--split", "dev"), "--split needs --set NAME"),
         (("-n", "3"), "-n needs --set NAME"),
+        (("--hidden-folder", "x"), "--hidden-folder needs --set NAME"),
+        (
+            ("--set", "known", "--hidden-folder", "x"),
+            "--hidden-folder needs --split hidden",
+        ),
+        (
+            ("--set", "known", "--split", "hidden", "--hidden-folder", "x"),
+            "set 'known' makes its worlds",
+        ),
         (("--set", "unkown"), r"unknown task set 'unkown'"),
         (("--set", "known", "--task", "maze"), "leave out --task"),
         (("--set", "known", "--paper"), "leave out --paper"),
