@@ -175,7 +175,7 @@ def _check_hiding(request: _Request) -> None:
         what = "salt file" if request.salt_file else "hidden folder"
         raise TaskError(
             f"{what} {secret}: controllers can read this folder, which belongs to "
-            f"Python or its packages; move the {what.split()[-1]}"
+            f"Python or its packages; move it"
         )
 
 
