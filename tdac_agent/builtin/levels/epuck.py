@@ -56,6 +56,7 @@ WIDE = 0.009  # m beside a ray that count as seen
 LOOK = 0.07  # m ahead on the path
 MARGIN = 0.006  # m that arcs keep from hits
 BEYOND = 0.02  # m that a wall is taken to go on beyond its last hit
+AGAIN = 0.02  # m that a spin back costs
 RISK, SAFE = 0.25, 0.02  # m that a contact costs; m of room in which it is a third
 
 
@@ -240,6 +241,11 @@ class Maps:
                 if key in self.hits:
                     self.drop(key)
 
+    def trust(self, x, y):
+        """Takes what is near for free, unless something was hit there."""
+        i, j = int((x + HALF) / FINE), int((y + HALF) / FINE)
+        self.free[j - 10 : j + 11, i - 10 : i + 11] = True
+
     def around(self, x, y, reach):
         """Hits within a square, shape (n, 2)."""
         found = [
@@ -331,6 +337,7 @@ def courses():
 
 
 SPEEDS, PLACES = courses()
+SPINS = np.where(SPEEDS.prod(axis=1) < 0.0, SPEEDS[:, 1] - SPEEDS[:, 0], 0.0)
 # The rim of the body, in which nothing may be that no ray has seen.
 BEARINGS = np.linspace(-1.5, 1.5, 13)
 RINGS = np.repeat([RADIUS + 0.002, 0.7 * RADIUS], len(BEARINGS))
@@ -355,6 +362,7 @@ def reset(obs):
         now=0,
         looks=0,
         trail=[],
+        spin=0.0,
     )
 
 
@@ -388,6 +396,7 @@ def aim_around(x, y):
     if stuck:
         STATE["trail"] = []
         if gap > 0.3:
+            STATE["maps"].trust(x, y)
             return
     if not STATE["goals"]:
         gx, gy = STATE["goal"]
@@ -504,7 +513,7 @@ def chosen(x, y, heading):
     price = worth[:, 3:].min(axis=1)
     price = price + RISK * np.exp(-np.maximum(room[:, :4].min(axis=1), 0.0) / SAFE)
     back = SPEEDS.sum(axis=1) < -0.1
-    price = price + 0.05 * back
+    price = price + 0.05 * back + AGAIN * (SPINS * STATE["spin"] < 0.0)
     rx, ry, unseen = swept(px[:, :2], py[:, :2], facing[:, :2], back)
     hidden = unseen.any(axis=(1, 2))
     price = price + 0.03 * hidden
@@ -517,6 +526,7 @@ def chosen(x, y, heading):
         return look(math.atan2(at_y - y, at_x - x) - heading, rx[k], ry[k])
     if SPEEDS[k].sum() > 0.1:
         STATE["looks"] = 0
+    STATE["spin"] = float(SPINS[k])
     return float(SPEEDS[k, 0]), float(SPEEDS[k, 1])
 
 
