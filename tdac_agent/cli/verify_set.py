@@ -109,6 +109,11 @@ def show(report: SetReport, console: Console) -> None:
         say("failures: " + ", ".join(f"{count} {name}" for name, count in causes))
     for text in report.told:
         print_sentences(console, text, indent=2)
+    if report.clock_dependent is not None:
+        say(
+            f"[yellow]clock-dependent[/]: {report.clock_dependent}, so a slower or "
+            "busier machine may give other results"
+        )
     result = report.sequential
     if result is not None:
         colour = "green" if report.passed else "red"

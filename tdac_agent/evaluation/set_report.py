@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Sequence
 from statistics import fmean
@@ -18,6 +19,12 @@ from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import Checks
 from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.suite.contract import (
+    ParseError,
+    parse_source,
+    reads_clock,
+)
+from tdac_envs.ladder.set_file import CpuSpec
 
 MOST_TOLD = 3
 """Failures whose diagnosis is reported."""
@@ -91,7 +98,11 @@ class SetReport(_Record):
     sequential: SequentialResult | None = None
     child_cpu_seconds: float
     seconds: float
-
+    clock_dependent: str | None = Field(
+        None,
+        description="Why a slower or busier machine may give other results; None for "
+        "a controller that reads no clock and used at most half of its CPU budget.",
+    )
     hidden: HiddenCount | None = Field(None, description="Only of hidden worlds.")
 
     @property
@@ -115,6 +126,7 @@ def summarise(
     *,
     told: bool,
     checks: Checks | None = None,
+    clock_dependent: str | None = None,
 ) -> SetReport:
     """Summarises episodes.
 
@@ -125,6 +137,7 @@ def summarise(
         seconds: Wall time, s.
         told: Whether single worlds may be reported.
         checks: The static and contract tests. If one failed, there are no episodes.
+        clock_dependent: See `clock_dependence`.
     """
     checks = checks or Checks(results={})
     if checks.failures:
@@ -152,7 +165,22 @@ def summarise(
         sequential=None if test is None else result_of(test, successes, len(failed)),
         child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
         seconds=round(seconds, 3),
+        clock_dependent=clock_dependent,
     )
+
+
+def clock_dependence(
+    source: bytes, episodes: Sequence[WorldEpisode], budget: CpuSpec
+) -> str | None:
+    """Why a slower or busier machine may give other results; None if it may not."""
+    with contextlib.suppress(ParseError):
+        if reads_clock(parse_source(source)):
+            return "it reads the clock"
+    used = [e.cpu_seconds / (budget.start + budget.of_steps(e.steps)) for e in episodes]
+    over = sum(share > 0.5 for share in used)
+    if over == 0:
+        return None
+    return f"in {over} of {len(used)} episodes it used over half of its CPU budget"
 
 
 def scores_of(episodes: Sequence[WorldEpisode]) -> Scores:

@@ -20,7 +20,12 @@ from tdac_agent.evaluation.kept_sets import (
 )
 from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, user_ledger
 from tdac_agent.evaluation.seeded_run import run_job
-from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
+from tdac_agent.evaluation.set_report import (
+    SetProvenance,
+    SetReport,
+    clock_dependence,
+    summarise,
+)
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
@@ -224,7 +229,16 @@ def _driven(
             versions=dict(versions()),
         )
         seconds = time.monotonic() - began
-        report = summarise(provenance, ended, test, seconds, told=told, checks=checks)
+        clock = clock_dependence(request.source, ended, tasks.file.cpu)
+        report = summarise(
+            provenance,
+            ended,
+            test,
+            seconds,
+            told=told,
+            checks=checks,
+            clock_dependent=clock,
+        )
         if out is not None and told:
             keep_report(report, out)
             keep_trajectories(job.trajectories, out)

@@ -109,6 +109,17 @@ def import_error(tree: ast.Module) -> str | None:
     return f"{'; '.join(problems)}; allowed modules: {allowed}" if problems else None
 
 
+def reads_clock(tree: ast.Module) -> bool:
+    """Whether a source imports `time`, the one allowed module that knows it."""
+    for node in nodes_of(tree):
+        if isinstance(node, ast.Import):
+            if any(alias.name == "time" for alias in node.names):
+                return True
+        elif isinstance(node, ast.ImportFrom) and node.module == "time":
+            return True
+    return False
+
+
 def policy_error(tree: ast.Module) -> str | None:
     """Says why `policy` is not a plain function of one observation; None if it is."""
     function = top_level_names(tree).get("policy")

@@ -3,7 +3,10 @@
 import hashlib
 import json
 import math
+import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +16,7 @@ import yaml
 import tdac_agent
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.evaluation.ledger import user_ledger
-from tdac_agent.evaluation.set_report import SetReport
+from tdac_agent.evaluation.set_report import SetReport, clock_dependence
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.verification.judge.set_checks import static_checks
 from tdac_agent.verification.judge.set_files import level_params, write_files
@@ -348,6 +351,46 @@ def test_an_import_may_not_take_long(judge, set_yaml):
     tasks = set_yaml(cpu={"start": 0.15, "step": 0.02, "bank": 1.0})
     (episode,) = verify_on_set(source, tasks, "dev", 1, judge=judge).episodes
     assert "of CPU time for import and reset; 0.15 s are allowed" in episode.error
+
+
+def test_results_that_depend_on_the_clock_are_marked(judge, set_yaml):
+    """Those of controllers that read it, or that use over half of their CPU budget."""
+    tasks = set_yaml()
+    found = []
+    for source in (STILL, "from time import monotonic\n" + STILL):
+        report = verify_on_set(source, tasks, "dev", 2, judge=judge)
+        found.append(report.clock_dependent)
+    assert found == [None, "it reads the clock"]
+    slow, quick = report.episodes
+    budget = tasks.file.cpu
+    most = budget.start + budget.of_steps(slow.steps)
+    slow = slow.model_copy(update={"cpu_seconds": 0.51 * most})
+    quick = quick.model_copy(update={"cpu_seconds": 0.49 * most})
+    assert clock_dependence(STILL.encode(), [quick], budget) is None
+    assert clock_dependence(STILL.encode(), [slow, quick], budget) == (
+        "in 1 of 2 episodes it used over half of its CPU budget"
+    )
+
+
+@pytest.mark.slow
+def test_equal_beside_busy_loops(tmp_path):
+    """A controller that reads no clock gets the same results, but for the times."""
+    busy = [sys.executable, "-c", "while True: pass"]
+    reports = []
+    for loops in (0, 2 * (os.cpu_count() or 1)):
+        beside = [subprocess.Popen(busy) for _ in range(loops)]
+        try:
+            report = verify_on_set(KNOWN, load_set("known"), "dev", 4)
+        finally:
+            for process in beside:
+                process.kill()
+                process.wait()
+        assert report.clock_dependent is None
+        told = report.model_dump(exclude={"seconds", "child_cpu_seconds"})
+        for episode in told["episodes"]:
+            del episode["cpu_seconds"]
+        reports.append(told)
+    assert reports[0] == reports[1]
 
 
 def test_a_sequential_test_stops_early(judge, set_yaml):
