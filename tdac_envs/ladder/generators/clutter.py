@@ -53,13 +53,17 @@ def draw(words: Words, params: Clutter, body: float) -> Draft:
     gap = _sixteenths(words.uniform(*params.gaps) * body)
     circles: list[Circle] = []
     wanted = round(words.uniform(0.8 * params.density, params.density) * cells.size)
-    failures = 0
-    while failures < _FAILURES and np.count_nonzero(cells) < wanted:
+    failures, occupied = 0, np.count_nonzero(cells)
+    while failures < _FAILURES and occupied < wanted:
         chain = _chain(words, params, body, circles, gap)
-        failures = failures + 1 if not chain else 0
+        if not chain:
+            failures += 1
+            continue
+        failures = 0
         for circle in chain:
             fill_disc(cells, *circle)
         circles += chain
+        occupied = np.count_nonzero(cells)
     return Draft(cells, free_places(words, cells, _PLACES))
 
 
