@@ -28,6 +28,12 @@ kept = []
 def policy(obs):
     return 0.0, 0.0
 
+def listed(folder):
+    try:
+        return sorted(os.listdir(folder))
+    except OSError as error:  # some tiers show no other folder
+        return type(error).__name__
+
 def around():
     files = {}
     for name in os.listdir("."):
@@ -36,8 +42,8 @@ def around():
             files[name] = file.read(), status.st_mtime, status.st_mode
     return {
         "files": files,
-        "folder": (os.getcwd(), os.stat(".").st_mtime, os.listdir("..")),
-        "scratch": os.listdir(os.environ["TMPDIR"]),
+        "folder": (os.getcwd(), os.stat(".").st_mtime, listed("..")),
+        "scratch": listed(os.environ["TMPDIR"]),
         "argv": list(sys.argv),
         "environment": dict(os.environ),
         "hash": hash("a text"),
