@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -34,13 +35,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def _set_up_secret() -> None:
     """An installation of the tests' own, whose secret is the same in each run."""
-    folder = tempfile.TemporaryDirectory(prefix="tdac-state-")
-    secret = Path(folder.name, "tdac", "secret")
+    # Not a TemporaryDirectory: since Python 3.13, a forked child of multiprocessing drops
+    # the functions of atexit, and with them the object, which would remove the folder.
+    folder = tempfile.mkdtemp(prefix="tdac-state-")
+    secret = Path(folder, "tdac", "secret")
     secret.parent.mkdir()
     secret.touch(0o600)
     secret.write_bytes(bytes(range(32)))
-    os.environ["XDG_STATE_HOME"] = folder.name
-    atexit.register(folder.cleanup)
+    os.environ["XDG_STATE_HOME"] = folder
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
 
 
 def _compile_kernels() -> None:
