@@ -35,8 +35,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def _set_up_secret() -> None:
     """An installation of the tests' own, whose secret is the same in each run."""
-    # Not a TemporaryDirectory: since Python 3.13, a forked child of multiprocessing drops
-    # the functions of atexit, and with them the object, which would remove the folder.
+    # Not a TemporaryDirectory: since Python 3.13, a forked child of multiprocessing
+    # drops the functions of atexit, and with them the object, which removes its folder.
     folder = tempfile.mkdtemp(prefix="tdac-state-")
     secret = Path(folder, "tdac", "secret")
     secret.parent.mkdir()
