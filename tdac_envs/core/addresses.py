@@ -39,12 +39,12 @@ class Addresses:
         self.words: Words = np.array([words_of(arrays) for arrays in self._held])
 
     def put(self, row: int, arrays: tuple[NDArray[Any], ...]) -> None:
-        """Replaces the arrays of one row."""
-        words = words_of(arrays)
+        """Replaces the first arrays of one row, as many as are given."""
+        words, held = words_of(arrays), self._held[row]
         # Keep both until the address is replaced, in case of an interrupt in between.
-        self._held[row] = self._held[row], arrays
-        self.words[row] = words
-        self._held[row] = arrays
+        self._held[row] = held, arrays
+        self.words[row, : len(arrays)] = words
+        self._held[row] = *arrays, *held[len(arrays) :]
 
     def __getstate__(self) -> dict[str, Any]:
         raise TypeError("memory addresses cannot be copied or pickled")

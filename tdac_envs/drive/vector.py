@@ -305,8 +305,8 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         self.tasks[i], self._starts[i] = task, (*task.start, task.shortest)
         self.goals[i] = task.goal
         if task.field is not before.field:
-            self._addresses.put(i, self._arrays(i))
-        self.robots.row(i).place(task)
+            self._addresses.put(i, self.setups[i].world(task))
+        self.robots.place(task, i)
 
     def _random(self, i: int) -> np.random.Generator:
         random = self._randoms[i]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import EllipsisType
 from typing import NamedTuple
 
 import numpy as np
@@ -77,9 +78,13 @@ class Robot(NamedTuple):
         """Views of the arrays of one of many robots."""
         return Robot(*(array[index] for array in self))
 
-    def place(self, task: EPuckTask) -> None:
-        """Places the robot at the start of a task; call `kernels.begin` next."""
+    def place(self, task: EPuckTask, index: int | EllipsisType = ...) -> None:
+        """Places the robot, or robot `index` of many, at the start of a task.
+
+        Call `kernels.begin` next.
+        """
         goal = slice(stepping.GOAL_X, stepping.HORIZON + 1)
-        self.constants[goal] = *task.goal, task.goal_tolerance, task.horizon
-        self.state[: stepping.HEADING + 1] = task.start
-        self.outcome[stepping.REMAINING] = task.shortest
+        wanted = *task.goal, task.goal_tolerance, task.horizon
+        self.constants[index, goal] = wanted
+        self.state[index, : stepping.HEADING + 1] = task.start
+        self.outcome[index, stepping.REMAINING] = task.shortest

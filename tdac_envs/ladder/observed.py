@@ -66,9 +66,9 @@ class View:
         x, y, heading = task.start if self._from_start else (0.0, 0.0, 0.0)
         # Of `math`, since NumPy's may differ between one number and many.
         cosine, sine = math.cos(heading), math.sin(heading)
-        anchor = np.array([x, y, heading, cosine, sine, 0.0, 0.0])
-        anchor[5:] = _moved(np.array(task.goal), anchor)
-        return anchor
+        dx, dy = task.goal[0] - x, task.goal[1] - y
+        goal = cosine * dx + sine * dy, cosine * dy - sine * dx
+        return np.array([x, y, heading, cosine, sine, *goal])
 
     def seen(self, whole: Seen, poses: Array, anchors: Array) -> Seen:
         """The observations of one robot, or of many with an additional first axis.
@@ -78,8 +78,16 @@ class View:
             poses: True poses, shape (..., 3).
             anchors: See `anchor`, shape (..., 7).
         """
-        own = dict(whole)
-        own["goal"] = anchors[..., 5:].astype(np.float32)
+        own = {**whole, **self.placed(poses, anchors)}
+        return self.chosen(own)
+
+    def chosen(self, whole: Seen) -> Seen:
+        """The entries that are observed."""
+        return {key: whole[key] for key in self._keys}
+
+    def placed(self, poses: Array, anchors: Array) -> Seen:
+        """The observed goal and pose; arguments as for `seen`."""
+        own = {"goal": anchors[..., 5:].astype(np.float32)}
         if self._from_start and "pose" in self._keys:
             turned = poses[..., 2] - anchors[..., 2]
             turned = np.where(turned > math.pi, turned - 2.0 * math.pi, turned)
@@ -87,7 +95,7 @@ class View:
             places = _moved(poses[..., :2], anchors)
             joined = np.concatenate([places, turned[..., None]], axis=-1)
             own["pose"] = joined.astype(np.float32)
-        return {key: own[key] for key in self._keys}
+        return own
 
     def info(self, whole: dict[str, Any], pose: Array, ended: bool) -> dict[str, Any]:
         """The info of one robot.

@@ -52,8 +52,10 @@ class OnSetVector(DrivenVectorEnv):
             told = view.infos(infos, poses, ended)
             return seen, rewards, terminated, truncated, told
         final = infos.pop("final_obs")
+        placed = view.placed(self.last_poses, before)
         for i in np.flatnonzero(ended).tolist():
-            final[i] = view.seen(final[i], self.last_poses[i], before[i])
+            own = {key: values[i].copy() for key, values in placed.items()}
+            final[i] = view.chosen({**final[i], **own})
         last = view.infos(infos.pop("final_info"), self.last_poses, ended)
         # The new episodes have not ended.
         told = view.infos(infos, poses, np.zeros_like(ended))
