@@ -97,7 +97,7 @@ class LadderEnv(OnSet, Map2DEnv):
     are plates (`EPuckLadderEnv`); a task set defines the worlds, the robot, what it
     observes, and the disturbances (`docs/task-sets.md`). `tdac sets` lists the levels:
     - `known`: the map and the exact pose on it,
-    - `unknown`: the exact pose and short ranges, no map,
+    - `unknown`: the exact pose and ranges all around, no map,
     - `lost`: odometry with errors and noisy ranges; wheels that slip and are not
       equally fast; neither a pose nor a map,
     - `epuck`: infra-red sensors and wheel encoders of an e-puck whose wheels slip;

@@ -1,10 +1,11 @@
 """Drives to a goal without a map, and never into space that it has not seen free.
 
 Two maps grow: the distance to the nearest point that a ray has hit, and the space that
-rays and the body have found free. The way to the goal takes unseen space for free. In
-each step, arcs are tried out: the next step of an arc must lie in free space, what
-comes then must not touch a hit. If the best arc leads into unseen space, the robot
-first turns on the spot to look there.
+rays and the body have found free. The way to the goal takes unseen space for free,
+except between two hits that seem to be of one wall. In each step, arcs are tried out:
+the next step of an arc must lie in free space, what comes then must not touch a hit.
+If the best arc leads into unseen space, the robot first turns on the spot to look
+there. With rays all around, it drives backwards as well as forwards.
 """
 
 import json
@@ -20,11 +21,16 @@ DT, TOLERANCE = PARAMS["dt"], PARAMS["goal_tolerance"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
 RAYS = ROBOT["n_rays"]
 VIEW = math.radians(ROBOT["field_of_view_deg"])
-FAN = VIEW * (np.arange(RAYS) / max(RAYS - 1, 1) - 0.5)
+GAP = VIEW / max(RAYS - 1, 1)  # rad between two rays
+FAN = GAP * np.arange(RAYS) - 0.5 * VIEW
+ROUND = 2.0 * math.pi - VIEW < 1.01 * GAP  # whether the robot sees behind itself
 MARGIN = 0.06  # px that are kept from walls
 WISH, FEAR = 0.5, 6.0  # px that are kept where there is room; price of a px less
 LOOSE = 0.45  # px by which the search may come too near to a hit
 SLIVER = 1.6  # px around walls in which a px must be crossed to be free
+GUESS = 2.5  # how much more a px costs where a wall is likely
+LINE = 60  # px between two hits in a row that are taken for one wall, at most
+APART = 2.0 * (RADIUS - LOOSE) - 1.0  # px between two hits that leave no way
 STALE = 5  # steps after which new walls lead to a new plan, if they are not in the way
 ROOM = 1.5 * RADIUS  # clearance from which a px costs nothing extra
 REACH = int(ROOM) + 2
@@ -33,6 +39,7 @@ UNSEEN = 0.0  # how much more an unseen px costs
 PEEK = 6.0  # px that a look costs
 WAIT, STUCK = 25, 6.0  # steps within so many px after which the search goes another way
 CELL = 2  # px between the places of the search
+BEYOND = 48.0  # px beyond the robot up to which the search goes
 LOOK, TURN = 6.0, 10.0  # px ahead; px that a turn by a right angle costs
 WINDOW = 36  # px around the robot in which arcs lie
 # Steps after which an arc is looked at: often in the first ones, which will be driven.
@@ -46,7 +53,7 @@ TURNS = np.arange(120) * (2.0 * math.pi / 120)
 SPINS = np.array([(k + 30) % 60 - 30 for k in range(120)]) * (2.0 * math.pi / 120)
 FULL_SPINS = np.remainder(TURNS + math.pi, 2.0 * math.pi) - math.pi
 LENGTHS = np.arange(1, 33) * 0.75  # px
-SAMPLES = np.arange(0.0, RANGE, 0.25)  # px along a ray
+SAMPLES = np.arange(0.0, RANGE, 0.5)  # px along a ray
 STEPS = np.maximum(np.abs(np.arange(-REACH, REACH + 1)) - 0.5, 0.0)
 KERNEL = np.hypot(STEPS[:, None], STEPS)  # distance to a px from the px around it
 
@@ -59,6 +66,7 @@ class Maps:
         walls: Which px are walls.
         crossed: Which px a ray or the body has been in: they are free.
         filled: Which px lie between two rays that went further.
+        guessed: Which px may be walls, since they lie between two hits of a wall.
         away: Distance to the nearest wall, at most REACH px.
         cost: Cost of the way to the goal, for every CELL-th px.
         closed: Places at which the robot got no further.
@@ -68,8 +76,8 @@ class Maps:
         self.goal = goal
         half = int(max(320.0, max(map(abs, goal)) + 160.0)) // CELL * CELL
         self.half, self.side = half, 2 * half + 1
-        self.walls, self.crossed, self.filled = np.zeros(
-            (3, self.side, self.side), bool
+        self.walls, self.crossed, self.filled, self.guessed = np.zeros(
+            (4, self.side, self.side), bool
         )
         self.away = np.full((self.side, self.side), float(REACH))
         self.cost = np.full((half + 1, half + 1), np.inf)
@@ -102,8 +110,10 @@ class Maps:
         )
         self.crossed[rows, columns] = True
         hit = ranges < RANGE - 1e-3
-        tips = ranges[hit] + 1e-3
-        rows, columns = self.indices(x + tips * cosines[hit], y + tips * sines[hit])
+        tips = ranges + 1e-3
+        rows, columns = self.indices(x + tips * cosines, y + tips * sines)
+        self.guess(rows, columns, hit)
+        rows, columns = rows[hit], columns[hit]
         fresh = {
             (j, i)
             for j, i in zip(rows.tolist(), columns.tolist(), strict=True)
@@ -117,19 +127,57 @@ class Maps:
         self.fill(x, y, heading, ranges)
         return bool(fresh)
 
+    def guess(self, rows, columns, hit):
+        """Takes what is between two hits for a wall, if they are in one row or column.
+
+        A wall along which rays graze has hits that are far apart.
+        """
+        next_row, next_column = np.roll(rows, -1), np.roll(columns, -1)
+        tall, wide = np.abs(next_row - rows), np.abs(next_column - columns)
+        both, long = hit & np.roll(hit, -1), np.maximum(tall, wide)
+        both &= (np.minimum(tall, wide) == 0) & (long > APART) & (long <= LINE)
+        both[RAYS - 1 :] &= ROUND
+        for k in np.flatnonzero(both).tolist():
+            j, i = np.linspace(
+                (rows[k], columns[k]), (next_row[k], next_column[k]), long[k] + 1
+            ).T.astype(int)
+            self.guessed[j[1:-1], i[1:-1]] = True
+
+    def doubt(self):
+        """Forgets guesses that have been seen free; rows and columns of the others."""
+        places = np.nonzero(self.guessed)
+        free = self.crossed[places] | self.filled[places]
+        self.guessed[places] = ~free
+        return places[0][~free], places[1][~free]
+
+    def likely(self):
+        """Distance to the nearest wall or guess, for every CELL-th px."""
+        away = self.away[::CELL, ::CELL].copy()
+        reach = REACH // CELL
+        kernel = KERNEL[REACH % CELL :: CELL, REACH % CELL :: CELL]
+        rows, columns = self.doubt()
+        for j, i in np.unique(np.stack([rows, columns]) // CELL, axis=1).T.tolist():
+            part = away[j - reach : j + reach + 1, i - reach : i + reach + 1]
+            if part.shape == kernel.shape:
+                np.minimum(part, kernel, out=part)
+        return away
+
     def fill(self, x, y, heading, ranges):
         """Fills the px between two rays, as far as both went; and those of the body."""
         rows, columns, dx, dy = self.square(x, y, int(RANGE) + 1)
-        dx, dy = dx[None, :], dy[:, None]
-        cosine, sine = math.cos(heading), math.sin(heading)
-        ahead, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
-        distance = np.sqrt(ahead * ahead + aside * aside)
-        self.crossed[rows, columns] |= distance <= RADIUS
-        place = (np.arctan2(aside, ahead) + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
-        seen = (place >= 0.0) & (place < RAYS - 1) & (distance <= RANGE)
-        least = np.minimum(ranges[:-1], ranges[1:])
-        k = place[seen].astype(int)
-        self.filled[rows, columns][seen] |= distance[seen] <= least[k]
+        square = dx * dx + (dy * dy)[:, None]
+        self.crossed[rows, columns] |= square <= RADIUS * RADIUS
+        filled = self.filled[rows, columns]
+        far = float(ranges.max())
+        j, i = np.nonzero(~filled & (square <= far * far))
+        place = np.arctan2(dy[j], dx[i]) - (heading - 0.5 * VIEW)
+        place = np.remainder(place, 2.0 * math.pi) * (1.0 / GAP)
+        k = place.astype(int)
+        least = np.minimum(ranges, np.roll(ranges, -1))
+        # Behind the last ray nothing is seen, unless the first one is next to it.
+        least = np.append(least if ROUND else least[:-1], 0.0)
+        new = square[j, i] <= least[np.minimum(k, least.size - 1)] ** 2
+        filled[j[new], i[new]] = True
 
     def replan(self, x, y, new):
         """Makes a new plan if a wall is in the way, or if walls are new for a while."""
@@ -163,12 +211,20 @@ class Maps:
     def plan(self, x, y):
         """Costs of the way to the goal, up to somewhat beyond the robot."""
         away, free = self.away[::CELL, ::CELL], self.filled[::CELL, ::CELL]
-        price = 1.0 + PRICE * np.clip((ROOM - away) / (ROOM - RADIUS), 0.0, 1.0) ** 2
+        likely = self.likely()
+        price = 1.0 + PRICE * np.clip((ROOM - likely) / (ROOM - RADIUS), 0.0, 1.0) ** 2
+        price += GUESS * (likely < RADIUS - LOOSE)
         price += UNSEEN * ~free
         passable = (away >= RADIUS - LOOSE) & ~self.closed
         passable[:3], passable[-3:], passable[:, :3], passable[:, -3:] = (False,) * 4
-        goal = self.cell(*self.goal)
-        self.cost[:] = wave(passable, price, goal, self.cell(x, y))
+        goal, robot = self.cell(*self.goal), self.cell(x, y)
+        least = CELL * math.dist(goal, robot)
+        if math.isfinite(self.cost[robot]):
+            least = max(least, float(self.cost[robot]))
+        for most in (least + BEYOND, 2.0 * least + BEYOND, math.inf):
+            self.cost[:], found = wave(passable, price, goal, robot, most)
+            if found:
+                return
 
     def cell(self, x, y):
         """Row and column of the place of the search that is nearest."""
@@ -192,12 +248,16 @@ def moves(width):
     return found
 
 
-def wave(passable, price, goal, robot, beyond=48.0):
+def wave(passable, price, goal, robot, most):
     """Costs to the goal over places, in bands of equal cost; inf where there is no way.
 
-    Stops somewhat beyond the robot. No move is shorter than a band is wide, so each
-    band is final when its turn comes.
+    Stops somewhat beyond the robot, and leaves out places over which the robot cannot
+    get to the goal for at most `most`. No move is shorter than a band is wide, so each
+    band is final when its turn comes. Also returns whether the robot was reached.
     """
+    rows = np.arange(passable.shape[0]) - robot[0]
+    columns = np.arange(passable.shape[1]) - robot[1]
+    spare = most - CELL * np.hypot(rows[:, None], columns).ravel()
     width = passable.shape[1]
     shifts, lengths, first, second = (
         np.array(each) for each in zip(*moves(width), strict=True)
@@ -209,6 +269,7 @@ def wave(passable, price, goal, robot, beyond=48.0):
     target = robot[0] * width + robot[1]
     around = target + np.array([0, 1, -1, width, -width])
     cost[start] = 0.0
+    last = np.zeros(cost.shape, int)  # where a place is in a band for the last time
     bands, band = {0: [np.array([start])]}, 0
     while bands and band * CELL < until:
         parts = bands.pop(band, None)
@@ -216,11 +277,12 @@ def wave(passable, price, goal, robot, beyond=48.0):
         if parts is None:
             continue
         at = np.concatenate(parts)
-        so_far = cost[at]
-        at = np.unique(at[so_far >= (band - 1) * CELL])
+        at = at[cost[at] >= (band - 1) * CELL]
+        last[at] = np.arange(at.size)
+        at = at[last[at] == np.arange(at.size)]
         to = at[:, None] + shifts
         further = cost[at][:, None] + lengths * (price[at][:, None] + price[to])
-        better = passable[to] & (further < cost[to])
+        better = passable[to] & (further < np.minimum(cost[to], spare[to]))
         better &= passable[at[:, None] + first] & passable[at[:, None] + second]
         to, further = to[better], further[better]
         if not to.size:
@@ -232,8 +294,8 @@ def wave(passable, price, goal, robot, beyond=48.0):
             if some.size:
                 bands.setdefault(k, []).append(some)
         if until == math.inf and np.isfinite(cost[around]).any():
-            until = float(cost[around].min()) + beyond
-    return cost.reshape(-1, width)
+            until = float(cost[around].min()) + BEYOND
+    return cost.reshape(-1, width), until < math.inf
 
 
 def descent(cost, robot):
@@ -402,8 +464,11 @@ def lattice(tips):
 
 
 def turns_left(near, x, y, facing, left):
-    """Price of the turn into the way that is still to come, forwards."""
-    ahead = near.left(x + LOOK * np.cos(facing), y + LOOK * np.sin(facing))
+    """Price of the turn into the way that is still to come."""
+    dx, dy = LOOK * np.cos(facing), LOOK * np.sin(facing)
+    ahead = near.left(x + dx, y + dy)
+    if ROUND:
+        ahead = np.minimum(ahead, near.left(x - dx, y - dy))
     return TURN * np.clip((ahead - left) / LOOK + 1.0, 0.0, 2.0)
 
 
@@ -423,7 +488,8 @@ def best_arc(near, x, y, heading, slack):
     fear = fears(room[:, :SOON], seen[:, :NEXT])
     seen = seen >= -slack
     ready = seen[:, :NEXT].all(axis=1)
-    fits[~FORWARD] &= np.logical_and.accumulate(seen[~FORWARD], axis=1)
+    if not ROUND:
+        fits[~FORWARD] &= np.logical_and.accumulate(seen[~FORWARD], axis=1)
     there = fits & ready[:, None]
     there &= np.hypot(px - goal[0], py - goal[1]) <= 0.97 * TOLERANCE
     if there.any():
@@ -450,7 +516,9 @@ def best_line(near, x, y, heading, slack):
     left = near.left(px, py)
     best = math.inf, None, None
     for sign, spins in (1.0, FULL_SPINS), (-1.0, np.roll(FULL_SPINS, 60)):
-        able = fits if sign > 0.0 else fits & np.logical_and.accumulate(seen, axis=1)
+        able = fits
+        if sign < 0.0 and not ROUND:
+            able = fits & np.logical_and.accumulate(seen, axis=1)
         spun = np.where(
             np.abs(spins) < 1e-6, 0.0, STEP * np.maximum(np.abs(spins) / SPIN, 1.0)
         )
@@ -480,7 +548,10 @@ def look(near, x, y, heading, unseen):
     gaps = np.hypot(places[:, :1] - px, places[:, 1:] - py).min(axis=1)
     dx, dy = (places[int(gaps.argmin())] - (x, y)).tolist()
     bearing = math.remainder(math.atan2(dy, dx) - heading, 2.0 * math.pi)
-    turn = math.copysign(max(abs(bearing) - 0.48 * VIEW, 0.15), bearing)
+    if ROUND:
+        turn = bearing - FAN[np.abs(FAN - bearing).argmin()]
+    else:
+        turn = math.copysign(max(abs(bearing) - 0.48 * VIEW, 0.15), bearing)
     share = min(max(turn / SPIN, -1.0), 1.0)
     return share, -share
 
