@@ -129,7 +129,8 @@ def _tested(
     conditions: Conditions,
 ) -> Admitted | Rejection:
     """Tests a start and a goal; computes the figures on the way."""
-    gap = rounded(bottleneck(cells, clear, start, goal) / conditions.radius)
+    least = (conditions.min_gap - 1.0 / FRACTIONS) * conditions.radius
+    gap = rounded(bottleneck(cells, clear, start, goal, least) / conditions.radius)
     if gap < conditions.min_gap:
         return Rejection.NARROW
     padded = read_only(np.pad(clear, 1))
