@@ -47,10 +47,13 @@ class Draft:
     Attributes:
         cells: Shape (height, width), bool, True = occupied.
         places: Shape (n, 2), int64: pixels (x, y) for the start and the goal.
+        touched: Shape (height, width), bool: also the pixels of which an obstacle
+            occupies a part. The gap is measured on them; by default on `cells`.
     """
 
     cells: BoolGrid
     places: Places
+    touched: BoolGrid | None = None
 
     def turned(self, quarters: int, mirrored: bool) -> Draft:
         """This draft mirrored at the vertical axis, then turned by `quarters` * 90°."""
