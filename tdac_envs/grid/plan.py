@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import kernel, read_only
+from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.grid.astar import ROUNDING, Guide, Lengths, lengths_between
 from tdac_envs.grid.grid import BoolGrid
 
@@ -21,56 +22,74 @@ _SOLID, _OPEN, _TRIED = 0, 1, 2
 
 
 @kernel
-def _spread(
-    free: BoolGrid,
-    goal_x: int,
-    goal_y: int,
-    field: Field,
-    settled: NDArray[np.bool_],
-    buckets: NDArray[np.int64],
-) -> bool:
+def _spread(free: BoolGrid, goal: int, padded: Field, buckets: NDArray[np.int32]) -> bool:
     """Dijkstra with buckets of width 1; returns False if a bucket is full.
 
     No step is shorter than 1, so a bucket receives no cells while it is processed, and
     three buckets in rotation suffice.
+
+    Args:
+        free: Shape (height, width).
+        goal: Index of the goal in `padded`, flattened.
+        padded: Shape (height + 2, width + 2), overwritten: the lengths; negative where
+            no path may go.
+        buckets: Shape (3, n), overwritten.
     """
     height, width = free.shape
-    room = buckets.shape[1]
+    _fill_open(free, padded)
+    field, row, room = padded.ravel(), width + 2, buckets.shape[1]
     one, two, three = 0, 1, 2
     n_one, n_two, n_three = 1, 0, 0
-    buckets[one, 0] = goal_y * width + goal_x
-    field[goal_y, goal_x] = 0.0
+    buckets[one, 0] = goal
+    field[goal] = 0.0
     level = 0
     while n_one + n_two + n_three > 0:
         for index in range(n_one):
             cell = buckets[one, index]
-            if settled[cell]:
-                continue
-            settled[cell] = True
-            y, x = cell // width, cell % width
+            length = field[cell]
+            if int(length) < level:
+                continue  # It was in an earlier bucket, too.
             if n_two + 8 > room or n_three + 8 > room:
                 return False
             for k in range(8):
-                nx, ny = x + _DX[k], y + _DY[k]
-                if nx < 0 or ny < 0 or nx >= width or ny >= height:
+                to = cell + _DX[k] + _DY[k] * row
+                candidate = length + (1.0 if k < 4 else _SQRT2)
+                if candidate >= field[to] - 1e-12:
                     continue
-                if not free[ny, nx]:
+                if k >= 4 and (field[cell + _DX[k]] < 0.0 or field[to - _DX[k]] < 0.0):
                     continue
-                if k >= 4 and not (free[y, nx] and free[ny, x]):
-                    continue
-                candidate = field[y, x] + (1.0 if k < 4 else _SQRT2)
-                if candidate < field[ny, nx] - 1e-12:
-                    field[ny, nx] = candidate
-                    if int(candidate) == level + 1:
-                        buckets[two, n_two] = ny * width + nx
-                        n_two += 1
-                    else:
-                        buckets[three, n_three] = ny * width + nx
-                        n_three += 1
+                field[to] = candidate
+                if int(candidate) == level + 1:
+                    buckets[two, n_two] = to
+                    n_two += 1
+                else:
+                    buckets[three, n_three] = to
+                    n_three += 1
         one, two, three = two, three, one
         n_one, n_two, n_three = n_two, n_three, 0
         level += 1
     return True
+
+
+@subkernel
+def _fill_open(free: BoolGrid, padded: Field) -> None:
+    """Fills `padded` with inf where the path may go, and -1 elsewhere."""
+    height, width = free.shape
+    padded[0], padded[height + 1] = -1.0, -1.0
+    for y in range(height):
+        padded[y + 1, 0], padded[y + 1, width + 1] = -1.0, -1.0
+        for x in range(width):
+            padded[y + 1, x + 1] = math.inf if free[y, x] else -1.0
+
+
+@kernel
+def _cropped(padded: Field, field: Field) -> None:
+    """Copies the lengths without their border; inf where there is no path."""
+    height, width = field.shape
+    for y in range(height):
+        for x in range(width):
+            length = padded[y + 1, x + 1]
+            field[y, x] = math.inf if length < 0.0 else length
 
 
 def distance_field(free: BoolGrid, goal: tuple[int, int]) -> Field:
@@ -85,13 +104,14 @@ def distance_field(free: BoolGrid, goal: tuple[int, int]) -> Field:
     """
     if not _is_free(free, goal):
         return np.full(free.shape, np.inf)
-    room, open_ = 4 * sum(free.shape) + 1024, read_only(free)
-    while True:
-        field: Field = np.full(free.shape, np.inf)
-        settled, buckets = np.zeros(free.size, np.bool_), np.empty((3, room), np.int64)
-        if _spread(open_, *goal, field, settled, buckets):
-            return field
+    height, width = free.shape
+    first = (goal[1] + 1) * (width + 2) + goal[0] + 1
+    padded, field = np.empty((height + 2, width + 2)), np.empty(free.shape)
+    room = 4 * sum(free.shape) + 1024
+    while not _spread(read_only(free), first, padded, np.empty((3, room), np.int32)):
         room *= 4
+    _cropped(padded, field)
+    return field
 
 
 def _is_free(free: BoolGrid, pixel: tuple[int, int]) -> bool:

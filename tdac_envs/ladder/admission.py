@@ -116,12 +116,12 @@ def admit(draft: Draft, words: Words, conditions: Conditions) -> Admitted | Reje
         field = distance_field(free, goal)
         start = _drawn_start(draft, field, goal, words, conditions)
         if start is not None:
-            return _tested(draft.cells, clear, start, goal, field, conditions)
+            return _tested(draft, clear, start, goal, field, conditions)
     return Rejection.NEAR
 
 
 def _tested(
-    cells: BoolGrid,
+    draft: Draft,
     clear: FloatGrid,
     start: Pixel,
     goal: Pixel,
@@ -129,18 +129,29 @@ def _tested(
     conditions: Conditions,
 ) -> Admitted | Rejection:
     """Tests a start and a goal; computes the figures on the way."""
-    gap = rounded(bottleneck(cells, clear, start, goal) / conditions.radius)
+    gap = _gap(draft, clear, start, goal, conditions)
     if gap < conditions.min_gap:
         return Rejection.NARROW
     padded = read_only(np.pad(clear, 1))
     if _straight_drive_arrives(padded, start, goal, conditions):
         return Rejection.STRAIGHT
-    found = measured(cells, padded, start, goal, field, gap, conditions)
+    found = measured(draft.cells, padded, start, goal, field, gap, conditions)
     if found.difficulty.steps < conditions.min_steps:
         return Rejection.SHORT
     if found.difficulty.detour < conditions.min_detour:
         return Rejection.DIRECT
     return found
+
+
+def _gap(
+    draft: Draft, clear: FloatGrid, start: Pixel, goal: Pixel, conditions: Conditions
+) -> float:
+    """The gap, or 0 if it is too narrow."""
+    cells = draft.cells
+    if draft.touched is not None:
+        cells, clear = draft.touched, clearance(draft.touched)
+    least = (conditions.min_gap - 1.0 / FRACTIONS) * conditions.radius
+    return rounded(bottleneck(cells, clear, start, goal, least) / conditions.radius)
 
 
 def measured(

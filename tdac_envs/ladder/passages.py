@@ -12,13 +12,15 @@ from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.grid.grid import BoolGrid, FloatGrid
 
 Pixel = tuple[int, int]
-Nodes = NDArray[np.int64]
+Nodes = NDArray[np.int32]
 
-_FRESH = -2
-"""Link of a node that was not reached yet."""
+_CENTRE, _CORNER = 0, 1
+"""Layers of the nodes."""
 
 
-def bottleneck(cells: BoolGrid, clear: FloatGrid, start: Pixel, goal: Pixel) -> float:
+def bottleneck(
+    cells: BoolGrid, clear: FloatGrid, start: Pixel, goal: Pixel, least: float = 0.0
+) -> float:
     """Clearance at the narrowest place of the widest path between two pixels, px.
 
     The path joins centres and corners of pixels, so that the result is exact in
@@ -30,20 +32,23 @@ def bottleneck(cells: BoolGrid, clear: FloatGrid, start: Pixel, goal: Pixel) -> 
         clear: Shape (height, width), float32, from `grid.clearance`.
         start: Pixel (x, y).
         goal: Pixel (x, y).
+        least: Least clearance of interest, px. It makes the search faster.
 
     Returns:
-        0 if there is no path.
+        0 if there is no path, or none with the least clearance.
     """
-    width = cells.shape[1]
+    height, width = cells.shape
     at_corners = cv2.distanceTransform(
         (~touched_corners(cells)).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
     )
-    first, last = goal[1] * width + goal[0], start[1] * width + start[0]
-    nodes = clear.size + at_corners.size
-    heads = np.full(_quarters(float(clear[goal[::-1]])) + 1, -1)
-    links, stack = np.full(nodes, _FRESH), np.empty(nodes, np.int64)
-    centres, corners = read_only(clear.ravel()), read_only(at_corners.ravel())
-    found = _widest(centres, corners, width, first, last, heads, links, stack)
+    room = np.empty((2, height + 2, width + 1), np.int32)
+    heads = np.full(_quarters(float(clear[goal[::-1]])) + 1, -1, np.int32)
+    links, stack = np.empty(room.size, np.int32), np.empty(room.size, np.int32)
+    first, last = ((y + 1) * (width + 1) + x for x, y in (goal, start))
+    distances = read_only(clear), read_only(at_corners)
+    lowest = max(_quarters(least), 1)
+    _fill_rooms(*distances, lowest, room)
+    found = _widest(room.ravel(), width + 1, first, last, heads, links, stack)
     return math.sqrt(found) / 2.0
 
 
@@ -70,10 +75,28 @@ _compiled_quarters = subkernel(_quarters)
 
 
 @kernel
+def _fill_rooms(clear: FloatGrid, at_corners: FloatGrid, least: int, room: Nodes) -> None:
+    """Fills `room` with the clearance of each node, quarters of px**2; 0 below `least`.
+
+    Pixel (i, j) is `[_CENTRE, j + 1, i]`, and its first corner is `[_CORNER, j + 1, i]`.
+    Nodes beside the map have no room, and neither have corners on its border. So a
+    node with room has all its neighbours at the same offsets.
+    """
+    height, width = clear.shape
+    room[:, 0], room[:, height + 1], room[_CENTRE, :, width] = 0, 0, 0
+    for j in range(height):
+        for i in range(width):
+            centre = _compiled_quarters(clear[j, i])
+            corner = _compiled_quarters(at_corners[j, i])
+            room[_CENTRE, j + 1, i] = centre if centre >= least else 0
+            room[_CORNER, j + 1, i] = corner if corner >= least else 0
+        room[_CORNER, j + 1, width] = 0
+
+
+@kernel
 def _widest(
-    centres: NDArray[np.float32],
-    corners: NDArray[np.float32],
-    width: int,
+    room: Nodes,
+    stride: int,
     first: int,
     last: int,
     heads: Nodes,
@@ -82,39 +105,41 @@ def _widest(
 ) -> int:
     """Bottleneck from node `first` to `last`, quarters of px**2.
 
-    The nodes are the centres of all pixels, row by row, and then their corners. A node
-    at least as wide as the bottleneck so far is visited at once; the others wait in a
-    list for each width: `heads` has the first of each list, `links` the next.
+    A node at least as wide as the bottleneck so far is visited at once; the others wait
+    in a list for each width: `heads` has the first of each list, `links` the next.
+
+    Args:
+        room: From `_fill_rooms`, flattened. A node that was reached gets 0.
+        stride: Nodes in a row.
+        first: A node.
+        last: A node.
+        heads: One more than the room of `first`, filled with -1.
+        links: As many as nodes, overwritten.
+        stack: As many as nodes, overwritten.
     """
-    height = centres.size // width
-    level, size = heads.shape[0] - 1, 1
-    stack[0], links[first] = first, -1
+    level, size, corners = heads.shape[0] - 1, 1, room.size // 2
+    stack[0] = first
+    level, room[first] = room[first], 0
     while level > 0:
         while size > 0:
             size -= 1
             node = stack[size]
             if node == last:
                 return int(level)
-            is_corner = node >= centres.size
-            place = node - centres.size if is_corner else node
-            columns = width + 1 if is_corner else width
-            j = place // columns
-            i = place - j * columns
+            across = -corners if node >= corners else corners
+            ahead = -1 if node >= corners else 1
             for k in range(8):
-                to = _neighbour(i, j, is_corner, k, height, width)
-                if to < 0 or links[to] != _FRESH:
+                to = _neighbour(node, k, stride, across, ahead)
+                wide = room[to]
+                if wide == 0:
                     continue
-                links[to] = -1
-                if to < centres.size:
-                    room = _compiled_quarters(centres[to])
-                else:
-                    room = _compiled_quarters(corners[to - centres.size])
-                if room >= level:
+                room[to] = 0
+                if wide >= level:
                     stack[size] = to
                     size += 1
-                elif room > 0:
-                    links[to] = heads[room]
-                    heads[room] = to
+                else:
+                    links[to] = heads[wide]
+                    heads[wide] = to
         level -= 1
         while level > 0 and heads[level] < 0:
             level -= 1
@@ -127,20 +152,18 @@ def _widest(
 
 
 @subkernel
-def _neighbour(i: int, j: int, is_corner: bool, k: int, height: int, width: int) -> int:
-    """The k-th of the eight nodes around node (i, j); -1 outside the map."""
+def _neighbour(node: int, k: int, stride: int, across: int, ahead: int) -> int:
+    """The k-th of the eight nodes around a node: four of its layer, four of the other.
+
+    Args:
+        node: The node.
+        k: 0 to 7.
+        stride: Nodes in a row.
+        across: Offset of the other layer.
+        ahead: Direction of the nearest nodes there: 1 from pixels, -1 from corners.
+    """
     if k < 4:
-        i += (k == 0) - (k == 1)
-        j += (k == 2) - (k == 3)
-        more = 1 if is_corner else 0
-        if i < 0 or j < 0 or i >= width + more or j >= height + more:
-            return -1
-        return height * width + j * (width + 1) + i if is_corner else j * width + i
-    # Pixel (i, j) has the corners (i, j) to (i + 1, j + 1).
-    i += k & 1
-    j += (k >> 1) & 1
-    if not is_corner:
-        return height * width + j * (width + 1) + i
-    if i < 1 or j < 1 or i > width or j > height:
-        return -1
-    return (j - 1) * width + i - 1
+        step = 1 if k < 2 else stride
+        return node + step if k & 1 else node - step
+    step = (k & 1) + (stride if k & 2 else 0)
+    return node + across + ahead * step

@@ -13,14 +13,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import Pose
-from tdac_envs.grid.grid import clearance
 from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
 from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.generators.blocks import PIXEL, Block, centres, raster
 from tdac_envs.ladder.generators.draft import Draft
 from tdac_envs.ladder.generators.plates import Plates, PlatesDraft, draw
-from tdac_envs.ladder.passages import bottleneck
-from tdac_envs.ladder.words import Words, rounded
+from tdac_envs.ladder.words import Words
 from tdac_envs.ladder.worlds import LadderWorld
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.footprint import Rectangle
@@ -122,17 +120,12 @@ def _admitted(
     """Tests lengths on the pixels within blocks, and the gap on all that they touch."""
     blocks = (*draft.plates, *draft.things)
     inner, outer = (raster(draft.columns, draft.rows, blocks, t) for t in (False, True))
-    conditions = spec.conditions
-    found = admit(Draft(inner, draft.places), words, conditions)
+    found = admit(Draft(inner, draft.places, outer), words, spec.conditions)
     if isinstance(found, Rejection):
         return found
     if found.difficulty.steps * spec.dt > spec.max_seconds:
         return Rejection.LONG
-    widest = bottleneck(outer, clearance(outer), found.start, found.goal)
-    gap = rounded(widest / conditions.radius)
-    if gap < spec.min_gap:
-        return Rejection.NARROW
-    return replace(found, difficulty=replace(found.difficulty, gap=gap))
+    return found
 
 
 def _made(

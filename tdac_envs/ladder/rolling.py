@@ -32,16 +32,25 @@ _PIECE = 8.0
 
 @kernel
 def exposed_corners(
-    cells: BoolGrid, radius: float, corners: Values, exposed: Values, rows: Links
+    cells: BoolGrid,
+    ends: Values,
+    radius: float,
+    bound: float,
+    corners: Values,
+    exposed: Values,
+    rows: Links,
 ) -> int:
     """Convex corners of obstacles, and the directions in which a disc may touch them.
 
     Directions at the ends of a corner's quarter circle are dropped where a disc that
-    touches the corner covers another corner.
+    touches the corner covers another corner. Corners that are too far away for a path
+    within the bound are left out.
 
     Args:
         cells: Shape (height, width), bool, True = occupied.
+        ends: Start and goal, [[x, y], [x, y]].
         radius: Radius of the disc, px.
+        bound: Length of the longest path of interest, px.
         corners: Shape (n, 2); its first rows become the corners (x, y).
         exposed: Shape (n, 4); its first rows become the first and last direction.
         rows: Shape (height + 2,), overwritten.
@@ -50,28 +59,45 @@ def exposed_corners(
         The number of corners.
     """
     found = _convex_corners(cells, corners, exposed, rows)
-    reach = math.ceil(2.0 * radius)
     kept = np.zeros(found, np.bool_)
     for k in range(found):
-        row = math.floor(corners[k, 1] + 0.5)
-        first = rows[max(row - reach, 0)]
-        last = rows[min(row + reach + 1, rows.shape[0] - 1)]
-        kept[k] = True
-        # A second pass, since what covers the middle may then be at an end.
-        for number in range(2 * (last - first)):
-            other = first + number % (last - first)
-            dx = corners[other, 0] - corners[k, 0]
-            if other != k and abs(dx) < 2.0 * radius:
-                dy = corners[other, 1] - corners[k, 1]
-                if not _trim(exposed, k, dx, dy, radius):
-                    kept[k] = False
-                    break
+        way = 0.0
+        for end in range(2):
+            dx, dy = corners[k, 0] - ends[end, 0], corners[k, 1] - ends[end, 1]
+            way += math.sqrt(dx * dx + dy * dy)
+        # The disc touches a corner from at most its radius away.
+        if way <= bound + 2.0 * radius + ROUNDING:
+            kept[k] = _is_exposed(corners, exposed, rows, k, radius)
     count = 0
     for k in range(found):
         if kept[k]:
             corners[count], exposed[count] = corners[k], exposed[k]
             count += 1
     return count
+
+
+@subkernel
+def _is_exposed(
+    corners: Values, exposed: Values, rows: Links, k: int, radius: float
+) -> bool:
+    """Drops the directions in which the disc at a corner covers any other corner.
+
+    Returns:
+        False if no direction is left.
+    """
+    x, y, reach = corners[k, 0], corners[k, 1], math.ceil(2.0 * radius)
+    row = math.floor(y + 0.5)
+    first = rows[max(row - reach, 0)]
+    last = rows[min(row + reach + 1, rows.shape[0] - 1)]
+    # A second pass, since what covers the middle may then be at an end.
+    for _ in range(2):
+        for other in range(first, last):
+            dx, dy = corners[other, 0] - x, corners[other, 1] - y
+            if other == k or dx * dx + dy * dy >= 4.0 * radius * radius:
+                continue
+            if not _trim(exposed, k, dx, dy, radius):
+                return False
+    return True
 
 
 @subkernel

@@ -56,8 +56,8 @@ def shortest_path(
     Returns:
         None if there is no path within the bound.
     """
-    corners, exposed = _corners(cells, radius)
-    ends = np.array([start, goal], np.float64)
+    ends = read_only(np.array([start, goal], np.float64))
+    corners, exposed = _corners(cells, ends, radius, bound + rolling.SLACK)
     clear, touched = read_only(padded_clear), read_only(touched_corners(cells))
     labels, found = _LABELS, tangents.FULL
     while found == tangents.FULL:
@@ -70,7 +70,7 @@ def shortest_path(
             read_only(corners),
             read_only(exposed),
             heads,
-            read_only(ends),
+            ends,
             float(radius),
             float(bound) + rolling.SLACK,
             values,
@@ -84,13 +84,14 @@ def shortest_path(
 
 
 def _corners(
-    cells: BoolGrid, radius: float
+    cells: BoolGrid, ends: NDArray[np.float64], radius: float, bound: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     # Not initialised: memory that is never written costs nothing.
     corners, exposed = np.empty((cells.size, 2)), np.empty((cells.size, 4))
     rows = np.empty(cells.shape[0] + 2, np.int64)
+    numbers = float(radius), float(bound)
     count = rolling.exposed_corners(
-        read_only(cells), float(radius), corners, exposed, rows
+        read_only(cells), ends, *numbers, corners, exposed, rows
     )
     return corners[:count], exposed[:count]
 

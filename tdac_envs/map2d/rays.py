@@ -42,20 +42,27 @@ def leaps_of(cells: BoolGrid) -> LeapGrid:
 
 @kernel
 def _fill_leaps(cells: BoolGrid, leaps: LeapGrid) -> None:
-    """Fills `leaps`: 1 + the smallest square of the three neighbours ahead."""
+    """Fills `leaps`: 1 + the smallest square of the three neighbours ahead.
+
+    Two of these are in the row ahead: for them, the pixels of a row are independent.
+    """
     height, width = cells.shape
+    most = np.empty(width, np.uint8)
     for quadrant in range(4):
-        out = leaps[quadrant]
         dx = 1 if _GROWS_X[quadrant] else -1
         dy = 1 if _GROWS_Y[quadrant] else -1
         for row in range(height):
             j = height - row if dy > 0 else row + 1
+            out, ahead, occupied = leaps[quadrant, j], leaps[quadrant, j + dy], cells[j - 1]
+            for i in range(width):
+                beside = min(ahead[i + 1], ahead[i + 1 + dx])
+                side = beside + 1 if beside < _LONGEST else _LONGEST
+                most[i] = 0 if occupied[i] else side
+            side = 0
             for column in range(width):
-                i = width - column if dx > 0 else column + 1
-                if not cells[j - 1, i - 1]:
-                    beside = min(out[j, i + dx], out[j + dy, i])
-                    least = min(beside, out[j + dy, i + dx])
-                    out[j, i] = min(least, _LONGEST - 1) + 1
+                i = width - 1 - column if dx > 0 else column
+                side = min(side + 1, int(most[i]))
+                out[i + 1] = side
 
 
 @subkernel

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import ndimage
 
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.generators.draft import (
@@ -66,21 +66,23 @@ def _counts(cells: BoolGrid, reach: int) -> NDArray[np.int32]:
         reach: The square has a side of 2 * reach + 1.
     """
     side = 2 * reach + 1
-    padded = np.pad(cells, reach, constant_values=True)
-    sums = np.zeros((padded.shape[0] + 1, padded.shape[1] + 1), np.int32)
-    np.cumsum(np.cumsum(padded, axis=0, dtype=np.int32), axis=1, out=sums[1:, 1:])
-    after, before = sums[side:], sums[:-side]
-    whole = after - before
-    return np.asarray(whole[:, side:] - whole[:, :-side])
+    free = (~np.ascontiguousarray(cells)).view(np.uint8)
+    # Outside, `boxFilter` adds zeros: nothing is free there.
+    near = cv2.boxFilter(
+        free, cv2.CV_32S, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT
+    )
+    return np.asarray(side * side - near)
 
 
 def _without_pockets(cells: BoolGrid) -> BoolGrid:
     """Fills all free regions but the largest; of equal ones the first stays."""
-    labels, count = ndimage.label(~cells)
-    if count < 2:
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        (~cells).view(np.uint8), connectivity=4
+    )
+    if count < 3:
         return cells
-    areas = np.bincount(labels.ravel())
-    areas[0] = 0
-    is_largest = (areas == areas.max())[labels]
-    first = int(np.argmax(is_largest))
+    areas = stats[:, cv2.CC_STAT_AREA]
+    is_largest = areas == areas[1:].max()
+    is_largest[0] = False
+    first = int(np.argmax(is_largest[labels]))
     return np.asarray(labels != labels.ravel()[first])

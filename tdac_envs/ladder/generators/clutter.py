@@ -6,8 +6,10 @@ from math import isqrt
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
+from tdac_envs.core.compiled import kernel
 from tdac_envs.ladder.generators.draft import (
     Band,
     Draft,
@@ -21,6 +23,8 @@ from tdac_envs.ladder.words import Words
 
 Circle = tuple[int, int, int]
 """Centre and radius, sixteenths of a px."""
+Circles = NDArray[np.int64]
+"""Circles, shape (n, 3)."""
 
 _PLACES = 48
 _FAILURES = 25
@@ -51,18 +55,21 @@ def draw(words: Words, params: Clutter, body: float) -> Draft:
     cells = np.zeros((params.height, params.width), np.bool_)
     frame(cells, _BORDER)
     gap = _sixteenths(words.uniform(*params.gaps) * body)
-    circles: list[Circle] = []
+    circles, count = np.empty((params.chain, 3), np.int64), 0
     wanted = round(words.uniform(0.8 * params.density, params.density) * cells.size)
     failures, occupied = 0, np.count_nonzero(cells)
     while failures < _FAILURES and occupied < wanted:
-        chain = _chain(words, params, body, circles, gap)
+        if count + params.chain > len(circles):
+            circles = np.concatenate([circles, np.empty_like(circles)])
+        chain = _chain(words, params, body, circles, count, gap)
         if not chain:
             failures += 1
             continue
         failures = 0
         for circle in chain:
             fill_disc(cells, *circle)
-        circles += chain
+        circles[count : count + len(chain)] = chain
+        count += len(chain)
         occupied = np.count_nonzero(cells)
     return Draft(cells, free_places(words, cells, _PLACES))
 
@@ -72,7 +79,7 @@ def _sixteenths(length: float) -> int:
 
 
 def _chain(
-    words: Words, params: Clutter, body: float, circles: list[Circle], gap: int
+    words: Words, params: Clutter, body: float, circles: Circles, count: int, gap: int
 ) -> list[Circle]:
     """A row of overlapping circles, up to the first that does not fit."""
     chain: list[Circle] = []
@@ -88,25 +95,45 @@ def _chain(
             length = max(isqrt(ahead_x * ahead_x + ahead_y * ahead_y), 1)
             far = 3 * (chain[-1][2] + radius) // 4
             x, y = x + far * ahead_x // length, y + far * ahead_y // length
-        if not _fits((x, y, radius), circles, gap, params):
+        if not _fits(x, y, radius, circles, count, gap, params.width, params.height):
             break
         chain.append((x, y, radius))
     return chain
 
 
-def _fits(circle: Circle, circles: list[Circle], gap: int, params: Clutter) -> bool:
-    """Whether the circle leaves the gap to all that it does not touch."""
-    x, y, radius = circle
+@kernel
+def _fits(
+    x: int,
+    y: int,
+    radius: int,
+    circles: Circles,
+    count: int,
+    gap: int,
+    width: int,
+    height: int,
+) -> bool:
+    """Whether a circle leaves the gap to all that it does not touch.
+
+    Args:
+        x: Column of its centre, sixteenths of a px, like all lengths but the last two.
+        y: Row of its centre.
+        radius: Its radius.
+        circles: Shape (n, 3): other circles; the first `count` are tested.
+        count: Their number.
+        gap: Least gap.
+        width: Columns of the map, px.
+        height: Rows of the map, px.
+    """
     border = 16 * _BORDER
-    for side, extent in ((x, 16 * params.width), (y, 16 * params.height)):
+    for side, extent in ((x, 16 * width), (y, 16 * height)):
         if (
             0 < side - radius - border < gap
             or 0 < extent - side - radius - border < gap
         ):
             return False
-    for i, j, other in circles:
-        touching = radius + other
-        apart = (x - i) ** 2 + (y - j) ** 2
+    for k in range(count):
+        touching = radius + circles[k, 2]
+        apart = (x - circles[k, 0]) ** 2 + (y - circles[k, 1]) ** 2
         if touching * touching < apart < (touching + gap) ** 2:
             return False
     return True

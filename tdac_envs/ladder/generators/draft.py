@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from tdac_envs.core.compiled import kernel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.words import FRACTIONS, Words
 
@@ -46,10 +47,13 @@ class Draft:
     Attributes:
         cells: Shape (height, width), bool, True = occupied.
         places: Shape (n, 2), int64: pixels (x, y) for the start and the goal.
+        touched: Shape (height, width), bool: also the pixels of which an obstacle
+            occupies a part. The gap is measured on them; by default on `cells`.
     """
 
     cells: BoolGrid
     places: Places
+    touched: BoolGrid | None = None
 
     def turned(self, quarters: int, mirrored: bool) -> Draft:
         """This draft mirrored at the vertical axis, then turned by `quarters` * 90°."""
@@ -105,13 +109,16 @@ def whole_pixels(size: float, body: float) -> int:
 
 def fill_disc(cells: BoolGrid, x: int, y: int, radius: int, value: bool = True) -> None:
     """Sets the pixels whose centre is in a disc; all numbers in sixteenths of a px."""
+    _fill_disc(cells, x, y, radius, value)
+
+
+@kernel
+def _fill_disc(cells: BoolGrid, x: int, y: int, radius: int, value: bool) -> None:
     height, width = cells.shape
-    x0, x1 = max((x - radius) >> 4, 0), min(((x + radius) >> 4) + 2, width)
-    y0, y1 = max((y - radius) >> 4, 0), min(((y + radius) >> 4) + 2, height)
-    columns = 16 * np.arange(x0, x1, dtype=np.int64) - x
-    rows = 16 * np.arange(y0, y1, dtype=np.int64) - y
-    inside = columns[None, :] ** 2 + rows[:, None] ** 2 <= radius * radius
-    cells[y0:y1, x0:x1][inside] = value
+    for j in range(max((y - radius) >> 4, 0), min(((y + radius) >> 4) + 2, height)):
+        for i in range(max((x - radius) >> 4, 0), min(((x + radius) >> 4) + 2, width)):
+            if (16 * i - x) ** 2 + (16 * j - y) ** 2 <= radius * radius:
+                cells[j, i] = value
 
 
 def frame(cells: BoolGrid, thickness: int) -> None:
