@@ -22,7 +22,9 @@ _SOLID, _OPEN, _TRIED = 0, 1, 2
 
 
 @kernel
-def _spread(free: BoolGrid, goal: int, padded: Field, buckets: NDArray[np.int32]) -> bool:
+def _spread(
+    free: BoolGrid, goal: int, padded: Field, buckets: NDArray[np.int32]
+) -> bool:
     """Dijkstra with buckets of width 1; returns False if a bucket is full.
 
     No step is shorter than 1, so a bucket receives no cells while it is processed, and
@@ -35,7 +37,7 @@ def _spread(free: BoolGrid, goal: int, padded: Field, buckets: NDArray[np.int32]
             no path may go.
         buckets: Shape (3, n), overwritten.
     """
-    height, width = free.shape
+    width = free.shape[1]
     _fill_open(free, padded)
     field, row, room = padded.ravel(), width + 2, buckets.shape[1]
     one, two, three = 0, 1, 2

@@ -75,10 +75,13 @@ _compiled_quarters = subkernel(_quarters)
 
 
 @kernel
-def _fill_rooms(clear: FloatGrid, at_corners: FloatGrid, least: int, room: Nodes) -> None:
-    """Fills `room` with the clearance of each node, quarters of px**2; 0 below `least`.
+def _fill_rooms(
+    clear: FloatGrid, at_corners: FloatGrid, least: int, room: Nodes
+) -> None:
+    """Fills `room` with the clearance of each node, quarters of px**2.
 
-    Pixel (i, j) is `[_CENTRE, j + 1, i]`, and its first corner is `[_CORNER, j + 1, i]`.
+    What is below `least` becomes 0. Pixel (i, j) is `[_CENTRE, j + 1, i]`, and its
+    first corner is `[_CORNER, j + 1, i]`.
     Nodes beside the map have no room, and neither have corners on its border. So a
     node with room has all its neighbours at the same offsets.
     """

@@ -53,7 +53,8 @@ def _fill_leaps(cells: BoolGrid, leaps: LeapGrid) -> None:
         dy = 1 if _GROWS_Y[quadrant] else -1
         for row in range(height):
             j = height - row if dy > 0 else row + 1
-            out, ahead, occupied = leaps[quadrant, j], leaps[quadrant, j + dy], cells[j - 1]
+            out, ahead = leaps[quadrant, j], leaps[quadrant, j + dy]
+            occupied = cells[j - 1]
             for i in range(width):
                 beside = min(ahead[i + 1], ahead[i + 1 + dx])
                 side = beside + 1 if beside < _LONGEST else _LONGEST
