@@ -5,10 +5,11 @@
 
 `judge` reads ANSWERS/LEVEL/NAME/reply.md, extracts each file as `tdac synth` does, and
 drives it and `builtin` on the first N hidden worlds of a salt, which it draws and keeps
-in OUT/sealed. After an interruption, the same command continues. At the end the salt is
-revealed: OUT has `salt.hex`, `results.csv` with a row for each file, and `worlds.csv`
-with a row for each episode. `ahead` is by how much the mean time score of `builtin` is
-above that of the file, with the 95 % interval of a paired bootstrap over worlds.
+in OUT/sealed. A program that no model wrote is ANSWERS/LEVEL/NAME/controller.py. After
+an interruption, the same command continues. At the end the salt is revealed: OUT has
+`salt.hex`, `results.csv` with a row for each file, and `worlds.csv` with a row for each
+episode. `ahead` is by how much the mean time score of `builtin` is above that of the
+file, with the 95 % interval of a paired bootstrap over worlds.
 
 `stability` compares two such folders, of two salts: Kendall's tau of the mean time
 scores of each level, and the pairs whose paired intervals say opposite things.
@@ -45,6 +46,8 @@ FIGURES = ("index", "generator", "outcome", "steps", "time_score", "path_score")
 def sources(answers: Path, level: str) -> Iterator[tuple[str, str | None]]:
     """Name and source of each entrant of a level; None for an answer without a file."""
     yield BUILTIN, (LEVELS / f"{level}.py").read_text(encoding="utf-8")
+    for file in sorted((answers / level).glob("*/controller.py")):
+        yield file.parent.name, file.read_text(encoding="utf-8")
     for reply in sorted((answers / level).glob("*/reply.md")):
         yield reply.parent.name, extract_source(reply.read_text(encoding="utf-8"))
 
