@@ -31,7 +31,7 @@ SLIVER = 1.6  # px around walls in which a px must be crossed to be free
 GUESS = 2.5  # how much more a px costs where a wall is likely
 LINE = 60  # px between two hits in a row that are taken for one wall, at most
 APART = 2.0 * (RADIUS - LOOSE) - 1.0  # px between two hits that leave no way
-STALE = 5  # steps after which new walls lead to a new plan, if they are not in the way
+STALE = 8  # steps after which new walls lead to a new plan, if they are not in the way
 ROOM = 1.5 * RADIUS  # clearance from which a px costs nothing extra
 REACH = int(ROOM) + 2
 PRICE = 0.15  # how much more a px beside a wall costs
@@ -164,19 +164,21 @@ class Maps:
 
     def fill(self, x, y, heading, ranges):
         """Fills the px between two rays, as far as both went; and those of the body."""
-        rows, columns, dx, dy = self.square(x, y, int(RANGE) + 1)
-        square = dx * dx + (dy * dy)[:, None]
-        self.crossed[rows, columns] |= square <= RADIUS * RADIUS
-        filled = self.filled[rows, columns]
-        far = float(ranges.max())
-        j, i = np.nonzero(~filled & (square <= far * far))
-        place = np.arctan2(dy[j], dx[i]) - (heading - 0.5 * VIEW)
-        place = np.remainder(place, 2.0 * math.pi) * (1.0 / GAP)
-        k = place.astype(int)
+        rows, columns, dx, dy = self.square(x, y, int(RADIUS) + 1)
+        body = dx * dx + (dy * dy)[:, None] <= RADIUS * RADIUS
+        self.crossed[rows, columns] |= body
         least = np.minimum(ranges, np.roll(ranges, -1))
         # Behind the last ray nothing is seen, unless the first one is next to it.
         least = np.append(least if ROUND else least[:-1], 0.0)
-        new = square[j, i] <= least[np.minimum(k, least.size - 1)] ** 2
+        far = float(least.max())
+        rows, columns, dx, dy = self.square(x, y, int(far) + 1)
+        square = dx * dx + (dy * dy)[:, None]
+        filled = self.filled[rows, columns]
+        j, i = np.nonzero(~filled & (square <= far * far))
+        place = np.arctan2(dy[j], dx[i]) - (heading - 0.5 * VIEW)
+        place = np.remainder(place, 2.0 * math.pi) * (1.0 / GAP)
+        k = np.minimum(place.astype(int), least.size - 1)
+        new = square[j, i] <= least[k] ** 2
         filled[j[new], i[new]] = True
 
     def replan(self, x, y, new):
@@ -257,18 +259,19 @@ def wave(passable, price, goal, robot, most):
     """
     rows = np.arange(passable.shape[0]) - robot[0]
     columns = np.arange(passable.shape[1]) - robot[1]
-    spare = most - CELL * np.hypot(rows[:, None], columns).ravel()
+    # A place that has not been reached has the cost that would be too much.
+    cost = most - CELL * np.hypot(rows[:, None], columns).ravel()
+    reached = np.zeros(cost.shape, bool)
     width = passable.shape[1]
     shifts, lengths, first, second = (
         np.array(each) for each in zip(*moves(width), strict=True)
     )
     lengths = 0.5 * lengths
-    passable, price = passable.ravel(), price.ravel()
-    cost = np.full(passable.shape, np.inf)
+    passable, price = passable.ravel(), np.where(passable, price, np.inf).ravel()
     start, until = goal[0] * width + goal[1], math.inf
     target = robot[0] * width + robot[1]
     around = target + np.array([0, 1, -1, width, -width])
-    cost[start] = 0.0
+    cost[start], reached[start] = 0.0, True
     last = np.zeros(cost.shape, int)  # where a place is in a band for the last time
     bands, band = {0: [np.array([start])]}, 0
     while bands and band * CELL < until:
@@ -282,19 +285,23 @@ def wave(passable, price, goal, robot, most):
         at = at[last[at] == np.arange(at.size)]
         to = at[:, None] + shifts
         further = cost[at][:, None] + lengths * (price[at][:, None] + price[to])
-        better = passable[to] & (further < np.minimum(cost[to], spare[to]))
-        better &= passable[at[:, None] + first] & passable[at[:, None] + second]
-        to, further = to[better], further[better]
-        if not to.size:
+        some, move = np.nonzero(further < cost[to])
+        free = passable[at[some] + first[move]] & passable[at[some] + second[move]]
+        some, move = some[free], move[free]
+        if not some.size:
             continue
+        to, further = to[some, move], further[some, move]
         np.minimum.at(cost, to, further)
+        reached[to] = True
         where = (further * (1.0 / CELL)).astype(int)
         for k in range(int(where.min()), int(where.max()) + 1):
             some = to[where == k]
             if some.size:
                 bands.setdefault(k, []).append(some)
-        if until == math.inf and np.isfinite(cost[around]).any():
-            until = float(cost[around].min()) + BEYOND
+        near = around[reached[around]]
+        if until == math.inf and near.size:
+            until = float(cost[near].min()) + BEYOND
+    cost[~reached] = np.inf
     return cost.reshape(-1, width), until < math.inf
 
 
