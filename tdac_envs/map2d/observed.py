@@ -3,13 +3,35 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from tdac_envs.drive import batching, stepping
+from tdac_envs.drive.stepping import CONTACT
 from tdac_envs.map2d.setup import Setup
 from tdac_envs.map2d.task import Map2DTask
+
+CONTACTS = None, "wall", "mover", "mover_standing"
+"""What the robot touched in a step, by `outcome[CONTACT]`."""
+_NAMES = np.array(CONTACTS, object)
+
+
+def info_of(outcome: list[float]) -> dict[str, Any]:
+    """The `info` of a step, from its `outcome` as a list; see `Map2DEnv`."""
+    info = stepping.info_of(outcome)
+    info["contact"] = CONTACTS[int(outcome[CONTACT])]
+    return info
+
+
+def infos_of(outcome: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str, Any]:
+    """The infos of a batch, as of `drive.batching.infos_of`."""
+    infos = batching.infos_of(outcome, mask)
+    infos["contact"] = _NAMES[outcome[:, CONTACT].astype(np.int64)]
+    infos["_contact"] = mask.copy()
+    return infos
 
 
 def noisy(

@@ -27,8 +27,8 @@ TIME, FROM_X, FROM_Y, RATE_X, RATE_Y, STATE = range(6)
 N_PIECE = 6
 # Columns of `Movers.path`; the first three are those of `Movers.pieces`.
 HEADING, FORWARD, TURN = range(3, 6)
-MOST_ARCS = 104
-"""Rows of `Movers.path`; `tdac_envs.drive.sliding` needs at most 3 * 33 and an end."""
+MOST_ARCS = 108
+"""Rows of `Movers.path`; `tdac_envs.drive.sliding` needs at most 3 * 34 + 1."""
 STANDING_SECONDS = 0.5
 """A robot stands if it has hardly moved in this time."""
 
@@ -46,7 +46,7 @@ class Movers(NamedTuple):
             bouncing disc, its heading (rad).
         points: Shape (k, 2): way-points of all routes, px. Each is driven in a circle;
             one that goes back and forth also lists the way back.
-        pieces: Shape (n, `MOST_PIECES` + 1, 6): motion in the current step. A row has
+        pieces: Shape (n, `MOST_PIECES` + 2, 6): motion in the current step. A row has
             the time at which a piece begins, x, y (px), velocity (px per step), and the
             last entry of `now` during the piece. The row after the last piece has the
             time 1.
@@ -72,7 +72,7 @@ class Movers(NamedTuple):
             np.zeros((count, N_TRAITS)),
             np.zeros((count, N_NOW)),
             np.ascontiguousarray(points, np.float64).reshape(-1, 2),
-            np.zeros((count, MOST_PIECES + 1, N_PIECE)),
+            np.zeros((count, MOST_PIECES + 2, N_PIECE)),
             np.zeros((MOST_ARCS, N_PIECE)),
             np.zeros((steps, 2)),
         )
