@@ -84,8 +84,8 @@ class Placing:
             )
         return TaskError(
             f"mover {self.m} starts at ({x:.1f}, {y:.1f}) and reaches the robot, which "
-            f"starts at ({start.x:.1f}, {start.y:.1f}), within {SAFE_SECONDS:g} s; move "
-            "one of them"
+            f"starts at ({start.x:.1f}, {start.y:.1f}), within {SAFE_SECONDS:g} s; "
+            "move one of them"
         )
 
     def check_leaves_goal(self, places: Points) -> None:
@@ -189,7 +189,8 @@ def _fault_of_route(
     for k, (x, y) in enumerate(points):
         if not fits(clear, x, y, radius):
             what = f"way-point {k} at" if len(points) > 1 else "it stands at"
-            return f"{what} ({x:.1f}, {y:.1f}), where its radius of {radius:g} px hits a wall"
+            where = f"({x:.1f}, {y:.1f})"
+            return f"{what} {where}, where its radius of {radius:g} px hits a wall"
     for k in range(len(ends) - 1 if len(points) > 1 else 0):
         (x, y), (to_x, to_y) = ends[k], ends[k + 1]
         length, heading = (

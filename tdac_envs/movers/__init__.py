@@ -13,8 +13,8 @@ them compiled and without allocation:
    `Movers.now[m]`, as if there were no robot. Only this depends on the kind.
 2. *Meet*: the first contact of the robot's exact arc with any piece is found. In block
    mode, a mover that touches the robot stands from there on (`motion.hold`).
-3. *Stop*: `motion.stop` moves each mover to the end of its pieces, or to the time of the
-   contact that ends the episode, and updates `Movers.now`.
+3. *Stop*: `motion.stop` moves each mover to the end of its pieces, or to the time of
+   the contact that ends the episode, and updates `Movers.now`.
 
 A further kind (a crowd) needs
 - a model in `spec.KINDS` and an entry in `map2d.placing._KINDS`: a function that draws

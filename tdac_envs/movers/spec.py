@@ -52,8 +52,8 @@ class RouteSpec(_Strict):
     )
     phase: Annotated[float, Field(ge=0.0, lt=1.0)] | None = Field(
         None,
-        description="Where on its whole route it starts, as a part of the length; there "
-        "and back if not `loop`. Default: drawn at each reset.",
+        description="Where on its whole route it starts, as a part of the length, "
+        "there and back if not `loop`. Default: drawn at each reset.",
     )
 
     @model_validator(mode="after")
@@ -137,9 +137,7 @@ def read_specs(given: MoversOption) -> tuple[AnySpec, ...]:
         return ()
     if isinstance(given, str):
         given = [_from_text(given)]
-    if not isinstance(given, Sequence) or not all(
-        isinstance(each, Mapping | BaseModel) for each in given
-    ):
+    if not isinstance(given, list | tuple):
         raise TaskError(f"expected movers such as {_EXAMPLE}, got {given!r:.100}")
     _check_number(len(given))
     specs = tuple(_checked(each, f"movers[{i}]") for i, each in enumerate(given))
@@ -170,9 +168,9 @@ def _from_text(text: str) -> dict[str, Any]:
     return {"kind": kind, "count": int(count)}
 
 
-def _checked(entry: Mapping[str, Any] | BaseModel, name: str) -> AnySpec:
-    if isinstance(entry, BaseModel):
-        entry = entry.model_dump()
+def _checked(entry: Any, name: str) -> AnySpec:
+    if not isinstance(entry, Mapping):
+        raise TaskError(f"{name}: expected a dict, got {entry!r:.100}")
     kind = entry.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise TaskError(

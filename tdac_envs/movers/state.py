@@ -86,11 +86,6 @@ class Movers(NamedTuple):
         """Copies of these arrays, for an episode that begins with them."""
         return Movers(*(array.copy() for array in self))
 
-    @property
-    def count(self) -> int:
-        """Number of movers."""
-        return len(self.traits)
-
     def discs(self) -> Array:
         """x, y and radius of each mover, shape (n, 3), px; a copy."""
         return np.column_stack([self.now[:, :2], self.traits[:, RADIUS]])
