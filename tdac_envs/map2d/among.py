@@ -32,6 +32,7 @@ from tdac_envs.drive.stepping import (
     Array,
     X,
     Y,
+    apply_command,
     batch_at,
     copy_row,
     finish_step,
@@ -200,7 +201,8 @@ def _drive_among(
 ) -> None:
     """`kernels.drive_step` among movers, whose arrays are the last ones."""
     before, dt = outcome[REMAINING], constants[DT]
-    left, right = ground_speeds(constants, state, queue, wheel_speeds, outcome)
+    apply_command(constants, state, queue, wheel_speeds, outcome)
+    left, right = ground_speeds(constants, state, wheel_speeds)
     forward, turn = arc_of(left, right, constants[AXLE], dt)
     slot = int(state[STEPS]) % past.shape[0]
     past[slot, 0], past[slot, 1] = state[X], state[Y]

@@ -205,14 +205,9 @@ def begin_episode(
 
 @subkernel
 def ground_speeds(
-    constants: Array,
-    state: Array,
-    queue: Array,
-    wheel_speeds: NDArray[np.float32],
-    outcome: Array,
+    constants: Array, state: Array, wheel_speeds: NDArray[np.float32]
 ) -> tuple[float, float]:
-    """Speeds of the wheels over ground in the next step, px/s, from the commands."""
-    apply_command(constants, state, queue, wheel_speeds, outcome)
+    """Speeds of the wheels over ground in the step, px/s."""
     limit = constants[MAX_SPEED]
     left, right = turned_wheels(constants, wheel_speeds)
     return (
@@ -243,7 +238,8 @@ def drive_step(
     commands and the slip.
     """
     before = outcome[REMAINING]
-    left, right = ground_speeds(constants, state, queue, wheel_speeds, outcome)
+    apply_command(constants, state, queue, wheel_speeds, outcome)
+    left, right = ground_speeds(constants, state, wheel_speeds)
     axle, dt, radius = constants[AXLE], constants[DT], constants[RADIUS]
     forward, turn = arc_of(left, right, axle, dt)
     if constants[STOPS] == 1.0:

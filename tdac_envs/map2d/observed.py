@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from tdac_envs.drive import batching, stepping
+from tdac_envs.drive import batching
 from tdac_envs.drive.stepping import CONTACT
 from tdac_envs.map2d.setup import Setup
 from tdac_envs.map2d.task import Map2DTask
@@ -21,9 +21,20 @@ _NAMES = np.array(CONTACTS, object)
 
 def info_of(outcome: list[float]) -> dict[str, Any]:
     """The `info` of a step, from its `outcome` as a list; see `Map2DEnv`."""
-    info = stepping.info_of(outcome)
-    info["contact"] = CONTACTS[int(outcome[CONTACT])]
-    return info
+    # In one literal, because it is made in each step.
+    (
+        _, _, _, reached, touched, collisions, clipped, gap, remaining, room, contact,
+    ) = outcome  # fmt: skip
+    return {
+        "is_success": reached == 1.0,
+        "collision": touched == 1.0,
+        "contact": CONTACTS[int(contact)] if contact else None,
+        "collisions": int(collisions),
+        "clipped": int(clipped),
+        "distance_to_goal": gap,
+        "path_distance": remaining,
+        "clearance": room,
+    }
 
 
 def infos_of(outcome: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str, Any]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +28,6 @@ if TYPE_CHECKING:
 
 SAFE_SECONDS = 2.0
 """No mover touches a robot that stands at its start for this time."""
-Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,20 +37,23 @@ class Placing:
     Attributes:
         movers: Arrays of all movers; `traits` and `points` are complete.
         m: Number of this mover.
+        radius: Its radius, px.
+        speed: Its speed, px/s.
         task: The task of the episode.
         random: Random numbers of the episode.
     """
 
     movers: Movers
     m: int
+    radius: float
+    speed: float
     task: Map2DTask
     random: np.random.Generator
 
     @property
     def reach(self) -> float:
         """Distance of the centres of robot and mover when they touch, px."""
-        radius: float = self.movers.traits[self.m, at.RADIUS]
-        return self.task.robot.radius + radius
+        return self.task.robot.radius + self.radius
 
     def put(self, x: float, y: float, own: float) -> None:
         """Places the mover at (x, y), px; `own` is the last entry of `Movers.now`."""
@@ -57,19 +61,14 @@ class Placing:
 
     def is_safe(self) -> bool:
         """Whether the mover, as placed, does not touch the standing robot for 2 s."""
-        movers, start = self.movers, self.task.start
-        now = movers.now.copy()
+        x, y, _ = self.task.start
+        traits, now, points, pieces, *_ = self.movers
+        begins = now[self.m].copy()
+        clear, at_start = self.task.terrain.padded_clear, (float(x), float(y))
         least = nearest_approach(
-            self.task.terrain.padded_clear,
-            movers.traits,
-            now,
-            movers.points,
-            movers.pieces,
-            self.m,
-            float(start.x),
-            float(start.y),
-            SAFE_SECONDS,
+            clear, traits, now, points, pieces, self.m, *at_start, SAFE_SECONDS
         )
+        now[self.m] = begins
         return bool(least > self.reach)
 
     def refuse(self) -> TaskError:
@@ -88,21 +87,26 @@ class Placing:
             "move one of them"
         )
 
-    def check_leaves_goal(self, places: Points) -> None:
-        """Checks that a mover that stays among some places may leave the goal.
+    def leaves_goal(self, places: Sequence[tuple[float, float]]) -> bool:
+        """Whether the robot can reach the goal beside a mover at one of some places.
 
         Args:
-            places: Shape (n, 2); the mover is always within their convex hull, px.
+            places: The mover is always within their convex hull, px.
+        """
+        farthest = max(math.dist(self.task.goal, place) for place in places)
+        return farthest + self.task.goal_tolerance >= self.reach
+
+    def check_leaves_goal(self, places: Sequence[tuple[float, float]]) -> None:
+        """Checks `leaves_goal`.
 
         Raises:
             TaskError: The robot could never reach the goal.
         """
-        goal, tolerance = self.task.goal, self.task.goal_tolerance
-        farthest = max(math.dist(goal, place) for place in places.tolist())
-        if farthest + tolerance < self.reach:
+        if not self.leaves_goal(places):
+            x, y = self.task.goal
             raise TaskError(
-                f"mover {self.m} covers the goal ({goal[0]:.1f}, {goal[1]:.1f}) for "
-                "ever; move one of them"
+                f"mover {self.m} covers the goal ({x:.1f}, {y:.1f}) for ever; move one "
+                "of them"
             )
 
 
@@ -121,62 +125,87 @@ def place_movers(
             covers the goal for ever; the message names the mover.
     """
     each = [spec for spec in specs for _ in range(spec.number)]
-    routes = [whole_route(s) if isinstance(s, RouteSpec) else None for s in each]
-    lengths = [0 if route is None else len(route) for route in routes]
-    given = [route for route in routes if route is not None]
-    points = np.concatenate(given) if given else np.empty((0, 2))
-    movers, first = Movers.blank(len(each), points, task.dt), 0
+    rounds = [Round.of(s).points if isinstance(s, RouteSpec) else () for s in each]
+    points = [point for places in rounds for point in places]
+    movers, first = Movers.blank(len(each), np.array(points), task.dt), 0
     robot = task.robot
-    for m, (spec, count) in enumerate(zip(each, lengths, strict=True)):
+    for m, (spec, places) in enumerate(zip(each, rounds, strict=True)):
         radius = robot.radius if spec.radius is None else spec.radius
         speed = 0.5 * robot.max_wheel_speed if spec.speed is None else spec.speed
         check_full_step(max(task.dt, LOOK), speed, "px")
         kind, place = _KINDS[spec.kind]
-        movers.traits[m] = kind, radius, speed, first, count
-        first += count
-        place(spec, Placing(movers, m, task, random))
+        movers.traits[m] = kind, radius, speed, first, len(places)
+        first += len(places)
+        place(spec, Placing(movers, m, radius, speed, task, random))
     return movers
 
 
-def whole_route(spec: RouteSpec) -> Points:
-    """The way-points of one round of a route, also of the way back, shape (n, 2)."""
-    points = np.array(spec.points, np.float64)
-    return points if spec.loop else np.vstack([points, points[-2:0:-1]])
+@dataclass(frozen=True, slots=True)
+class Round:
+    """One round of a route: there and back, if it is not a loop.
+
+    Attributes:
+        points: The way-points, px.
+        ends: Length of the round up to the way-point after each, px.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    ends: tuple[float, ...]
+
+    @classmethod
+    def of(cls, spec: RouteSpec) -> Round:
+        """The round of a route, from a cache."""
+        return _round_of(spec)
+
+    def place(self, phase: float) -> tuple[float, float, float]:
+        """The place at a part of the length, and the number of the next way-point."""
+        along, count = phase * self.ends[-1], len(self.points)
+        leg = min(bisect_right(self.ends, along), count - 1)
+        (x, y), (to_x, to_y) = self.points[leg], self.points[(leg + 1) % count]
+        begin = self.ends[leg - 1] if leg else 0.0
+        length = self.ends[leg] - begin
+        part = (along - begin) / length if length else 0.0
+        return x + part * (to_x - x), y + part * (to_y - y), float((leg + 1) % count)
+
+    def most_points(self, length: float) -> int:
+        """Largest number of way-points in a piece of this length, or a few more."""
+        legs = np.diff(self.ends, prepend=0.0)
+        if len(legs) == 1 or length < legs.min():
+            return 1
+        further = np.resize(legs, len(legs) + at.MOST_PIECES)
+        at_points = np.concatenate([[0.0], np.cumsum(further)])
+        until = np.searchsorted(at_points, at_points[: len(legs)] + length, "right")
+        return int((until - np.arange(len(legs))).max())
+
+
+@lru_cache(maxsize=1024)
+def _round_of(spec: RouteSpec) -> Round:
+    points = spec.points if spec.loop else (*spec.points, *spec.points[-2:0:-1])
+    following = (*points[1:], points[0])
+    legs = [math.dist(*ends) for ends in zip(points, following, strict=True)]
+    return Round(points, tuple(accumulate(legs)))
 
 
 def _place_route(spec: RouteSpec, placing: Placing) -> None:
-    points, traits = whole_route(spec), placing.movers.traits[placing.m]
-    radius, speed = float(traits[at.RADIUS]), float(traits[at.SPEED])
-    task = placing.task
-    fault = _fault_of_route(task.terrain, spec, radius, speed * task.dt)
+    own, task = Round.of(spec), placing.task
+    full_step = placing.speed * task.dt
+    fault = _fault_of_route(task.terrain, spec, placing.radius, full_step)
     if fault:
         raise TaskError(f"mover {placing.m}: {fault}")
-    placing.check_leaves_goal(points if speed else points[:1])
-    if spec.phase is not None or len(points) == 1:
-        placing.put(*_at_phase(points, spec.phase or 0.0))
+    placing.check_leaves_goal(own.points if placing.speed else own.points[:1])
+    if spec.phase is not None or len(own.points) == 1:
+        placing.put(*own.place(spec.phase or 0.0))
         if not placing.is_safe():
             raise placing.refuse()
         return
     for _ in range(MAX_DRAWS):
-        placing.put(*_at_phase(points, placing.random.random()))
+        placing.put(*own.place(placing.random.random()))
         if placing.is_safe():
             return
     raise TaskError(
         f"mover {placing.m} reaches the robot within {SAFE_SECONDS:g} s wherever it "
         "starts on its route; move the route or the start"
     )
-
-
-def _at_phase(points: Points, phase: float) -> tuple[float, float, float]:
-    """The place on a route at a part of its length, and the next way-point."""
-    legs = np.roll(points, -1, axis=0) - points
-    ends = np.cumsum(np.hypot(*legs.T))
-    along = phase * float(ends[-1])
-    leg = min(int(np.searchsorted(ends, along, "right")), len(points) - 1)
-    length = float(ends[leg] - (ends[leg - 1] if leg else 0.0))
-    part = 1.0 - (float(ends[leg]) - along) / length if length else 0.0
-    x, y = (points[leg] + part * legs[leg]).tolist()
-    return x, y, float((leg + 1) % len(points))
 
 
 @lru_cache(maxsize=256)
@@ -204,7 +233,7 @@ def _fault_of_route(
                 f"segment {k} of its route, from ({x:.1f}, {y:.1f}) to ({to_x:.1f}, "
                 f"{to_y:.1f}), runs into a wall at ({at_x:.1f}, {at_y:.1f})"
             )
-    if _most_points(whole_route(spec), full_step) > at.MOST_PIECES - 2:
+    if Round.of(spec).most_points(full_step) > at.MOST_PIECES - 2:
         return (
             f"it would pass more than {at.MOST_PIECES - 2} way-points in a step; use a "
             "lower speed or fewer way-points"
@@ -212,20 +241,8 @@ def _fault_of_route(
     return ""
 
 
-def _most_points(points: Points, length: float) -> int:
-    """Largest number of way-points that a piece of a route of this length contains."""
-    legs = np.hypot(*(np.roll(points, -1, axis=0) - points).T)
-    if len(points) == 1 or length < legs.min():
-        return 1
-    most = at.MOST_PIECES - 1
-    windows = np.concatenate([[0.0], np.cumsum(np.resize(legs, len(legs) + most))])
-    spans = np.searchsorted(windows, windows[: len(legs)] + length, "right")
-    return int((spans - np.arange(len(legs))).max())
-
-
 def _place_bounce(spec: BounceSpec, placing: Placing) -> None:
-    task, random = placing.task, placing.random
-    radius, speed = placing.movers.traits[placing.m, [at.RADIUS, at.SPEED]].tolist()
+    task, random, radius = placing.task, placing.random, placing.radius
     if spec.start is not None and not fits(
         task.terrain.padded_clear, *spec.start, radius
     ):
@@ -241,23 +258,16 @@ def _place_bounce(spec: BounceSpec, placing: Placing) -> None:
         if heading is None:
             heading = random.uniform(-math.pi, math.pi)
         placing.put(x, y, heading)
-        if placing.is_safe() and (speed or _leaves_goal(placing, x, y)):
+        if placing.is_safe() and (placing.speed or placing.leaves_goal([(x, y)])):
             return
-    placing.check_leaves_goal(np.array([[x, y]]))
+    if not placing.speed:
+        placing.check_leaves_goal([(x, y)])
     if not drawn:
         raise placing.refuse()
     raise TaskError(
         f"mover {placing.m}: no start was found from which it stays away from the "
         f"robot for {SAFE_SECONDS:g} s; make it slower or smaller"
     )
-
-
-def _leaves_goal(placing: Placing, x: float, y: float) -> bool:
-    try:
-        placing.check_leaves_goal(np.array([[x, y]]))
-    except TaskError:
-        return False
-    return True
 
 
 def _drawn_place(
