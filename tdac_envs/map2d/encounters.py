@@ -286,38 +286,51 @@ def fits(clear: FloatGrid, x: float, y: float, radius: float) -> bool:
 
 
 @kernel
-def nearest_approach(
+def nearest_approaches(
     clear: FloatGrid, traits: Array, now: Array, points: Array, pieces: Array,
-    m: int, x: float, y: float, seconds: float,
-) -> float:  # fmt: skip
-    """Least distance of mover m's centre from a point within a time, px.
+    x: float, y: float, seconds: float, least: Array,
+) -> None:  # fmt: skip
+    """Least distance of each mover's centre from a point within a time.
+
+    Of a person of a crowd, it is a lower bound.
 
     Args:
         clear: Padded clearance, px.
         traits: `Movers.traits`; the arrays after it are those of `Movers`, too.
-        now: The row of mover m is overwritten.
+        now: Overwritten.
         points: Way-points.
         pieces: Overwritten.
-        m: The mover.
         x: Column of the point, px.
         y: Row of the point, px.
         seconds: The time, s.
+        least: Shape (n,), overwritten with the distances, px.
     """
-    least = math.hypot(now[m, at.X] - x, now[m, at.Y] - y)
-    for _ in range(math.ceil(seconds / LOOK)):
-        plan_one(clear, traits, now, points, pieces, m, LOOK)
-        row = 0
-        while pieces[m, row, at.TIME] < 1.0:
-            begin_x, begin_y = pieces[m, row, at.FROM_X], pieces[m, row, at.FROM_Y]
-            row += 1
-            along_x = pieces[m, row, at.FROM_X] - begin_x
-            along_y = pieces[m, row, at.FROM_Y] - begin_y
-            length2 = along_x * along_x + along_y * along_y
-            part = (x - begin_x) * along_x + (y - begin_y) * along_y
-            part = min(max(part / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
-            off_x = begin_x + part * along_x - x
-            least = min(least, math.hypot(off_x, begin_y + part * along_y - y))
-        stop(now, pieces, m, 1.0, LOOK)
+    for m in range(traits.shape[0]):
+        nearest = math.hypot(now[m, at.X] - x, now[m, at.Y] - y)
+        if traits[m, at.KIND] == at.CROWD:
+            least[m] = nearest - traits[m, at.SPEED] * seconds
+            continue
+        for _ in range(math.ceil(seconds / LOOK)):
+            plan_one(clear, traits, now, points, pieces, m, LOOK)
+            nearest = min(nearest, _distance_of_pieces(pieces, m, x, y))
+            stop(now, pieces, m, 1.0, LOOK)
+        least[m] = nearest
+
+
+@subkernel
+def _distance_of_pieces(pieces: Array, m: int, x: float, y: float) -> float:
+    """Least distance of mover m's centre from a point in a step, px."""
+    row, least = 0, math.inf
+    while pieces[m, row, at.TIME] < 1.0:
+        begin_x, begin_y = pieces[m, row, at.FROM_X], pieces[m, row, at.FROM_Y]
+        row += 1
+        along_x = pieces[m, row, at.FROM_X] - begin_x
+        along_y = pieces[m, row, at.FROM_Y] - begin_y
+        length2 = along_x * along_x + along_y * along_y
+        part = (x - begin_x) * along_x + (y - begin_y) * along_y
+        part = min(max(part / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
+        off_x, off_y = begin_x + part * along_x - x, begin_y + part * along_y - y
+        least = min(least, math.sqrt(off_x * off_x + off_y * off_y))
     return least
 
 

@@ -16,7 +16,6 @@ from tdac_envs.map2d.task import Map2DTask
 
 CONTACTS = None, "wall", "mover", "mover_standing"
 """What the robot touched in a step, by `outcome[CONTACT]`."""
-_NAMES = np.array(CONTACTS, object)
 
 
 def info_of(outcome: list[float]) -> dict[str, Any]:
@@ -40,7 +39,10 @@ def info_of(outcome: list[float]) -> dict[str, Any]:
 def infos_of(outcome: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str, Any]:
     """The infos of a batch, as of `drive.batching.infos_of`."""
     infos = batching.infos_of(outcome, mask)
-    infos["contact"] = _NAMES[outcome[:, CONTACT].astype(np.int64)]
+    contacts = np.full(len(mask), None, object)
+    for i in np.flatnonzero(outcome[:, CONTACT]).tolist():
+        contacts[i] = CONTACTS[int(outcome[i, CONTACT])]
+    infos["contact"] = contacts
     infos["_contact"] = mask.copy()
     return infos
 

@@ -19,7 +19,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.disturbances import Random
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.task import Pose
-from tdac_envs.map2d.placing import place_movers
+from tdac_envs.map2d.placing import Cast
 from tdac_envs.map2d.rays import fan
 from tdac_envs.map2d.robot import constants_of
 from tdac_envs.map2d.task import (
@@ -45,6 +45,7 @@ class Setup(DriveSetup):
         range_dropout: Probability that a ray reads the largest range.
         movers: Movers of all episodes, if the source of the tasks has none.
         directions: Directions of the rays, from `rays.fan`.
+        cast: The movers, checked on the map.
     """
 
     nominal: Map2DTask
@@ -52,6 +53,7 @@ class Setup(DriveSetup):
     range_dropout: float
     movers: tuple[AnySpec, ...] = ()
     directions: NDArray[np.float64] = field(init=False)
+    cast: Cast = field(init=False)
 
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
@@ -62,9 +64,11 @@ class Setup(DriveSetup):
         robot = self.nominal.robot
         view = np.radians(robot.field_of_view_deg)
         object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
+        cast = Cast.of(self.movers, self.nominal)
+        object.__setattr__(self, "cast", cast)
         if self.movers and self.variation == "nominal" and self.source is None:
             # A fault is found here, and not at the first reset.
-            place_movers(self.movers, self.nominal, np.random.default_rng(0))
+            self.cast.start(self.nominal, np.random.default_rng(0))
 
     @property
     def has_inexact_ranges(self) -> bool:
@@ -92,7 +96,7 @@ class Setup(DriveSetup):
         again = 0 if options or self.variation == "nominal" else MOST_STARTS
         while True:
             try:
-                movers = place_movers(self.movers, drawn, noise)
+                movers = self.cast.start(drawn, noise)
             except TaskError:
                 if again == 0:
                     raise

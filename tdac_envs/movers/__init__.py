@@ -3,7 +3,7 @@
 `spec` has the models of `movers=[...]`, `state` the arrays, `motion` moves routes and
 bouncing discs. This package knows occupied squares only through functions that it is
 given (`motion.moving`), as `tdac_envs.drive.sliding` does. In `tdac_envs.map2d`,
-`placing` draws and checks the start of an episode, robot and movers meet in
+`starts` and `placing` draw and check the start of an episode, robot and movers meet in
 `encounters`, and `among` is the step.
 
 The motion of a mover within a step is piecewise linear. A step has three phases, all of
@@ -17,9 +17,10 @@ them compiled and without allocation:
    the contact that ends the episode, and updates `Movers.now`.
 
 A further kind (a crowd) needs
-- a model in `spec.KINDS` and an entry in `map2d.placing._KINDS`: a function that draws
-  the start of an episode, with the random numbers of the episode, and fills `now`. No
-  mover may touch the robot, standing at its start, for 2 s;
+- a model in `spec.KINDS` and an entry in `map2d.starts.KINDS`: a `Start`, whose
+  `place` draws where a mover starts, with the random numbers of the episode. No mover
+  may touch the robot, standing at its start, for 2 s: `placing` draws a start again
+  if it would. It takes a member of a crowd to drive at full speed to the robot;
 - a function that plans all its movers at once and is called in
   `map2d.among._drive_among` after `plan`, where the robot's arrays are at hand, and
   which skips the movers of other kinds (`traits[m, KIND]`). For each of its movers m it

@@ -10,6 +10,7 @@ from typing import Any
 
 from tdac_envs.core.compiled import subkernel
 from tdac_envs.movers.state import (
+    BOUNCE,
     COUNT,
     FIRST,
     FROM_X,
@@ -229,7 +230,7 @@ def moving(find_contact: Any, find_normal: Any) -> tuple[Any, Any, Any]:
         """Plans the step of mover m on a route or bouncing; arguments as for `plan`."""
         if traits[m, KIND] == ROUTE:
             follow_route(traits, now, points, pieces, m, dt)
-        else:
+        elif traits[m, KIND] == BOUNCE:
             bounce(obstacles, traits, now, pieces, m, dt)
 
     @subkernel
@@ -237,7 +238,7 @@ def moving(find_contact: Any, find_normal: Any) -> tuple[Any, Any, Any]:
         obstacles: Any, traits: Array, now: Array, points: Array, pieces: Array,
         dt: float,
     ) -> None:  # fmt: skip
-        """Plans the motion of all movers in a step of `dt` s, without the robot.
+        """Plans the motion of these movers in a step of `dt` s, without the robot.
 
         Args:
             obstacles: First argument of `find_contact` and `find_normal`.
