@@ -334,14 +334,6 @@ def _distance_of_pieces(pieces: Array, m: int, x: float, y: float) -> float:
     return least
 
 
-@kernel
-def first_contact_of_discs(
-    path: Array, pieces: Array, m: int, reach: float, until: float
-) -> float:
-    """`meeting` from the start of a step, for calls from Python."""
-    return meeting(path, pieces, m, reach, 0.0, until)
-
-
 @subkernel
 def note_arc(
     ground: tuple[FloatGrid, Array],
