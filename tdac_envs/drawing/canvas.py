@@ -25,6 +25,7 @@ RED: Colour = (208, 38, 52)
 AMBER: Colour = (196, 122, 0)
 BLUE: Colour = (0, 128, 190)
 ORANGE: Colour = (226, 124, 22)
+MOVER: Colour = (176, 58, 120)
 
 LARGEST = 1200
 ENLARGE_TO = 900

@@ -16,6 +16,7 @@ from tdac_envs.drawing.canvas import (
     FREE,
     GREEN,
     GREY,
+    MOVER,
     ORANGE,
     RED,
     TRAIL,
@@ -98,6 +99,22 @@ def draw_rays(
     for half, colour in halves:
         for tip in tips[half & (ranges < range_max)]:
             canvas.disc(tip, 2, colour)
+
+
+def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
+    """Draws moving discs as they are now, with a trail of where they were.
+
+    Args:
+        canvas: Where to draw.
+        steps: Discs in the last steps, oldest first, each of shape (m, 3): x, y and
+            radius in canvas coordinates.
+    """
+    if not len(steps):
+        return
+    for m, (x, y, radius) in enumerate(steps[-1].tolist()):
+        canvas.line([discs[m, :2] for discs in steps], MOVER, 2, 0.45)
+        canvas.disc((x, y), radius * canvas.scale, MOVER, 0.55)
+        canvas.disc((x, y), radius * canvas.scale, MOVER, width=1)
 
 
 def draw_disc(canvas: Canvas, pose: tuple[float, float, float], radius: float) -> None:

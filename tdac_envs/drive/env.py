@@ -37,12 +37,14 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         render_mode: `"rgb_array"`, `"human"` or None.
 
     Attributes:
+        info_of: The `info` of a step, from `robot.outcome` as a list.
         title: Title of the window.
         robot: Arrays of the robot; see `tdac_envs.drive.stepping`.
         task: The task of the current episode.
         nominal: The task without variation.
     """
 
+    info_of: Callable[[list[float]], dict[str, Any]] = staticmethod(info_of)
     title: str
     robot: Any
     task: Any
@@ -85,7 +87,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._call_drive()
         outcome = self.robot.outcome.tolist()
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
-        info = info_of(outcome)
+        info = self.info_of(outcome)
         if self.render_mode is not None:
             self._note(info["is_success"], info["collision"], truncated)
         return self._observation(), reward, terminated, truncated, info

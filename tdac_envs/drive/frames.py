@@ -55,6 +55,11 @@ class Frames:
             viewer._begin_trail()
             viewer._scene = scene
 
+    def show(self, i: int, **state: Any) -> None:
+        """From now on, draws robot i with these attributes of its environment."""
+        for name, value in state.items():
+            setattr(self._viewers[i], name, value)
+
     def note(self, which: Iterable[int]) -> None:
         """Adds the last step of some robots to their trails."""
         for i in which:

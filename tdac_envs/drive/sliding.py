@@ -26,7 +26,21 @@ _FEWEST_PIECES, _MOST_PIECES, _TURN_OF_A_PIECE = 8, 32, 0.1
 _INTO = -1e-9
 
 
-def sliding(find_contact: Any, find_normals: Any) -> Any:
+@subkernel
+def _forget(
+    obstacles: Any,
+    row: int,
+    time: float,
+    x: float,
+    y: float,
+    heading: float,
+    forward: float,
+    turn: float,
+) -> None:
+    """Notes nothing."""
+
+
+def sliding(find_contact: Any, find_normals: Any, note: Any = _forget) -> Any:
     """Returns the subkernel `slide` for one kind of obstacle.
 
     Args:
@@ -36,6 +50,10 @@ def sliding(find_contact: Any, find_normals: Any) -> Any:
         find_normals: Subkernel `(obstacles, x, y, reach, normals)` that writes the unit
             vectors away from the obstacles within `reach` of a point, shape
             (`MOST_NORMALS`, 2), and returns their number.
+        note: Subkernel `(obstacles, row, time, x, y, heading, forward, turn)` that is
+            called for each arc of the motion, in their order, and for its end: the
+            number of the arc; the fraction of the step at which it begins; the pose
+            there; speed and turn, per step.
     """
 
     @subkernel
@@ -51,7 +69,7 @@ def sliding(find_contact: Any, find_normals: Any) -> Any:
         """Moves a disc for one step; it slides along obstacles that are in its way.
 
         Args:
-            obstacles: First argument of `find_contact` and `find_normals`.
+            obstacles: First argument of the functions of `sliding`.
             state: Begins with x, y (any unit of length) and heading (rad); overwritten.
             forward: Length of the commanded arc, negative backwards.
             turn: Commanded change of heading, rad.
@@ -65,9 +83,11 @@ def sliding(find_contact: Any, find_normals: Any) -> Any:
         x, y, heading = state[X], state[Y], state[HEADING]
         pieces = math.ceil(abs(turn) / _TURN_OF_A_PIECE)
         piece = 1.0 / min(max(pieces, _FEWEST_PIECES), _MOST_PIECES)
-        rest, touched = 1.0, False
+        rest, touched, row = 1.0, False, 0
         while rest > 0.0:
             arc, bend = rest * forward, rest * turn
+            note(obstacles, row, 1.0 - rest, x, y, heading, forward, turn)
+            row += 1
             part = find_contact(obstacles, x, y, heading, arc, bend, radius)
             if part > 1.0:
                 x, y, heading = move(x, y, heading, arc, bend)
@@ -88,9 +108,16 @@ def sliding(find_contact: Any, find_normals: Any) -> Any:
                 bearing = math.atan2(along_y, along_x)
                 part = find_contact(obstacles, x, y, bearing, length, 0.0, radius)
                 part = max(part - gap / length, 0.0) if part <= 1.0 else 1.0
+                note(obstacles, row, 1.0 - rest, x, y, bearing, length / share, 0.0)
                 x, y, _ = move(x, y, bearing, part * length, 0.0)
+                row += 1
+            else:
+                part = 0.0
+            note(obstacles, row, 1.0 - rest + part * share, x, y, heading, 0.0, 0.0)
+            row += 1
             heading += share * turn
             rest -= share
+        note(obstacles, row, 1.0, x, y, heading, 0.0, 0.0)
         state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
         return touched
 

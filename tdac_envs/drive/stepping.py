@@ -31,8 +31,8 @@ X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS, FORWARD, TURN = range(
 N_STATE = 10
 # Entries of `outcome`.
 REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
-GAP, REMAINING, ROOM = range(7, 10)
-N_OUTCOME = 10
+GAP, REMAINING, ROOM, CONTACT = range(7, 11)
+N_OUTCOME = 11
 UNDISTURBED = 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
 """Gains, scales and relative wheel radii in `constants` of a robot without errors."""
 
@@ -47,7 +47,7 @@ def clear(
     state[STEPS] = state[FORWARD] = state[TURN] = 0.0
     queue[:] = 0.0
     wheel_speeds[:] = 0.0
-    outcome[:REMAINING] = 0.0
+    outcome[:REMAINING] = outcome[CONTACT] = 0.0
 
 
 @subkernel

@@ -55,12 +55,14 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         step_rows: The compiled loop over robots; see
             `tdac_envs.map2d.kernels.step_rows`.
         copied: Observation keys that this loop fills in.
+        infos_of: The infos of a step; see `tdac_envs.drive.batching.infos_of`.
         last_poses: True poses of all robots before the last `SAME_STEP` autoreset,
             shape (num_envs, 3).
     """
 
     step_rows: Callable[..., None]
     copied: tuple[str, ...]
+    infos_of: Callable[[Array, Flags], dict[str, Any]] = staticmethod(infos_of)
 
     def __init__(
         self,
@@ -171,7 +173,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             self._frames.begin(np.flatnonzero(self._over).tolist(), self.tasks)
             self._frames.note(np.flatnonzero(~self._over).tolist())
         rewards, terminated, truncated = ends_of(outcome)
-        infos = infos_of(outcome, self._everyone)
+        infos = self.infos_of(outcome, self._everyone)
         np.logical_or(terminated, truncated, out=self._over)
         self._complete(observations, range(self.num_envs))
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
@@ -347,4 +349,4 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         }
 
     def _infos(self, mask: Flags) -> dict[str, Any]:
-        return infos_of(np.where(mask[:, None], self.robots.outcome, 0.0), mask)
+        return self.infos_of(np.where(mask[:, None], self.robots.outcome, 0.0), mask)

@@ -178,6 +178,37 @@ def near_normals(
 
 
 @subkernel
+def opposing_normal(
+    clear: FloatGrid, x: float, y: float, reach: float, vx: float, vy: float
+) -> tuple[float, float]:
+    """Unit vector to a point from the nearest square that is in the way of a velocity.
+
+    Args:
+        clear: Padded clearance, px.
+        x: Column of the point, px.
+        y: Row of the point, px.
+        reach: Largest distance of the square, px.
+        vx: Velocity, in any unit.
+        vy: Velocity.
+
+    Returns:
+        (0, 0) if there is no such square.
+    """
+    nearest, best_x, best_y = reach, 0.0, 0.0
+    for j in range(math.ceil(y - reach - 0.5), math.floor(y + reach + 0.5) + 1):
+        for i in range(math.ceil(x - reach - 0.5), math.floor(x + reach + 0.5) + 1):
+            inside = -1 <= i < clear.shape[1] - 1 and -1 <= j < clear.shape[0] - 1
+            if not inside or clear[j + 1, i + 1] > 0.0:
+                continue
+            off_x = x - max(i - 0.5, min(x, i + 0.5))
+            off_y = y - max(j - 0.5, min(y, j + 0.5))
+            distance = math.sqrt(off_x * off_x + off_y * off_y)
+            if 0.0 < distance <= nearest and off_x * vx + off_y * vy < 0.0:
+                nearest, best_x, best_y = distance, off_x / distance, off_y / distance
+    return best_x, best_y
+
+
+@subkernel
 def _square_distance2(x: float, y: float, i: int, j: int) -> float:
     dx = max(abs(x - i) - 0.5, 0.0)
     dy = max(abs(y - j) - 0.5, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -16,16 +17,21 @@ from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
-from tdac_envs.drive.stepping import info_of
 from tdac_envs.drive.task import Pose
+from tdac_envs.map2d.among import begin_among, drive_among
 from tdac_envs.map2d.kernels import begin, drive
-from tdac_envs.map2d.observed import noisy, observation_space
+from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
 from tdac_envs.map2d.source import MapSource, prepare
-from tdac_envs.map2d.task import Terrain, make_task
+from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import ReadingOptions, Shade
+from tdac_envs.movers.spec import MoversOption, read_specs
+from tdac_envs.movers.state import Movers
+
+GHOST_SECONDS, MOST_GHOSTS = 1.0, 200
+"""Frames show where the movers were in the last second, in at most 200 steps."""
 
 
 class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
@@ -40,6 +46,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     step. The disc swept along this arc is tested exactly against the occupied squares,
     so no step can jump through a thin wall.
 
+    With `movers`, discs move about: they follow routes or bounce off walls, exactly
+    within a step, and never enter a wall. They block rays and touch the robot, but
+    never in the first 2 s if it stands at its start; they pass through each other and
+    do not react to the robot. The observation shows them in `ranges` alone.
+
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
     fraction of `max_wheel_speed`. Values out of range are clipped and counted in
@@ -53,7 +64,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `pose` | (3,) | px, px, rad | x, y, heading in (-pi, pi] |
     | `goal` | (2,) | px | x, y of the goal |
     | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
-    | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
+    | `ranges` | (n_rays,) | px | distance to the first wall or mover along each ray |
     | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
     Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
@@ -65,7 +76,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     - `progress`: +0.1 times the decrease of the grid path length to the goal,
       divided by the distance of one step at full speed,
     - `goal`: +10 if the goal is reached,
-    - `collision`: -10 if the body touches an obstacle,
+    - `collision`: -10 if the body touches an obstacle or a mover,
     - `time`: -0.01.
 
     ## Starting State
@@ -77,13 +88,17 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     `reset(options={"start": (x, y, heading), "goal": (x, y)})` overrides `variation`.
 
+    Where movers start is drawn at each reset, unless it is given. A drawn start at
+    which a mover would touch the robot within 2 s is drawn again.
+
     ## Info
     `reset` and `step` return these entries; distances are in px:
 
     | key | content |
     |---|---|
     | `is_success` | whether the goal is reached |
-    | `collision` | whether the body touched an obstacle in this step |
+    | `collision` | whether the body touched an obstacle or a mover in this step |
+    | `contact` | what it touched: `"wall"`, `"mover"`, `"mover_standing"`, or None |
     | `collisions` | number of such steps so far |
     | `clipped` | number of actions out of range so far |
     | `distance_to_goal` | straight distance from the robot's centre to the goal |
@@ -93,16 +108,22 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     The border of the map counts as an obstacle. `clearance` is never negative; it is
     measured from the centre of the pixel in which the robot's centre lies, so it is
     exact to 0.71 px. The gap between the body and the obstacle is
-    `clearance - robot_radius`.
+    `clearance - robot_radius`. Movers do not count for `path_distance` and `clearance`.
+
+    `collision` is a bool, as libraries expect; `contact` is its cause. It is
+    `"mover_standing"` if a mover touched a robot that stood: one that had moved by less
+    than 2 % of what it can in the last 0.5 s. Of a wall and a mover, the first counts.
 
     ## Episode End
     The episode ends if one of the following happens:
     1. Termination: the robot's centre is within `goal_tolerance` of the goal, with no
        wall in between (`info["is_success"]`).
-    2. Termination: the body touches an obstacle (`info["collision"]`). With
+    2. Termination: the body touches an obstacle or a mover (`info["collision"]`). With
        `on_collision="block"` the episode goes on: the wheels slip, so that the robot
        turns and slides along the obstacle (`docs/contacts.md`), and
-       `info["collisions"]` counts the steps in contact.
+       `info["collisions"]` counts the steps in contact. Robot and mover stand from
+       their contact to the end of the step; the robot may turn. A mover that would
+       press against the robot waits.
     3. Truncation: the episode has lasted `horizon` steps.
 
     ## Arguments
@@ -144,6 +165,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         snap: Whether to move start and goal to the nearest place where the body fits.
         polarity: Which pixels of a map image are obstacles: `"dark"`, `"light"`, or
             None to decide from the image.
+        movers: A list with a dict for each mover or group of movers, such as
+            `{"kind": "route", "points": [[40, 40], [90, 40]], "speed": 30, "radius": 8,
+            "loop": False}` or `{"kind": "bounce", "count": 3, "speed": 30}`;
+            `"bounce:5"` stands for five movers with the defaults, half as fast as the
+            robot and as large. `tdac_envs.movers.spec` has all keys.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -157,6 +183,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     }
     readings = "ranges"
     """Observation key of the distance sensors."""
+    info_of = staticmethod(info_of)
 
     def __init__(
         self,
@@ -188,8 +215,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         reward_weights: Mapping[str, float] | None = None,
         snap: bool = False,
         polarity: Shade | None = None,
+        movers: MoversOption = None,
         render_mode: str | None = None,
     ) -> None:
+        specs = read_specs(movers)
         prepared = prepare(
             map,
             start,
@@ -238,6 +267,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             source=None,
             range_noise=range_noise,
             range_dropout=range_dropout,
+            movers=specs,
         )
         self.params = params
         self._prepare(setup, render_mode)
@@ -261,6 +291,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self.robot = Robot.blank(setup.nominal.robot.n_rays, self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
+        self.movers = movers_of(self.nominal)
+        self._ghosts: deque[NDArray[np.float64]] = deque(maxlen=1)
         self._bind()
         self._scene: MapScene | None = None
 
@@ -275,7 +307,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         before = self.task
         self._draw(options or {})
-        if self.task.field is not before.field:
+        if self.setup.has_movers:
+            self.movers = movers_of(self.task)
+        if self.task.field is not before.field or self.setup.has_movers:
             self._bind()
         task, robot = self.task, self.robot
         robot.place(task)
@@ -299,10 +333,13 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     def _bind(self) -> None:
         """Binds the kernels to this environment's own arrays."""
-        self.addresses = Addresses([(*self.setup.world(self.task), *self.robot)])
+        arrays = *self.setup.world(self.task), *self.robot
+        among = self.setup.has_movers
+        self.addresses = Addresses([(*arrays, *self.movers) if among else arrays])
         (words,) = self.addresses.words
-        self._call_begin: Callable[[], None] = partial(begin, words)
-        self._call_drive = partial(drive, words)
+        kernels = (begin_among, drive_among) if among else (begin, drive)
+        calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
+        self._call_begin, self._call_drive = calls
         robot = self.robot
         seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
         self._copies = [array.copy for array in seen]
@@ -322,6 +359,15 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 seen["odometry"] = self._odometry()
         return seen
 
+    def _begin_trail(self) -> None:
+        super()._begin_trail()
+        steps = math.ceil(GHOST_SECONDS / self.task.dt)
+        self._ghosts = deque([self.movers.discs()], min(steps + 1, MOST_GHOSTS))
+
+    def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
+        self._ghosts.append(self.movers.discs())
+        super()._note(reached, collided, truncated)
+
     def _frame(self) -> NDArray[np.uint8]:
         task, robot = self.task, self.robot
         if self._scene is None:
@@ -336,5 +382,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)
         return self._scene.frame(
-            robot.state[:3].tolist(), robot.ranges, self._trail, status
+            robot.state[:3].tolist(), robot.ranges, self._trail, status, self._ghosts
         )
+
+
+def movers_of(task: Map2DTask) -> Movers:
+    """New arrays of the movers of a task at the start of an episode."""
+    return Movers.none() if task.movers is None else task.movers.fresh()

@@ -18,6 +18,7 @@ from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
     AXLE,
+    CONTACT,
     DT,
     FORWARD,
     FRICTION,
@@ -58,7 +59,7 @@ from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
 # A stopped body is moved back along its arc by this distance, px, so that the next
 # step starts outside the obstacle.
 CONTACT_GAP = 1e-6
-# Indices of some of the arrays of `_arrays_at`.
+# Indices of some of the arrays of `arrays_at`.
 STATE, POSE, WHEEL_SPEEDS, RANGES, OUTCOME = 5, 7, 8, 9, 10
 
 _slide = sliding(arc_contact, near_normals)
@@ -90,7 +91,7 @@ def advance(
         After a contact the robot is placed `CONTACT_GAP` before it, with the heading
         it had there.
     """
-    forward, turn = _arc(left, right, axle, dt)
+    forward, turn = arc_of(left, right, axle, dt)
     x, y, heading = state[X], state[Y], state[HEADING]
     end_x, end_y, end_heading = move(x, y, heading, forward, turn)
     touch = contact_before(
@@ -105,7 +106,7 @@ def advance(
 
 
 @subkernel
-def _arc(left: float, right: float, axle: float, dt: float) -> tuple[float, float]:
+def arc_of(left: float, right: float, axle: float, dt: float) -> tuple[float, float]:
     """Length (px) and turn (rad) of a step at constant wheel speeds."""
     # y points down, so a positive turn is clockwise on the screen.
     return 0.5 * (left + right) * dt, (left - right) * dt / axle
@@ -152,7 +153,7 @@ def path_distance(
 
 
 @subkernel
-def _observe(
+def observe(
     leaps: LeapGrid,
     clear: FloatGrid,
     field: FloatGrid,
@@ -177,7 +178,7 @@ def _observe(
 
 
 @subkernel
-def _begin(
+def begin_episode(
     leaps: LeapGrid,
     clear: FloatGrid,
     field: FloatGrid,
@@ -190,20 +191,33 @@ def _begin(
     ranges: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Begins an episode at the pose in `state`; arguments as for `_drive`.
+    """Begins an episode at the pose in `state`; arguments as for `drive_step`.
 
     `outcome[REMAINING]` must be the length of the shortest path from there.
     """
     clear_state(state, queue, wheel_speeds, outcome)
     remaining = outcome[REMAINING]
-    _observe(
+    observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
     outcome[REACHED], outcome[REMAINING] = 0.0, remaining
 
 
 @subkernel
-def _drive(
+def ground_speeds(
+    constants: Array, state: Array, wheel_speeds: NDArray[np.float32]
+) -> tuple[float, float]:
+    """Speeds of the wheels over ground in the step, px/s."""
+    limit = constants[MAX_SPEED]
+    left, right = turned_wheels(constants, wheel_speeds)
+    return (
+        limit * clip_unit(left * state[SLIP_LEFT]),
+        limit * clip_unit(right * state[SLIP_RIGHT]),
+    )
+
+
+@subkernel
+def drive_step(
     leaps: LeapGrid,
     clear: FloatGrid,
     field: FloatGrid,
@@ -223,13 +237,11 @@ def _drive(
     `Robot`. All of them are overwritten except `constants` and, in `state`, the
     commands and the slip.
     """
+    before = outcome[REMAINING]
     apply_command(constants, state, queue, wheel_speeds, outcome)
-    limit, before = constants[MAX_SPEED], outcome[REMAINING]
-    left, right = turned_wheels(constants, wheel_speeds)
-    left = limit * clip_unit(left * state[SLIP_LEFT])
-    right = limit * clip_unit(right * state[SLIP_RIGHT])
+    left, right = ground_speeds(constants, state, wheel_speeds)
     axle, dt, radius = constants[AXLE], constants[DT], constants[RADIUS]
-    forward, turn = _arc(left, right, axle, dt)
+    forward, turn = arc_of(left, right, axle, dt)
     if constants[STOPS] == 1.0:
         touched, part = advance(clear, state, left, right, axle, dt, radius)
         outcome[TOUCHED] = touched
@@ -239,16 +251,17 @@ def _drive(
             clear, state, forward, turn, radius, constants[FRICTION],
             CONTACT_GAP,
         )  # fmt: skip
+    outcome[CONTACT] = outcome[TOUCHED]
     state[FORWARD], state[TURN] = forward, turn
-    _observe(
+    observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
     finish_step(constants, state, outcome, before)
 
 
 @subkernel
-def _arrays_at(words: Words) -> Any:
-    """The arrays of a robot and its world, in the order of `_drive`'s arguments."""
+def arrays_at(words: Words) -> Any:
+    """The arrays of a robot and its world, in the order of `drive_step`'s arguments."""
     return (
         block(words[0], np.uint8),
         plane(words[1], np.float32),
@@ -266,19 +279,19 @@ def _arrays_at(words: Words) -> Any:
 
 @kernel
 def begin(words: Words) -> None:
-    """Begins an episode; see `_begin`.
+    """Begins an episode; see `begin_episode`.
 
     Args:
         words: Shape (11, 4), from `tdac_envs.core.addresses.Addresses`: the arrays of
             `Setup.world`, then those of the robot.
     """
-    _begin(*_arrays_at(words))
+    begin_episode(*arrays_at(words))
 
 
 @kernel
 def drive(words: Words) -> None:
     """Runs one step of a robot; `words` as for `begin`."""
-    _drive(*_arrays_at(words))
+    drive_step(*arrays_at(words))
 
 
 @kernel
@@ -300,12 +313,12 @@ def step_rows(batch: Words, rows: Words) -> None:
     poses, speeds = plane(batch[5], np.float32), plane(batch[6], np.float32)
     ranges = plane(batch[7], np.float32)
     for row in rows:
-        own = _arrays_at(words[row])
+        own = arrays_at(words[row])
         give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
         if over[row]:
-            _begin(*own)
+            begin_episode(*own)
         else:
-            _drive(*own)
+            drive_step(*own)
         copy_row(own[OUTCOME], outcomes, row)
         copy_row(own[POSE], poses, row)
         copy_row(own[WHEEL_SPEEDS], speeds, row)

@@ -3,13 +3,48 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from tdac_envs.drive import batching
+from tdac_envs.drive.stepping import CONTACT
 from tdac_envs.map2d.setup import Setup
 from tdac_envs.map2d.task import Map2DTask
+
+CONTACTS = None, "wall", "mover", "mover_standing"
+"""What the robot touched in a step, by `outcome[CONTACT]`."""
+
+
+def info_of(outcome: list[float]) -> dict[str, Any]:
+    """The `info` of a step, from its `outcome` as a list; see `Map2DEnv`."""
+    # In one literal, because it is made in each step.
+    (
+        _, _, _, reached, touched, collisions, clipped, gap, remaining, room, contact,
+    ) = outcome  # fmt: skip
+    return {
+        "is_success": reached == 1.0,
+        "collision": touched == 1.0,
+        "contact": CONTACTS[int(contact)] if contact else None,
+        "collisions": int(collisions),
+        "clipped": int(clipped),
+        "distance_to_goal": gap,
+        "path_distance": remaining,
+        "clearance": room,
+    }
+
+
+def infos_of(outcome: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str, Any]:
+    """The infos of a batch, as of `drive.batching.infos_of`."""
+    infos = batching.infos_of(outcome, mask)
+    contacts = np.full(len(mask), None, object)
+    for i in np.flatnonzero(outcome[:, CONTACT]).tolist():
+        contacts[i] = CONTACTS[int(outcome[i, CONTACT])]
+    infos["contact"] = contacts
+    infos["_contact"] = mask.copy()
+    return infos
 
 
 def noisy(

@@ -7,7 +7,7 @@ from math import radians
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tdac_envs.drawing.canvas import GREY, INK, TRAIL, Canvas, Image
 from tdac_envs.drawing.marks import (
@@ -15,6 +15,7 @@ from tdac_envs.drawing.marks import (
     OUTCOMES,
     RIGHT_RAYS,
     draw_disc,
+    draw_movers,
     draw_outcome,
     draw_rays,
     draw_task,
@@ -69,6 +70,7 @@ class MapScene:
         ranges: ArrayLike = (),
         trail: ArrayLike = (),
         status: Status | None = None,
+        movers: Sequence[NDArray[np.float64]] = (),
     ) -> Image:
         """One frame, uint8 RGB with even width and height.
 
@@ -77,11 +79,13 @@ class MapScene:
             ranges: Distances along the sensor's rays, px.
             trail: Positions so far, shape (n, 2), px.
             status: Text of the status strip; its outcome also marks the robot.
+            movers: Movers in the last steps, each of shape (m, 3): x, y, radius, px.
         """
         canvas, robot = self._canvas.copy(), self._robot
         x, y, heading = (float(value) for value in pose)
         fan, fov = np.asarray(ranges, np.float64), radians(robot.field_of_view_deg)
         draw_rays(canvas, (x, y, heading), fan, fov, robot.range_max)
+        draw_movers(canvas, movers)
         canvas.line(trail, TRAIL, 2)
         if self._radius < SMALLEST_PICTURE:
             canvas.disc((x, y), 3 * self._radius, TRAIL, 0.6, 1)

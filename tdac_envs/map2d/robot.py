@@ -23,7 +23,7 @@ FRICTION = 0.4
 class Robot(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
-    `kernels._arrays_at` and the indices beside it follow the order of the fields.
+    `kernels.arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
         constants: Shape (22,), float64: axle length (px), full wheel speed (px/s), dt
@@ -41,11 +41,11 @@ class Robot(NamedTuple):
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
         ranges: Shape (n_rays,), float32, px.
-        outcome: Shape (10,), float64: reward of the last step; whether it terminated
+        outcome: Shape (11,), float64: reward of the last step; whether it terminated
             or truncated the episode, reached the goal, touched an obstacle; number of
             contacts and of clipped actions so far; straight distance to the goal,
             length of the shortest path to it, clearance of the pixel under the robot
-            (px).
+            (px); what was touched, an index of `observed.CONTACTS`.
     """
 
     constants: Array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,10 @@ from tdac_envs.core.arguments import (
     whole_number,
 )
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.disturbances import Random
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.task import Pose
+from tdac_envs.map2d.placing import Cast
 from tdac_envs.map2d.rays import fan
 from tdac_envs.map2d.robot import constants_of
 from tdac_envs.map2d.task import (
@@ -28,6 +30,10 @@ from tdac_envs.map2d.task import (
     random_task,
 )
 from tdac_envs.mapping.params import RobotParams
+from tdac_envs.movers.spec import AnySpec
+
+MOST_STARTS = 100
+"""Starts that are drawn until no mover touches the robot."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,13 +43,17 @@ class Setup(DriveSetup):
     Attributes:
         range_noise: Relative standard deviation of each range.
         range_dropout: Probability that a ray reads the largest range.
+        movers: Movers of all episodes, if the source of the tasks has none.
         directions: Directions of the rays, from `rays.fan`.
+        cast: The movers, checked on the map.
     """
 
     nominal: Map2DTask
     range_noise: float
     range_dropout: float
+    movers: tuple[AnySpec, ...] = ()
     directions: NDArray[np.float64] = field(init=False)
+    cast: Cast = field(init=False)
 
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
@@ -54,11 +64,46 @@ class Setup(DriveSetup):
         robot = self.nominal.robot
         view = np.radians(robot.field_of_view_deg)
         object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
+        cast = Cast.of(self.movers, self.nominal)
+        object.__setattr__(self, "cast", cast)
+        if self.movers and self.variation == "nominal" and self.source is None:
+            # A fault is found here, and not at the first reset.
+            self.cast.start(self.nominal, np.random.default_rng(0))
 
     @property
     def has_inexact_ranges(self) -> bool:
         """Whether ranges have noise or dropouts."""
         return bool(self.range_noise or self.range_dropout)
+
+    @property
+    def has_movers(self) -> bool:
+        """Whether there are movers in an episode."""
+        return bool(self.movers) or self.nominal.movers is not None
+
+    @property
+    def varies(self) -> bool:
+        """Whether the task may differ from episode to episode."""
+        return self.has_movers or bool(DriveSetup.varies.__get__(self))
+
+    def draw(self, options: dict[str, Any], random: Random) -> tuple[Any, Random]:
+        """The task of an episode with its movers; see `DriveSetup.draw`.
+
+        A start at which a mover would touch the robot is drawn anew, if it is drawn.
+        """
+        drawn, noise = DriveSetup.draw(self, options, random)
+        if not self.movers:
+            return drawn, noise
+        again = 0 if options or self.variation == "nominal" else MOST_STARTS
+        while True:
+            try:
+                movers = self.cast.start(drawn, noise)
+            except TaskError:
+                if again == 0:
+                    raise
+                again -= 1
+                drawn, noise = DriveSetup.draw(self, options, random)
+            else:
+                return replace(drawn, movers=movers), noise
 
     def constants(self) -> NDArray[np.float64]:
         """`Robot.constants` of the nominal task."""

@@ -42,6 +42,7 @@ from tdac_envs.map2d.terrain import (
     widest_connected_radius,
 )
 from tdac_envs.mapping.params import RobotParams
+from tdac_envs.movers.state import Movers
 
 __all__ = [
     "Map2DTask",
@@ -75,6 +76,7 @@ class Map2DTask:
             the body from each pixel to the goal, px; inf if there is none.
         shortest: d0, the length of the shortest grid path from the nominal start, px;
             see `path_from`.
+        movers: The movers at the start of the episode; None without movers.
     """
 
     env_id: ClassVar = "TDAC-Map2D-v0"
@@ -88,9 +90,10 @@ class Map2DTask:
     horizon: int
     field: NDArray[np.float32]
     shortest: float
+    movers: Movers | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        rest = (self.robot, self.goal_tolerance, self.dt, self.horizon)
+        rest = self.robot, self.goal_tolerance, self.dt, self.horizon, self.movers
         return _restored, (self.terrain, self.start, self.goal, *rest)
 
     @property
@@ -279,9 +282,9 @@ def _restored(
     terrain: Terrain, start: Pose, goal: tuple[float, float], *rest: Any
 ) -> Map2DTask:
     """Restores a pickled task and recomputes what the pickle leaves out."""
-    robot, tolerance, dt, horizon = rest
+    robot, tolerance, dt, horizon, movers = rest
     field = route(terrain, start[:2], goal, robot.radius)
     shortest = path_length_from(terrain, field, start.x, start.y)
     return Map2DTask(
-        terrain, start, goal, robot, tolerance, dt, horizon, field, shortest
+        terrain, start, goal, robot, tolerance, dt, horizon, field, shortest, movers
     )

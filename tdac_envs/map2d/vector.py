@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.drive.batching import make_envs
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations
-from tdac_envs.map2d.env import Map2DEnv
+from tdac_envs.map2d.among import step_rows_among
+from tdac_envs.map2d.env import Map2DEnv, movers_of
 from tdac_envs.map2d.kernels import step_rows
-from tdac_envs.map2d.observed import noisy
+from tdac_envs.map2d.observed import infos_of, noisy
+from tdac_envs.movers.state import Movers
 
 
 class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
@@ -31,14 +34,14 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             number of cores.
         each: Arguments that differ between robots, such as `[{"map": "maze"},
             {"map": "office"}]`; robot i takes entry `i % len(each)`. All robots need
-            the same `n_rays`, `delay` and `odometry`.
+            the same `n_rays`, `delay` and `odometry`; their movers may differ.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
         **options: Arguments of `Map2DEnv` for all robots.
     """
 
     make: Callable[..., Map2DEnv] = Map2DEnv
-    step_rows = staticmethod(step_rows)
     copied = ("pose", "wheel_speeds", "ranges")
+    infos_of = staticmethod(infos_of)
 
     def __init__(
         self,
@@ -51,8 +54,11 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         **options: Any,
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
+        envs = make_envs(self.make, each, options, num_envs)
+        self._among = any(env.setup.has_movers for env in envs)
+        self._movers = [Movers.none() for _ in range(num_envs)]
         super().__init__(
-            make_envs(self.make, each, options, num_envs),
+            envs,
             num_envs,
             autoreset_mode=autoreset_mode,
             threads=threads,
@@ -62,6 +68,27 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         self._noisy = np.flatnonzero(noisy)
         # Last observation: robots that are not reset keep their noise.
         self._ranges = self.robots.ranges.copy()
+
+    @property
+    def step_rows(self) -> Callable[..., None]:  # type: ignore[override]
+        """The compiled loop over robots."""
+        return step_rows_among if self._among else step_rows
+
+    def movers(self, i: int) -> Movers:
+        """The movers of robot i in the current step; only to be read."""
+        return self._movers[i]
+
+    def _arrays(self, i: int) -> tuple[NDArray[Any], ...]:
+        arrays = super()._arrays(i)
+        return (*arrays, *self._movers[i]) if self._among else arrays
+
+    def _assign(self, i: int, task: Any) -> None:
+        super()._assign(i, task)
+        if self._among:
+            self._movers[i] = movers_of(task)
+            self._addresses.put(i, self._arrays(i))
+            if self._frames is not None:
+                self._frames.show(i, movers=self._movers[i])
 
     def _seen(self) -> Observations:
         robots = self.robots

@@ -9,8 +9,8 @@ def assert_same(one, two):
         assert one.keys() == two.keys()
         for key in one:
             assert_same(one[key], two[key])
-    elif one is None:
-        assert two is None
+    elif one is None or isinstance(one, str):
+        assert one == two
     elif one.dtype == object:
         for a, b in zip(one, two, strict=True):
             assert_same(a, b)

@@ -39,6 +39,17 @@ VARIANTS = [
         },
     ),
     (
+        "TDAC-Map2D-v0",
+        {
+            "map": "office",
+            "variation": "jitter",
+            "movers": [
+                {"kind": "bounce", "count": 4, "radius": 6.0, "speed": 50.0},
+                {"kind": "bounce", "speed": 0.0},
+            ],
+        },
+    ),
+    (
         "TDAC-EPuck-v0",
         {
             "world": "crates",

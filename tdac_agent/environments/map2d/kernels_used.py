@@ -19,6 +19,8 @@ def use_kernels() -> None:
     grid, _ = tdac_envs.preprocess(image, start, goal, radius, preset="paper")
     ends = {"start": start, "goal": goal, "robot_radius": radius}
     disc = use_robot("TDAC-Map2D-v0", map=grid.cells, **ends)
+    post = {"kind": "route", "points": [(45.0, 10.0)], "radius": 3.0}
+    use_robot("TDAC-Map2D-v0", map=grid.cells, movers=[post], **ends)
     rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
     _use_ladder()
 

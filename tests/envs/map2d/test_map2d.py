@@ -274,6 +274,8 @@ class TestInfo:
         env = walled_env()
         infos = [env.reset(seed=0)[1], env.step(FULL)[4]]
         infos.append(TestEnds().drive(env, FULL)[4])
+        contacts = [info.pop("contact") for info in infos]
+        assert contacts == [None, None, "wall"]
         for info in infos:
             assert {key: type(value) for key, value in info.items()} == expected
 

@@ -1,0 +1,174 @@
+"""The movers of an environment, and where they are at the start of an episode."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.task import MAX_DRAWS, check_full_step
+from tdac_envs.map2d.encounters import LOOK, nearest_approaches
+from tdac_envs.map2d.starts import KINDS, Point, Random, Start
+from tdac_envs.movers import state as at
+from tdac_envs.movers.spec import AnySpec
+from tdac_envs.movers.state import Movers
+
+if TYPE_CHECKING:
+    from tdac_envs.map2d.task import Map2DTask
+
+SAFE_SECONDS = 2.0
+"""No mover touches a robot that stands at its start for this time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cast:
+    """The movers of an environment on a map; their starts are drawn per episode.
+
+    Attributes:
+        starts: Where each mover starts.
+        traits: `Movers.traits`.
+        points: `Movers.points`.
+    """
+
+    starts: tuple[Start, ...]
+    traits: NDArray[np.float64]
+    points: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, specs: Sequence[AnySpec], task: Map2DTask) -> Cast:
+        """The movers that a user asks for, checked on the map of a task.
+
+        Args:
+            specs: From `movers.spec.read_specs`.
+            task: The task; its start, goal and movers are ignored.
+
+        Raises:
+            TaskError: A route runs into a wall, or a disc fits nowhere; the message
+                names the mover.
+        """
+        robot = task.robot
+        each = [spec for spec in specs for _ in range(spec.number)]
+        starts: list[Start] = []
+        points: list[Point] = []
+        traits = np.zeros((len(each), at.N_TRAITS))
+        for m, spec in enumerate(each):
+            radius = robot.radius if spec.radius is None else spec.radius
+            speed = 0.5 * robot.max_wheel_speed if spec.speed is None else spec.speed
+            check_full_step(max(task.dt, LOOK), speed, "px")
+            try:
+                own = KINDS[spec.kind](spec, task, radius, speed)
+            except TaskError as error:
+                raise TaskError(f"mover {m}: {error}") from None
+            traits[m] = own.kind, radius, speed, len(points), len(own.points)
+            points += own.points
+            starts.append(own)
+        return cls(tuple(starts), traits, np.array(points).reshape(-1, 2))
+
+    def start(self, task: Map2DTask, random: Random) -> Movers:
+        """Draws the movers of an episode at its start.
+
+        Args:
+            task: The task; its movers are ignored.
+            random: Random numbers of the episode.
+
+        Raises:
+            TaskError: A mover would touch the standing robot within 2 s, or covers the
+                goal for ever; the message names the mover.
+        """
+        self._check_goal(task)
+        movers = Movers.blank(len(self.traits), self.points, task.dt)
+        movers.traits[:] = self.traits
+        for m, own in enumerate(self.starts):
+            _put(movers, m, own, random)
+        for m in np.flatnonzero(_in_the_way(movers, task)).tolist():
+            self._draw_again(movers, m, task, random)
+        return movers
+
+    def _draw_again(
+        self, movers: Movers, m: int, task: Map2DTask, random: Random
+    ) -> None:
+        if not self.starts[m].is_drawn:
+            raise _too_near(movers, m, task)
+        # Views of the rows of this mover.
+        alone = Movers(
+            movers.traits[m : m + 1],
+            movers.now[m : m + 1],
+            movers.points,
+            movers.pieces[m : m + 1],
+            movers.path,
+            movers.past,
+        )
+        for _ in range(MAX_DRAWS):
+            _put(movers, m, self.starts[m], random)
+            if not _in_the_way(alone, task)[0]:
+                return
+        raise TaskError(
+            f"mover {m} reaches the robot within {SAFE_SECONDS:g} s wherever it "
+            "starts; move it or the robot, or make it slower"
+        )
+
+    def _check_goal(self, task: Map2DTask) -> None:
+        for m, own in enumerate(self.starts):
+            places = own.stays_within()
+            if not places:
+                continue
+            farthest = max(math.dist(task.goal, place) for place in places)
+            if farthest + task.goal_tolerance < _reach(self.traits, m, task):
+                x, y = task.goal
+                raise TaskError(
+                    f"mover {m} covers the goal ({x:.1f}, {y:.1f}) for ever; move one "
+                    "of them"
+                )
+
+
+def _put(movers: Movers, m: int, start: Start, random: Random) -> None:
+    x, y, remembered = start.place(random)
+    movers.now[m] = x, y, 0.0, 0.0, remembered
+
+
+def _reach(traits: NDArray[np.float64], m: int, task: Map2DTask) -> float:
+    """Distance of the centres of robot and mover m when they touch, px."""
+    return float(traits[m, at.RADIUS]) + task.robot.radius
+
+
+def _in_the_way(movers: Movers, task: Map2DTask) -> NDArray[np.bool_]:
+    """Which movers touch the robot at its start within 2 s, or stand on its goal."""
+    least = np.empty(len(movers.traits))
+    nearest_approaches(
+        task.terrain.padded_clear,
+        movers.traits,
+        movers.now.copy(),
+        movers.points,
+        movers.pieces,
+        float(task.start.x),
+        float(task.start.y),
+        SAFE_SECONDS,
+        least,
+    )
+    reach = movers.traits[:, at.RADIUS] + task.robot.radius
+    off_x, off_y = (movers.now[:, : at.Y + 1] - task.goal).T
+    covers = np.hypot(off_x, off_y) + task.goal_tolerance < reach
+    on_goal: NDArray[np.bool_] = covers & (movers.traits[:, at.SPEED] == 0.0)
+    return (least <= reach) | on_goal
+
+
+def _too_near(movers: Movers, m: int, task: Map2DTask) -> TaskError:
+    """Why a given start is refused."""
+    x, y = movers.now[m, : at.Y + 1].tolist()
+    start, reach = task.start, _reach(movers.traits, m, task)
+    gap = math.dist((x, y), start[:2])
+    if gap <= reach:
+        return TaskError(
+            f"mover {m} starts on the robot: their centres are {gap:.1f} px apart and "
+            f"need {reach:.1f} px; move one of them"
+        )
+    return TaskError(
+        f"mover {m} starts at ({x:.1f}, {y:.1f}) and reaches the robot, which starts "
+        f"at ({start.x:.1f}, {start.y:.1f}), within {SAFE_SECONDS:g} s; move one "
+        "of them"
+    )

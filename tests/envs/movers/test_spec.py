@@ -1,0 +1,65 @@
+"""Promises of `movers=...`: what is understood, and what is refused in one line."""
+
+import json
+
+import pytest
+
+from tdac_envs.core.errors import TaskError
+from tdac_envs.movers.spec import BounceSpec, RouteSpec, read_specs
+
+ROUTE = {"kind": "route", "points": [[1, 2], [3, 4]], "speed": 30, "radius": 8}
+
+
+def test_no_movers():
+    assert read_specs(None) == read_specs([]) == ()
+
+
+def test_a_text_is_a_kind_with_its_defaults():
+    assert read_specs("bounce:5") == (BounceSpec(count=5),)
+    assert read_specs("crowd:20")[0].number == 20
+
+
+def test_entries_survive_json():
+    given = [ROUTE, {"kind": "bounce", "count": 3, "heading": 0.5}]
+    specs = read_specs(json.loads(json.dumps(given)))
+    assert specs == (RouteSpec(**ROUTE), BounceSpec(count=3, heading=0.5))
+    again = [json.loads(spec.model_dump_json()) for spec in specs]
+    assert read_specs(again) == specs
+
+
+def test_every_key_is_documented():
+    for kind in (RouteSpec, BounceSpec):
+        for name, key in kind.model_fields.items():
+            assert key.description or name == "kind"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("bounse:3", "unknown kind of movers 'bounse'.*did you mean 'bounce'"),
+        ("bounce", "expected movers such as 'bounce:5', got 'bounce'"),
+        ("bounce:-1", "expected movers such as 'bounce:5'"),
+        ("bounce:1000000", "at most 256 movers, got 1000000"),
+        ("route:3", "of kind 'route' need more than a number"),
+        ([ROUTE] * 257, "at most 256 movers, got 257"),
+        ([{"kind": "bounce", "count": 10**6}], "at most 256 movers, got 1000000"),
+        ([{"kind": "bounce", "count": 200}] * 2, "at most 256 movers, got 400"),
+        ({"kind": "bounce"}, "expected movers such as"),
+        (["bounce"], r"movers\[0\]: expected a dict, got 'bounce'"),
+        ([ROUTE, {"kind": "walk"}], r"movers\[1\]: expected kind to be one of 'route'"),
+        ([{**ROUTE, "kind": ["a"]}], r"movers\[0\]: expected kind to be one of"),
+        ([{**ROUTE, "radius": 0}], r"movers\[0\]: radius: "),
+        ([{**ROUTE, "speed": -1}], r"movers\[0\]: speed: "),
+        ([{**ROUTE, "speed": float("nan")}], r"movers\[0\]: speed: "),
+        ([{**ROUTE, "sped": 1}], r"sped: unknown key \(did you mean 'speed'\?\)"),
+        ([{"kind": "route"}], r"movers\[0\]: points: is missing"),
+        ([{**ROUTE, "points": []}], r"movers\[0\]: points: "),
+        ([{**ROUTE, "points": [[1, 2], [1, 2]]}], "segment 0 of the route"),
+        ([{**ROUTE, "phase": 1.0}], r"movers\[0\]: phase: "),
+        ([{"kind": "bounce", "count": 2, "start": [1, 2]}], "start is for a single"),
+    ],
+)
+def test_a_fault_is_one_line(given, message):
+    with pytest.raises(TaskError, match=message) as caught:
+        read_specs(given)
+    assert "\n" not in str(caught.value)
