@@ -292,8 +292,6 @@ def nearest_approaches(
 ) -> None:  # fmt: skip
     """Least distance of each mover's centre from a point within a time.
 
-    Of a person of a crowd, it is a lower bound.
-
     Args:
         clear: Padded clearance, px.
         traits: `Movers.traits`; the arrays after it are those of `Movers`, too.
@@ -307,9 +305,6 @@ def nearest_approaches(
     """
     for m in range(traits.shape[0]):
         nearest = math.hypot(now[m, at.X] - x, now[m, at.Y] - y)
-        if traits[m, at.KIND] == at.CROWD:
-            least[m] = nearest - traits[m, at.SPEED] * seconds
-            continue
         for _ in range(math.ceil(seconds / LOOK)):
             plan_one(clear, traits, now, points, pieces, m, LOOK)
             nearest = min(nearest, _distance_of_pieces(pieces, m, x, y))

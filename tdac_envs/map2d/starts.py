@@ -224,13 +224,8 @@ class Bouncer:
         return (self.place_given,) if self.stands and self.place_given else ()
 
 
-def _no_crowd(*_: Any) -> Start:
-    raise TaskError("crowds are not available yet")
-
-
 KINDS: dict[str, Callable[[Any, Any, float, float], Start]] = {
     "route": Route.of,
     "bounce": Bouncer.of,
-    "crowd": _no_crowd,
 }
 """The start of a mover, from its entry, the task, its radius (px) and speed (px/s)."""

@@ -16,11 +16,11 @@ them compiled and without allocation:
 3. *Stop*: `motion.stop` moves each mover to the end of its pieces, or to the time of
    the contact that ends the episode, and updates `Movers.now`.
 
-A further kind (a crowd) needs
+A further kind needs
 - a model in `spec.KINDS` and an entry in `map2d.starts.KINDS`: a `Start`, whose
   `place` draws where a mover starts, with the random numbers of the episode. No mover
   may touch the robot, standing at its start, for 2 s: `placing` draws a start again
-  if it would. It takes a member of a crowd to drive at full speed to the robot;
+  if it would;
 - a function that plans all its movers at once and is called in
   `map2d.among._drive_among` after `plan`, where the robot's arrays are at hand, and
   which skips the movers of other kinds (`traits[m, KIND]`). For each of its movers m it

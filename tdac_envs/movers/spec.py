@@ -16,8 +16,6 @@ from tdac_envs.movers.state import MOST_MOVERS
 
 MOST_POINTS = 1000
 """Largest number of way-points of a route."""
-MOST_PEOPLE = 64
-"""Largest number of members of crowds."""
 
 Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Point = tuple[Coordinate, Coordinate]
@@ -94,31 +92,15 @@ class BounceSpec(_Strict):
         return self.count
 
 
-class CrowdSpec(_Strict):
-    """People with goals of their own, who avoid each other."""
-
-    kind: Literal["crowd"] = "crowd"
-    count: int = Field(20, ge=1, le=MOST_PEOPLE, description="Number of people.")
-    sees_robot: bool | Annotated[float, Field(ge=0.0, le=1.0)] = Field(
-        0.5, description="Whether they avoid the robot, or the share of those who do."
-    )
-
-    @property
-    def number(self) -> int:
-        """Number of discs."""
-        return self.count
-
-
-Spec = Annotated[RouteSpec | BounceSpec | CrowdSpec, Field(discriminator="kind")]
+Spec = Annotated[RouteSpec | BounceSpec, Field(discriminator="kind")]
 """Any entry of `movers`, for the models of files."""
 MoversOption = str | Sequence[Mapping[str, Any]] | None
 """The argument `movers` of an environment."""
 
-AnySpec = RouteSpec | BounceSpec | CrowdSpec
+AnySpec = RouteSpec | BounceSpec
 KINDS: dict[str, type[AnySpec]] = {
     "route": RouteSpec,
     "bounce": BounceSpec,
-    "crowd": CrowdSpec,
 }
 _EXAMPLE = "'bounce:5' or [{'kind': 'bounce', 'count': 5}]"
 

@@ -13,7 +13,7 @@ MOST_MOVERS = 256
 """Largest number of movers of a robot."""
 MOST_PIECES = 16
 """Largest number of straight pieces in a mover's motion within a step."""
-ROUTE, BOUNCE, CROWD = range(3)
+ROUTE, BOUNCE = range(2)
 """Kinds of movers, in `traits`."""
 
 # Columns of `Movers.traits`.

@@ -16,7 +16,6 @@ def test_no_movers():
 
 def test_a_text_is_a_kind_with_its_defaults():
     assert read_specs("bounce:5") == (BounceSpec(count=5),)
-    assert read_specs("crowd:20")[0].number == 20
 
 
 def test_entries_survive_json():
