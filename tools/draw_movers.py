@@ -1,0 +1,36 @@
+"""Draws docs/movers.png: an office in which discs bounce off walls.
+
+Run `python tools/draw_movers.py`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+from PIL import Image
+
+import tdac_envs  # noqa: F401 - registers the environments
+
+STEPS = 60
+PICTURE = Path(__file__).resolve().parents[1] / "docs" / "movers.png"
+
+
+def main() -> None:
+    """Draws a frame after some steps of a robot that turns on the spot."""
+    env = gym.make(
+        "TDAC-Map2D-v0",
+        map="office",
+        movers=[{"kind": "bounce", "count": 12, "radius": 12, "speed": 50}],
+        render_mode="rgb_array",
+    )
+    env.reset(seed=3)
+    for _ in range(STEPS):
+        env.step(np.array([0.1, -0.1], np.float32))
+    frame = Image.fromarray(env.render())
+    frame.quantize(64).save(PICTURE, optimize=True)
+
+
+if __name__ == "__main__":
+    main()
