@@ -29,7 +29,7 @@ def main() -> None:
     for _ in range(STEPS):
         env.step(np.array([0.1, -0.1], np.float32))
     frame = Image.fromarray(env.render())
-    frame.quantize(64).save(PICTURE, optimize=True)
+    frame.quantize(256).save(PICTURE, optimize=True)
 
 
 if __name__ == "__main__":
