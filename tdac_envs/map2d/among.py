@@ -69,8 +69,7 @@ from tdac_envs.map2d.kernels import (
     observe,
 )
 from tdac_envs.map2d.rays import LeapGrid
-from tdac_envs.movers.motion import hold, stop
-from tdac_envs.movers.state import STANDING_SECONDS, TIME
+from tdac_envs.movers.state import STANDING_SECONDS, TIME, hold, stop
 
 N_ROBOT = 11
 """Arrays before those of the movers in the table of addresses."""

@@ -20,7 +20,8 @@ from tdac_envs.map2d.contact import (
     opposing_normal,
 )
 from tdac_envs.movers import state as at
-from tdac_envs.movers.motion import hold, moving, stop
+from tdac_envs.movers.motion import moving
+from tdac_envs.movers.state import hold, stop
 
 # The search for a contact stops at this distance, px: the time of a contact that is
 # 1e-6 px deep is then exact to 1e-9 of a step.

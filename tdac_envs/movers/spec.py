@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from tdac_envs.core.arguments import LARGEST, SMALLEST
 from tdac_envs.core.errors import TaskError, first_problem, hint
-from tdac_envs.movers.state import MOST_MOVERS
 
+MOST_MOVERS = 256
+"""Largest number of movers of a robot."""
 MOST_POINTS = 1000
 """Largest number of way-points of a route."""
 

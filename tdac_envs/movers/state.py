@@ -1,4 +1,4 @@
-"""The arrays of the movers of one robot, which the compiled step reads and writes."""
+"""The arrays of the movers of one robot, and what reads and writes their pieces."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.core.compiled import subkernel
+
 Array = NDArray[np.float64]
 
-MOST_MOVERS = 256
-"""Largest number of movers of a robot."""
 MOST_PIECES = 16
 """Largest number of straight pieces in a mover's motion within a step."""
 ROUTE, BOUNCE = range(2)
@@ -89,3 +89,73 @@ class Movers(NamedTuple):
     def discs(self) -> Array:
         """x, y and radius of each mover, shape (n, 3), px; a copy."""
         return np.column_stack([self.now[:, :2], self.traits[:, RADIUS]])
+
+
+@subkernel
+def begin_piece(
+    pieces: Array,
+    m: int,
+    row: int,
+    time: float,
+    x: float,
+    y: float,
+    rate_x: float,
+    rate_y: float,
+    own: float,
+) -> int:
+    """Writes a piece of the motion of mover m; returns the row of the next piece.
+
+    Args:
+        pieces: `Movers.pieces`.
+        m: The mover.
+        row: Number of the piece.
+        time: Fraction of the step at which the piece begins.
+        x: Place there, px.
+        y: px.
+        rate_x: Velocity, px per step.
+        rate_y: px per step.
+        own: Last entry of `Movers.now` during the piece.
+    """
+    pieces[m, row, TIME] = time
+    pieces[m, row, FROM_X], pieces[m, row, FROM_Y] = x, y
+    pieces[m, row, RATE_X], pieces[m, row, RATE_Y] = rate_x, rate_y
+    pieces[m, row, STATE] = own
+    return row + 1
+
+
+@subkernel
+def end_pieces(pieces: Array, m: int, row: int, x: float, y: float) -> None:
+    """Ends the motion of mover m at a place: `row` is the one after the last piece."""
+    begin_piece(pieces, m, row, 1.0, x, y, 0.0, 0.0, pieces[m, row - 1, STATE])
+
+
+@subkernel
+def place_at(pieces: Array, m: int, time: float) -> tuple[int, float, float]:
+    """The piece in which mover m is at a fraction of the step, and its place, px."""
+    row = 0
+    while pieces[m, row + 1, TIME] < time:
+        row += 1
+    since = time - pieces[m, row, TIME]
+    return (
+        row,
+        pieces[m, row, FROM_X] + since * pieces[m, row, RATE_X],
+        pieces[m, row, FROM_Y] + since * pieces[m, row, RATE_Y],
+    )
+
+
+@subkernel
+def hold(pieces: Array, m: int, time: float) -> None:
+    """Lets mover m stand from a fraction of the step to its end."""
+    row, x, y = place_at(pieces, m, time)
+    own = pieces[m, row, STATE]
+    row = begin_piece(pieces, m, row + 1, time, x, y, 0.0, 0.0, own)
+    end_pieces(pieces, m, row, x, y)
+
+
+@subkernel
+def stop(now: Array, pieces: Array, m: int, time: float, dt: float) -> None:
+    """Moves mover m to its place at a fraction of the step of `dt` s."""
+    row, x, y = place_at(pieces, m, time)
+    now[m, X], now[m, Y] = x, y
+    now[m, VX], now[m, VY] = pieces[m, row, RATE_X] / dt, pieces[m, row, RATE_Y] / dt
+    now[m, OWN] = pieces[m, row, STATE]
