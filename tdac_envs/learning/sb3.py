@@ -149,9 +149,9 @@ class SB3VecEnv(VecEnv):
 
 
 def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:
-    """The info of one robot, as plain Python numbers."""
+    """The info of one robot, as plain Python values."""
     return {
-        key: value[i].item()
+        key: value[i : i + 1].tolist()[0]
         for key, value in infos.items()
         if not key.startswith("_") and infos[f"_{key}"][i]
     }
