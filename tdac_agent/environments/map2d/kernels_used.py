@@ -7,6 +7,8 @@ import numpy as np
 import tdac_envs
 from tdac_agent.environments.kernels_used import use_robot
 from tdac_envs.ladder.dead_ends import Sensor, dead_ends
+from tdac_envs.ladder.generators.clutter import Clutter, draw
+from tdac_envs.ladder.words import Words
 from tdac_envs.ladder.worlds import WorldSpec, make_world
 from tdac_envs.map2d import rays
 
@@ -26,7 +28,9 @@ def use_kernels() -> None:
 
 
 def _use_ladder() -> None:
-    """Makes a small world."""
+    """Makes a small world, and a draft of another kind."""
     maze = {"name": "mazes", "width": 60, "height": 60, "loops": 0.0}
     spec = WorldSpec.model_validate({"generator": maze, "radius": 4, "min_steps": 10})
     dead_ends(make_world(spec, bytes(32)), spec.radius, Sensor(18, 2.0, 40.0))
+    clutter = Clutter.model_validate({"name": "clutter", "width": 60, "height": 60})
+    draw(Words(bytes(32)), clutter, 2.0 * spec.radius)
