@@ -46,11 +46,6 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     step. The disc swept along this arc is tested exactly against the occupied squares,
     so no step can jump through a thin wall.
 
-    With `movers`, discs move about: they follow routes or bounce off walls, exactly
-    within a step, and never enter a wall. They block rays and touch the robot, but
-    never in the first 2 s if it stands at its start; they pass through each other and
-    do not react to the robot. The observation shows them in `ranges` alone.
-
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
     fraction of `max_wheel_speed`. Values out of range are clipped and counted in
@@ -64,12 +59,19 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `pose` | (3,) | px, px, rad | x, y, heading in (-pi, pi] |
     | `goal` | (2,) | px | x, y of the goal |
     | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
-    | `ranges` | (n_rays,) | px | distance to the first wall or mover along each ray |
+    | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
     | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
     Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
     heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
     Rays start at the centre; no hit gives `range_max`.
+
+    ## Movers
+    With `movers`, discs move about: they follow routes or bounce off walls, exactly
+    within a step, and never enter a wall. They block rays and touch the robot, but
+    never in the first 2 s if it stands at its start; they pass through each other and
+    do not react to the robot. The observation shows them in `ranges` alone,
+    whose rays end at the first wall or mover.
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
