@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.addresses import Words, block, plane
+from tdac_envs.core.addresses import Words, block, line, plane
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
@@ -52,6 +52,7 @@ from tdac_envs.map2d.encounters import (
     near_normals_on,
     note_arc,
     plan,
+    plan_crowd,
     pose_at,
 )
 from tdac_envs.map2d.kernels import (
@@ -70,6 +71,7 @@ from tdac_envs.map2d.kernels import (
 )
 from tdac_envs.map2d.rays import LeapGrid
 from tdac_envs.movers.state import STANDING_SECONDS, TIME, hold, stop
+from tdac_envs.movers.walls import Cells
 
 N_ROBOT = 11
 """Arrays before those of the movers in the table of addresses."""
@@ -91,6 +93,13 @@ def _movers_at(words: Words) -> Any:
         block(words[N_ROBOT + 3], np.float64),
         plane(words[N_ROBOT + 4], np.float64),
         plane(words[N_ROBOT + 5], np.float64),
+        plane(words[N_ROBOT + 6], np.float64),
+        plane(words[N_ROBOT + 7], np.float64),
+        plane(words[N_ROBOT + 8], np.float64),
+        plane(words[N_ROBOT + 9], np.int64),
+        line(words[N_ROBOT + 10], np.int64),
+        block(words[N_ROBOT + 11], np.float32),
+        line(words[N_ROBOT + 12], np.float64),
     )
 
 
@@ -197,6 +206,13 @@ def _drive_among(
     pieces: Array,
     path: Array,
     past: Array,
+    people: Array,
+    planes: Array,
+    walls: Array,
+    first: Cells,
+    listed: Cells,
+    fields: NDArray[np.float32],
+    spacing: Array,
 ) -> None:
     """`kernels.drive_step` among movers, whose arrays are the last ones."""
     before, dt = outcome[REMAINING], constants[DT]
@@ -206,6 +222,13 @@ def _drive_among(
     slot = int(state[STEPS]) % past.shape[0]
     past[slot, 0], past[slot, 1] = state[X], state[Y]
     plan(clear, traits, now, points, pieces, dt)
+    if people.shape[0] > 0:
+        drove = state[FORWARD] / dt
+        plan_crowd(
+            clear, leaps, traits, now, pieces, people, planes, walls, first, listed,
+            fields, spacing, state[X], state[Y], drove * math.cos(state[HEADING]),
+            drove * math.sin(state[HEADING]), constants[RADIUS], dt,
+        )  # fmt: skip
     part = 1.0
     if constants[STOPS] == 1.0:
         part, kind = _drive_to_contact(
@@ -251,6 +274,13 @@ def _begin_among(
     pieces: Array,  # noqa: ARG001
     path: Array,  # noqa: ARG001
     past: Array,
+    people: Array,  # noqa: ARG001
+    planes: Array,  # noqa: ARG001
+    walls: Array,  # noqa: ARG001
+    first: Cells,  # noqa: ARG001
+    listed: Cells,  # noqa: ARG001
+    fields: NDArray[np.float32],  # noqa: ARG001
+    spacing: Array,  # noqa: ARG001
 ) -> None:
     """`kernels.begin_episode` among movers, which are at their starts already."""
     begin_episode(
@@ -285,7 +315,7 @@ def begin_among(words: Words) -> None:
     """Begins an episode among movers.
 
     Args:
-        words: Shape (17, 4): those of `kernels.begin`, then those of `Movers`.
+        words: Shape (24, 4): those of `kernels.begin`, then those of `Movers`.
     """
     _begin(arrays_at(words), _movers_at(words))
 
@@ -301,7 +331,7 @@ def step_rows_among(batch: Words, rows: Words) -> None:
     """`kernels.step_rows` for robots of which some are among movers.
 
     Args:
-        batch: As for `kernels.step_rows`, but `words` has shape (n, 17, 4).
+        batch: As for `kernels.step_rows`, but `words` has shape (n, 24, 4).
         rows: Indices of the robots, shape (k,).
     """
     over, commands, starts, words = batch_at(batch)

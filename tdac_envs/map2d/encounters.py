@@ -19,7 +19,9 @@ from tdac_envs.map2d.contact import (
     near_normals,
     opposing_normal,
 )
+from tdac_envs.map2d.rays import in_sight
 from tdac_envs.movers import state as at
+from tdac_envs.movers.crowd import crowding
 from tdac_envs.movers.motion import moving
 from tdac_envs.movers.state import hold, stop
 
@@ -37,6 +39,7 @@ LOOK = 0.05
 """Duration of the steps with which a mover's future is computed, s."""
 
 plan, plan_one, advance_straight = moving(arc_contact, opposing_normal)
+plan_crowd = crowding(arc_contact, opposing_normal, in_sight)
 
 
 @subkernel

@@ -67,11 +67,12 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     Rays start at the centre; no hit gives `range_max`.
 
     ## Movers
-    With `movers`, discs move about: they follow routes or bounce off walls, exactly
-    within a step, and never enter a wall. They block rays and touch the robot, but
-    never in the first 2 s if it stands at its start; they pass through each other and
-    do not react to the robot. The observation shows them in `ranges` alone,
-    whose rays end at the first wall or mover.
+    With `movers`, discs move about: they follow routes, bounce off walls, or walk in a
+    crowd, exactly within a step, and never enter a wall. They block rays and touch the
+    robot, but never in the first 2 s if it stands at its start. The people of a crowd
+    avoid each other and all other movers; those who see the robot make way for it. The
+    other movers react to nothing. The observation shows movers in `ranges` alone, whose
+    rays end at the first wall or mover.
 
     ## Rewards
     The reward of a step is the sum of these terms; `reward_weights` changes them:
@@ -169,9 +170,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             None to decide from the image.
         movers: A list with a dict for each mover or group of movers, such as
             `{"kind": "route", "points": [[40, 40], [90, 40]], "speed": 30, "radius": 8,
-            "loop": False}` or `{"kind": "bounce", "count": 3, "speed": 30}`;
-            `"bounce:5"` stands for five movers with the defaults, half as fast as the
-            robot and as large. `tdac_envs.movers.spec` has all keys.
+            "loop": False}`, `{"kind": "bounce", "count": 3, "speed": 30}` or
+            `{"kind": "crowd", "count": 20}`; `"bounce:5"` stands for five movers with
+            the defaults, half as fast as the robot and as large.
+            `tdac_envs.movers.spec` has all keys.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import MAX_DRAWS, check_full_step
 from tdac_envs.map2d.encounters import LOOK, nearest_approaches
-from tdac_envs.map2d.starts import KINDS, Point, Random, Start
+from tdac_envs.map2d.starts import KINDS, Person, Point, Random, Start
 from tdac_envs.movers import state as at
-from tdac_envs.movers.spec import AnySpec
+from tdac_envs.movers.crowd import WALL_HORIZON
+from tdac_envs.movers.places import Places, places_of
+from tdac_envs.movers.spec import AnySpec, CrowdSpec
 from tdac_envs.movers.state import Movers
 
 if TYPE_CHECKING:
@@ -33,11 +35,15 @@ class Cast:
         starts: Where each mover starts.
         traits: `Movers.traits`.
         points: `Movers.points`.
+        places: Where people walk; None without a crowd.
+        seeing: Of each mover, whether a person sees the robot; None if drawn.
     """
 
     starts: tuple[Start, ...]
     traits: NDArray[np.float64]
     points: NDArray[np.float64]
+    places: Places | None
+    seeing: tuple[bool | None, ...]
 
     @classmethod
     def of(cls, specs: Sequence[AnySpec], task: Map2DTask) -> Cast:
@@ -51,23 +57,29 @@ class Cast:
             TaskError: A route runs into a wall, or a disc fits nowhere; the message
                 names the mover.
         """
-        robot = task.robot
         each = [spec for spec in specs for _ in range(spec.number)]
         starts: list[Start] = []
         points: list[Point] = []
         traits = np.zeros((len(each), at.N_TRAITS))
+        places = _places(specs, task)
         for m, spec in enumerate(each):
-            radius = robot.radius if spec.radius is None else spec.radius
-            speed = 0.5 * robot.max_wheel_speed if spec.speed is None else spec.speed
+            radius, speed = _size_of(spec, task)
             check_full_step(max(task.dt, LOOK), speed, "px")
             try:
-                own = KINDS[spec.kind](spec, task, radius, speed)
+                own = (
+                    Person(places.nodes(), len(places.fields))
+                    if places and isinstance(spec, CrowdSpec)
+                    else KINDS[spec.kind](spec, task, radius, speed)
+                )
             except TaskError as error:
                 raise TaskError(f"mover {m}: {error}") from None
             traits[m] = own.kind, radius, speed, len(points), len(own.points)
             points += own.points
             starts.append(own)
-        return cls(tuple(starts), traits, np.array(points).reshape(-1, 2))
+        seeing = tuple(getattr(spec, "sees_robot", None) for spec in each)
+        return cls(
+            tuple(starts), traits, np.array(points).reshape(-1, 2), places, seeing
+        )
 
     def start(self, task: Map2DTask, random: Random) -> Movers:
         """Draws the movers of an episode at its start.
@@ -78,16 +90,49 @@ class Cast:
 
         Raises:
             TaskError: A mover would touch the standing robot within 2 s, or covers the
-                goal for ever; the message names the mover.
+                goal for ever; or there is no room for a crowd. The message names the
+                mover.
         """
         self._check_goal(task)
-        movers = Movers.blank(len(self.traits), self.points, task.dt)
+        movers = Movers.blank(len(self.traits), self.points, task.dt, self.places)
         movers.traits[:] = self.traits
         for m, own in enumerate(self.starts):
-            _put(movers, m, own, random)
+            if own.kind != at.CROWD:
+                _put(movers, m, own, random)
         for m in np.flatnonzero(_in_the_way(movers, task)).tolist():
-            self._draw_again(movers, m, task, random)
+            if self.starts[m].kind != at.CROWD:
+                self._draw_again(movers, m, task, random)
+        if self.places:
+            self._gather(movers, task, random)
         return movers
+
+    def _gather(self, movers: Movers, task: Map2DTask, random: Random) -> None:
+        """Draws where the people start: apart from each other and from the robot."""
+        traits, now, people = movers.traits, movers.now, movers.people
+        crowd = np.flatnonzero(traits[:, at.KIND] == at.CROWD)
+        sees = np.zeros(len(traits))
+        sees[random.permutation(crowd)[: len(crowd) // 2]] = 1.0
+        given = [(m, own) for m, own in enumerate(self.seeing) if own is not None]
+        for m, own in given:
+            sees[m] = own
+        people[:, at.SEES] = sees
+        people[:, at.SEED] = random.integers(2**31, size=len(people))
+        robot, placed = task.start[: at.Y + 1], np.zeros(len(traits), np.bool_)
+        for number, m in enumerate(crowd.tolist()):
+            radius, speed = traits[m, at.RADIUS], traits[m, at.SPEED]
+            safe = radius + task.robot.radius + SAFE_SECONDS * speed
+            for _ in range(MAX_DRAWS):
+                _put(movers, m, self.starts[m], random)
+                off = now[placed, : at.Y + 1] - now[m, : at.Y + 1]
+                apart = np.hypot(*off.T) > radius + traits[placed, at.RADIUS]
+                if apart.all() and math.dist(now[m, : at.Y + 1], robot) > safe:
+                    break
+            else:
+                raise TaskError(
+                    f"mover {m}: there is room for {number} of the {len(crowd)} people "
+                    f"of the crowd, {SAFE_SECONDS:g} s away from the robot"
+                )
+            placed[m] = True
 
     def _draw_again(
         self, movers: Movers, m: int, task: Map2DTask, random: Random
@@ -95,13 +140,9 @@ class Cast:
         if not self.starts[m].is_drawn:
             raise _too_near(movers, m, task)
         # Views of the rows of this mover.
-        alone = Movers(
-            movers.traits[m : m + 1],
-            movers.now[m : m + 1],
-            movers.points,
-            movers.pieces[m : m + 1],
-            movers.path,
-            movers.past,
+        own = slice(m, m + 1)
+        alone = movers._replace(
+            traits=movers.traits[own], now=movers.now[own], pieces=movers.pieces[own]
         )
         for _ in range(MAX_DRAWS):
             _put(movers, m, self.starts[m], random)
@@ -124,6 +165,24 @@ class Cast:
                     f"mover {m} covers the goal ({x:.1f}, {y:.1f}) for ever; move one "
                     "of them"
                 )
+
+
+def _size_of(spec: AnySpec, task: Map2DTask) -> tuple[float, float]:
+    """Radius (px) and speed (px/s) of a mover."""
+    robot = task.robot
+    return (
+        robot.radius if spec.radius is None else spec.radius,
+        0.5 * robot.max_wheel_speed if spec.speed is None else spec.speed,
+    )
+
+
+def _places(specs: Sequence[AnySpec], task: Map2DTask) -> Places | None:
+    """The places of the people of all crowds; None without a crowd."""
+    sizes = [_size_of(spec, task) for spec in specs if isinstance(spec, CrowdSpec)]
+    if not sizes:
+        return None
+    radius, speed = (max(each) for each in zip(*sizes, strict=True))
+    return places_of(task.terrain.grid, radius, radius + WALL_HORIZON * speed + 1.0)
 
 
 def _put(movers: Movers, m: int, start: Start, random: Random) -> None:

@@ -224,8 +224,36 @@ class Bouncer:
         return (self.place_given,) if self.stands and self.place_given else ()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Person:
+    """Where a person of a crowd starts.
+
+    Attributes:
+        nodes: Places that it may start at, shape (n, 2), px.
+        goals: Number of places that people walk to.
+        is_drawn: See `Start`.
+        points: See `Start`.
+        kind: See `Start`.
+    """
+
+    nodes: NDArray[np.float64]
+    goals: int
+    is_drawn: bool = True
+    points: tuple[Point, ...] = ()
+    kind: int = at.CROWD
+
+    def place(self, random: Random) -> Place:
+        """See `Start`; the last entry is the number of its first place."""
+        x, y = self.nodes[random.integers(len(self.nodes))].tolist()
+        return x, y, float(random.integers(self.goals))
+
+    def stays_within(self) -> Sequence[Point]:
+        """See `Start`."""
+        return ()
+
+
 KINDS: dict[str, Callable[[Any, Any, float, float], Start]] = {
     "route": Route.of,
     "bounce": Bouncer.of,
 }
-"""The start of a mover, from its entry, the task, its radius (px) and speed (px/s)."""
+"""The start of a scripted mover: from its entry, task, radius (px) and speed (px/s)."""

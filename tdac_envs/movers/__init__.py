@@ -1,7 +1,8 @@
 """Moving discs: what a user asks for, their state, and their motion in a step.
 
 `spec` has the models of `movers=[...]`, `state` the arrays and the pieces of a motion,
-`motion` moves routes and bouncing discs. This package knows occupied squares only
+`motion` moves routes and bouncing discs, `crowd` moves people: by `orca`, between
+`places`, around `walls`. This package knows occupied squares only
 through functions that it is given (`motion.moving`), as `tdac_envs.drive.sliding` does.
 In `tdac_envs.map2d`, `starts` and `placing` draw and check the start of an episode,
 robot and movers meet in `encounters`, and `among` is the step.
@@ -17,10 +18,9 @@ them compiled and without allocation:
    the contact that ends the episode, and updates `Movers.now`.
 
 A further kind needs
-- a model in `spec.KINDS` and an entry in `map2d.starts.KINDS`: a `Start`, whose
-  `place` draws where a mover starts, with the random numbers of the episode. No mover
-  may touch the robot, standing at its start, for 2 s: `placing` draws a start again
-  if it would;
+- a model in `spec.KINDS`, and a `Start` in `map2d.starts`, whose `place` draws where a
+  mover starts, with the random numbers of the episode. No mover may touch the robot,
+  standing at its start, for 2 s: `placing` draws a start again if it would;
 - a function that plans all its movers at once and is called in
   `map2d.among._drive_among` after `plan`, where the robot's arrays are at hand, and
   which skips the movers of other kinds (`traits[m, KIND]`). For each of its movers m it

@@ -15,6 +15,8 @@ from tdac_envs.core.errors import TaskError, first_problem, hint
 
 MOST_MOVERS = 256
 """Largest number of movers of a robot."""
+MOST_PEOPLE = 64
+"""Largest number of people in the crowds of a robot."""
 MOST_POINTS = 1000
 """Largest number of way-points of a route."""
 
@@ -93,15 +95,33 @@ class BounceSpec(_Strict):
         return self.count
 
 
-Spec = Annotated[RouteSpec | BounceSpec, Field(discriminator="kind")]
+class CrowdSpec(_Strict):
+    """People who walk to places of their own and avoid each other (ORCA)."""
+
+    kind: Literal["crowd"] = "crowd"
+    count: int = Field(1, ge=1, le=MOST_PEOPLE, description="Number of people.")
+    sees_robot: bool | None = Field(
+        None,
+        description="Whether they make way for the robot. Default: half of them do, "
+        "drawn at each reset.",
+    )
+
+    @property
+    def number(self) -> int:
+        """Number of discs."""
+        return self.count
+
+
+Spec = Annotated[RouteSpec | BounceSpec | CrowdSpec, Field(discriminator="kind")]
 """Any entry of `movers`, for the models of files."""
 MoversOption = str | Sequence[Mapping[str, Any]] | None
 """The argument `movers` of an environment."""
 
-AnySpec = RouteSpec | BounceSpec
+AnySpec = RouteSpec | BounceSpec | CrowdSpec
 KINDS: dict[str, type[AnySpec]] = {
     "route": RouteSpec,
     "bounce": BounceSpec,
+    "crowd": CrowdSpec,
 }
 _EXAMPLE = "'bounce:5' or [{'kind': 'bounce', 'count': 5}]"
 
@@ -125,6 +145,11 @@ def read_specs(given: MoversOption) -> tuple[AnySpec, ...]:
     _check_number(len(given))
     specs = tuple(_checked(each, f"movers[{i}]") for i, each in enumerate(given))
     _check_number(sum(spec.number for spec in specs))
+    people = sum(spec.number for spec in specs if isinstance(spec, CrowdSpec))
+    if people > MOST_PEOPLE:
+        raise TaskError(
+            f"expected crowds of at most {MOST_PEOPLE} people, got {people}"
+        )
     return specs
 
 

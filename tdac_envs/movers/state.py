@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import subkernel
+from tdac_envs.movers.orca import N_PLANE
+from tdac_envs.movers.places import Places
+from tdac_envs.movers.walls import MOST_WALLS, Cells
 
 Array = NDArray[np.float64]
 
 MOST_PIECES = 16
 """Largest number of straight pieces in a mover's motion within a step."""
-ROUTE, BOUNCE = range(2)
+ROUTE, BOUNCE, CROWD = range(3)
 """Kinds of movers, in `traits`."""
 
 # Columns of `Movers.traits`.
@@ -22,6 +25,13 @@ N_TRAITS = 5
 # Columns of `Movers.now`.
 X, Y, VX, VY, OWN = range(5)
 N_NOW = 5
+# Columns of `Movers.people`.
+SEES, SEED, STUCK, NEXT_VX, NEXT_VY, NEXT_GOAL = range(6)
+N_PEOPLE = 6
+MOST_NEIGHBOURS = 10
+"""A person takes notice of this many others, the nearest ones."""
+MOST_PLANES = MOST_WALLS + MOST_NEIGHBOURS
+"""Largest number of half-planes that limit the velocity of a person."""
 # Columns of `Movers.pieces`.
 TIME, FROM_X, FROM_Y, RATE_X, RATE_Y, STATE = range(6)
 N_PIECE = 6
@@ -31,6 +41,10 @@ MOST_ARCS = 108
 """Rows of `Movers.path`; `tdac_envs.drive.sliding` needs at most 3 * 34 + 1."""
 STANDING_SECONDS = 0.5
 """A robot stands if it has hardly moved in this time."""
+
+
+_N_ROWS = 2 * MOST_PLANES + MOST_NEIGHBOURS
+_CHANGING = "now", "pieces", "path", "past", "people", "planes"
 
 
 class Movers(NamedTuple):
@@ -43,7 +57,7 @@ class Movers(NamedTuple):
             its first way-point in `points` and their number, else 0.
         now: Shape (n, 5): x, y (px); velocity at the end of the last step (px/s); what
             a kind remembers: of a route, the number of the next way-point; of a
-            bouncing disc, its heading (rad).
+            bouncing disc, its heading (rad); of a person, the number of its place.
         points: Shape (k, 2): way-points of all routes, px. Each is driven in a circle;
             one that goes back and forth also lists the way back.
         pieces: Shape (n, `MOST_PIECES` + 2, 6): motion in the current step. A row has
@@ -55,6 +69,15 @@ class Movers(NamedTuple):
             step) and turn (rad per step). The row after the last arc has the time 1.
         past: Shape (s, 2): positions of the robot at the starts of the last steps, px,
             a ring buffer over `STANDING_SECONDS`.
+        people: Shape (n, 6), (0, 6) without a crowd: whether a person sees the robot;
+            the state of its random numbers; for how long it has been stuck (s); its
+            velocity (px/s) and place in the current step.
+        planes: Shape (2 * `MOST_PLANES` + `MOST_NEIGHBOURS`, 4), or (0, 4): scratch.
+        walls: The last five arrays are those of `Places`, which are only read.
+        first: See `Places`.
+        listed: See `Places`.
+        fields: See `Places`.
+        spacing: See `Places`.
     """
 
     traits: Array
@@ -63,11 +86,28 @@ class Movers(NamedTuple):
     pieces: Array
     path: Array
     past: Array
+    people: Array
+    planes: Array
+    walls: Array
+    first: Cells
+    listed: Cells
+    fields: NDArray[np.float32]
+    spacing: Array
 
     @classmethod
-    def blank(cls, count: int, points: Array, dt: float) -> Movers:
-        """Arrays of `count` movers for steps of `dt` s; all zeros but the points."""
+    def blank(
+        cls, count: int, points: Array, dt: float, places: Places | None = None
+    ) -> Movers:
+        """Arrays of `count` movers for steps of `dt` s; all zeros but what is given.
+
+        Args:
+            count: Number of movers.
+            points: Way-points.
+            dt: Duration of a step, s.
+            places: What people know of the map; None without a crowd.
+        """
         steps = max(round(STANDING_SECONDS / dt), 1)
+        people, rows = (0, 0) if places is None else (count, _N_ROWS)
         return cls(
             np.zeros((count, N_TRAITS)),
             np.zeros((count, N_NOW)),
@@ -75,6 +115,9 @@ class Movers(NamedTuple):
             np.zeros((count, MOST_PIECES + 2, N_PIECE)),
             np.zeros((MOST_ARCS, N_PIECE)),
             np.zeros((steps, 2)),
+            np.zeros((people, N_PEOPLE)),
+            np.zeros((rows, N_PLANE)),
+            *(Places.none() if places is None else places),
         )
 
     @classmethod
@@ -83,8 +126,9 @@ class Movers(NamedTuple):
         return cls.blank(0, np.zeros((0, 2)), STANDING_SECONDS)
 
     def fresh(self) -> Movers:
-        """Copies of these arrays, for an episode that begins with them."""
-        return Movers(*(array.copy() for array in self))
+        """These movers with own arrays, for an episode that begins with them."""
+        own = {name: getattr(self, name).copy() for name in _CHANGING}
+        return self._replace(**own)
 
     def discs(self) -> Array:
         """x, y and radius of each mover, shape (n, 3), px; a copy."""

@@ -11,6 +11,7 @@ from tdac_envs.ladder.generators.clutter import Clutter, draw
 from tdac_envs.ladder.words import Words
 from tdac_envs.ladder.worlds import WorldSpec, make_world
 from tdac_envs.map2d import rays
+from tdac_envs.movers.orca import velocity_among
 
 
 def use_kernels() -> None:
@@ -22,7 +23,9 @@ def use_kernels() -> None:
     ends = {"start": start, "goal": goal, "robot_radius": radius}
     disc = use_robot("TDAC-Map2D-v0", map=grid.cells, **ends)
     post = {"kind": "route", "points": [(45.0, 10.0)], "radius": 3.0}
-    use_robot("TDAC-Map2D-v0", map=grid.cells, movers=[post], **ends)
+    people = {"kind": "crowd", "count": 2, "radius": 2.0, "speed": 5.0}
+    use_robot("TDAC-Map2D-v0", map=grid.cells, movers=[post, people], **ends)
+    velocity_among(np.zeros((1, 5)), np.zeros(2), 1.0, 1.0, 0.1, np.empty(2))
     rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
     _use_ladder()
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from tdac_envs.core.errors import TaskError
-from tdac_envs.movers.spec import BounceSpec, RouteSpec, read_specs
+from tdac_envs.movers.spec import BounceSpec, CrowdSpec, RouteSpec, read_specs
 
 ROUTE = {"kind": "route", "points": [[1, 2], [3, 4]], "speed": 30, "radius": 8}
 
@@ -16,6 +16,7 @@ def test_no_movers():
 
 def test_a_text_is_a_kind_with_its_defaults():
     assert read_specs("bounce:5") == (BounceSpec(count=5),)
+    assert read_specs("crowd:20") == (CrowdSpec(count=20),)
 
 
 def test_entries_survive_json():
@@ -27,7 +28,7 @@ def test_entries_survive_json():
 
 
 def test_every_key_is_documented():
-    for kind in (RouteSpec, BounceSpec):
+    for kind in (RouteSpec, BounceSpec, CrowdSpec):
         for name, key in kind.model_fields.items():
             assert key.description or name == "kind"
 
