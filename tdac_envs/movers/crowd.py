@@ -218,7 +218,8 @@ def _walking(find_contact: Any, find_normal: Any) -> Any:
         vx: float, vy: float, own: float, dt: float,
     ) -> None:  # fmt: skip
         """Plans the step of person m, along the walls that it touches."""
-        radius, time, row = traits[m, RADIUS], 0.0, 0
+        # Who slides along a wall may sink in a little less than `GAP`.
+        radius, time, row = traits[m, RADIUS] + GAP, 0.0, 0
         rate_x, rate_y = vx * dt, vy * dt
         for _ in range(_MOST_SLIDES):
             length = (1.0 - time) * math.hypot(rate_x, rate_y)
