@@ -72,15 +72,16 @@ class TrainingPool:
         """The task from its file, or made and written to it if possible."""
         path = None if self._folder is None else self._folder / f"{index}.bin"
         task = None if path is None else _mapped_task(path, self._set)
-        if task is not None:
-            return _keep(self._mapped, index, task, _MAPPED)
-        made = self._set.task("train", index)
-        assert isinstance(made, Map2DTask)
-        if path is not None:
-            _write(path, made)
-            task = _mapped_task(path, self._set)
         if task is None:
-            return _keep(self._made, index, made, _IN_MEMORY)
+            made = self._set.task_of(self._set.world("train", index))
+            assert isinstance(made, Map2DTask)
+            if path is not None:
+                _write(path, made)
+                task = _mapped_task(path, self._set)
+            if task is None:
+                made = self._set.with_movers(made, "train", index)
+                return _keep(self._made, index, made, _IN_MEMORY)
+        task = self._set.with_movers(task, "train", index)
         return _keep(self._mapped, index, task, _MAPPED)
 
 

@@ -25,6 +25,7 @@ from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.ladder.files.spec import FilesSpec
 from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.generators.registry import AnyParameters
+from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.plate_worlds import PlatesSpec
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.worlds import WorldSpec
@@ -139,6 +140,7 @@ class SetFile(_Strict):
         "start", description="Whose origin and heading poses and the goal refer to."
     )
     map: bool = Field(False, description="Whether the map is given.")
+    movers: tuple[MoversOfSet, ...] = Field((), max_length=8)
     disturbances: DisturbanceSpec = DisturbanceSpec()
     horizon: HorizonSpec = HorizonSpec()
     admission: AdmissionSpec = AdmissionSpec()
@@ -186,6 +188,10 @@ class SetFile(_Strict):
             if key not in _ALL_ROBOTS | own:
                 raise ValueError(f"{whose} does not observe `{key}`")
         rays = self.disturbances.range_noise or self.disturbances.range_dropout
+        if epuck and self.movers:
+            raise ValueError("`movers` are for robots on maps")
+        for group in self.movers:
+            group.checked()
         if epuck and rays:
             raise ValueError("an e-puck has no ranges; expected `robot.sensor_noise`")
 
@@ -248,6 +254,9 @@ class SetFile(_Strict):
         """
         out = {"description", "files"}
         values = self.model_dump(mode="json", by_alias=True, exclude=out)
+        if not self.movers:
+            # Sets without movers keep the hash that they had before there were any.
+            del values["movers"]
         if self.files is not None:
             splits = list(self.files.splits)
             values["files"] = {"sha256": files_sha256, "splits": splits}

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import get_args
+from typing import TypeVar, get_args
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from tdac_envs.epuck.task import EPuckTask, make_task
 from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
+from tdac_envs.ladder.moving import draw_movers
 from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import SetFile, Split, find_set_file
@@ -32,6 +33,7 @@ MOST_SALT = 4096
 AnyWorld = LadderWorld | PlatesWorld
 """A world of maps, or of plates for the e-puck."""
 AnyTask = Map2DTask | EPuckTask
+TaskType = TypeVar("TaskType", Map2DTask, EPuckTask, AnyTask)
 _PUBLIC_SALT = b"tdac ladder, public worlds, 2026"
 
 
@@ -140,10 +142,20 @@ class TaskSet:
         Raises:
             TaskError: As `world` does.
         """
-        return self.task_of(self.world(split, index, salt))
+        task = self.task_of(self.world(split, index, salt))
+        return self.with_movers(task, split, index, salt)
+
+    def with_movers(
+        self, task: TaskType, split: str, index: int, salt: bytes | None = None
+    ) -> TaskType:
+        """The task of a world with its movers, if the set has any."""
+        if not self.file.movers or not isinstance(task, Map2DTask):
+            return task
+        key = self.key(split, index, "movers", salt)
+        return replace(task, movers=draw_movers(self.file.movers, task, key))
 
     def task_of(self, world: AnyWorld) -> AnyTask:
-        """The task of a world of this set."""
+        """The task of a world of this set, without its movers."""
         file, start = self.file, world.start
         horizon = file.horizon.steps(world.difficulty.steps)
         if isinstance(world, PlatesWorld):

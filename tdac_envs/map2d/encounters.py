@@ -19,11 +19,12 @@ from tdac_envs.map2d.contact import (
     near_normals,
     opposing_normal,
 )
-from tdac_envs.map2d.rays import in_sight
+from tdac_envs.map2d.rays import LeapGrid, in_sight
 from tdac_envs.movers import state as at
 from tdac_envs.movers.crowd import crowding
 from tdac_envs.movers.motion import moving
 from tdac_envs.movers.state import hold, stop
+from tdac_envs.movers.walls import Cells
 
 # The search for a contact stops at this distance, px: the time of a contact that is
 # 1e-6 px deep is then exact to 1e-9 of a step.
@@ -35,6 +36,8 @@ _SINK = 1e-9
 # Discs touch within this distance, px.
 TOUCH = 1e-6
 NEVER = 2.0
+# Where nobody sees it, px.
+_FAR = 1e9
 LOOK = 0.05
 """Duration of the steps with which a mover's future is computed, s."""
 
@@ -314,6 +317,48 @@ def nearest_approaches(
             nearest = min(nearest, _distance_of_pieces(pieces, m, x, y))
             stop(now, pieces, m, 1.0, LOOK)
         least[m] = nearest
+
+
+@kernel
+def foresee(
+    clear: FloatGrid, leaps: LeapGrid, traits: Array, now: Array, points: Array,
+    pieces: Array, _path: Array, _past: Array, people: Array, planes: Array,
+    walls: Array, first: Cells, listed: Cells, fields: FloatGrid, spacing: Array,
+    dt: float, places: Array,
+) -> None:  # fmt: skip
+    """Where movers will be, as if there were no robot.
+
+    Args:
+        clear: Padded clearance, px.
+        leaps: From `rays.leaps_of`.
+        traits: `Movers.traits`; the arrays up to `spacing` are those of `Movers`, too.
+        now: Overwritten.
+        points: Way-points.
+        pieces: Overwritten.
+        _path: Not used.
+        _past: Not used.
+        people: Overwritten.
+        planes: Overwritten.
+        walls: Only read.
+        first: Only read.
+        listed: Only read.
+        fields: Only read.
+        spacing: Only read.
+        dt: Duration of a step, s.
+        places: Shape (steps + 1, n, 2), overwritten with x, y at each step, px.
+    """
+    for step in range(places.shape[0]):
+        if step > 0:
+            plan(clear, traits, now, points, pieces, dt)
+            if people.shape[0] > 0:
+                plan_crowd(
+                    clear, leaps, traits, now, pieces, people, planes, walls, first,
+                    listed, fields, spacing, _FAR, _FAR, 0.0, 0.0, 0.0, dt,
+                )  # fmt: skip
+        for m in range(traits.shape[0]):
+            if step > 0:
+                stop(now, pieces, m, 1.0, dt)
+            places[step, m, 0], places[step, m, 1] = now[m, at.X], now[m, at.Y]
 
 
 @subkernel

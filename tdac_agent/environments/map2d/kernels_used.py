@@ -8,6 +8,7 @@ import tdac_envs
 from tdac_agent.environments.kernels_used import use_robot
 from tdac_envs.ladder.dead_ends import Sensor, dead_ends
 from tdac_envs.ladder.generators.clutter import Clutter, draw
+from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.ladder.words import Words
 from tdac_envs.ladder.worlds import WorldSpec, make_world
 from tdac_envs.map2d import rays
@@ -24,7 +25,8 @@ def use_kernels() -> None:
     disc = use_robot("TDAC-Map2D-v0", map=grid.cells, **ends)
     post = {"kind": "route", "points": [(45.0, 10.0)], "radius": 3.0}
     people = {"kind": "crowd", "count": 2, "radius": 2.0, "speed": 5.0}
-    use_robot("TDAC-Map2D-v0", map=grid.cells, movers=[post, people], **ends)
+    disc = use_robot("TDAC-Map2D-v0", map=grid.cells, movers=[post, people], **ends)
+    earliest_arrival(disc.task, disc.task.movers)
     velocity_among(np.zeros((1, 5)), np.zeros(2), 1.0, 1.0, 0.1, np.empty(2))
     rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
     _use_ladder()
