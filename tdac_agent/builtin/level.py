@@ -64,6 +64,6 @@ def level_of(tasks: TaskSet) -> str | None:
     return next((name for name in names if (LEVELS / f"{name}.py").is_file()), None)
 
 
-def _given(tasks: TaskSet) -> tuple[frozenset[str], str, bool]:
+def _given(tasks: TaskSet) -> tuple[frozenset[str], str, bool, bool]:
     file = tasks.file
-    return frozenset(file.observed), file.frame, file.map
+    return frozenset(file.observed), file.frame, file.map, bool(file.movers)

@@ -100,6 +100,7 @@ class LadderEnv(OnSet, Map2DEnv):
     - `unknown`: the exact pose and ranges all around, no map,
     - `lost`: odometry with errors and noisy ranges; wheels that slip and are not
       equally fast; neither a pose nor a map,
+    - `moving`: as `unknown`, with room to pass, among discs that move,
     - `epuck`: infra-red sensors and wheel encoders of an e-puck whose wheels slip;
       neither a pose nor a map.
 
@@ -113,7 +114,7 @@ class LadderEnv(OnSet, Map2DEnv):
 
     | key | levels | content |
     |---|---|---|
-    | `pose` | `known`, `unknown` | x, y (px), heading (rad, in (-pi, pi]) |
+    | `pose` | `known`, `unknown`, `moving` | x, y (px), heading (rad, in (-pi, pi]) |
     | `goal` | all | x, y, px; on `epuck` m |
     | `wheel_speeds` | all | left, right, as last applied, fraction |
     | `ranges` | all but `epuck` | distance to the first wall along each ray, px |

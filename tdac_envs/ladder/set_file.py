@@ -306,7 +306,7 @@ BUILT_IN = Path(__file__).parent / "sets"
 
 def set_names() -> tuple[str, ...]:
     """Names of the sets that come with the package, the easiest first."""
-    order = {"known": 0, "unknown": 1, "lost": 2, "epuck": 3}
+    order = {"known": 0, "unknown": 1, "lost": 2, "moving": 3, "epuck": 4}
     names = [path.stem for path in BUILT_IN.glob("*.yaml")]
     return tuple(sorted(names, key=lambda name: (order.get(name, len(order)), name)))
 

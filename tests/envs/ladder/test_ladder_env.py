@@ -18,6 +18,7 @@ KEYS = {
     "known": {"pose", "goal", "wheel_speeds", "ranges"},
     "unknown": {"pose", "goal", "wheel_speeds", "ranges"},
     "lost": {"goal", "wheel_speeds", "ranges", "odometry"},
+    "moving": {"pose", "goal", "wheel_speeds", "ranges"},
     "epuck": {"goal", "wheel_speeds", "ps", "encoders"},
 }
 LEVELS = sorted(KEYS)
