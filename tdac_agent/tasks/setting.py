@@ -163,6 +163,9 @@ class Setting(Protocol):
             TaskError: It has no other units than its own.
         """
 
+    def without_movers(self) -> Setting:
+        """Returns the same task without moving obstacles."""
+
     def told(self, length: float) -> str:
         """Formats a length in the units that the user has chosen: `12 px`, `0.6 m`."""
 
