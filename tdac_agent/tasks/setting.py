@@ -109,6 +109,9 @@ class JudgedEnv(Protocol):
     def pose(self) -> NDArray[np.float64]:
         """Returns the true pose x, y, heading; shape (3,)."""
 
+    def discs(self) -> NDArray[np.float64]:
+        """Returns the movers as they are now, shape (n, 3): x, y, radius (px or m)."""
+
 
 class Params(Protocol):
     """Contents of `params.json`."""

@@ -1,4 +1,4 @@
-"""Tasks with movers: one identity, the same movers for every command, clear refusals."""
+"""Tasks with movers: one identity, the same movers in all commands, clear refusals."""
 
 import numpy as np
 import pytest
