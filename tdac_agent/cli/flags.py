@@ -19,10 +19,10 @@ from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 
 FIXED_BY_TASK = (
     *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
-    *("robot_image", "snap", "polarity", "threshold", "instructions"),
+    *("robot_image", "movers", "snap", "polarity", "threshold", "instructions"),
 )
 ONLY_FOR_MAPS = (
-    *("map_image", "robot_radius", "robot_image", "snap", "metres"),
+    *("map_image", "robot_radius", "robot_image", "movers", "snap", "metres"),
     *("polarity", "threshold"),
 )
 
@@ -40,6 +40,7 @@ class TaskFlags:
     heading: float | None = None
     robot_radius: float | None = None
     robot_image: Path | None = None
+    movers: str | None = None
     snap: bool = False
     metres: bool = False
     polarity: Literal["dark", "light"] | None = None
@@ -145,6 +146,7 @@ class TaskFlags:
             "map": source,
             "start": start,
             "goal": goal,
+            "movers": self.movers,
             "snap": self.snap,
             "metres": self.metres,
             "polarity": self.polarity,

@@ -107,6 +107,14 @@ RobotImage = Annotated[
     Optional[Path],  # noqa: UP045
     file_flag("--robot-image", help="Picture of the robot, nose to the right."),
 ]
+Movers = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        metavar="KIND:COUNT",
+        help="Moving obstacles on a map: `bounce:5` or `crowd:20`; a task.yaml can say "
+        "more of them.  [default: none]",
+    ),
+]
 Snap = Annotated[
     bool,
     typer.Option(

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.episodes.trajectory import Outcome, Rollout, Trajectory
+from tdac_agent.episodes.trajectory import Contact, Outcome, Rollout, Trajectory
 from tdac_agent.sandbox import (
     Child,
     ControllerFault,
@@ -66,11 +66,13 @@ class Record:
     seed: int | None = None
     options: dict[str, Any] | None = None
     outcome: Outcome | None = None
+    contact: Contact | None = None
     _poses: list[NDArray[np.float64]] = field(default_factory=list)
     _actions: list[NDArray[np.float32]] = field(default_factory=list)
     _distances: list[float] = field(default_factory=list)
     _ranges: list[NDArray[np.float32]] = field(default_factory=list)
     _rooms: list[float] = field(default_factory=list)
+    _movers: list[NDArray[np.float32]] = field(default_factory=list)
     _collisions: int = 0
 
     def reset(self) -> tuple[Observation, dict[str, Any]]:
@@ -125,7 +127,14 @@ class Record:
             np.array(self._ranges, np.float32),
             self._collisions,
             self.env.nominal.dt,
+            self._all_movers(),
         )
+
+    def _all_movers(self) -> NDArray[np.float32] | None:
+        """The movers so far; None without movers."""
+        if not self._movers or not len(self._movers[0]):
+            return None
+        return np.array(self._movers, np.float32)
 
     def rooms(self) -> NDArray[np.float64]:
         """Returns the clearances so far; see `Rollout.rooms`."""
@@ -137,6 +146,8 @@ class Record:
         self._distances.append(info["path_distance"])
         self._ranges.append(observation[self.env.readings])
         self._rooms.append(info["clearance"])
+        self.contact = info.get("contact") or self.contact
+        self._movers.append(self.env.discs().astype(np.float32))
         self._collisions = self.collisions_before + info["collisions"]
         return {**info, "collisions": self._collisions}
 
@@ -303,6 +314,7 @@ def _rollout(
         returned=returned,
         rooms=record.rooms(),
         calls=np.array(calls, np.float64),
+        contact=record.contact,
         timed_out=isinstance(error, ControllerTimeout) or slow,
         is_retryable=slow
         or (isinstance(error, ControllerFault) and error.is_retryable),

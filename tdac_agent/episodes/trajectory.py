@@ -16,6 +16,7 @@ from tdac_envs.core.intake import read_array, read_file, read_zip
 SCHEMA_VERSION = 1
 MOST_BYTES = 256_000_000
 Outcome = Literal["reached", "collision", "out of time", "stopped", "not run", "error"]
+Contact = Literal["wall", "mover", "mover_standing"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +31,8 @@ class Trajectory:
             px, or the raw readings of ps0 to ps7.
         collisions: Number of steps with a contact.
         dt: Duration of a step, s.
+        movers: Shape (T + 1, n, 3), float32: x, y, radius (px) of each moving obstacle;
+            None without any, when the file has no such array.
     """
 
     poses: NDArray[np.float64]
@@ -38,6 +41,7 @@ class Trajectory:
     ranges: NDArray[np.float32]
     collisions: int
     dt: float
+    movers: NDArray[np.float32] | None = None
 
     @property
     def steps(self) -> int:
@@ -50,16 +54,18 @@ class Trajectory:
 
     def save(self, path: Path) -> None:
         """Writes an `.npz` with one array per attribute."""
-        np.savez_compressed(
-            path,
-            schema_version=SCHEMA_VERSION,
-            poses=self.poses,
-            actions=self.actions,
-            path_distances=self.path_distances,
-            ranges=self.ranges,
-            collisions=self.collisions,
-            dt=self.dt,
-        )
+        arrays: dict[str, Any] = {
+            "schema_version": SCHEMA_VERSION,
+            "poses": self.poses,
+            "actions": self.actions,
+            "path_distances": self.path_distances,
+            "ranges": self.ranges,
+            "collisions": self.collisions,
+            "dt": self.dt,
+        }
+        if self.movers is not None:
+            arrays["movers"] = self.movers
+        np.savez_compressed(path, **arrays)
 
     @classmethod
     def load(cls, path: Path) -> Trajectory:
@@ -79,6 +85,7 @@ class Trajectory:
                 data["ranges"],
                 int(data["collisions"]),
                 float(data["dt"]),
+                data.get("movers"),
             )
             _check_shapes(loaded)
         except (OSError, ValueError, TypeError, LookupError, OverflowError) as error:
@@ -102,12 +109,15 @@ def nominal_first(path: Path) -> tuple[bool, str]:
 def _check_shapes(trajectory: Trajectory) -> None:
     """Raises ValueError if the arrays do not fit together."""
     length = len(trajectory.poses)
-    for name, shape in (
-        ("poses", (length, 3)),
-        ("actions", (length - 1, 2)),
-        ("path_distances", (length,)),
-        ("ranges", (length, trajectory.ranges.shape[-1])),
-    ):
+    shapes: dict[str, tuple[int, ...]] = {
+        "poses": (length, 3),
+        "actions": (length - 1, 2),
+        "path_distances": (length,),
+        "ranges": (length, trajectory.ranges.shape[-1]),
+    }
+    if trajectory.movers is not None:
+        shapes["movers"] = (length, *trajectory.movers.shape[1:2], 3)
+    for name, shape in shapes.items():
         array = getattr(trajectory, name)
         if array.shape != shape or array.dtype.kind != "f":
             got = f"{array.dtype} {array.shape}"
@@ -137,6 +147,8 @@ class Rollout:
             px (for the centre of its pixel) or m; empty if not recorded.
         calls: Shape (T,): duration of each policy call, s; empty if not recorded.
         printed: What the controller printed, of bounded length.
+        contact: What the body touched at last, as in `info`; None if nothing, or if the
+            environment does not say.
     """
 
     name: str
@@ -154,6 +166,7 @@ class Rollout:
     rooms: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     calls: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     printed: str = ""
+    contact: Contact | None = None
 
     @property
     def reached(self) -> bool:

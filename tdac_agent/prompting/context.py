@@ -53,6 +53,7 @@ def _of_any(task: Task) -> dict[str, Any]:
             "geodesic": "length of the shortest free path",
             "euclidean": "straight line",
         }[progress.distance],
+        "movers_text": "",
         "horizon": nominal.horizon,
         "straight": math.dist(nominal.start[:2], nominal.goal),
         "shortest": nominal.shortest,

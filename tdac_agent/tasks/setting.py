@@ -109,6 +109,9 @@ class JudgedEnv(Protocol):
     def pose(self) -> NDArray[np.float64]:
         """Returns the true pose x, y, heading; shape (3,)."""
 
+    def discs(self) -> NDArray[np.float64]:
+        """Returns the movers as they are now, shape (n, 3): x, y, radius (px or m)."""
+
 
 class Params(Protocol):
     """Contents of `params.json`."""
@@ -162,6 +165,9 @@ class Setting(Protocol):
         Raises:
             TaskError: It has no other units than its own.
         """
+
+    def without_movers(self) -> Setting:
+        """Returns the same task without moving obstacles."""
 
     def told(self, length: float) -> str:
         """Formats a length in the units that the user has chosen: `12 px`, `0.6 m`."""

@@ -6,6 +6,7 @@ import functools
 import hashlib
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from tdac_agent.tasks.task_file import (
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import printable
+from tdac_envs.drive.task import Pose
 
 SENSORS_FILE = Path(__file__).parents[2] / "tdac_envs" / "controller_kit" / "sensors.py"
 MIN_PROGRESS_STEPS = 400
@@ -81,6 +83,13 @@ class Task:
         spec = self.spec.model_copy(update={"profile": profile})
         return replace(self, spec=spec)
 
+    def without_movers(self) -> Task:
+        """Returns the same task without moving obstacles."""
+        if not self.spec.movers:
+            return self
+        spec = self.spec.model_copy(update={"movers": ()})
+        return replace(self, spec=spec, setting=self.setting.without_movers())
+
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's environment."""
         return self.setting.env_kwargs()
@@ -88,6 +97,24 @@ class Task:
     def make_env(self, **options: Any) -> JudgedEnv:
         """Constructs this task's environment; `options` override its arguments."""
         return self.setting.make_env(**options)
+
+    def start_check(self) -> Callable[[Pose], bool]:
+        """Returns whether an episode may begin at a feasible start of the body.
+
+        It may not where a mover with a start of its own would soon touch the robot.
+        """
+        if not self.spec.movers:
+            return lambda _: True
+        env = self.make_env()
+
+        def allows(start: Pose) -> bool:
+            try:
+                env.reset(seed=0, options={"start": start})
+            except TaskError:
+                return False
+            return True
+
+        return allows
 
     def disturbed_env(
         self, disturbance: Disturbance, variation: str = "jitter"

@@ -5,13 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+)
 
 from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
 from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.mapping.params import MOST_RAYS, Length, Place
+from tdac_envs.movers.spec import AnySpec, Spec, read_specs
 
 TASK_FILE = "task.yaml"
 """File name in the folder of a task or a run."""
@@ -32,6 +40,14 @@ def _names_a_file(name: str) -> str:
     if not name.isprintable() or "/" in name:
         raise ValueError("expected printable characters only, and no /")
     return name
+
+
+def _movers_of(given: Any) -> tuple[AnySpec, ...]:
+    try:
+        return read_specs(given)
+    except TaskError as error:
+        # The key is named already: `movers: [0]: ...`.
+        raise ValueError(str(error).removeprefix("movers")) from None
 
 
 class _Strict(BaseModel):
@@ -87,6 +103,9 @@ class TaskFile(_Strict):
     )
     threshold: float | None = Field(
         None, ge=0, lt=255, description="Luminance above which a pixel is light."
+    )
+    movers: Annotated[tuple[Spec, ...], BeforeValidator(_movers_of)] = Field(
+        (), description="Moving obstacles, as the environment's argument `movers`."
     )
     tolerance: Length | None = Field(None, description="px; e-puck: m")
     dt: Length | None = Field(

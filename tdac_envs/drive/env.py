@@ -118,6 +118,10 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         pose: NDArray[np.float64] = self.robot.state[: HEADING + 1].copy()
         return pose
 
+    def discs(self) -> NDArray[np.float64]:
+        """Moving obstacles as they are now, shape (n, 3): x, y, radius (px or m)."""
+        return np.zeros((0, 3))
+
     def _draw(self, options: dict[str, Any]) -> Any:
         """Draws the task of an episode, and returns it."""
         drawn = self.setup.draw(options, self.np_random)

@@ -325,6 +325,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             self.render()
         return self._observation(), info_of(robot.outcome.tolist())
 
+    def discs(self) -> NDArray[np.float64]:
+        """The movers as they are now, shape (n, 3): x, y, radius, px."""
+        return self.movers.discs()
+
     def __getstate__(self) -> dict[str, Any]:
         return {
             **self.__dict__,
@@ -366,10 +370,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     def _begin_trail(self) -> None:
         super()._begin_trail()
         steps = math.ceil(GHOST_SECONDS / self.task.dt)
-        self._ghosts = deque([self.movers.discs()], min(steps + 1, MOST_GHOSTS))
+        self._ghosts = deque([self.discs()], min(steps + 1, MOST_GHOSTS))
 
     def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
-        self._ghosts.append(self.movers.discs())
+        self._ghosts.append(self.discs())
         super()._note(reached, collided, truncated)
 
     def _frame(self) -> NDArray[np.uint8]:

@@ -63,6 +63,7 @@ def drive(env, act, start=None, steps=None, name="nominal", held_out=False) -> R
         goal=task.goal,
         radius=task.body_radius,
         tolerance=task.goal_tolerance,
+        contact=record.contact,
     )
 
 

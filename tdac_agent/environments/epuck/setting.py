@@ -67,6 +67,10 @@ class EPuckSetting:
         """Raises an error: worlds are always in metres."""
         raise TaskError("--metres is for maps; a world is in metres anyway")
 
+    def without_movers(self) -> Setting:
+        """Returns this task: nothing but the robot moves in a world."""
+        return self
+
     def told(self, length: float) -> str:
         """Formats a length in mm."""
         return METRES.figure(length)

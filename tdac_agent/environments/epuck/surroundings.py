@@ -91,6 +91,11 @@ class WorldSurroundings:
             f"In step {before} {reading}, the sensor on that side (67: nothing near)."
         )
 
+    def in_sight(self, pose: Pose, place: Point, radius: float) -> bool:
+        """False: nothing but the robot moves in a world."""
+        del pose, place, radius
+        return False
+
     def path_from(self, pose: Pose) -> Path:
         """Returns the shortest grid path to the goal."""
         start = Pose(*METRES.place_of(pose.x, pose.y), 0.0)

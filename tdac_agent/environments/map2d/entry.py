@@ -26,7 +26,7 @@ class Map2D(Environment):
     id = "TDAC-Map2D-v0"
     folder = Path(__file__).parent
     units = PIXELS
-    keys = ("map", "robot", "snap", "metres", "polarity", "threshold")
+    keys = ("map", "robot", "movers", "snap", "metres", "polarity", "threshold")
     names = Names(
         constants=(
             *("MAP_IMG", "PARAMS_JSON", "ROBOT_IMG", "AXLE_LENGTH_PX"),

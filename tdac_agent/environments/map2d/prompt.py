@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tdac_agent.environments.map2d.moving import sentence_on
 from tdac_agent.environments.map2d.setting import map_setting
 from tdac_agent.prompting.source_excerpt import needed_part
 from tdac_agent.tasks.task import SENSORS_FILE, Task
@@ -31,6 +32,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         ),
         "params_text": params,
         "widest": widest_connected_radius(terrain.clear, start, nominal.goal),
+        "movers_text": sentence_on(setting.movers),
         "number": 6,
         "speed_unit": "px/s",
         "full_speed": "max_wheel_speed",

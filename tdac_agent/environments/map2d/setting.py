@@ -8,6 +8,7 @@ from typing import Any
 
 import cv2
 
+from tdac_agent.environments.map2d.moving import as_option, check_movers, in_pixels
 from tdac_agent.tasks.setting import Original, Setting
 from tdac_agent.tasks.task_file import RobotSpec, TaskFile
 from tdac_agent.tasks.units import PIXELS, Units
@@ -28,6 +29,7 @@ from tdac_envs.mapping.map_folder import preview_of, write_grid
 from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
+from tdac_envs.movers.spec import AnySpec
 
 DT = 0.05
 ROBOT_IMAGE_BYTES = 16_000_000
@@ -43,6 +45,7 @@ class Map2DSetting:
         nominal: The feasible task.
         image: Map image, or None.
         robot_image: Picture of the robot.
+        movers: Moving obstacles, px.
         shown_in: Units of what the user reads; the environment's units are pixels.
     """
 
@@ -50,6 +53,7 @@ class Map2DSetting:
     nominal: Map2DTask
     image: Path | None
     robot_image: Path
+    movers: tuple[AnySpec, ...] = ()
     shown_in: MapUnits = MAP_PIXELS
 
     @property
@@ -80,6 +84,10 @@ class Map2DSetting:
             )
         return replace(self, shown_in=MapUnits.metres(self.params))
 
+    def without_movers(self) -> Map2DSetting:
+        """See `Setting`."""
+        return replace(self, movers=())
+
     def told(self, length: float) -> str:
         """Formats a length in `shown_in`."""
         return self.shown.figure(length)
@@ -106,7 +114,10 @@ class Map2DSetting:
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's `Map2DEnv`."""
         nominal, robot = self.nominal, self.nominal.robot
+        # Tasks without movers keep the hash that they had before there were any.
+        movers = {"movers": as_option(self.movers)} if self.movers else {}
         return {
+            **movers,
             "map": nominal.terrain.grid.cells,
             "start": tuple(nominal.start),
             "goal": nominal.goal,
@@ -158,7 +169,9 @@ class Map2DSetting:
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
         robot = self.nominal.robot
+        movers = {"movers": as_option(self.movers)} if self.movers else {}
         return {
+            **movers,
             "map": ".",
             "robot": {
                 "radius": robot.radius,
@@ -219,13 +232,17 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
             message += metres_hint(prepared.grid, params.start, params.goal)
         pictures = {"refused": picture}
         raise RefusedError(message, params.source, pictures) from error
+    check_movers(spec.movers, nominal)
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
     if spec.robot.image is not None:
         _check_robot_image(robot_image)
     name = spec.map if bundled else Path(spec.map).stem
-    return name, Map2DSetting(params, nominal, prepared.image, robot_image, units)
+    setting = Map2DSetting(
+        params, nominal, prepared.image, robot_image, spec.movers, units
+    )
+    return name, setting
 
 
 def robot_text(robot: RobotParams, units: MapUnits) -> str:
@@ -258,6 +275,7 @@ def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
         if length is not None
     }
     changes["robot"] = spec.robot.model_copy(update=robot)
+    changes["movers"] = in_pixels(spec.movers, units)
     return spec.model_copy(update=changes)
 
 

@@ -16,6 +16,7 @@ from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.plan import Path, descend, first_beyond
+from tdac_envs.map2d.rays import sees
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import path_entry
 
@@ -68,6 +69,17 @@ class MapSurroundings:
             f"{earlier} steps earlier the shortest ray read "
             f"{self.units.far(shortest)} (from the centre of the body)."
         )
+
+    def in_sight(self, pose: Pose, place: Point, radius: float) -> bool:
+        """See `Surroundings`; the disc's edge is within the range of the rays."""
+        robot, (x, y) = self.task.robot, place
+        if math.dist(pose[:2], place) - radius > robot.range_max:
+            return False
+        bearing = math.atan2(y - pose.y, x - pose.x) - pose.heading
+        off = abs(math.remainder(bearing, math.tau))
+        if off > math.radians(robot.field_of_view_deg) / 2.0:
+            return False
+        return bool(sees(self.task.terrain.leaps, pose.x, pose.y, x, y))
 
     def path_from(self, pose: Pose) -> Path:
         """Returns the shortest grid path to the goal."""

@@ -17,6 +17,13 @@ from tdac_agent.verification.diagnosis.course import (
     turned_away,
 )
 from tdac_agent.verification.diagnosis.motion import forward, saturated
+from tdac_agent.verification.diagnosis.mover import (
+    MoverTouch,
+    how_it_drove,
+    nearest_mover,
+    time_in_sight,
+    where_from,
+)
 from tdac_agent.verification.diagnosis.report import Cause, Diagnosis
 from tdac_agent.verification.diagnosis.stall import PROGRESS, percent
 from tdac_agent.verification.diagnosis.surroundings import (
@@ -85,20 +92,14 @@ def _error(rollout: Rollout, units: Units) -> Diagnosis:
 def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
     trajectory, units = rollout.trajectory, around.units
     pose, speed = _pose(trajectory, trajectory.steps), float(forward(trajectory)[-1])
-    touch = around.touch(pose, rollout.radius + 3.0)
-    assert touch is not None
-    side, share = side_of(touch.bearing), saturated(trajectory)
-    towards = pose.heading + (math.pi if speed < 0.0 else 0.0)
-    corner = where_on_the_wall(touch, towards, units)
+    share = saturated(trajectory)
+    touched, facts = _touched(rollout, around)
     error, course = _course(rollout, around)
     text = (
         f"collision in step {trajectory.steps} "
         f"({trajectory.steps * trajectory.dt:.1f} s) at {units.point(pose.x, pose.y)}, "
         f"heading {units.degrees(pose.heading)}°, speed "
-        f"{units.far(speed * around.full_speed, 0)}/s: the {side} of the body "
-        f"touched the {touch.thing} at "
-        f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
-        f"{around.seen(touch, trajectory)} {_limits(share)}"
+        f"{units.far(speed * around.full_speed, 0)}/s: {touched} {_limits(share)}"
         f"{_passed_goal(rollout, units)}{course}"
     )
     return _diagnosis(
@@ -107,13 +108,54 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
         "collision",
         text,
         trajectory.steps,
-        side=side,
-        wall=units.kept_place(*touch.wall),
-        corner=None if touch.corner is None else units.kept_place(*touch.corner),
-        thing=touch.thing,
         heading_error=error,
         saturated=round(share, 3),
+        **facts,
     )
+
+
+def _touched(rollout: Rollout, around: Surroundings) -> tuple[str, dict[str, Any]]:
+    """What the body touched, as text and as fields of the diagnosis."""
+    mover = nearest_mover(rollout.trajectory, rollout.radius)
+    if mover is not None and rollout.contact in ("mover", "mover_standing"):
+        return _touched_mover(rollout, around, mover)
+    return _touched_wall(rollout, around)
+
+
+def _touched_mover(
+    rollout: Rollout, around: Surroundings, mover: MoverTouch
+) -> tuple[str, dict[str, Any]]:
+    trajectory, units = rollout.trajectory, around.units
+    side, thing = side_of(mover.bearing), f"mover {mover.number}"
+    drove = how_it_drove(trajectory, stood=rollout.contact == "mover_standing")
+    text = (
+        f"the {side} of the body touched {thing}, which came from "
+        f"{where_from(trajectory, mover.number)} and "
+        f"{time_in_sight(around, trajectory, mover.number)}; the robot {drove}."
+    )
+    place = units.kept_place(*mover.place)
+    return text, {"side": side, "wall": place, "thing": thing}
+
+
+def _touched_wall(rollout: Rollout, around: Surroundings) -> tuple[str, dict[str, Any]]:
+    trajectory, units = rollout.trajectory, around.units
+    pose, speed = _pose(trajectory, trajectory.steps), float(forward(trajectory)[-1])
+    touch = around.touch(pose, rollout.radius + 3.0)
+    assert touch is not None
+    side = side_of(touch.bearing)
+    towards = pose.heading + (math.pi if speed < 0.0 else 0.0)
+    corner = where_on_the_wall(touch, towards, units)
+    text = (
+        f"the {side} of the body touched the {touch.thing} at "
+        f"{units.point(*touch.wall)}{', ' if corner else ''}{corner}. "
+        f"{around.seen(touch, trajectory)}"
+    )
+    return text, {
+        "side": side,
+        "wall": units.kept_place(*touch.wall),
+        "corner": None if touch.corner is None else units.kept_place(*touch.corner),
+        "thing": touch.thing,
+    }
 
 
 def _limits(share: float) -> str:

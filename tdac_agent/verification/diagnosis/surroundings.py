@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Protocol
 
+import numpy as np
+
 from tdac_agent.episodes.trajectory import Rollout, Trajectory
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import Nominal
@@ -41,6 +43,12 @@ class Surroundings(Protocol):
     def seen(self, touch: Touch, trajectory: Trajectory) -> str:
         """What the distance sensors saw of what was touched, as text."""
 
+    def in_sight(self, pose: Pose, place: Point, radius: float) -> bool:
+        """Whether the distance sensors at a pose can see a disc.
+
+        Its centre is in their field of view, and no wall is in between.
+        """
+
     def path_from(self, pose: Pose) -> Path:
         """Shortest grid path to the goal, shape (n, 2); empty where there is none."""
 
@@ -62,8 +70,15 @@ def surroundings_of(task: Nominal, shown: Units | None = None) -> Surroundings:
 
 def trajectory_on_screen(trajectory: Trajectory, units: Units) -> Trajectory:
     """Converts a trajectory to units of the screen."""
+    movers = trajectory.movers
+    if movers is not None:
+        places = units.on_screen(movers[..., :2].reshape(-1, 2))
+        movers = np.dstack(
+            [places.reshape(*movers.shape[:2], 2), movers[..., 2] * units.scale]
+        ).astype(np.float32)
     return replace(
         trajectory,
+        movers=movers,
         poses=units.on_screen(trajectory.poses),
         path_distances=trajectory.path_distances * units.scale,
     )

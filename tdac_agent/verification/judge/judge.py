@@ -34,7 +34,7 @@ from tdac_agent.verification.judge.suite_episode import (
 from tdac_agent.verification.judge.time_limit import time_limit
 from tdac_agent.verification.judge.turns import Turns
 from tdac_agent.verification.judge.worker_pool import SIZE, WorkerPool
-from tdac_agent.verification.suite.starts import JITTERS, spread_starts
+from tdac_agent.verification.suite.starts import JITTERS, episode_seed, spread_starts
 from tdac_envs.drive.task import Pose
 
 NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))
@@ -59,7 +59,7 @@ class Judge:
         source: Bytes of `controller.py`.
         workdir: Folder whose files the controller may read.
         tier: Sandbox tier, or `auto`.
-        seed: Seed of the jittered starts.
+        seed: Seed of the jittered starts, and of movers.
         limits: Limits of each child; `cpu_seconds` is the total of all of them.
         child_pool: The child pool; a new one by default.
         worker_pool: Drives the episodes; by default a new one, forked now.
@@ -243,7 +243,8 @@ class Judge:
 
     @cached_property
     def _starts(self) -> dict[str, Pose]:
-        starts = spread_starts(self.task.nominal, self.seed, JITTERS)
+        task = self.task
+        starts = spread_starts(task.nominal, self.seed, JITTERS, task.start_check())
         return dict(zip(NAMES[1:], starts, strict=True))
 
     def _run(self, name: str, steps: int | None, drive: str) -> Rollout:
@@ -292,7 +293,8 @@ class Judge:
         return driven.rollout
 
     def _request(self, name: str, steps: int | None, drive: str) -> EpisodeRequest:
-        return EpisodeRequest(name, self.start_pose(name), steps, drive)
+        seed = episode_seed(self.seed, NAMES.index(name))
+        return EpisodeRequest(name, self.start_pose(name), steps, drive, seed)
 
     def _overspent(self) -> str:
         return f"used up its limit of {self._limits.cpu_seconds} s of CPU time"

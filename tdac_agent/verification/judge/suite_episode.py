@@ -51,12 +51,14 @@ class EpisodeRequest:
         start: Start pose.
         steps: Maximum number of steps; None for the horizon.
         drive: `policy`, `run_episode` or `truncated run_episode`.
+        seed: Seed of all that the environment draws, such as movers.
     """
 
     name: str
     start: Pose
     steps: int | None
     drive: str
+    seed: int
 
     @property
     def held_out(self) -> bool:
@@ -109,7 +111,7 @@ def drive(
         Fault: The sandbox or the judge failed.
     """
     limit = request.steps if request.steps is not None else task.nominal.horizon
-    record = Record(task.make_env(), request.start, limit)
+    record = Record(task.make_env(), request.start, limit, seed=request.seed)
     if request.drive == "truncated run_episode":
         record.truncates, record.collisions_before = True, 2
     child = child_pool.take(settings.tier, settings.limits)
@@ -163,7 +165,7 @@ def skipped(
     task: Task, request: EpisodeRequest, outcome: Outcome, reason: str
 ) -> Rollout:
     """An episode without steps."""
-    record = Record(task.make_env(), request.start, 1)
+    record = Record(task.make_env(), request.start, 1, seed=request.seed)
     record.reset()
     nominal = task.nominal
     return Rollout(

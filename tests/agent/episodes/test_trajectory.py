@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,9 +40,19 @@ def whole(trajectory, tmp_path_factory):
     return path.read_bytes()
 
 
+@pytest.fixture(scope="module")
+def moving(trajectory):
+    """The same episode with two movers."""
+    discs = np.random.default_rng(1).random((STEPS + 1, 2, 3)).astype(np.float32)
+    return replace(trajectory, movers=discs)
+
+
 def same(one, other):
     """Equal to the last bit, types included."""
-    pairs = [(getattr(one, name), getattr(other, name)) for name in ARRAYS]
+    if (one.movers is None) != (other.movers is None):
+        return False
+    names = ARRAYS if one.movers is None else (*ARRAYS, "movers")
+    pairs = [(getattr(one, name), getattr(other, name)) for name in names]
     exact = all(a.dtype == b.dtype and np.array_equal(a, b) for a, b in pairs)
     return exact and (one.collisions, one.dt) == (other.collisions, other.dt)
 
@@ -50,6 +61,22 @@ def test_a_trajectory_comes_back(trajectory, whole, tmp_path):
     """Saved and loaded, every number and type is the same."""
     (tmp_path / "nominal.npz").write_bytes(whole)
     assert same(load_trajectories(tmp_path)["nominal"], trajectory)
+
+
+def test_movers_come_back(moving, whole, tmp_path):
+    """A file has them if, and only if, there were any."""
+    moving.save(tmp_path / "nominal.npz")
+    assert same(load_trajectories(tmp_path)["nominal"], moving)
+    assert "movers.npy" in zipfile.ZipFile(tmp_path / "nominal.npz").namelist()
+    assert "movers.npy" not in zipfile.ZipFile(io.BytesIO(whole)).namelist()
+
+
+@pytest.mark.parametrize("shape", [(STEPS, 2, 3), (STEPS + 1, 2, 2), (STEPS + 1, 3)])
+def test_movers_of_another_shape(trajectory, tmp_path, shape):
+    """They are refused."""
+    replace(trajectory, movers=np.zeros(shape, np.float32)).save(tmp_path / "x.npz")
+    with pytest.raises(RunError, match="expected movers as floats"):
+        Trajectory.load(tmp_path / "x.npz")
 
 
 def check(trajectory, whole, folder, data):

@@ -1,0 +1,84 @@
+"""The movers of a task on a map."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.map2d.placing import Cast
+from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.movers.spec import AnySpec
+
+
+def in_pixels(specs: Sequence[AnySpec], units: MapUnits) -> tuple[AnySpec, ...]:
+    """The movers of a task file with `metres`, converted to px."""
+    return tuple(spec.model_copy(update=_changes(spec, units)) for spec in specs)
+
+
+def _changes(spec: AnySpec, units: MapUnits) -> dict[str, Any]:
+    """What differs in px: lengths, places and headings."""
+    changes: dict[str, Any] = {
+        name: units.length_in_pixels(length)
+        for name in ("radius", "speed")
+        if (length := getattr(spec, name)) is not None
+    }
+    if spec.kind == "route":
+        changes["points"] = tuple(units.pixels(point) for point in spec.points)
+    elif spec.kind == "bounce":
+        if spec.start is not None:
+            changes["start"] = units.pixels(spec.start)
+        if spec.heading is not None:
+            changes["heading"] = units.heading_in_pixels(spec.heading)
+    return changes
+
+
+def check_movers(specs: Sequence[AnySpec], task: Map2DTask) -> None:
+    """Places the movers of a task once.
+
+    Raises:
+        TaskError: They cannot be placed; the message names the mover.
+    """
+    if specs:
+        Cast.of(specs, task).start(task, np.random.default_rng(0))
+
+
+def as_option(specs: Sequence[AnySpec]) -> list[dict[str, Any]]:
+    """The movers as the argument of an environment, with JSON-able values."""
+    return [spec.model_dump(mode="json", exclude_none=True) for spec in specs]
+
+
+def sentence_on(specs: Sequence[AnySpec]) -> str:
+    """A sentence for prompts; empty without movers."""
+    counts = Counter[str]()
+    for spec in specs:
+        counts[spec.kind] += spec.number
+    if not counts:
+        return ""
+    parts = [_WORDS[kind][count > 1].format(count) for kind, count in counts.items()]
+    return (
+        f"Beside the robot, {_joined(parts)} move about: they are not on the map, "
+        "ranges end at them as at walls, and touching one is a collision."
+    )
+
+
+_WORDS = {
+    "route": ("{} disc on a route", "{} discs on routes"),
+    "bounce": (
+        "{} disc that bounces off walls",
+        "{} discs that bounce off walls",
+    ),
+    "crowd": (
+        "{} person with a goal of their own",
+        "a crowd of {} people with goals of their own",
+    ),
+}
+
+
+def _joined(parts: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    *others, last = parts
+    return f"{', '.join(others)} and {last}" if others else last
