@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,6 +28,10 @@ from tdac_envs.drawing.canvas import (
 OUTCOMES: dict[str, Colour] = {"reached": GREEN, "collision": RED, "out of time": AMBER}
 LEFT_RAYS, RIGHT_RAYS = BLUE, ORANGE
 Sprite = NDArray[np.float32]
+GHOST_SECONDS = 1.0
+"""Trails of movers show where they were in this time."""
+# Pieces of a trail, and their opacity from the oldest to the newest.
+_FADES, _FADED, _FRESH = 6, 0.12, 0.6
 
 
 def load_sprite(file: Path, radius: float) -> Sprite | None:
@@ -102,7 +107,7 @@ def draw_rays(
 
 
 def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
-    """Draws moving discs as they are now, with a trail of where they were.
+    """Draws moving discs as they are now, with a fading trail of where they were.
 
     Args:
         canvas: Where to draw.
@@ -111,8 +116,12 @@ def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
     """
     if not len(steps):
         return
+    places = np.array([discs[:, :2] for discs in steps])
+    cuts = np.unique(np.linspace(0, len(places) - 1, _FADES + 1).astype(int)).tolist()
     for m, (x, y, radius) in enumerate(steps[-1].tolist()):
-        canvas.line([discs[m, :2] for discs in steps], MOVER, 2, 0.45)
+        for number, (first, last) in enumerate(itertools.pairwise(cuts)):
+            alpha = _FADED + (_FRESH - _FADED) * number / max(len(cuts) - 2, 1)
+            canvas.line(places[first : last + 1, m], MOVER, 2, alpha)
         canvas.disc((x, y), radius * canvas.scale, MOVER, 0.55)
         canvas.disc((x, y), radius * canvas.scale, MOVER, width=1)
 
