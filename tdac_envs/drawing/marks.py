@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,8 +29,8 @@ LEFT_RAYS, RIGHT_RAYS = BLUE, ORANGE
 Sprite = NDArray[np.float32]
 GHOST_SECONDS = 1.0
 """Trails of movers show where they were in this time."""
-# Pieces of a trail, and their opacity from the oldest to the newest.
-_FADES, _FADED, _FRESH = 6, 0.12, 0.6
+# Layers of a trail, each shorter than the one below it, and their opacity.
+_FADES, _LAYER = 6, 0.15
 
 
 def load_sprite(file: Path, radius: float) -> Sprite | None:
@@ -119,9 +118,9 @@ def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
     places = np.array([discs[:, :2] for discs in steps])
     cuts = np.unique(np.linspace(0, len(places) - 1, _FADES + 1).astype(int)).tolist()
     for m, (x, y, radius) in enumerate(steps[-1].tolist()):
-        for number, (first, last) in enumerate(itertools.pairwise(cuts)):
-            alpha = _FADED + (_FRESH - _FADED) * number / max(len(cuts) - 2, 1)
-            canvas.line(places[first : last + 1, m], MOVER, 2, alpha)
+        for first in cuts[:-1]:
+            # Pieces that lie on each other: those side by side would show their joints.
+            canvas.line(places[first:, m], MOVER, 2, _LAYER)
         canvas.disc((x, y), radius * canvas.scale, MOVER, 0.55)
         canvas.disc((x, y), radius * canvas.scale, MOVER, width=1)
 

@@ -107,16 +107,14 @@
 
     // A mover where it is now, with a fading trail of its last second.
     function mover({ way, radius }) {
-      const first = Math.max(0, step - GHOST / episode.dt);
-      let from = poseAt(way, first)[0];
-      for (let n = 1; n <= FADES; n++) {
-        const to = poseAt(way, first + (n / FADES) * (step - first))[0];
-        pen.globalAlpha = 0.15 + (0.6 * n) / FADES;
-        line([from, to], MOVER, 2);
-        from = to;
+      const first = Math.max(0, step - GHOST / episode.dt), trail = [];
+      for (let n = 0; n <= FADES; n++) {
+        trail.push(poseAt(way, first + (n / FADES) * (step - first))[0]);
       }
-      pen.globalAlpha = 1;
-      disc(from[1], from[2], radius, `${MOVER}8c`, MOVER, 1);
+      // Layers, each shorter than the one below: pieces side by side would show joints.
+      for (let n = 0; n < FADES; n++) line(trail.slice(n), `${MOVER}26`, 2);
+      const [, x, y] = trail[FADES];
+      disc(x, y, radius, `${MOVER}8c`, MOVER, 1);
     }
 
     function draw() {
