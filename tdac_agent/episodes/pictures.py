@@ -20,9 +20,20 @@ class Pictures(Protocol):
         """Returns the background of the pictures of failed episodes."""
 
     def trajectories(
-        self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
+        self,
+        runs: Sequence[Points],
+        outcomes: Sequence[str],
+        labels: Sequence[str],
+        movers: Sequence[Points] = (),
     ) -> Image:
-        """Draws the poses of episodes, each of shape (T + 1, 3), in one picture."""
+        """Draws the poses of episodes, each of shape (T + 1, 3), in one picture.
+
+        Args:
+            runs: The poses.
+            outcomes: Outcome of each episode.
+            labels: Name of each episode.
+            movers: Movers at the end of the first episode; see `Trajectory.ghosts`.
+        """
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
         """Draws every `stride`-th step and the last one."""

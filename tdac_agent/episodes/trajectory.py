@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from tdac_agent.errors import RunError
 from tdac_envs.core.errors import one_line_reason
 from tdac_envs.core.intake import read_array, read_file, read_zip
+from tdac_envs.drawing.marks import GHOST_SECONDS
 
 SCHEMA_VERSION = 1
 MOST_BYTES = 256_000_000
@@ -51,6 +53,18 @@ class Trajectory:
     def every(self, stride: int) -> list[int]:
         """Returns every `stride`-th step from the start, and the last one."""
         return [*range(0, self.steps, stride), self.steps]
+
+    def ghosts(self, step: int) -> list[NDArray[np.float64]]:
+        """Returns the movers until a step, for pictures of them with their trails.
+
+        Returns:
+            Those in the last second, oldest first, each of shape (n, 3): x, y, radius;
+            an empty list without movers.
+        """
+        if self.movers is None:
+            return []
+        since = max(step - math.ceil(GHOST_SECONDS / self.dt), 0)
+        return list(self.movers[since : step + 1].astype(np.float64))
 
     def save(self, path: Path) -> None:
         """Writes an `.npz` with one array per attribute."""

@@ -29,6 +29,8 @@ RAD = 20.0
 MOST_POINTS = 400
 ALL_POINTS = 60_000
 """Maximum number of points of all episodes of a run together."""
+ALL_MOVER_POINTS = 60_000
+"""The same of their movers; each has at least 20."""
 
 
 def animations(told: Told, task: Task, scene: TaskPicture) -> list[dict[str, Any]]:
@@ -36,11 +38,45 @@ def animations(told: Told, task: Task, scene: TaskPicture) -> list[dict[str, Any
 
     Returns:
         A dict per episode for the player: candidate, name, outcome, dt, steps, points
-        (differences of step, x, y and heading, flattened) and contact.
+        (differences of step, x, y and heading, flattened), contact, and movers: radius
+        and points (differences of step, x and y) of each.
     """
     found = [(one, *pair) for one in told.tried for pair in _episodes(one)]
-    most = max(20, min(MOST_POINTS, ALL_POINTS // max(1, len(found))))
-    return [_encoded(task, scene, most, *each) for each in found]
+    most = _share(ALL_POINTS, len(found))
+    of_mover = _share(ALL_MOVER_POINTS, sum(_count(each[-1]) for each in found))
+    return [
+        _encoded(task, scene, most, *each)
+        | {"movers": _movers(scene, of_mover, each[-1])}
+        for each in found
+    ]
+
+
+def _share(points: int, count: int) -> int:
+    """Maximum number of points of each of `count` ways."""
+    return max(20, min(MOST_POINTS, points // max(1, count)))
+
+
+def _count(trajectory: Trajectory) -> int:
+    """Number of movers."""
+    return 0 if trajectory.movers is None else trajectory.movers.shape[1]
+
+
+def _movers(
+    scene: TaskPicture, most: int, trajectory: Trajectory
+) -> list[dict[str, Any]]:
+    """Encodes the movers of an episode; px of the picture, times `FINENESS`."""
+    if trajectory.movers is None:
+        return []
+    encoded = []
+    for disc in range(_count(trajectory)):
+        places = scene.at(trajectory.movers[:, disc, :2].astype(np.float64))
+        flat = np.column_stack([places, np.zeros(len(places))])
+        kept = thinned(flat, most)
+        rows = np.column_stack([kept, np.rint(places[kept] * FINENESS)]).astype(int)
+        radius = float(trajectory.movers[0, disc, 2]) * scene.chart.scale * scene.zoom
+        points = np.diff(rows, axis=0, prepend=0).ravel().tolist()
+        encoded.append({"radius": round(radius, 1), "points": points})
+    return encoded
 
 
 def _episodes(one: CandidateHistory) -> Iterator[tuple[Episode, Trajectory]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -15,6 +16,7 @@ from tdac_envs.drawing.canvas import (
     GREEN,
     GREY,
     INK,
+    MOVER,
     PAPER,
     TRAIL,
     Canvas,
@@ -23,6 +25,7 @@ from tdac_envs.drawing.canvas import (
     blank,
     write_text,
 )
+from tdac_envs.drawing.marks import draw_movers
 
 # Distinguishable from the goal's green with every kind of colour vision.
 EVENT: Colour = (213, 94, 0)
@@ -47,6 +50,8 @@ class Event:
         where: Shape (n, 2): points that the close-up must contain.
         contact: Point of a wall that the body touched.
         way: Shape (m, 2): the shortest path from the last position.
+        movers: Movers in the last steps, oldest first, each of shape (k, 3): x, y,
+            radius.
     """
 
     title: str
@@ -54,6 +59,7 @@ class Event:
     where: Points
     contact: tuple[float, float] | None = None
     way: Points | None = None
+    movers: Sequence[Points] = ()
 
 
 def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
@@ -88,6 +94,7 @@ def _draw_run(
     canvas, places = chart.canvas, chart.at(poses[:, :2])
     if show_path and event.way is not None:
         canvas.line(chart.at(event.way), GREEN, 2, 0.9, dash=6)
+    draw_movers(canvas, [_on_canvas(chart, discs) for discs in event.movers])
     body = max(radius * chart.scale, _SMALLEST_BODY)
     canvas.disc(places[0], 4, FREE)
     canvas.disc(places[0], 4, EARLY, width=2)
@@ -102,6 +109,12 @@ def _draw_run(
         size, contact = max(0.3 * body, 6.0), chart.at(np.array([event.contact]))
         canvas.disc(contact, size, FREE, 0.9, 5)
         canvas.disc(contact, size, EVENT, width=3)
+
+
+def _on_canvas(chart: Chart, discs: Points) -> Points:
+    """Discs, shape (n, 3), in canvas coordinates."""
+    radii = discs[:, 2] * chart.scale / chart.canvas.scale
+    return np.column_stack([chart.at(discs[:, :2]), radii])
 
 
 def _draw_trail(canvas: Canvas, places: Points) -> None:
@@ -157,6 +170,8 @@ def _column(event: Event, close: Image | None) -> Image:
         legend.append((GREEN, True, "shortest path from the end"))
     if event.contact is not None:
         legend.append((EVENT, False, "contact"))
+    if len(event.movers):
+        legend.append((MOVER, False, "movers, and their last second"))
     rows = len(lines) + len(legend) + 1
     tall = 0 if close is None else close.shape[0] + MARGIN
     column = blank(2 * MARGIN + _LINE * rows + 10 + tall, COLUMN, PAPER)

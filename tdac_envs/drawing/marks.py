@@ -27,6 +27,10 @@ from tdac_envs.drawing.canvas import (
 OUTCOMES: dict[str, Colour] = {"reached": GREEN, "collision": RED, "out of time": AMBER}
 LEFT_RAYS, RIGHT_RAYS = BLUE, ORANGE
 Sprite = NDArray[np.float32]
+GHOST_SECONDS = 1.0
+"""Trails of movers show where they were in this time."""
+# Layers of a trail, each shorter than the one below it, and their opacity.
+_FADES, _LAYER = 6, 0.15
 
 
 def load_sprite(file: Path, radius: float) -> Sprite | None:
@@ -102,7 +106,7 @@ def draw_rays(
 
 
 def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
-    """Draws moving discs as they are now, with a trail of where they were.
+    """Draws moving discs as they are now, with a fading trail of where they were.
 
     Args:
         canvas: Where to draw.
@@ -111,8 +115,12 @@ def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
     """
     if not len(steps):
         return
+    places = np.array([discs[:, :2] for discs in steps])
+    cuts = np.unique(np.linspace(0, len(places) - 1, _FADES + 1).astype(int)).tolist()
     for m, (x, y, radius) in enumerate(steps[-1].tolist()):
-        canvas.line([discs[m, :2] for discs in steps], MOVER, 2, 0.45)
+        for first in cuts[:-1]:
+            # Pieces that lie on each other: those side by side would show their joints.
+            canvas.line(places[first:, m], MOVER, 2, _LAYER)
         canvas.disc((x, y), radius * canvas.scale, MOVER, 0.55)
         canvas.disc((x, y), radius * canvas.scale, MOVER, width=1)
 

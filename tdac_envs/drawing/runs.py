@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.drawing.canvas import GREY, INK, TRAIL, Canvas, Colour
+from tdac_envs.drawing.canvas import GREY, INK, MOVER, TRAIL, Canvas, Colour
 from tdac_envs.drawing.marks import draw_outcome
 
 SMALLEST_BODY = 3.0
@@ -16,11 +16,12 @@ _RUN_COLOURS: tuple[Colour, ...] = (
     TRAIL,
     (0, 136, 126),
     (206, 98, 0),
-    (186, 44, 138),
     (24, 116, 205),
     (122, 118, 0),
     (146, 84, 44),
     (96, 104, 118),
+    # Last, since it is nearly that of movers.
+    (186, 44, 138),
 )
 _ROW = 22
 
@@ -96,7 +97,13 @@ class Legend(NamedTuple):
 
     @classmethod
     def of(
-        cls, outcomes: Sequence[str], labels: Sequence[str], *, path: bool, width: int
+        cls,
+        outcomes: Sequence[str],
+        labels: Sequence[str],
+        *,
+        path: bool,
+        width: int,
+        movers: bool = False,
     ) -> Legend:
         """The legend of some trajectories.
 
@@ -105,11 +112,15 @@ class Legend(NamedTuple):
             labels: Names of the first trajectories; the others are numbered.
             path: Whether the shortest path is drawn, too.
             width: Available width, frame px.
+            movers: Whether the movers of the first trajectory are drawn.
         """
         entries = [(GREY, "shortest path")] if path else []
         for k, end in enumerate(outcomes):
             name = labels[k] if k < len(labels) else f"run {k + 1}"
             entries.append((run_colour(k), f"{name}: {end}" if end else name))
+        if movers:
+            first = f" of {labels[0]}" if len(outcomes) > 1 and labels else ""
+            entries.append((MOVER, f"movers at the end{first}"))
         return cls(_legend_rows(entries, width))
 
     @property

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Addresses
+from tdac_envs.drawing.marks import GHOST_SECONDS
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
@@ -30,7 +31,7 @@ from tdac_envs.mapping.params import ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
 from tdac_envs.movers.state import Movers
 
-GHOST_SECONDS, MOST_GHOSTS = 1.0, 200
+MOST_GHOSTS = 200
 """Frames show where the movers were in the last second, in at most 200 steps."""
 
 

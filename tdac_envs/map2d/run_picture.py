@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from tdac_envs.drawing.backdrop import CLOSE_UP, Points, Window
 from tdac_envs.drawing.canvas import Canvas, Image
-from tdac_envs.drawing.marks import draw_task
+from tdac_envs.drawing.marks import draw_movers, draw_task
 from tdac_envs.drawing.runs import SMALLEST_BODY, Legend, draw_runs
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.map2d.task import Map2DTask
@@ -107,6 +107,7 @@ def trajectory_picture(
     path: ArrayLike = (),
     outcomes: Sequence[str] = (),
     labels: Sequence[str] = (),
+    movers: Sequence[Points] = (),
 ) -> Image:
     """The map with one or more trajectories and a legend, uint8 RGB.
 
@@ -121,14 +122,21 @@ def trajectory_picture(
         outcomes: "reached", "collision" or "out of time" for each trajectory; sets
             the mark at its end.
         labels: Name of each trajectory.
+        movers: Movers in the last steps of the first trajectory, each of shape (m, 3):
+            x, y, radius, px. Those of the others are not drawn.
     """
     runs = [np.asarray(run, np.float64).reshape(-1, 3) for run in trajectories]
     ends = [*outcomes, *[""] * (len(runs) - len(outcomes))]
     legend = Legend.of(
-        ends, labels, path=len(np.asarray(path)) > 1, width=Canvas.frame_width(cells)
+        ends,
+        labels,
+        path=len(np.asarray(path)) > 1,
+        movers=len(movers) > 0,
+        width=Canvas.frame_width(cells),
     )
     canvas = Canvas(cells, strip=legend.height)
     draw_task(canvas, start, goal, goal_tolerance, path)
+    draw_movers(canvas, movers)
     draw_runs(canvas, runs, ends, max(radius * canvas.scale, SMALLEST_BODY))
     legend.write(canvas)
     return canvas.image

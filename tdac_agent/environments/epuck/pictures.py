@@ -30,9 +30,14 @@ class WorldPictures:
         return WorldBackground.of(self.setting.nominal)
 
     def trajectories(
-        self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
+        self,
+        runs: Sequence[Points],
+        outcomes: Sequence[str],
+        labels: Sequence[str],
+        movers: Sequence[Points] = (),
     ) -> Image:
-        """Draws the world with all trajectories."""
+        """Draws the world with all trajectories; it has no movers."""
+        del movers
         nominal = self.setting.nominal
         return trajectory_picture(nominal, runs, outcomes=outcomes, labels=labels)
 

@@ -28,9 +28,13 @@ class MapPictures:
         return Background.of(self.setting.nominal)
 
     def trajectories(
-        self, runs: Sequence[Points], outcomes: Sequence[str], labels: Sequence[str]
+        self,
+        runs: Sequence[Points],
+        outcomes: Sequence[str],
+        labels: Sequence[str],
+        movers: Sequence[Points] = (),
     ) -> Image:
-        """Draws the map with all trajectories."""
+        """Draws the map with all trajectories, and the movers of the first one."""
         nominal = self.setting.nominal
         return trajectory_picture(
             nominal.terrain.grid.cells,
@@ -42,6 +46,7 @@ class MapPictures:
             path=nominal.shortest_path(nominal.start),
             outcomes=outcomes,
             labels=labels,
+            movers=movers,
         )
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
@@ -85,4 +90,5 @@ def frames_of(
         status = Status(step, nominal.horizon, float(gaps[step]), outcome)
         trail = trajectory.poses[: step + 1, :2]
         pose = trajectory.poses[step].tolist()
-        yield scene.frame(pose, trajectory.ranges[step], trail, status)
+        ghosts = trajectory.ghosts(step)
+        yield scene.frame(pose, trajectory.ranges[step], trail, status, ghosts)

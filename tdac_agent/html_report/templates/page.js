@@ -1,6 +1,7 @@
 "use strict";
 (() => {
-  const TRAIL = "#5848c6", CONTACT = "#d55e00", FINENESS = 4, TURNS = 100;
+  const TRAIL = "#5848c6", CONTACT = "#d55e00", MOVER = "#b03a78";
+  const GHOST = 1, FADES = 8, FINENESS = 4, TURNS = 100;
   const scenes = read("scenes");
   const players = new Map();
 
@@ -51,11 +52,11 @@
     });
   }
 
-  // One row [step, x, y, heading] for each kept step.
-  function rows(points) {
+  // One row [step, x, y, heading] for each kept step; [step, x, y] of a mover.
+  function rows(points, width) {
     const at = [0, 0, 0, 0], found = [];
-    for (let n = 0; n < points.length; n += 4) {
-      for (let i = 0; i < 4; i++) at[i] += points[n + i];
+    for (let n = 0; n < points.length; n += width) {
+      for (let i = 0; i < width; i++) at[i] += points[n + i];
       found.push([at[0], at[1] / FINENESS, at[2] / FINENESS, at[3] / TURNS]);
     }
     return found;
@@ -86,7 +87,7 @@
     canvas.style.width = `${Math.min(720, scene.width)}px`;
     pen.scale(sharp, sharp);
     const background = new Image();
-    let episode, path, step = 0, before = null;
+    let episode, path, movers, step = 0, before = null;
 
     function line(points, colour, width) {
       pen.beginPath();
@@ -104,10 +105,23 @@
       if (stroke) { pen.strokeStyle = stroke; pen.lineWidth = width; pen.stroke(); }
     }
 
+    // A mover where it is now, with a fading trail of its last second.
+    function mover({ way, radius }) {
+      const first = Math.max(0, step - GHOST / episode.dt), trail = [];
+      for (let n = 0; n <= FADES; n++) {
+        trail.push(poseAt(way, first + (n / FADES) * (step - first))[0]);
+      }
+      // Layers, each shorter than the one below: pieces side by side would show joints.
+      for (let n = 0; n < FADES; n++) line(trail.slice(n), `${MOVER}26`, 2);
+      const [, x, y] = trail[FADES];
+      disc(x, y, radius, `${MOVER}8c`, MOVER, 1);
+    }
+
     function draw() {
       pen.clearRect(0, 0, scene.width, scene.height);
       if (background.complete) pen.drawImage(background, 0, 0, scene.width, scene.height);
       const [pose, passed] = poseAt(path, step), [, x, y, heading] = pose;
+      movers.forEach(mover);
       line(path, `${TRAIL}38`, 2);
       line([...path.slice(0, passed), pose], TRAIL, 3);
       const radius = Math.max(scene.radius, 5);
@@ -119,7 +133,8 @@
       }
       pen.fillStyle = TRAIL;
       pen.fill();
-      if (episode.contact) {
+      // A mover is at the contact only at the end.
+      if (episode.contact && (!movers.length || step > episode.steps - 1)) {
         const [at, to] = episode.contact, size = Math.max(0.35 * radius, 6);
         disc(at, to, size, null, "#fffc", 6);
         disc(at, to, size, null, CONTACT, 3);
@@ -161,7 +176,9 @@
     function show(number, playing) {
       pause();
       episode = episodes[number];
-      path = rows(episode.points);
+      path = rows(episode.points, 4);
+      movers = episode.movers.map(({ radius, points }) => (
+        { way: rows(points, 3), radius: Math.max(radius, 2) }));
       const same = (e) => e.candidate === episode.candidate;
       fill(ofEpisode, episodes.map((e, n) => [e, n]).filter(([e]) => same(e))
         .map(([e, n]) => [`${e.name}: ${e.outcome}`, n]));

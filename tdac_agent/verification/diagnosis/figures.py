@@ -16,6 +16,7 @@ from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.course import path_ahead
+from tdac_agent.verification.diagnosis.mover import nearest_mover
 from tdac_agent.verification.diagnosis.report import Diagnosis, Episode, Report
 from tdac_agent.verification.diagnosis.surroundings import (
     surroundings_of,
@@ -39,8 +40,15 @@ def draw_trajectories(
         [trajectory.poses for trajectory in trajectories.values()],
         [outcomes.get(name, "") for name in trajectories],
         list(trajectories),
+        _movers_of(trajectories),
     )
     write_png(picture, path)
+
+
+def _movers_of(trajectories: dict[str, Trajectory]) -> list[NDArray[np.float64]]:
+    """The movers at the end of the first trajectory."""
+    first = next(iter(trajectories.values()), None)
+    return [] if first is None else first.ghosts(first.steps)
 
 
 def draw_failures(
@@ -120,6 +128,7 @@ def event_of(
         ),
         where=where,
         contact=contact_of(task, trajectory, episode.outcome),
+        movers=trajectory.ghosts(trajectory.steps),
         way=None if way is None else np.array([units.place_of(x, y) for x, y in way]),
     )
 
@@ -133,6 +142,10 @@ def contact_of(
     around = surroundings_of(task)
     end = Pose(*around.units.on_screen(trajectory.poses[-1:])[0].tolist())
     touch = around.touch(end, around.radius + 3.0)
+    shown = trajectory_on_screen(trajectory, around.units)
+    mover = nearest_mover(shown, around.radius)
+    if mover is not None and (touch is None or mover.gap < touch.gap):
+        return around.units.place_of(*mover.place)
     return None if touch is None else around.units.place_of(*touch.wall)
 
 

@@ -1,11 +1,15 @@
 """Few whole numbers tell where the robot was at each step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.html_report import make_page
 from tdac_agent.html_report.animation import RAD, TOLERANCE, animations, thinned
 from tdac_agent.html_report.scene import scene_of
 from tdac_agent.runs.history import gather_run
@@ -100,3 +104,32 @@ def test_an_episode_as_numbers(runs):
             if where is not None:
                 mark = scene.at(np.array([where]))[0]
                 assert episode["contact"] == pytest.approx(mark.tolist(), abs=0.06)
+
+
+def test_movers_as_numbers(copied):
+    """Each has its way, to the same precision, and its radius; others have none."""
+    file = copied / "iterations" / "k01" / "j0" / "trajectories" / "nominal.npz"
+    trajectory = Trajectory.load(file)
+    turns = np.linspace(0.0, 3.0, trajectory.steps + 1)
+    ways = [(80 + 30 * np.cos(turns), 60 + 30 * np.sin(turns)), (20 + turns, 9 * turns)]
+    discs = [np.column_stack([x, y, np.full_like(x, 5.0)]) for x, y in ways]
+    movers = np.stack(discs, axis=1).astype(np.float32)
+    replace(trajectory, movers=movers).save(file)
+    told = gather_run(copied)
+    scene = scene_of(told.task)
+    first, *others = animations(told, told.task, scene)
+    assert [len(each["movers"]) for each in (first, others[0])] == [2, 0]
+    for disc, mover in enumerate(first["movers"]):
+        rows = np.cumsum(np.reshape(mover["points"], (-1, 3)), axis=0)
+        places = scene.at(movers[:, disc, :2].astype(float))
+        drawn = np.column_stack(
+            [np.interp(range(len(places)), rows[:, 0], c) for c in rows[:, 1:].T]
+        )
+        assert np.abs(drawn / 4 - places).max() <= TOLERANCE + 0.125 + 1e-6
+        assert mover["radius"] == pytest.approx(scene.radius * 5 / 6, abs=0.06)
+    assert "movers, with their last second" in make_page(copied).html.decode()
+
+
+def test_a_page_without_movers(page):
+    """Its legend has none."""
+    assert "movers, with" not in page
