@@ -1,14 +1,30 @@
 """The page in a real browser: no errors, controls that work, no word cut off."""
 
 import shutil
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.html_report import make_page
+
 WIDTHS = {"desktop": 1280, "phone": 390}
+# Right end, and middle of the height, of what has the colour of movers; parts of both.
+MOVER_END = """
+const canvas = document.querySelector(".player canvas"), { width, height } = canvas;
+const { data } = canvas.getContext("2d").getImageData(0, 0, width, height);
+let count = 0, x = 0, y = 0;
+for (let i = 0; i < width * height; i++) {
+  const near = [176, 58, 120].every((c, k) => Math.abs(data[4 * i + k] - c) < 40);
+  if (near) { count++; x = Math.max(x, i % width); y += Math.floor(i / width); }
+}
+return [x / width, y / count / height];
+"""
 PICTURE = "return document.querySelector(arguments[0] + ' canvas').toDataURL()"
 
 
@@ -48,6 +64,17 @@ def opened(request, browser, page, tmp_path):
     yield browser
     assert browser.get_log("browser") == []
     assert browser.execute_script("return typeof window.hacked") == "undefined"
+
+
+@pytest.fixture
+def moving(copied):
+    """The verified run; in its first episode, a disc drives to the right."""
+    file = copied / "iterations" / "k01" / "j0" / "trajectories" / "nominal.npz"
+    trajectory = Trajectory.load(file)
+    x = np.linspace(20.0, 140.0, trajectory.steps + 1)
+    discs = np.column_stack([x, np.full_like(x, 100.0), np.full_like(x, 5.0)])
+    replace(trajectory, movers=discs[:, None].astype(np.float32)).save(file)
+    return copied
 
 
 def find(browser, selector):
@@ -125,3 +152,29 @@ def test_ways_through_the_page(opened):
     chosen = Select(find(opened, "#run-2 .episode")).first_selected_option.text
     assert chosen == "jitter 2: reached"
     until(opened, lambda _: "reached" in find(opened, "#run-2 .clock").text)
+
+
+def test_movers(browser, moving, tmp_path):
+    """The player draws them at their places of the step that is shown."""
+    file = tmp_path / "report.html"
+    file.write_bytes(make_page(moving).html)
+    browser.get_log("browser")  # of the page before
+    browser.get(file.as_uri())
+    Select(find(browser, ".player .candidate")).select_by_visible_text("k=1 j=0")
+    steps = int(find(browser, ".player .scrub").get_attribute("max"))
+    drag = (
+        "arguments[0].value = arguments[1];"
+        "arguments[0].dispatchEvent(new Event('input'))"
+    )
+    ends = []
+    at = (0, steps // 2, steps)
+    for step in at:
+        browser.execute_script(drag, find(browser, ".player .scrub"), step)
+        ends.append(browser.execute_script(MOVER_END))
+    # Of 160 x 120 px; its trail is to the left of it.
+    for (x, y), step in zip(ends, at, strict=True):
+        assert x * 160 == pytest.approx(25 + 120 * step / steps, abs=2)
+        assert y * 120 == pytest.approx(100, abs=2)
+    # Chromium warns of the pixels that this test reads.
+    log = browser.get_log("browser")
+    assert [entry for entry in log if entry["level"] != "WARNING"] == []
