@@ -1,10 +1,11 @@
 """ORCA beside pyrvo, an independent implementation in single precision."""
 
 import numpy as np
-import pyrvo
 import pytest
 
 from tdac_envs.movers.orca import velocity_among
+
+pyrvo = pytest.importorskip("pyrvo", reason="no wheel for this Python")
 
 HORIZON, DT, FASTEST = 2.0, 0.1, 1.0
 
