@@ -96,12 +96,11 @@ class Cast:
         self._check_goal(task)
         movers = Movers.blank(len(self.traits), self.points, task.dt, self.places)
         movers.traits[:] = self.traits
-        for m, own in enumerate(self.starts):
-            if own.kind != at.CROWD:
-                _put(movers, m, own, random)
-        for m in np.flatnonzero(_in_the_way(movers, task)).tolist():
-            if self.starts[m].kind != at.CROWD:
-                self._draw_again(movers, m, task, random)
+        scripted = np.flatnonzero(movers.traits[:, at.KIND] != at.CROWD)
+        for m in scripted.tolist():
+            _put(movers, m, self.starts[m], random)
+        for m in _in_the_way(movers, scripted, task).tolist():
+            self._draw_again(movers, m, task, random)
         if self.places:
             self._gather(movers, task, random)
         return movers
@@ -139,14 +138,9 @@ class Cast:
     ) -> None:
         if not self.starts[m].is_drawn:
             raise _too_near(movers, m, task)
-        # Views of the rows of this mover.
-        own = slice(m, m + 1)
-        alone = movers._replace(
-            traits=movers.traits[own], now=movers.now[own], pieces=movers.pieces[own]
-        )
         for _ in range(MAX_DRAWS):
             _put(movers, m, self.starts[m], random)
-            if not _in_the_way(alone, task)[0]:
+            if not _in_the_way(movers, np.array([m]), task).size:
                 return
         raise TaskError(
             f"mover {m} reaches the robot within {SAFE_SECONDS:g} s wherever it "
@@ -195,25 +189,34 @@ def _reach(traits: NDArray[np.float64], m: int, task: Map2DTask) -> float:
     return float(traits[m, at.RADIUS]) + task.robot.radius
 
 
-def _in_the_way(movers: Movers, task: Map2DTask) -> NDArray[np.bool_]:
-    """Which movers touch the robot at its start within 2 s, or stand on its goal."""
-    least = np.empty(len(movers.traits))
+def _in_the_way(
+    movers: Movers, scripted: NDArray[np.int64], task: Map2DTask
+) -> NDArray[np.int64]:
+    """Which movers touch the robot at its start within 2 s, or stand on its goal.
+
+    Args:
+        movers: All movers; their pieces are overwritten.
+        scripted: The movers in question, whose motion does not depend on others.
+        task: The task.
+    """
+    traits, now = movers.traits[scripted], movers.now[scripted]
+    off_x, off_y = (now[:, : at.Y + 1] - task.goal).T
+    reach, least = traits[:, at.RADIUS] + task.robot.radius, np.empty(len(scripted))
+    covers = np.hypot(off_x, off_y) + task.goal_tolerance < reach
+    on_goal = covers & (traits[:, at.SPEED] == 0.0)
     nearest_approaches(
         task.terrain.padded_clear,
-        movers.traits,
-        movers.now.copy(),
+        traits,
+        now,
         movers.points,
-        movers.pieces,
+        movers.pieces[: len(scripted)],
         float(task.start.x),
         float(task.start.y),
         SAFE_SECONDS,
         least,
     )
-    reach = movers.traits[:, at.RADIUS] + task.robot.radius
-    off_x, off_y = (movers.now[:, : at.Y + 1] - task.goal).T
-    covers = np.hypot(off_x, off_y) + task.goal_tolerance < reach
-    on_goal: NDArray[np.bool_] = covers & (movers.traits[:, at.SPEED] == 0.0)
-    return (least <= reach) | on_goal
+    found: NDArray[np.int64] = scripted[(least <= reach) | on_goal]
+    return found
 
 
 def _too_near(movers: Movers, m: int, task: Map2DTask) -> TaskError:

@@ -143,6 +143,20 @@ def test_a_fair_start():
         assert far[np.triu_indices(30, 1)].min() > 12
 
 
+def test_scripted_movers_beside_people_have_a_fair_start():
+    """Only theirs is looked at; the message counts the people before them."""
+    crowd = {"kind": "crowd", "count": 5, "radius": 6, "speed": 20}
+    post = {"kind": "route", "points": [[30, 20]], "radius": 6}
+    bounce = {"kind": "bounce", "count": 3, "radius": 6, "speed": 20}
+    env = hall_env(0, movers=[crowd, bounce])
+    for seed in range(10):
+        env.reset(seed=seed)
+        for _ in range(20):
+            assert env.step(STILL)[4]["contact"] is None
+    with pytest.raises(TaskError, match="mover 5 starts on the robot"):
+        hall_env(0, movers=[crowd, post])
+
+
 def test_people_see_scripted_movers():
     """A disc that drives through people: they make way before it arrives."""
     route = {
