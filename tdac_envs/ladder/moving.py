@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.generators.draft import ordered
 from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.map2d.placing import Cast
 from tdac_envs.map2d.task import Map2DTask
@@ -26,12 +27,6 @@ TRIES = 10
 """Movers of a world are drawn so often before there are fewer of them."""
 
 
-def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
-    if ends[0] > ends[1]:
-        raise ValueError("expected the least value first")
-    return ends
-
-
 Count = Annotated[int, Field(ge=0, le=MOST_MOVERS)]
 
 
@@ -41,20 +36,16 @@ class MoversOfSet(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     kind: Literal["bounce", "crowd"]
-    count: Annotated[tuple[Count, Count], AfterValidator(_ordered)]
-    speed: Annotated[tuple[Speed, Speed], AfterValidator(_ordered)] = Field(
+    count: Annotated[tuple[Count, Count], AfterValidator(ordered)]
+    speed: Annotated[tuple[Speed, Speed], AfterValidator(ordered)] = Field(
         description="px/s"
     )
-    radius: Annotated[tuple[Length, Length], AfterValidator(_ordered)] = Field(
+    radius: Annotated[tuple[Length, Length], AfterValidator(ordered)] = Field(
         description="px"
     )
 
-    def checked(self) -> Self:
-        """This group.
-
-        Raises:
-            ValueError: There may be more people than a crowd can have.
-        """
+    @model_validator(mode="after")
+    def _check(self) -> Self:
         if self.kind == "crowd" and self.count[1] > MOST_PEOPLE:
             raise ValueError(f"count: a crowd has at most {MOST_PEOPLE} people")
         return self

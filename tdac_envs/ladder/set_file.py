@@ -190,8 +190,6 @@ class SetFile(_Strict):
         rays = self.disturbances.range_noise or self.disturbances.range_dropout
         if epuck and self.movers:
             raise ValueError("`movers` are for robots on maps")
-        for group in self.movers:
-            group.checked()
         if epuck and rays:
             raise ValueError("an e-puck has no ranges; expected `robot.sensor_noise`")
 
@@ -253,10 +251,9 @@ class SetFile(_Strict):
                 the place of the files.
         """
         out = {"description", "files"}
-        values = self.model_dump(mode="json", by_alias=True, exclude=out)
         if not self.movers:
-            # Sets without movers keep the hash that they had before there were any.
-            del values["movers"]
+            out.add("movers")  # Such sets keep the hash that they had before.
+        values = self.model_dump(mode="json", by_alias=True, exclude=out)
         if self.files is not None:
             splits = list(self.files.splits)
             values["files"] = {"sha256": files_sha256, "splits": splits}

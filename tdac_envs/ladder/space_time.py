@@ -17,10 +17,13 @@ from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.map2d.encounters import foresee
 from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.movers.places import Places
 from tdac_envs.movers.state import RADIUS, SPEED, Movers
 
 Array = NDArray[np.float64]
 Layers = NDArray[np.uint8]
+Node = tuple[int, int]
+"""Column and row of a node."""
 
 
 class Arrival(NamedTuple):
@@ -43,9 +46,9 @@ def earliest_arrival(task: Map2DTask, movers: Movers) -> Arrival | None:
         movers: The movers at the start, which are only read.
     """
     places = np.empty((task.horizon + 1, len(movers.traits), 2))
-    terrain, known = task.terrain, ("walls", "first", "listed", "fields", "spacing")
-    own = movers.fresh()
-    own = own._replace(**{key: read_only(getattr(own, key)) for key in known})
+    terrain, own = task.terrain, movers.fresh()
+    # Arrays of a task that was pickled can be written to.
+    own = own._replace(**{key: read_only(getattr(own, key)) for key in Places._fields})
     foresee(terrain.padded_clear, terrain.leaps, *own, task.dt, places)
     for steps in (2, 1):
         found = _plan(task, movers, places, steps)
@@ -61,11 +64,10 @@ def _plan(task: Map2DTask, movers: Movers, places: Array, steps: int) -> Arrival
         return None
     radius, layers = task.robot.radius, places[::steps]
     free = task.terrain.clear[::spacing, ::spacing] >= radius
-    goals = np.zeros_like(free)
-    ends = _near(free, spacing, task.goal, max(task.goal_tolerance, 2.0 * spacing))
-    goals[ends[:1, 1], ends[:1, 0]] = True
     begin = _near(free, spacing, task.start[:2], 2.0 * spacing)
-    if not len(ends) or not len(begin):
+    within = max(task.goal_tolerance, 2.0 * spacing)
+    goal = _near(free, spacing, task.goal, within)
+    if begin is None or goal is None:
         return None
     # A mover is always within half of its way between two layers of one of its places;
     # so is every point of an edge of the lattice, of one of its nodes.
@@ -73,59 +75,56 @@ def _plan(task: Map2DTask, movers: Movers, places: Array, steps: int) -> Arrival
     reach = radius + movers.traits[:, RADIUS] + half[1] * movers.traits[:, SPEED]
     reach = np.hypot(reach, half[0])
     reached = np.zeros((len(layers), *free.shape), np.uint8)
-    column, row = begin[0].tolist()
     last = _spread(
-        read_only(free), goals, read_only(layers), reach, spacing, column, row, reached
+        read_only(free), read_only(layers), reach, spacing, begin, goal, reached
     )
     if last < 0:
         return None
     nodes = np.empty((last + 1, 2), np.int64)
-    _trace(reached, goals, last, nodes)
+    _trace(reached, goal, last, nodes)
     times = steps * np.arange(last + 1)
     return Arrival(last * steps, np.column_stack([times, spacing * nodes]))
 
 
 def _near(
     free: BoolGrid, spacing: int, point: tuple[float, float], within: float
-) -> NDArray[np.int64]:
-    """Free nodes (column, row) within a distance of a point, the nearest first."""
+) -> Node | None:
+    """The free node nearest to a point; None if it is farther away than `within` px."""
     rows, columns = np.nonzero(free)
     far = np.hypot(spacing * columns - point[0], spacing * rows - point[1])
-    order = np.argsort(far, kind="stable")
-    order = order[far[order] <= within]
-    nodes: NDArray[np.int64] = np.column_stack([columns, rows])[order]
-    return nodes
+    if not far.size or far.min() > within:
+        return None
+    nearest = int(far.argmin())
+    return int(columns[nearest]), int(rows[nearest])
 
 
 @kernel
 def _spread(
     free: BoolGrid,
-    goals: BoolGrid,
     layers: Array,
     reach: Array,
     spacing: int,
-    column: int,
-    row: int,
+    begin: Node,
+    goal: Node,
     reached: Layers,
 ) -> int:
     """Marks the nodes that can be reached in each layer; returns that of the goal.
 
     Args:
         free: Nodes where the body fits, shape (rows, columns).
-        goals: Nodes at the goal.
         layers: Shape (layers, n, 2): places of the movers, px.
         reach: Shape (n,): distance that is kept from each mover, px.
         spacing: Distance of the nodes, px.
-        column: Node at the start.
-        row: Its row.
+        begin: Node (column, row) at the start.
+        goal: Node at the goal.
         reached: Shape (layers, rows, columns), all 0; overwritten.
     """
     rows, columns = free.shape
     open_now, open_next = free.copy(), free.copy()
     _close(layers[0], reach, spacing, open_now)
-    if not open_now[row, column]:
+    if not open_now[begin[1], begin[0]]:
         return -1
-    reached[0, row, column] = 1
+    reached[0, begin[1], begin[0]] = 1
     for layer in range(1, layers.shape[0]):
         open_next[:] = free
         _close(layers[layer], reach, spacing, open_next)
@@ -142,10 +141,9 @@ def _spread(
                             # No corner is cut.
                             found = found or (free[b, i] and free[j, a])
                 if found:
-                    if goals[j, i]:
-                        reached[layer, j, i] = 1
-                        return layer
                     reached[layer, j, i] = 1
+                    if i == goal[0] and j == goal[1]:
+                        return layer
                     some = True
         if not some:
             return -1
@@ -173,16 +171,10 @@ def _close(places: Array, reach: Array, spacing: int, free: BoolGrid) -> None:
 
 
 @kernel
-def _trace(
-    reached: Layers, goals: BoolGrid, last: int, nodes: NDArray[np.int64]
-) -> None:
+def _trace(reached: Layers, goal: Node, last: int, nodes: NDArray[np.int64]) -> None:
     """Writes the node (column, row) of each layer, back from the goal."""
-    rows, columns = goals.shape
-    i, j = -1, -1
-    for row in range(rows):
-        for column in range(columns):
-            if goals[row, column] and reached[last, row, column]:
-                i, j = column, row
+    rows, columns = reached.shape[1], reached.shape[2]
+    i, j = goal
     nodes[last, 0], nodes[last, 1] = i, j
     for back in range(last):
         layer, found = last - 1 - back, False

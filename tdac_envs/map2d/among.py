@@ -270,17 +270,7 @@ def _begin_among(
     outcome: Array,
     traits: Array,
     now: Array,
-    points: Array,  # noqa: ARG001 - so that the arguments are those of `_drive_among`
-    pieces: Array,  # noqa: ARG001
-    path: Array,  # noqa: ARG001
     past: Array,
-    people: Array,  # noqa: ARG001
-    planes: Array,  # noqa: ARG001
-    walls: Array,  # noqa: ARG001
-    first: Cells,  # noqa: ARG001
-    listed: Cells,  # noqa: ARG001
-    fields: NDArray[np.float32],  # noqa: ARG001
-    spacing: Array,  # noqa: ARG001
 ) -> None:
     """`kernels.begin_episode` among movers, which are at their starts already."""
     begin_episode(
@@ -299,7 +289,8 @@ def _begin(robot: Any, movers: Any) -> None:
     if movers[0].shape[0] == 0:
         begin_episode(*robot)
     else:
-        _begin_among(*robot, *movers)
+        own: Any = (movers[0], movers[1], movers[5])
+        _begin_among(*robot, *own)
 
 
 @subkernel

@@ -42,7 +42,7 @@ LOOK = 0.05
 """Duration of the steps with which a mover's future is computed, s."""
 
 plan, plan_one, advance_straight = moving(arc_contact, opposing_normal)
-plan_crowd = crowding(arc_contact, opposing_normal, in_sight)
+plan_crowd = crowding(advance_straight, opposing_normal, in_sight)
 
 
 @subkernel

@@ -53,6 +53,7 @@ WALL_HORIZON = 0.3
 """A person does not get to a wall within this time, s."""
 KEEP_RIGHT = 0.1
 """Angle by which people walk to the right of their way, rad."""
+_COS, _SIN = math.cos(KEEP_RIGHT), math.sin(KEEP_RIGHT)
 PATIENCE = 2.0
 """A person who is stuck goes elsewhere after this time, or up to twice this time, s."""
 SLOW = 0.2
@@ -209,7 +210,7 @@ def _halt(traits: Array, now: Array, people: Array, dt: float) -> None:
                 break
 
 
-def _walking(find_contact: Any, find_normal: Any) -> Any:
+def _walking(advance_straight: Any, find_normal: Any) -> Any:
     """The subkernel `walk`; arguments as for `crowding`."""
 
     @subkernel
@@ -222,17 +223,12 @@ def _walking(find_contact: Any, find_normal: Any) -> Any:
         radius, time, row = traits[m, RADIUS] + GAP, 0.0, 0
         rate_x, rate_y = vx * dt, vy * dt
         for _ in range(_MOST_SLIDES):
-            length = (1.0 - time) * math.hypot(rate_x, rate_y)
-            if length <= GAP:
+            speed, heading = math.hypot(rate_x, rate_y), math.atan2(rate_y, rate_x)
+            if (1.0 - time) * speed <= GAP:
                 break
-            heading = math.atan2(rate_y, rate_x)
-            part = find_contact(obstacles, x, y, heading, length, 0.0, radius)
-            part = max(part - GAP / length, 0.0) if part <= 1.0 else 1.0
-            since = part * (1.0 - time)
-            if since > 0.0:
-                row = begin_piece(pieces, m, row, time, x, y, rate_x, rate_y, own)
-            x, y = x + since * rate_x, y + since * rate_y
-            time = time + since if part < 1.0 else 1.0
+            row, time, x, y = advance_straight(
+                obstacles, pieces, m, row, time, x, y, heading, speed, radius, own
+            )  # fmt: skip
             if time >= 1.0:
                 break
             away_x, away_y = find_normal(
@@ -249,11 +245,11 @@ def _walking(find_contact: Any, find_normal: Any) -> Any:
     return walk
 
 
-def crowding(find_contact: Any, find_normal: Any, sees: Any) -> Any:
+def crowding(advance_straight: Any, find_normal: Any, sees: Any) -> Any:
     """Returns the subkernel `plan_crowd` for one kind of obstacle.
 
     Args:
-        find_contact: As for `motion.moving`.
+        advance_straight: From `motion.moving`.
         find_normal: As for `motion.moving`.
         sees: Subkernel `(sight, x, y, to_x, to_y)`: whether there is no obstacle in
             between.
@@ -283,7 +279,7 @@ def crowding(find_contact: Any, find_normal: Any, sees: Any) -> Any:
         off = math.hypot(off_x, off_y)
         return (best, off_x / off, off_y / off) if off > 0.0 else (best, 0.0, 0.0)
 
-    walk = _walking(find_contact, find_normal)
+    walk = _walking(advance_straight, find_normal)
 
     @subkernel
     def plan_crowd(
@@ -295,7 +291,7 @@ def crowding(find_contact: Any, find_normal: Any, sees: Any) -> Any:
         """Plans the motion of the people in a step; the others have been planned.
 
         Args:
-            obstacles: First argument of `find_contact` and `find_normal`.
+            obstacles: First argument of `advance_straight` and `find_normal`.
             sight: First argument of `sees`.
             traits: `Movers.traits`; `now` to `planes` are those of `Movers`, too.
             now: Only read.
@@ -328,10 +324,9 @@ def crowding(find_contact: Any, find_normal: Any, sees: Any) -> Any:
                 goal = _another(people, m, goal, places)
                 people[m, STUCK] = 0.0
                 length, to_x, to_y = way(sight, fields, spacing[0], goal, at_x, at_y)
-            cos, sin = math.cos(KEEP_RIGHT), math.sin(KEEP_RIGHT)
             # y points down.
-            want_x = speed * (cos * to_x - sin * to_y)
-            want_y = speed * (sin * to_x + cos * to_y)
+            want_x = speed * (_COS * to_x - _SIN * to_y)
+            want_y = speed * (_SIN * to_x + _COS * to_y)
             number = wall_planes(
                 walls, first, listed, at_x, at_y, traits[m, RADIUS], speed,
                 WALL_HORIZON, planes,

@@ -19,6 +19,17 @@ def assert_same(one, two):
         np.testing.assert_array_equal(one, two)
 
 
+def assert_alike(many, batch, seed, script):
+    """A batch does what the single environments do; yields the result of each step."""
+    for one, two in zip(many.reset(seed=seed), batch.reset(seed=seed), strict=True):
+        assert_same(one, two)
+    for action in script:
+        expected, result = many.step(action), batch.step(action)
+        for one, two in zip(expected, result, strict=True):
+            assert_same(one, two)
+        yield result
+
+
 def actions(count, steps, seed=0):
     """Random actions, now and then straight ahead or out of range."""
     random = np.random.default_rng(seed)

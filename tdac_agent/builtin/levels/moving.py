@@ -159,11 +159,10 @@ class Disc:
     def meet(self, place):
         """Corrects place and velocity by what was seen in this step."""
         off = place - self.place
-        gain = 1.0 / DT if self.age == 0 else (0.5 if self.age < 4 else 0.25) / DT
         if self.age == 0:
             self.velocity = off / DT
         else:
-            self.velocity = self.velocity + gain * off
+            self.velocity = self.velocity + (0.5 if self.age < 4 else 0.25) / DT * off
         speed = float(np.hypot(*self.velocity))
         if speed > 1.1 * FASTEST:
             self.velocity *= 1.1 * FASTEST / speed
@@ -264,6 +263,18 @@ def futures(discs, chart):
     return places
 
 
+def between(values, u, v):
+    """Values at points between nodes, by column and row."""
+    i, j = (
+        np.clip(each.astype(int), 0, count - 2)
+        for each, count in ((u, values.shape[1]), (v, values.shape[0]))
+    )
+    a, b = u - i, v - j
+    return (1 - b) * ((1 - a) * values[j, i] + a * values[j, i + 1]) + b * (
+        (1 - a) * values[j + 1, i] + a * values[j + 1, i + 1]
+    )
+
+
 class Field:
     """Lengths of the shortest paths to the goal from the nodes of a lattice."""
 
@@ -315,13 +326,7 @@ class Field:
 
     def at(self, x, y):
         """Lengths at points, between nodes."""
-        u, v = (x + HALF) / NODE, (y + HALF) / NODE
-        i = np.clip(u.astype(int), 0, self.count - 2)
-        j = np.clip(v.astype(int), 0, self.count - 2)
-        a, b, own = u - i, v - j, self.lengths
-        return (1 - b) * ((1 - a) * own[j, i] + a * own[j, i + 1]) + b * (
-            (1 - a) * own[j + 1, i] + a * own[j + 1, i + 1]
-        )
+        return between(self.lengths, (x + HALF) / NODE, (y + HALF) / NODE)
 
 
 def shifted(values, row, column, fill):
@@ -401,11 +406,7 @@ def chosen(field, chart, discs, pose):
             far = np.hypot(*(place - at).T) - (RADIUS + DISC + 1.5)
             cost += np.where(far < TOUCH, 400.0, np.clip(SHY - far, 0.0, None) * 0.75)
     u, v = ((place - (x, y)) / NODE + WINDOW).T
-    i, j = (np.clip(each.astype(int), 0, 2 * WINDOW - 1) for each in (u, v))
-    a, b = u - i, v - j
-    cost += (1 - b) * ((1 - a) * value[j, i] + a * value[j, i + 1]) + b * (
-        (1 - a) * value[j + 1, i] + a * value[j + 1, i + 1]
-    )
+    cost += between(value, u, v)
     moves = choice[np.rint(v).astype(int), np.rint(u).astype(int)]
     off = np.abs(
         np.remainder(ANGLES[moves] - facing + 0.5 * math.pi, math.pi) - 0.5 * math.pi

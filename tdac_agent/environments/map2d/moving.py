@@ -46,9 +46,13 @@ def check_movers(specs: Sequence[AnySpec], task: Map2DTask) -> None:
         Cast.of(specs, task).start(task, np.random.default_rng(0))
 
 
-def as_option(specs: Sequence[AnySpec]) -> list[dict[str, Any]]:
-    """The movers as the argument of an environment, with JSON-able values."""
-    return [spec.model_dump(mode="json", exclude_none=True) for spec in specs]
+def as_option(specs: Sequence[AnySpec]) -> dict[str, list[dict[str, Any]]]:
+    """The argument `movers` of an environment, JSON-able; empty without movers.
+
+    So tasks without movers keep the hash that they had before there were any.
+    """
+    given = [spec.model_dump(mode="json", exclude_none=True) for spec in specs]
+    return {"movers": given} if given else {}
 
 
 def sentence_on(specs: Sequence[AnySpec]) -> str:

@@ -114,10 +114,8 @@ class Map2DSetting:
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's `Map2DEnv`."""
         nominal, robot = self.nominal, self.nominal.robot
-        # Tasks without movers keep the hash that they had before there were any.
-        movers = {"movers": as_option(self.movers)} if self.movers else {}
         return {
-            **movers,
+            **as_option(self.movers),
             "map": nominal.terrain.grid.cells,
             "start": tuple(nominal.start),
             "goal": nominal.goal,
@@ -169,9 +167,8 @@ class Map2DSetting:
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
         robot = self.nominal.robot
-        movers = {"movers": as_option(self.movers)} if self.movers else {}
         return {
-            **movers,
+            **as_option(self.movers),
             "map": ".",
             "robot": {
                 "radius": robot.radius,

@@ -19,14 +19,19 @@ Places = NDArray[np.int64]
 LARGEST_SIDE = 2048
 
 
-def _ordered(band: tuple[float, float]) -> tuple[float, float]:
+def ordered(band: tuple[float, float]) -> tuple[float, float]:
+    """The band; for models.
+
+    Raises:
+        ValueError: Its ends are in the wrong order.
+    """
     if band[0] > band[1]:
         raise ValueError(f"expected the smaller number first, got {list(band)}")
     return band
 
 
 Size = Annotated[float, Field(gt=0, le=100)]
-Band = Annotated[tuple[Size, Size], AfterValidator(_ordered)]
+Band = Annotated[tuple[Size, Size], AfterValidator(ordered)]
 """Smallest and largest value of a size, in body diameters."""
 Share = Annotated[float, Field(ge=0, le=1)]
 

@@ -8,20 +8,13 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from tdac_envs.ladder.generators.blocks import PIXEL, Block, Box, Cylinder
-from tdac_envs.ladder.generators.draft import Places, Share, as_places
+from tdac_envs.ladder.generators.draft import Places, Share, as_places, ordered
 from tdac_envs.ladder.generators.lanes import Lane, lanes_from
 from tdac_envs.ladder.generators.mazes import openings
 from tdac_envs.ladder.words import Words
 
-
-def _ordered(band: tuple[float, float]) -> tuple[float, float]:
-    if band[0] > band[1]:
-        raise ValueError(f"expected the smaller number first, got {list(band)}")
-    return band
-
-
 Metres = Annotated[float, Field(ge=0.01, le=5.0)]
-MetreBand = Annotated[tuple[Metres, Metres], AfterValidator(_ordered)]
+MetreBand = Annotated[tuple[Metres, Metres], AfterValidator(ordered)]
 """Smallest and largest value of a length, m."""
 
 

@@ -6,7 +6,7 @@ import pickle
 import gymnasium as gym
 import numpy as np
 import pytest
-from batches import actions, assert_same
+from batches import actions, assert_alike, assert_same
 from scipy import stats
 from world_texts import text
 
@@ -351,12 +351,7 @@ def test_a_batch_does_what_single_environments_do(name, mode, blocked):
     many = gym.make_vec(name, 4, "sync", vector_kwargs=kwargs, **options)
     batch = gym.make_vec(name, 4, "vector_entry_point", **kwargs, **options)
     assert batch.single_observation_space == many.single_observation_space
-    for one, two in zip(many.reset(seed=3), batch.reset(seed=3), strict=True):
-        assert_same(one, two)
-    for action in actions(4, 60):
-        expected, result = many.step(action), batch.step(action)
-        for one, two in zip(expected, result, strict=True):
-            assert_same(one, two)
+    for result in assert_alike(many, batch, 3, actions(4, 60)):
         assert result[0] in batch.observation_space
         over = result[2] | result[3]
         if mode == "Disabled" and over.any():

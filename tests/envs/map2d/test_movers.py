@@ -9,7 +9,7 @@ import brute_force
 import gymnasium as gym
 import numpy as np
 import pytest
-from batches import actions, assert_same
+from batches import actions, assert_alike, assert_same
 from gymnasium.envs.registration import EnvSpec
 
 from tdac_envs.core.errors import TaskError
@@ -329,13 +329,8 @@ class TestBatch:
             for given in kinds
         ]
         many = gym.vector.SyncVectorEnv(makes, autoreset_mode=mode)
-        for one, two in zip(many.reset(seed=5), batch.reset(seed=5), strict=True):
-            assert_same(one, two)
         contacts = set()
-        for action in actions(6, 150):
-            expected, result = many.step(action), batch.step(action)
-            for one, two in zip(expected, result, strict=True):
-                assert_same(one, two)
+        for result in assert_alike(many, batch, 5, actions(6, 150)):
             contacts |= set(result[4]["contact"])
         assert "mover" in contacts
         for i, env in enumerate(many.envs):
